@@ -1,0 +1,1 @@
+//! The JavaScript face of the core: convert, call one core function, convert back.

@@ -1,0 +1,16 @@
+//! **Vesicle** grows living surfaces out of 3D data: a closed triangle mesh that splits, merges and
+//! refines itself while it is fitted to a volume.
+//!
+//! Modules form one-way layers, kept by `tests/architecture.rs`:
+//! `math < mesh < {spatial, volume} < remesh < methods < bindings`; `io` uses only math, mesh and volume.
+
+pub mod io;
+pub mod math;
+pub mod mesh;
+pub mod methods;
+pub mod remesh;
+pub mod spatial;
+pub mod volume;
+
+#[cfg(target_arch = "wasm32")]
+pub mod bindings;

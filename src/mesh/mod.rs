@@ -1,0 +1,5 @@
+//! The dynamic mesh: closed, oriented, 2-manifold, edited in place.
+
+mod triangles;
+
+pub use triangles::TriangleMesh;

@@ -1,0 +1,1 @@
+//! Surfaces fitted to data, one folder a method.

@@ -1,0 +1,1 @@
+//! Searching in space: points near a point, triangles near a triangle.

@@ -1,0 +1,1 @@
+//! Regular grids of intensities, and what is read from them.
