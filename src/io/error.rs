@@ -51,7 +51,11 @@ pub enum FormatError {
 
 impl FormatError {
     /// An [`Invalid`](Self::Invalid) field.
-    pub(crate) fn invalid(format: &'static str, field: impl Into<String>, problem: impl Into<String>) -> Self {
+    pub(crate) fn invalid(
+        format: &'static str,
+        field: impl Into<String>,
+        problem: impl Into<String>,
+    ) -> Self {
         Self::Invalid { format, field: field.into(), problem: problem.into() }
     }
 
@@ -66,7 +70,12 @@ impl FormatError {
     }
 
     /// A [`Truncated`](Self::Truncated) part.
-    pub(crate) fn truncated(format: &'static str, field: impl Into<String>, needed: usize, found: usize) -> Self {
+    pub(crate) fn truncated(
+        format: &'static str,
+        field: impl Into<String>,
+        needed: usize,
+        found: usize,
+    ) -> Self {
         Self::Truncated { format, field: field.into(), needed: needed as u64, found: found as u64 }
     }
 
