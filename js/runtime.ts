@@ -1,6 +1,6 @@
 // The WebAssembly instance: how it starts, how calls into it fail, how objects of it are held.
 import { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
-import load, { __wbg_reset_state as reset, initSync as loadSync } from './vesicle.js';
+import load, { initSync as loadSync, __wbg_reset_state as reset } from './vesicle.js';
 
 /** Whatever the module can be made from. */
 export type InitInput = RequestInfo | URL | Response | BufferSource | WebAssembly.Module;

@@ -1,9 +1,10 @@
 // Fills pkg/ with the npm package: the wasm module, its glue, the TypeScript face and the papers around it.
-import { copyFile, cp, mkdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
+
 import { createHash } from 'node:crypto';
 import { existsSync } from 'node:fs';
-import { at, must, say, script, startedAs, tool } from './shell.mjs';
+import { copyFile, cp, mkdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
 import { setup } from './setup.mjs';
+import { at, must, say, script, startedAs, tool } from './shell.mjs';
 
 const COMPILED = 'target/wasm32-unknown-unknown/release/vesicle.wasm';
 // Glue and optimised module are kept here between builds: both depend on the compiled module alone.
@@ -18,7 +19,8 @@ async function compile() {
 
 async function stamp() {
   const hash = createHash('sha256');
-  for (const file of [COMPILED, 'Cargo.lock', 'package-lock.json', 'scripts/build.mjs']) hash.update(await readFile(at(file)));
+  for (const file of [COMPILED, 'Cargo.lock', 'package-lock.json', 'scripts/build.mjs'])
+    hash.update(await readFile(at(file)));
   return hash.digest('hex');
 }
 

@@ -17,7 +17,8 @@ const CHROMIUMS = [
 function checkNode() {
   const [major, minor] = process.versions.node.split('.').map(Number);
   const enough = major > OLDEST_NODE[0] || (major === OLDEST_NODE[0] && minor >= OLDEST_NODE[1]);
-  if (!enough) throw new Error(`Node ${process.versions.node} is too old: install Node ${OLDEST_NODE.join('.')} or newer`);
+  if (!enough)
+    throw new Error(`Node ${process.versions.node} is too old: install Node ${OLDEST_NODE.join('.')} or newer`);
   say('node', process.versions.node);
 }
 
@@ -31,7 +32,8 @@ async function checkRust() {
 // rust-toolchain.toml names a version; where automatic installs are off, cargo fails until it is there.
 async function installToolchain(problem) {
   const { code, output } = await run('rustup', ['toolchain', 'install', '--no-self-update'], { echo: false });
-  if (code !== 0) throw new Error(`the toolchain of rust-toolchain.toml is missing and could not be installed\n${problem}${output}`);
+  if (code !== 0)
+    throw new Error(`the toolchain of rust-toolchain.toml is missing and could not be installed\n${problem}${output}`);
   say('rust', 'toolchain installed');
 }
 
