@@ -1,1 +1,5 @@
 //! Searching in space: points near a point, triangles near a triangle.
+
+mod grid;
+
+pub use grid::PointGrid;
