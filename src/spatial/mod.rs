@@ -1,1 +1,7 @@
-//! Searching in space: points near a point, triangles near a triangle.
+//! Finding what is near: triangles by points, rays and planes.
+
+mod section;
+mod tree;
+
+pub use section::cross_section;
+pub use tree::{SurfacePoint, TriangleTree};
