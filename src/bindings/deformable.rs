@@ -86,13 +86,13 @@ impl RawDeformable {
     /// Iterations until the end or `iterations` of them; the report of the last, with the events of all.
     pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
         let mut model = self.0.borrow_mut();
-        let mut report = model.step();
+        let mut report = model.step().map_err(Failure::from)?;
         let mut events = report.events;
         for _ in 1..iterations {
             if report.done {
                 break;
             }
-            report = model.step();
+            report = model.step().map_err(Failure::from)?;
             events += report.events;
         }
         report.events = events;
