@@ -72,7 +72,7 @@ impl RawDeformable {
         params: &JsValue,
     ) -> Result<RawDeformable, JsValue> {
         let params = merged(&DeformableParams::for_volume(&volume.0), params)?;
-        let options = DeformableOptions { frame, start: start.0, levels, edge, params };
+        let options = DeformableOptions { frame, start: start.0, levels, edge, params: Some(params) };
         let mut model = DeformableModel::new(&volume.0, options).map_err(Failure::from)?;
         model.set_clock(now);
         Ok(RawDeformable(Rc::new(RefCell::new(model))))
