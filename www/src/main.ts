@@ -8,5 +8,10 @@ const lab = document.getElementById('lab');
 const help = document.getElementById('help');
 if (lab && help) {
   const Lab = LABS[location.hash as keyof typeof LABS] ?? ExtractLab;
-  void new Lab(lab, help).start();
+  try {
+    void new Lab(lab, help).start();
+  } catch (error) {
+    lab.dataset.state = 'error';
+    lab.textContent = `This page needs WebGL 2 and Web Workers, and could not use them here: ${error instanceof Error ? error.message : error}`;
+  }
 }

@@ -56,6 +56,9 @@ export function layOut(root: HTMLElement, parts: Parts): void {
   );
 }
 
+/** What is told of a volume, so that its place is there before one is open. */
+const FACTS = ['File', 'Voxels', 'Voxel size', 'Intensities'];
+
 /** Which volume is open, and how to open another. */
 export class DataPanel {
   readonly element: HTMLElement;
@@ -72,6 +75,8 @@ export class DataPanel {
       const example = examples.find((one) => one.id === this.#examples.value);
       if (example) onExample(example);
     });
+    this.#showFacts(FACTS.map((name) => [name, '–']));
+    this.#credit.textContent = examples[0]?.credit ?? '';
     this.element = h(
       'div',
       { class: 'data' },
@@ -98,7 +103,11 @@ export class DataPanel {
       ['Intensities', `${figure(volume.range[0])} to ${figure(volume.range[1])}`],
     ];
     if (volume.frames > 1) facts.push(['Frames', `${volume.frames}, the first is shown`]);
-    this.#facts.replaceChildren(...facts.map(([name, value]) => h('div', {}, h('dt', {}, name), h('dd', {}, value))));
+    this.#showFacts(facts);
     this.#credit.textContent = example?.credit ?? '';
+  }
+
+  #showFacts(facts: [string, string][]): void {
+    this.#facts.replaceChildren(...facts.map(([name, value]) => h('div', {}, h('dt', {}, name), h('dd', {}, value))));
   }
 }

@@ -34,7 +34,7 @@ import { type ViewOptions, viewOptions } from '../ui/view-options';
 import { Stage } from '../view/stage';
 import { DataPanel, layOut } from './extract-page';
 
-const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, byComponent: false, slices: true };
+const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, byComponent: false, slices: 'walls' };
 /** Radius of the sphere placed at the crosshair, as a part of the volume's smallest side. */
 const SPHERE_PART = 0.1;
 

@@ -104,16 +104,22 @@ function numberInput(spec: ParamSpec, id: string, onChange: (value: unknown) => 
   const main = h('input', { type: 'number', ...describedBy(id), min, max, step: 'any', inputmode: 'decimal' });
   const slider = min !== undefined && max !== undefined ? new Slider(spec, min, max) : undefined;
   const show = (value: unknown) => {
-    main.value = typeof value === 'number' ? String(Number(value.toPrecision(6))) : String(value);
+    main.value = typeof value === 'number' ? typed(value) : String(value);
     if (typeof value === 'number') slider?.show(value);
   };
   // Empty or unreadable goes on as NaN, so that the library itself says what is accepted.
   main.addEventListener('change', () => onChange(main.valueAsNumber));
   slider?.element.addEventListener('input', () => {
-    main.value = String(slider.value);
+    main.value = typed(slider.value);
     onChange(slider.value);
   });
   return { main, extra: slider ? [slider.element] : [], show };
+}
+
+/** A number as one would type it: 1e-6 rather than 0.000001. */
+function typed(value: number): string {
+  const short = Number(value.toPrecision(6));
+  return short !== 0 && Math.abs(short) < 1e-3 ? short.toExponential() : String(short);
 }
 
 /** A range input that can be logarithmic. The number input beside it carries the label. */

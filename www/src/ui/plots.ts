@@ -132,7 +132,12 @@ function optionsFor(kind: PlotKind, mark: (plot: uPlot) => void): uPlot.Options 
     },
     axes: [
       { ...axis, size: 24 },
-      { ...axis, size: 52, values: (_, ticks) => ticks.map((tick) => tickLabel(tick, kind.log)) },
+      {
+        ...axis,
+        size: 52,
+        values: (_, ticks) => ticks.map((tick) => tickLabel(tick, kind.log)),
+        ...(kind.log && { splits: decades }),
+      },
     ],
     series: [{}, ...kind.curves.map(seriesFor)],
     hooks: { drawClear: [mark] },
@@ -159,9 +164,16 @@ function logRange(_: uPlot, low: number | null, high: number | null): uPlot.Rang
   return [10 ** Math.floor(Math.log10(low)), 10 ** Math.ceil(Math.log10(high) + 1e-9)];
 }
 
+/** Ticks at every power of ten, or at every other one where there are many. */
+function decades(_: uPlot, __: number, low: number, high: number): number[] {
+  const [first, last] = [Math.round(Math.log10(low)), Math.round(Math.log10(high))];
+  const step = Math.max(1, Math.ceil((last - first) / 4));
+  return Array.from({ length: Math.floor((last - first) / step) + 1 }, (_, i) => 10 ** (first + i * step));
+}
+
 function tickLabel(tick: number | null, log: boolean): string {
   if (tick === null) return '';
-  if (log) return Math.abs(Math.log10(tick) % 1) < 1e-6 ? `1e${Math.round(Math.log10(tick))}` : '';
+  if (log) return `1e${Math.round(Math.log10(tick))}`;
   return Math.abs(tick) >= 10_000 ? `${count(tick / 1000)}k` : Number.isInteger(tick) ? count(tick) : '';
 }
 
@@ -170,6 +182,8 @@ function drawMarks(plot: uPlot, history: History): void {
   const { ctx, bbox } = plot;
   ctx.save();
   ctx.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
+  ctx.textAlign = 'left';
+  ctx.textBaseline = 'alphabetic';
   for (const { iteration, phase } of history.phases) {
     const x = Math.round(plot.valToPos(iteration, 'x', true));
     upright(ctx, x, bbox.top, bbox.top + bbox.height, token('--line-strong'));

@@ -53,7 +53,7 @@ export class StartControls {
     this.element = h(
       'div',
       { class: 'start' },
-      row(shapeId, 'Start shape', this.#shape),
+      row(shapeId, 'Shape', this.#shape),
       this.#help,
       this.#bubbleRow,
       row(levelsId, 'Pyramid levels', this.#levels),

@@ -1,3 +1,4 @@
+import type { Vector3 } from 'three';
 import type { Plane, Surface, Vec3, VolumeView } from '../protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import type { ViewOptions } from '../ui/view-options';
@@ -40,6 +41,7 @@ export class Stage {
     this.#onPlanes = onPlanes;
     this.#options = options;
     this.#viewport.add(this.#surface.object);
+    this.#viewport.onDraw = (viewer) => this.#placeSlices(viewer);
     this.#recolor();
     onSchemeChange(() => this.#recolor());
   }
@@ -55,7 +57,8 @@ export class Stage {
         }),
     );
     const planes = panels.map(
-      (panel) => new SlicePlane(volume, panel.frame, panel.picture, token(AXIS_TOKENS[panel.frame.axis])),
+      ({ frame, picture }) =>
+        new SlicePlane(volume, frame, picture, { frame: token(AXIS_TOKENS[frame.axis]), section: token('--outline') }),
     );
     const frame = new VolumeFrame(volume, token('--muted'));
     this.#scene = { volume, inverse, panels, planes, frame };
@@ -79,7 +82,9 @@ export class Stage {
   showSections(sections: Float32Array[]): void {
     sections.forEach((section, axis) => {
       this.#scene?.panels[axis]?.setOutline(section);
+      this.#scene?.planes[axis]?.showSection(section);
     });
+    this.#viewport.invalidate();
   }
 
   setOptions(options: ViewOptions): void {
@@ -87,7 +92,6 @@ export class Stage {
     this.#surface.edges = options.edges;
     this.#surface.solid = options.surface;
     this.#surface.byComponent = options.byComponent;
-    for (const plane of this.#scene?.planes ?? []) plane.object.visible = options.slices;
     this.#viewport.invalidate();
   }
 
@@ -111,6 +115,14 @@ export class Stage {
     const { volume, inverse } = scene;
     this.#onPlanes(([0, 1, 2] as const).map((axis) => slicePlane(volume.affine, inverse, axis, index[axis])));
     this.#viewport.invalidate();
+  }
+
+  #placeSlices(viewer: Vector3): void {
+    const { slices } = this.#options;
+    for (const plane of this.#scene?.planes ?? []) {
+      plane.object.visible = slices !== 'hidden';
+      if (slices !== 'hidden') plane.stand(slices, viewer);
+    }
   }
 
   #recolor(): void {

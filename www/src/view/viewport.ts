@@ -27,6 +27,8 @@ export class Viewport {
   readonly #controls: OrbitControls;
   readonly #observer = new ResizeObserver(() => this.#resize());
   readonly #spherical = new Spherical();
+  /** Called before each drawing, with the camera's place. */
+  onDraw: (viewer: Vector3) => void = () => undefined;
   #pending = 0;
   #home = { position: new Vector3(), target: new Vector3() };
 
@@ -53,7 +55,7 @@ export class Viewport {
   invalidate(): void {
     this.#pending ||= requestAnimationFrame(() => {
       this.#pending = 0;
-      this.#renderer.render(this.#scene, this.#camera);
+      this.#draw();
     });
   }
 
@@ -65,7 +67,7 @@ export class Viewport {
     const [x, y, z] = anatomicalSigns(grid.space);
     const direction = new Vector3(-0.55 * x, 1 * y, 0.32 * z).normalize();
     const narrow = Math.min(1, this.#camera.aspect);
-    const distance = (0.82 * radius) / Math.sin((FIELD_OF_VIEW * Math.PI) / 360) / narrow;
+    const distance = (0.9 * radius) / Math.sin((FIELD_OF_VIEW * Math.PI) / 360) / narrow;
     this.#home = { position: target.clone().addScaledVector(direction, distance), target };
     this.#camera.near = radius / 50;
     this.#camera.far = radius * 50;
@@ -106,6 +108,11 @@ export class Viewport {
     this.#camera.aspect = width / height;
     this.#camera.updateProjectionMatrix();
     // Setting the size clears the canvas: draw at once, or it flashes.
+    this.#draw();
+  }
+
+  #draw(): void {
+    this.onDraw(this.#camera.position);
     this.#renderer.render(this.#scene, this.#camera);
   }
 
