@@ -157,43 +157,4 @@ impl Mesh {
         self.topology_changed();
         members.len()
     }
-
-    /// The vertices connected with `v` in breadth-first order, at most `limit` of them.
-    pub fn component_of(&self, v: VertexId, limit: usize) -> Vec<VertexId> {
-        if limit <= 64 {
-            return self.small_component_of(v, limit);
-        }
-        let mut seen = vec![false; self.slots()];
-        let mut found = vec![v];
-        seen[v.index()] = true;
-        let mut next = 0;
-        while next < found.len() && found.len() < limit {
-            for &w in self.ring(found[next]).as_slice() {
-                if !seen[w.index()] {
-                    seen[w.index()] = true;
-                    found.push(w);
-                }
-            }
-            next += 1;
-        }
-        found
-    }
-
-    /// As [`Mesh::component_of`] with a linear search in place of an array over the whole mesh.
-    fn small_component_of(&self, v: VertexId, limit: usize) -> Vec<VertexId> {
-        let mut found = vec![v];
-        let mut next = 0;
-        while next < found.len() {
-            for &w in self.ring(found[next]).as_slice() {
-                if found.len() >= limit {
-                    return found;
-                }
-                if !found.contains(&w) {
-                    found.push(w);
-                }
-            }
-            next += 1;
-        }
-        found
-    }
 }

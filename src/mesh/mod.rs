@@ -14,6 +14,7 @@ mod attributes;
 mod build;
 mod check;
 mod compact;
+mod components;
 mod crossing;
 mod edge_table;
 mod edits;
@@ -109,7 +110,7 @@ impl Mesh {
     }
 
     /// The live vertices in the order of their slots.
-    pub fn vertices(&self) -> impl Iterator<Item = VertexId> + '_ {
+    pub fn vertices(&self) -> impl Iterator<Item = VertexId> + Clone + '_ {
         let live = |(i, ring): (usize, &Ring)| (!ring.is_empty()).then(|| VertexId::from_index(i));
         self.rings.iter().enumerate().filter_map(live)
     }

@@ -1,7 +1,6 @@
 //! Global √3 refinement.
 
 use super::{Mesh, MeshError, Ring, VertexId};
-use crate::math::Vec3;
 
 impl Mesh {
     /// Puts a vertex in the middle of every triangle and replaces every old edge by the edge between the two new

@@ -23,6 +23,30 @@ pub struct VectorGrid {
 }
 
 impl Grid {
+    /// A grid, checked.
+    ///
+    /// # Errors
+    /// A dimension of 0, or another number of values than the dimensions' product.
+    pub fn new(dims: [usize; 3], values: Vec<f32>) -> Result<Grid, VolumeError> {
+        let grid = Grid { dims, values };
+        grid.check()?;
+        Ok(grid)
+    }
+
+    /// An error unless the number of values is the product of the dimensions and not 0.
+    pub(super) fn check(&self) -> Result<(), VolumeError> {
+        let count = self.dims.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
+        if count == Some(self.values.len()) && !self.values.is_empty() {
+            return Ok(());
+        }
+        let problem = format!(
+            "{} values given for dims {:?}; their product, not 0, is needed",
+            self.values.len(),
+            self.dims
+        );
+        Err(VolumeError::invalid("values", problem))
+    }
+
     /// Trilinear value at `p`; outside the grid the border is replicated.
     #[inline]
     pub fn sample(&self, p: Vec3) -> f32 {

@@ -21,6 +21,8 @@
 //! # Ok::<(), vesicle::volume::VolumeError>(())
 //! ```
 
+mod contour;
+mod cube_cases;
 mod error;
 mod grid;
 mod pyramid;
@@ -29,6 +31,7 @@ mod sequence;
 mod slices;
 mod voxels;
 
+pub use contour::{marching_cubes, marching_cubes_world};
 pub use error::VolumeError;
 pub use grid::{Grid, VectorGrid};
 pub use voxels::Voxels;
