@@ -6,6 +6,8 @@
  */
 import type { MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, Vec3 } from 'vesicle';
 
+import type { Shape } from './shapes';
+
 export type { MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, Vec3 };
 
 export type ParamValues = Record<string, unknown>;
@@ -21,6 +23,9 @@ export type StartShape =
   | { kind: 'bubbles'; count: number }
   | { kind: 'sphere'; center: Vec3; radius: number }
   | { kind: 'isosurface' };
+
+/** Where a volume comes from: one file, or a header and its data; or a computed shape. */
+export type VolumeSource = { files: NamedBytes[] } | { shape: Shape };
 
 export interface Setup {
   start: StartShape;
@@ -86,8 +91,8 @@ export interface Loaded extends Ready {
 /** Every request: what is sent, and what comes back. */
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** One file, or a header and its data. When it fails, the former volume and model stay. */
-  load: { body: { name: string; files: NamedBytes[]; setup: Setup }; reply: Loaded };
+  /** When it fails, the former volume and model stay. */
+  load: { body: { name: string; source: VolumeSource; setup: Setup }; reply: Loaded };
   /** A new model on the same volume. When it fails, the former model stays. */
   rebuild: { body: Setup; reply: Ready };
   play: { body: undefined; reply: undefined };

@@ -14,10 +14,12 @@ import type {
   Setup,
   SurfaceBuffers,
   ToWorker,
+  VolumeSource,
   VolumeView,
   WorkerEvent,
 } from './protocol';
 import { quantize } from './quantize';
+import { shapeVoxels } from './shapes';
 import { otsu, quantiles } from './threshold';
 
 const HISTOGRAM_BINS = 256;
@@ -62,6 +64,10 @@ function parseFiles(files: NamedBytes[]): Volume {
   const isHeader = (file: NamedBytes) => /\.(nhdr|mhd)$/i.test(file.name);
   const [header, data] = isHeader(second) && !isHeader(first) ? [second, first] : [first, second];
   return Volume.parse(header.bytes, { data: data.bytes });
+}
+
+function volumeFrom(source: VolumeSource): Volume {
+  return 'files' in source ? parseFiles(source.files) : new Volume(shapeVoxels(source.shape));
 }
 
 /** The volume reduced to what the page shows; slice by slice, so that no second full copy in floats is made. */
@@ -118,7 +124,7 @@ class Session {
       await init();
       return { version: version(), specs: paramSpecs('deformable') };
     },
-    load: (body) => this.#load(body.name, body.files, body.setup),
+    load: ({ name, source, setup }) => this.#load(name, source, setup),
     rebuild: (setup) => this.#rebuild(setup),
     play: () => this.#play(),
     pause: () => this.#pause(),
@@ -132,9 +138,9 @@ class Session {
     if (this.#free.length < BUFFER_SETS) this.#free.push(buffers);
   }
 
-  async #load(name: string, files: NamedBytes[], setup: Setup): Promise<Loaded> {
+  async #load(name: string, source: VolumeSource, setup: Setup): Promise<Loaded> {
     await this.#pause();
-    const volume = parseFiles(files);
+    const volume = volumeFrom(source);
     try {
       const view = viewOf(volume, name);
       const ready = this.#adopt(buildModel(volume, setup));

@@ -3,7 +3,6 @@ import { EXAMPLES, type Example, exampleUrl } from '../examples';
 import type {
   Failure,
   MeshFormat,
-  NamedBytes,
   ParamValues,
   Plane,
   Ready,
@@ -11,6 +10,7 @@ import type {
   SnapshotEvent,
   StartShape,
   StepReport,
+  VolumeSource,
   VolumeView,
   WorkerEvent,
 } from '../protocol';
@@ -41,7 +41,7 @@ const SPHERE_PART = 0.1;
 /** What the present volume was made of, to open it again after a failure of the engine. */
 interface Source {
   name: string;
-  files: () => Promise<NamedBytes[]>;
+  volume: () => Promise<VolumeSource>;
   example?: Example;
 }
 
@@ -154,32 +154,28 @@ export class ExtractLab {
   // ── opening ───────────────────────────────────────────────────────────────────────────────────
 
   #openExample(example: Example): Promise<void> {
-    const files = async () => [{ name: example.file, bytes: await fetchBytes(exampleUrl(example)) }];
-    return this.#open({ name: example.file, files, example });
+    const { source } = example;
+    if ('shape' in source) return this.#open({ name: source.shape, volume: async () => source, example });
+    const { file } = source;
+    const volume = async () => ({ files: [{ name: file, bytes: await fetchBytes(exampleUrl(file)) }] });
+    return this.#open({ name: file, volume, example });
   }
 
   #openFiles(files: File[]): Promise<void> {
     const name = files.map((file) => file.name).join(' + ');
-    return this.#open({ name, files: () => readFiles(files) });
+    return this.#open({ name, volume: async () => ({ files: await readFiles(files) }) });
   }
 
   /** Opens a volume and runs the model on it. When that fails, everything stays as it was. */
   async #open(source: Source): Promise<void> {
     if (this.#state.value === 'loading' && this.#volume) return;
     this.#enterLoading(`Opening ${source.name}.`);
-    const { iso: _, ...kept } = this.#params;
-    const params = source.example ? { ...kept, iso: source.example.iso } : kept;
     try {
       if (this.#engineBroken) await this.#restartEngine();
-      const files = await source.files();
-      const setup = { ...this.#setup(), params };
-      const body = { name: source.name, files, setup };
-      const loaded = await this.#client.request(
-        'load',
-        body,
-        files.map(({ bytes }) => bytes.buffer as ArrayBuffer),
-      );
+      const body = { name: source.name, source: await source.volume(), setup: this.#setupFor(source) };
+      const loaded = await this.#client.request('load', body, transferable(body.source));
       this.#source = source;
+      if (source.example) this.#start.show({ kind: 'enclosing', levels: source.example.levels });
       this.#adoptVolume(loaded.volume, source.example);
       this.#adoptModel(loaded);
       await this.#play();
@@ -221,6 +217,13 @@ export class ExtractLab {
   #setup(): Setup {
     const { levels } = this.#start.value;
     return { start: this.#startShape(), levels, params: this.#params };
+  }
+
+  /** What suits an example; for a file, the settings as they are, except the iso value, which no other volume shares. */
+  #setupFor({ example }: Source): Setup {
+    if (example) return { start: { kind: 'enclosing' }, levels: example.levels, params: example.params };
+    const { iso: _, ...params } = this.#params;
+    return { ...this.#setup(), params };
   }
 
   #startShape(): StartShape {
@@ -416,6 +419,10 @@ export class ExtractLab {
 function toFailure(error: unknown): Failure {
   if (error instanceof RequestError) return { code: error.code, message: error.message };
   return { code: 'page', message: error instanceof Error ? error.message : String(error) };
+}
+
+function transferable(source: VolumeSource): Transferable[] {
+  return 'files' in source ? source.files.map(({ bytes }) => bytes.buffer as ArrayBuffer) : [];
 }
 
 async function fetchBytes(url: string): Promise<Uint8Array> {

@@ -70,6 +70,13 @@ export class StartControls {
     };
   }
 
+  /** Sets what suits an example; no change is reported. */
+  show({ kind, levels }: Pick<StartChoice, 'kind' | 'levels'>): void {
+    this.#shape.value = kind;
+    this.#levels.valueAsNumber = levels;
+    this.#explain();
+  }
+
   #changed(onChange: () => void): void {
     this.#explain();
     if (this.#bubbles.checkValidity() && this.#levels.checkValidity()) onChange();
