@@ -1,0 +1,70 @@
+//! Which format a file is in, told from its bytes.
+
+use super::gzip::{gunzip_start, is_gzip};
+use super::{FormatError, metaimage, nifti, nrrd};
+use crate::volume::Volume;
+
+const ANY: &str = "volume file";
+const ACCEPTED: &str =
+    "NIfTI (.nii, .nii.gz, .hdr with .img), NRRD (.nrrd, .nhdr with data), MetaImage (.mha, .mhd with data)";
+/// Bytes at the start of a gzipped file that are looked at.
+const START: usize = 512;
+
+/// Reads a volume file, its format detected from the bytes; `detached` is the payload of a header that names
+/// another file for its voxels (where it names several, their bytes one after the other).
+///
+/// # Errors
+/// [`FormatError`] naming format and field; for a format that is not read, one that says which it is.
+pub fn parse_volume(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, FormatError> {
+    if is_gzip(bytes) {
+        let start = gunzip_start(ANY, bytes, START)?;
+        if nifti::is_nifti(&start) {
+            return nifti::parse(bytes, detached);
+        }
+        if nrrd::is_nrrd(&start) || metaimage::is_metaimage(&start) {
+            return Err(FormatError::unsupported(
+                ANY,
+                "gzip",
+                "a whole NRRD or MetaImage in gzip",
+                "the file unpacked",
+            ));
+        }
+        return Err(unknown(&start));
+    }
+    if nifti::is_nifti(bytes) {
+        nifti::parse(bytes, detached)
+    } else if nrrd::is_nrrd(bytes) {
+        nrrd::parse(bytes, detached)
+    } else if metaimage::is_metaimage(bytes) {
+        metaimage::parse(bytes, detached)
+    } else {
+        Err(unknown(bytes))
+    }
+}
+
+/// What a file of no accepted format is, as far as its first bytes tell.
+fn unknown(bytes: &[u8]) -> FormatError {
+    if bytes.is_empty() {
+        return FormatError::truncated(ANY, "signature", 4, 0);
+    }
+    FormatError::unsupported(ANY, "signature", signature(bytes), ACCEPTED)
+}
+
+fn signature(bytes: &[u8]) -> &'static str {
+    let at = |offset: usize, mark: &[u8]| bytes.get(offset..).is_some_and(|rest| rest.starts_with(mark));
+    let line = |mark: &[u8]| bytes.trim_ascii_start().starts_with(mark);
+    match () {
+        () if at(0, &[0, 0, 0, 1, 0, 0]) => "MGH",
+        () if line(b"type") && bytes.windows(10).take(200).any(|w| w == b"-attribute") => "AFNI header",
+        () if at(128, b"DICM") => "DICOM",
+        () if at(0, b"II*\0") || at(0, b"MM\0*") => "TIFF",
+        () if at(0, b"\x89HDF") => "HDF5",
+        () if at(0, b"CDF") => "NetCDF or MINC",
+        () if at(0, b"PK\x03\x04") => "zip",
+        () if at(0, b"BZh") => "bzip2",
+        () if line(b"<?xml") || line(b"<VTKFile") => "XML",
+        () if at(0, b"# vtk") => "VTK legacy",
+        () if at(0, b"\x89PNG") || at(0, &[0xFF, 0xD8, 0xFF]) => "a flat picture",
+        () => "no known signature",
+    }
+}

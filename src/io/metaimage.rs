@@ -1,0 +1,253 @@
+//! MetaImage: .mha with the voxels inside, .mhd with them as detached payload.
+//!
+//! World is LPS, in the unit `DistanceUnits` names. Each row of `TransformMatrix` is the direction of one axis, as
+//! ITK reads it; `CenterOfRotation` and `AnatomicalOrientation` only describe and are not used. The step of a
+//! fourth axis has no unit in the format, so frames come without a time. A list of data files is taken as their
+//! bytes one after the other.
+
+use super::FormatError;
+use super::gzip::{gunzip, is_gzip, unzlib};
+use super::raw::{Place, SLACK, Scalar, decode, decode_text, exact, payload_size, refused};
+use super::text::{Field, Lines};
+use crate::math::{DAffine3, DMat3, DVec3};
+use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
+
+const FORMAT: &str = "MetaImage";
+const DATA: Place = Place { format: FORMAT, field: "voxel data" };
+
+/// Whether the bytes begin as a MetaImage header does: with a `key = value` line of one of its first keys.
+pub(super) fn is_metaimage(bytes: &[u8]) -> bool {
+    let start = bytes.trim_ascii_start();
+    [&b"ObjectType"[..], b"NDims", b"Comment", b"ObjectSubType"]
+        .iter()
+        .any(|key| start.strip_prefix(*key).is_some_and(|rest| rest.trim_ascii_start().starts_with(b"=")))
+}
+
+/// Reads a volume; `detached` is the payload where the header names a data file.
+///
+/// # Errors
+/// [`FormatError`] naming the header field.
+pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, FormatError> {
+    let mut lines = Lines::new(bytes);
+    let fields = Fields::read(&mut lines)?;
+    let header = Header::check(&fields)?;
+    let file = fields.need("ElementDataFile")?;
+    let source = match (file.text.eq_ignore_ascii_case("LOCAL"), detached) {
+        (true, _) => lines.rest(),
+        (false, Some(payload)) => payload,
+        (false, None) => {
+            return Err(file.invalid("voxels are in another file; give its bytes as the detached payload"));
+        }
+    };
+    header.volume(source)
+}
+
+/// The header's `key = value` lines, up to the one that says where voxels are.
+struct Fields {
+    pairs: Vec<(String, String)>,
+}
+
+impl Fields {
+    fn read(lines: &mut Lines<'_>) -> Result<Self, FormatError> {
+        let mut pairs: Vec<(String, String)> = Vec::new();
+        while let Some(line) = lines.next_line() {
+            if line.trim().is_empty() {
+                continue;
+            }
+            let Some((key, value)) = line.split_once('=') else {
+                let shown: String = line.chars().take(40).collect();
+                return Err(FormatError::invalid(
+                    FORMAT,
+                    "header",
+                    format!("'{shown}' is no 'key = value' line"),
+                ));
+            };
+            pairs.push((key.trim().to_owned(), value.trim().to_owned()));
+            if key.trim() == "ElementDataFile" {
+                break;
+            }
+        }
+        Ok(Self { pairs })
+    }
+
+    fn get(&self, key: &'static str) -> Option<Field<'_>> {
+        let (_, text) = self.pairs.iter().find(|(name, _)| name == key)?;
+        Some(Field { format: FORMAT, name: key, text })
+    }
+
+    /// The first of several names for one thing.
+    fn any(&self, keys: &[&'static str]) -> Option<Field<'_>> {
+        keys.iter().find_map(|key| self.get(key))
+    }
+
+    fn need(&self, key: &'static str) -> Result<Field<'_>, FormatError> {
+        self.get(key).ok_or_else(|| FormatError::invalid(FORMAT, key, "missing"))
+    }
+
+    /// A True or False field, False where it is missing.
+    fn flag(&self, keys: &[&'static str]) -> Result<bool, FormatError> {
+        let Some(field) = self.any(keys) else { return Ok(false) };
+        match field.text.to_ascii_lowercase().as_str() {
+            "true" | "1" => Ok(true),
+            "false" | "0" => Ok(false),
+            _ => Err(field.invalid("True or False is needed")),
+        }
+    }
+
+    fn number(&self, key: &'static str, default: f64) -> Result<f64, FormatError> {
+        self.get(key).map_or(Ok(default), |field| Ok(field.finite(1)?[0]))
+    }
+}
+
+/// A header found consistent.
+struct Header {
+    scalar: Scalar,
+    dims: [usize; 4],
+    big: bool,
+    text: bool,
+    compressed: bool,
+    /// Bytes of the data file before the voxels; `None` (-1 in the file): voxels are the last bytes.
+    skip: Option<usize>,
+    slope: f64,
+    intercept: f64,
+    affine: DAffine3,
+    unit: LengthUnit,
+}
+
+impl Header {
+    fn check(fields: &Fields) -> Result<Self, FormatError> {
+        check_object(fields)?;
+        let rank = rank(fields)?;
+        let mut dims = [1; 4];
+        let sizes = fields.need("DimSize")?.sizes(rank)?;
+        dims[..rank].copy_from_slice(&sizes);
+        Ok(Self {
+            scalar: scalar(&fields.need("ElementType")?)?,
+            dims,
+            big: fields.flag(&["BinaryDataByteOrderMSB", "ElementByteOrderMSB"])?,
+            text: fields.get("BinaryData").is_some() && !fields.flag(&["BinaryData"])?,
+            compressed: fields.flag(&["CompressedData"])?,
+            skip: skip(fields)?,
+            slope: fields.number("ElementToIntensityFunctionSlope", 1.0)?,
+            intercept: fields.number("ElementToIntensityFunctionOffset", 0.0)?,
+            affine: affine(fields, rank)?,
+            unit: unit(fields),
+        })
+    }
+
+    fn volume(&self, source: &[u8]) -> Result<Volume, FormatError> {
+        let volume = Volume::new(VolumeInit {
+            voxels: self.voxels(source)?,
+            dims: self.dims,
+            affine: self.affine,
+            slope: self.slope,
+            intercept: self.intercept,
+            frame_seconds: 0.0,
+            space: Space::Lps,
+        });
+        Ok(volume.map_err(|error| refused(FORMAT, error))?.with_unit(self.unit))
+    }
+
+    fn voxels(&self, source: &[u8]) -> Result<Voxels, FormatError> {
+        let size = payload_size(DATA, self.dims, self.scalar)?;
+        if self.compressed {
+            let limit = size.saturating_add(SLACK);
+            let source = self.after_skip(source, source.len())?;
+            // The format says zlib; some writers put a gzip stream there.
+            let inflate = if is_gzip(source) { gunzip } else { unzlib };
+            let bytes = inflate(FORMAT, source, limit)?;
+            return decode(DATA, exact(DATA, &bytes, size)?, self.scalar, self.big);
+        }
+        let source = self.after_skip(source, size)?;
+        if self.text {
+            return decode_text(DATA, source, self.scalar, size / self.scalar.size());
+        }
+        decode(DATA, exact(DATA, source, size)?, self.scalar, self.big)
+    }
+
+    /// What follows the skipped bytes; with -1, the last `size`.
+    fn after_skip<'a>(&self, source: &'a [u8], size: usize) -> Result<&'a [u8], FormatError> {
+        let skip = self.skip.unwrap_or_else(|| source.len().saturating_sub(size));
+        source.get(skip..).ok_or_else(|| FormatError::truncated(FORMAT, "HeaderSize", skip, source.len()))
+    }
+}
+
+fn check_object(fields: &Fields) -> Result<(), FormatError> {
+    if let Some(field) = fields.get("ObjectType").filter(|field| field.text != "Image") {
+        return Err(FormatError::unsupported(FORMAT, field.name, format!("'{}'", field.text), "Image"));
+    }
+    if let Some(field) = fields.get("ElementNumberOfChannels").filter(|field| field.text != "1") {
+        return Err(FormatError::unsupported(FORMAT, field.name, format!("'{}'", field.text), "1"));
+    }
+    Ok(())
+}
+
+fn rank(fields: &Fields) -> Result<usize, FormatError> {
+    match fields.need("NDims")?.integer(1)? {
+        n @ 1..=4 => Ok(n as usize),
+        n => Err(FormatError::unsupported(FORMAT, "NDims", n.to_string(), "1 to 4")),
+    }
+}
+
+fn scalar(field: &Field<'_>) -> Result<Scalar, FormatError> {
+    Ok(match field.text {
+        "MET_CHAR" => Scalar::I8,
+        "MET_UCHAR" => Scalar::U8,
+        "MET_SHORT" => Scalar::I16,
+        "MET_USHORT" => Scalar::U16,
+        // The format's LONG has four bytes on every machine.
+        "MET_INT" | "MET_LONG" => Scalar::I32,
+        "MET_UINT" | "MET_ULONG" => Scalar::U32,
+        "MET_LONG_LONG" => Scalar::I64,
+        "MET_ULONG_LONG" => Scalar::U64,
+        "MET_FLOAT" => Scalar::F32,
+        "MET_DOUBLE" => Scalar::F64,
+        other => {
+            let accepted =
+                "MET_CHAR, SHORT, INT, LONG, LONG_LONG and their unsigned kin, MET_FLOAT, MET_DOUBLE";
+            return Err(FormatError::unsupported(FORMAT, "ElementType", format!("'{other}'"), accepted));
+        }
+    })
+}
+
+fn skip(fields: &Fields) -> Result<Option<usize>, FormatError> {
+    let Some(field) = fields.get("HeaderSize") else { return Ok(Some(0)) };
+    let value = field.integer(-1)?;
+    Ok(usize::try_from(value).ok())
+}
+
+fn affine(fields: &Fields, rank: usize) -> Result<DAffine3, FormatError> {
+    let mut columns = axes(fields, rank)?;
+    if let Some(field) = fields.any(&["ElementSpacing", "ElementSize"]) {
+        for (column, spacing) in columns.iter_mut().zip(field.finite(rank)?) {
+            *column *= spacing;
+        }
+    }
+    let mut origin = [0.0; 3];
+    if let Some(field) = fields.any(&["Offset", "Position", "Origin"]) {
+        origin.iter_mut().zip(field.finite(rank)?).for_each(|(o, v)| *o = v);
+    }
+    Ok(DAffine3::from_mat3_translation(DMat3::from_cols(columns[0], columns[1], columns[2]), origin.into()))
+}
+
+/// The directions of the axes in space: rows of the matrix, the world's own where the file has none.
+fn axes(fields: &Fields, rank: usize) -> Result<[DVec3; 3], FormatError> {
+    let mut columns = [DVec3::X, DVec3::Y, DVec3::Z];
+    let Some(field) = fields.any(&["TransformMatrix", "Rotation", "Orientation"]) else { return Ok(columns) };
+    let matrix = field.finite(rank * rank)?;
+    for (column, row) in columns.iter_mut().zip(matrix.chunks(rank)) {
+        let mut direction = [0.0; 3];
+        direction.iter_mut().zip(row).for_each(|(d, &v)| *d = v);
+        *column = direction.into();
+    }
+    Ok(columns)
+}
+
+fn unit(fields: &Fields) -> LengthUnit {
+    match fields.get("DistanceUnits").map(|field| field.text) {
+        Some("mm") => LengthUnit::Millimetre,
+        Some("um") => LengthUnit::Micrometre,
+        Some("m") => LengthUnit::Metre,
+        _ => LengthUnit::Unknown,
+    }
+}

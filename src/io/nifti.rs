@@ -1,0 +1,580 @@
+//! NIfTI-1 and NIfTI-2: single files (.nii, .nii.gz) and pairs (.hdr with its .img as detached payload).
+//!
+//! World is RAS. The affine is the sform where its code is above 0, else the qform where its code is, else the voxel
+//! sizes alone with the first voxel at the origin (methods 3, 2 and 1 of the standard). Lengths stay in the file's
+//! unit, which [`Volume::unit`] names. A slope of 0 or NaN means that stored numbers are intensities. Frame time is
+//! pixdim[4] in the file's time unit, seconds where it names none.
+
+use super::FormatError;
+use super::gzip::{gunzip, gunzip_start, is_gzip};
+use super::raw::{Place, SLACK, Scalar, decode, exact, payload_size, refused};
+use crate::math::{DAffine3, DMat3, DVec3};
+use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
+
+const FORMAT: &str = "NIfTI";
+const DATA: Place = Place { format: FORMAT, field: "voxel data" };
+/// Header sizes of the two versions, which are also how a file begins.
+const SIZE_1: usize = 348;
+const SIZE_2: usize = 540;
+/// What must be inflated to know the header, its extension mark included.
+const HEADER_ROOM: usize = SIZE_2 + 4;
+
+/// Whether the bytes begin as a NIfTI header of either version and byte order does.
+pub(super) fn is_nifti(bytes: &[u8]) -> bool {
+    bytes.first_chunk().is_some_and(|&four| version(four).is_some())
+}
+
+/// The version and whether its byte order is big-endian.
+fn version(four: [u8; 4]) -> Option<(u8, bool)> {
+    let known = |size: u32| match size as usize {
+        SIZE_1 => Some(1),
+        SIZE_2 => Some(2),
+        _ => None,
+    };
+    let little = known(u32::from_le_bytes(four)).map(|v| (v, false));
+    little.or_else(|| known(u32::from_be_bytes(four)).map(|v| (v, true)))
+}
+
+/// Reads a volume; `detached` is the .img of a pair. Either may be gzipped.
+///
+/// # Errors
+/// [`FormatError`] naming the header field.
+pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, FormatError> {
+    let start = if is_gzip(bytes) {
+        gunzip_start(FORMAT, bytes, HEADER_ROOM)?
+    } else {
+        bytes.iter().take(HEADER_ROOM).copied().collect()
+    };
+    let fields = Fields::read(&start)?;
+    let header = Header::check(&fields)?;
+    let (source, offset) = match (header.pair, detached) {
+        (false, _) => (bytes, header.offset),
+        (true, Some(image)) => (image, header.offset),
+        (true, None) => {
+            return Err(FormatError::invalid(
+                FORMAT,
+                "magic",
+                "the header of a pair; give its .img as the detached payload",
+            ));
+        }
+    };
+    let size = payload_size(DATA, header.dims, header.scalar)?;
+    let end =
+        offset.checked_add(size).ok_or_else(|| FormatError::too_large(FORMAT, "vox_offset", u64::MAX))?;
+    if is_gzip(source) {
+        let whole = gunzip(FORMAT, source, end.saturating_add(SLACK))?;
+        return header.volume(&whole, offset, size);
+    }
+    header.volume(source, offset, size)
+}
+
+/// Header bytes with their byte order.
+struct Bytes<'a> {
+    bytes: &'a [u8],
+    big: bool,
+}
+
+impl Bytes<'_> {
+    /// N bytes in little-endian order. The header's length was checked: nothing is ever missing.
+    fn at<const N: usize>(&self, offset: usize) -> [u8; N] {
+        let mut out = [0; N];
+        if let Some(part) = self.bytes.get(offset..offset + N) {
+            out.copy_from_slice(part);
+        }
+        if self.big {
+            out.reverse();
+        }
+        out
+    }
+    fn i16(&self, offset: usize) -> i64 {
+        i16::from_le_bytes(self.at(offset)).into()
+    }
+    fn i32(&self, offset: usize) -> i64 {
+        i32::from_le_bytes(self.at(offset)).into()
+    }
+    fn i64(&self, offset: usize) -> i64 {
+        i64::from_le_bytes(self.at(offset))
+    }
+    fn f32(&self, offset: usize) -> f64 {
+        f32::from_le_bytes(self.at(offset)).into()
+    }
+    fn f64(&self, offset: usize) -> f64 {
+        f64::from_le_bytes(self.at(offset))
+    }
+}
+
+/// The fields of either version that matter, as they stand.
+struct Fields {
+    version: u8,
+    big: bool,
+    magic: [u8; 4],
+    dim: [i64; 8],
+    datatype: i64,
+    bitpix: i64,
+    pixdim: [f64; 8],
+    vox_offset: f64,
+    slope: f64,
+    intercept: f64,
+    units: i64,
+    qform_code: i64,
+    sform_code: i64,
+    quaternion: [f64; 3],
+    qoffset: [f64; 3],
+    srow: [[f64; 4]; 3],
+}
+
+impl Fields {
+    fn read(bytes: &[u8]) -> Result<Self, FormatError> {
+        let cut = |needed| FormatError::truncated(FORMAT, "header", needed, bytes.len());
+        let four = *bytes.first_chunk().ok_or_else(|| cut(SIZE_1))?;
+        let Some((version, big)) = version(four) else {
+            return Err(FormatError::invalid(
+                FORMAT,
+                "sizeof_hdr",
+                format!("{four:?} is neither 348 nor 540"),
+            ));
+        };
+        let size = if version == 1 { SIZE_1 } else { SIZE_2 };
+        if bytes.len() < size {
+            return Err(cut(size));
+        }
+        let bytes = Bytes { bytes, big };
+        Ok(if version == 1 { Self::version_1(&bytes) } else { Self::version_2(&bytes) })
+    }
+
+    fn version_1(b: &Bytes<'_>) -> Self {
+        Self {
+            version: 1,
+            big: b.big,
+            magic: [344, 345, 346, 347].map(|at| b.bytes[at]),
+            dim: std::array::from_fn(|i| b.i16(40 + 2 * i)),
+            datatype: b.i16(70),
+            bitpix: b.i16(72),
+            pixdim: std::array::from_fn(|i| b.f32(76 + 4 * i)),
+            vox_offset: b.f32(108),
+            slope: b.f32(112),
+            intercept: b.f32(116),
+            units: b.bytes[123].into(),
+            qform_code: b.i16(252),
+            sform_code: b.i16(254),
+            quaternion: [256, 260, 264].map(|at| b.f32(at)),
+            qoffset: [268, 272, 276].map(|at| b.f32(at)),
+            srow: [280, 296, 312].map(|at| std::array::from_fn(|i| b.f32(at + 4 * i))),
+        }
+    }
+
+    fn version_2(b: &Bytes<'_>) -> Self {
+        Self {
+            version: 2,
+            big: b.big,
+            magic: [4, 5, 6, 7].map(|at| b.bytes[at]),
+            dim: std::array::from_fn(|i| b.i64(16 + 8 * i)),
+            datatype: b.i16(12),
+            bitpix: b.i16(14),
+            pixdim: std::array::from_fn(|i| b.f64(104 + 8 * i)),
+            vox_offset: b.i64(168) as f64,
+            slope: b.f64(176),
+            intercept: b.f64(184),
+            units: b.i32(500),
+            qform_code: b.i32(344),
+            sform_code: b.i32(348),
+            quaternion: [352, 360, 368].map(|at| b.f64(at)),
+            qoffset: [376, 384, 392].map(|at| b.f64(at)),
+            srow: [400, 432, 464].map(|at| std::array::from_fn(|i| b.f64(at + 8 * i))),
+        }
+    }
+
+    /// Whether voxels are in a file of their own.
+    fn is_pair(&self) -> Result<bool, FormatError> {
+        match (&self.magic, self.version) {
+            (b"n+1\0", 1) | (b"n+2\0", 2) => Ok(false),
+            (b"ni1\0", 1) | (b"ni2\0", 2) => Ok(true),
+            (b"\0\0\0\0", 1) => Err(FormatError::unsupported(
+                FORMAT,
+                "magic",
+                "an Analyze 7.5 header",
+                "'n+1', 'ni1', 'n+2', 'ni2'",
+            )),
+            (other, _) => {
+                let shown = String::from_utf8_lossy(other).escape_debug().to_string();
+                Err(FormatError::invalid(
+                    FORMAT,
+                    "magic",
+                    format!("'{shown}' is none of 'n+1', 'ni1', 'n+2', 'ni2'"),
+                ))
+            }
+        }
+    }
+
+    fn dims(&self) -> Result<[usize; 4], FormatError> {
+        let rank = self.dim[0];
+        if !(1..=7).contains(&rank) {
+            return Err(FormatError::invalid(
+                FORMAT,
+                "dim[0]",
+                format!("{rank} dimensions; 1 to 7 are accepted"),
+            ));
+        }
+        let mut dims = [1; 4];
+        for axis in 1..=rank as usize {
+            let n = self.dim[axis];
+            let field = format!("dim[{axis}]");
+            match usize::try_from(n) {
+                Ok(n) if n >= 1 && axis <= 4 => dims[axis - 1] = n,
+                Ok(1) => {}
+                Ok(n) if n > 1 => {
+                    return Err(FormatError::unsupported(FORMAT, field, n.to_string(), "1 (no vector data)"));
+                }
+                _ => return Err(FormatError::invalid(FORMAT, field, format!("{n}; at least 1 is needed"))),
+            }
+        }
+        Ok(dims)
+    }
+
+    fn scalar(&self) -> Result<Scalar, FormatError> {
+        let scalar = match self.datatype {
+            2 => Scalar::U8,
+            4 => Scalar::I16,
+            8 => Scalar::I32,
+            16 => Scalar::F32,
+            64 => Scalar::F64,
+            256 => Scalar::I8,
+            512 => Scalar::U16,
+            768 => Scalar::U32,
+            1024 => Scalar::I64,
+            1280 => Scalar::U64,
+            code => return Err(unsupported_datatype(code)),
+        };
+        if self.bitpix == 8 * scalar.size() as i64 {
+            return Ok(scalar);
+        }
+        let problem = format!("{} bits, datatype {} has {}", self.bitpix, self.datatype, 8 * scalar.size());
+        Err(FormatError::invalid(FORMAT, "bitpix", problem))
+    }
+
+    /// Where voxels begin. A single file that states 0 means right after its header.
+    fn offset(&self, pair: bool) -> Result<usize, FormatError> {
+        let least = if self.version == 1 { 352 } else { 544 };
+        let stated = self.vox_offset;
+        let whole = stated >= 0.0 && stated <= MAX_OFFSET && stated == libm::trunc(stated);
+        match (whole, pair) {
+            (true, true) => Ok(stated as usize),
+            (true, false) if stated == 0.0 => Ok(least),
+            (true, false) if stated >= least as f64 => Ok(stated as usize),
+            _ => {
+                let problem = format!("{stated}; a whole number from {least} to {MAX_OFFSET} is accepted");
+                Err(FormatError::invalid(FORMAT, "vox_offset", problem))
+            }
+        }
+    }
+
+    /// Slope and intercept; 0 or NaN for the slope means none.
+    fn scaling(&self) -> Result<(f64, f64), FormatError> {
+        if self.slope == 0.0 || self.slope.is_nan() {
+            return Ok((1.0, 0.0));
+        }
+        if self.slope.is_finite() && self.intercept.is_finite() {
+            return Ok((self.slope, self.intercept));
+        }
+        let (field, value) =
+            if self.slope.is_finite() { ("scl_inter", self.intercept) } else { ("scl_slope", self.slope) };
+        Err(FormatError::invalid(FORMAT, field, format!("{value}; a finite number is needed")))
+    }
+
+    fn affine(&self) -> Result<DAffine3, FormatError> {
+        if self.sform_code > 0 {
+            return self.sform();
+        }
+        if self.qform_code > 0 {
+            return self.qform();
+        }
+        Ok(DAffine3::from_scale(DVec3::from(self.voxel_sizes()?)))
+    }
+
+    fn sform(&self) -> Result<DAffine3, FormatError> {
+        for (row, name) in self.srow.iter().zip(["srow_x", "srow_y", "srow_z"]) {
+            if row.iter().any(|v| !v.is_finite()) {
+                return Err(FormatError::invalid(
+                    FORMAT,
+                    name,
+                    format!("{row:?}; finite numbers are needed"),
+                ));
+            }
+        }
+        let column = |i: usize| DVec3::new(self.srow[0][i], self.srow[1][i], self.srow[2][i]);
+        let matrix = DMat3::from_cols(column(0), column(1), column(2));
+        Ok(DAffine3::from_mat3_translation(matrix, column(3)))
+    }
+
+    /// Rotation by the quaternion (a, b, c, d) with a ≥ 0, after scaling by the voxel sizes; pixdim[0] < 0 turns z.
+    fn qform(&self) -> Result<DAffine3, FormatError> {
+        let finite = |field: &str, values: [f64; 3]| {
+            if values.iter().all(|v| v.is_finite()) {
+                return Ok(values);
+            }
+            Err(FormatError::invalid(FORMAT, field, format!("{values:?}; finite numbers are needed")))
+        };
+        let [b, c, d] = finite("quatern_b, c, d", self.quaternion)?;
+        let origin = finite("qoffset_x, y, z", self.qoffset)?;
+        let rest = 1.0 - (b * b + c * c + d * d);
+        if rest < -QUATERNION_TOLERANCE {
+            let problem = format!("{:?} is longer than 1", self.quaternion);
+            return Err(FormatError::invalid(FORMAT, "quatern_b, c, d", problem));
+        }
+        let a = if rest > 0.0 { rest.sqrt() } else { 0.0 };
+        let rotation = DMat3::from_quat(glam::DQuat::from_xyzw(b, c, d, a).normalize());
+        let mut sizes = self.voxel_sizes()?;
+        if self.pixdim[0] < 0.0 {
+            sizes[2] = -sizes[2];
+        }
+        Ok(DAffine3::from_mat3_translation(rotation * DMat3::from_diagonal(sizes.into()), origin.into()))
+    }
+
+    /// Lengths of the voxel's sides, without sign; 1 along axes the file does not have.
+    fn voxel_sizes(&self) -> Result<[f64; 3], FormatError> {
+        let mut sizes = [1.0; 3];
+        for (axis, size) in sizes.iter_mut().enumerate().filter(|(axis, _)| (*axis as i64) < self.dim[0]) {
+            *size = self.pixdim[axis + 1].abs();
+            if !(*size > 0.0 && size.is_finite()) {
+                let problem = format!("{}; a length other than 0 is needed", self.pixdim[axis + 1]);
+                return Err(FormatError::invalid(FORMAT, format!("pixdim[{}]", axis + 1), problem));
+            }
+        }
+        Ok(sizes)
+    }
+
+    /// Seconds from frame to frame, 0 where there is one frame or the fourth axis is not time.
+    fn frame_seconds(&self, frames: usize) -> Result<f64, FormatError> {
+        let step = self.pixdim[4];
+        if frames < 2 {
+            return Ok(0.0);
+        }
+        if !step.is_finite() {
+            return Err(FormatError::invalid(
+                FORMAT,
+                "pixdim[4]",
+                format!("{step}; a finite time is needed"),
+            ));
+        }
+        let second = match self.units & 0x38 {
+            0 | 8 => 1.0,
+            16 => 1e-3,
+            24 => 1e-6,
+            _ => 0.0,
+        };
+        Ok(if step > 0.0 { step * second } else { 0.0 })
+    }
+
+    fn unit(&self) -> LengthUnit {
+        match self.units & 7 {
+            1 => LengthUnit::Metre,
+            2 => LengthUnit::Millimetre,
+            3 => LengthUnit::Micrometre,
+            _ => LengthUnit::Unknown,
+        }
+    }
+}
+
+/// Offsets beyond this cannot be told apart in a NIfTI-1 header (`f32`), and no header extension is as long.
+const MAX_OFFSET: f64 = 16_777_216.0;
+/// How far past length 1 rounding takes a quaternion in `f32`; longer ones are broken.
+const QUATERNION_TOLERANCE: f64 = 1e-5;
+
+fn unsupported_datatype(code: i64) -> FormatError {
+    let name = match code {
+        1 => "binary",
+        32 => "complex64",
+        128 => "RGB24",
+        1536 => "float128",
+        1792 => "complex128",
+        2048 => "complex256",
+        2304 => "RGBA32",
+        _ => "no known type",
+    };
+    FormatError::unsupported(
+        FORMAT,
+        "datatype",
+        format!("{code} ({name})"),
+        "integers of 8 to 64 bits, float32, float64",
+    )
+}
+
+/// A header found consistent.
+struct Header {
+    pair: bool,
+    big: bool,
+    dims: [usize; 4],
+    scalar: Scalar,
+    offset: usize,
+    slope: f64,
+    intercept: f64,
+    affine: DAffine3,
+    frame_seconds: f64,
+    unit: LengthUnit,
+}
+
+impl Header {
+    fn check(fields: &Fields) -> Result<Self, FormatError> {
+        let pair = fields.is_pair()?;
+        let dims = fields.dims()?;
+        let (slope, intercept) = fields.scaling()?;
+        Ok(Self {
+            pair,
+            big: fields.big,
+            dims,
+            scalar: fields.scalar()?,
+            offset: fields.offset(pair)?,
+            slope,
+            intercept,
+            affine: fields.affine()?,
+            frame_seconds: fields.frame_seconds(dims[3])?,
+            unit: fields.unit(),
+        })
+    }
+
+    fn volume(&self, source: &[u8], offset: usize, size: usize) -> Result<Volume, FormatError> {
+        let Some(rest) = source.get(offset..) else {
+            return Err(FormatError::truncated(
+                FORMAT,
+                "voxel data",
+                offset.saturating_add(size),
+                source.len(),
+            ));
+        };
+        let payload = exact(DATA, rest, size)?;
+        let volume = Volume::new(VolumeInit {
+            voxels: decode(DATA, payload, self.scalar, self.big)?,
+            dims: self.dims,
+            affine: self.affine,
+            slope: self.slope,
+            intercept: self.intercept,
+            frame_seconds: self.frame_seconds,
+            space: Space::Ras,
+        });
+        Ok(volume.map_err(|error| refused(FORMAT, error))?.with_unit(self.unit))
+    }
+}
+
+/// A volume as an uncompressed little-endian NIfTI-1 file, voxels as stored, world brought to RAS, affine as sform.
+///
+/// NIfTI-1 holds the affine in `f32` and dimensions up to 32,767; larger volumes are written as NIfTI-2.
+///
+/// # Errors
+/// [`FormatError::TooLarge`] where there is no memory for the file.
+pub fn write_nifti(volume: &Volume) -> Result<Vec<u8>, FormatError> {
+    let [nx, ny, nz] = volume.dims();
+    let dims = [nx, ny, nz, volume.frames()];
+    let (code, size) = datatype(volume.voxels());
+    let total = HEADER_ROOM + size * volume.voxels().len();
+    let mut out = Vec::new();
+    out.try_reserve_exact(total).map_err(|_| FormatError::too_large(FORMAT, "file", total as u64))?;
+    let header = if dims.iter().all(|&n| n <= i16::MAX as usize) { header_1 } else { header_2 };
+    header(&mut out, volume, dims, code, size);
+    append_voxels(&mut out, volume.voxels());
+    Ok(out)
+}
+
+/// NIfTI's code and the bytes of one voxel.
+fn datatype(voxels: &Voxels) -> (i16, usize) {
+    match voxels {
+        Voxels::U8(_) => (2, 1),
+        Voxels::I8(_) => (256, 1),
+        Voxels::U16(_) => (512, 2),
+        Voxels::I16(_) => (4, 2),
+        Voxels::U32(_) => (768, 4),
+        Voxels::I32(_) => (8, 4),
+        Voxels::F32(_) => (16, 4),
+        Voxels::F64(_) => (64, 8),
+    }
+}
+
+fn append_voxels(out: &mut Vec<u8>, voxels: &Voxels) {
+    match voxels {
+        Voxels::U8(values) => out.extend_from_slice(values),
+        Voxels::I8(values) => out.extend(values.iter().map(|v| v.cast_unsigned())),
+        Voxels::U16(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+        Voxels::I16(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+        Voxels::U32(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+        Voxels::I32(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+        Voxels::F32(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+        Voxels::F64(values) => out.extend(values.iter().flat_map(|v| v.to_le_bytes())),
+    }
+}
+
+/// Writes bytes at their place in a header.
+fn put<const N: usize>(out: &mut [u8], at: usize, bytes: [u8; N]) {
+    if let Some(place) = out.get_mut(at..at + N) {
+        place.copy_from_slice(&bytes);
+    }
+}
+
+fn header_1(out: &mut Vec<u8>, volume: &Volume, dims: [usize; 4], code: i16, size: usize) {
+    out.resize(352, 0);
+    put(out, 0, (SIZE_1 as i32).to_le_bytes());
+    for (i, v) in dim_field(dims).iter().enumerate() {
+        put(out, 40 + 2 * i, (*v as i16).to_le_bytes());
+    }
+    put(out, 70, code.to_le_bytes());
+    put(out, 72, (8 * size as i16).to_le_bytes());
+    for (i, v) in pixdim_field(volume).iter().enumerate() {
+        put(out, 76 + 4 * i, (*v as f32).to_le_bytes());
+    }
+    for (at, v) in [(108, 352.0), (112, volume.slope()), (116, volume.intercept())] {
+        put(out, at, (v as f32).to_le_bytes());
+    }
+    put(out, 123, [units_field(volume)]);
+    put(out, 254, 1i16.to_le_bytes());
+    for (i, v) in rows_in_ras(volume).iter().enumerate() {
+        put(out, 280 + 4 * i, (*v as f32).to_le_bytes());
+    }
+    put(out, 344, *b"n+1\0");
+}
+
+fn header_2(out: &mut Vec<u8>, volume: &Volume, dims: [usize; 4], code: i16, size: usize) {
+    out.resize(544, 0);
+    put(out, 0, (SIZE_2 as i32).to_le_bytes());
+    put(out, 4, *b"n+2\0\r\n\x1A\n");
+    put(out, 12, code.to_le_bytes());
+    put(out, 14, (8 * size as i16).to_le_bytes());
+    for (i, v) in dim_field(dims).iter().enumerate() {
+        put(out, 16 + 8 * i, (*v as i64).to_le_bytes());
+    }
+    for (i, v) in pixdim_field(volume).iter().enumerate() {
+        put(out, 104 + 8 * i, v.to_le_bytes());
+    }
+    put(out, 168, 544i64.to_le_bytes());
+    put(out, 176, volume.slope().to_le_bytes());
+    put(out, 184, volume.intercept().to_le_bytes());
+    put(out, 348, 1i32.to_le_bytes());
+    for (i, v) in rows_in_ras(volume).iter().enumerate() {
+        put(out, 400 + 8 * i, v.to_le_bytes());
+    }
+    put(out, 500, i32::from(units_field(volume)).to_le_bytes());
+}
+
+fn dim_field([nx, ny, nz, frames]: [usize; 4]) -> [usize; 8] {
+    [if frames > 1 { 4 } else { 3 }, nx, ny, nz, frames, 1, 1, 1]
+}
+
+fn pixdim_field(volume: &Volume) -> [f64; 8] {
+    let [x, y, z] = volume.spacing();
+    [1.0, x, y, z, volume.frame_seconds(), 0.0, 0.0, 0.0]
+}
+
+/// The length unit, and seconds.
+fn units_field(volume: &Volume) -> u8 {
+    8 + match volume.unit() {
+        LengthUnit::Unknown => 0,
+        LengthUnit::Metre => 1,
+        LengthUnit::Millimetre => 2,
+        LengthUnit::Micrometre => 3,
+    }
+}
+
+/// The upper three rows of the affine to RAS.
+fn rows_in_ras(volume: &Volume) -> [f64; 12] {
+    let a = volume.affine();
+    let sign = if volume.space() == Space::Lps { [-1.0, -1.0, 1.0] } else { [1.0; 3] };
+    let columns = [a.matrix3.x_axis, a.matrix3.y_axis, a.matrix3.z_axis, a.translation];
+    std::array::from_fn(|i| columns[i % 4][i / 4] * sign[i / 4])
+}

@@ -1,0 +1,219 @@
+//! Numbers as they stand in a file, turned into voxels.
+
+use super::FormatError;
+use crate::volume::{VolumeError, Voxels};
+
+/// Type of a stored number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scalar {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    U64,
+    I64,
+    F32,
+    F64,
+}
+
+/// Bytes a payload may have beyond what the header accounts for: writers pad the end of files.
+pub(super) const SLACK: usize = 512;
+
+/// Largest integer up to which every integer is an `f64`.
+const MAX_EXACT: u64 = 1 << 53;
+
+/// Where in which file the numbers stand, for messages.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    pub(super) format: &'static str,
+    pub(super) field: &'static str,
+}
+
+impl Scalar {
+    /// Bytes of one number.
+    pub(super) fn size(self) -> usize {
+        match self {
+            Scalar::U8 | Scalar::I8 => 1,
+            Scalar::U16 | Scalar::I16 => 2,
+            Scalar::U32 | Scalar::I32 | Scalar::F32 => 4,
+            Scalar::U64 | Scalar::I64 | Scalar::F64 => 8,
+        }
+    }
+}
+
+/// Bytes that `dims` numbers take.
+///
+/// # Errors
+/// A dimension of 0, or a size that cannot be addressed.
+pub(super) fn payload_size(place: Place, dims: [usize; 4], scalar: Scalar) -> Result<usize, FormatError> {
+    if dims.contains(&0) {
+        return Err(FormatError::invalid(
+            place.format,
+            place.field,
+            format!("{dims:?} has a 0; every size must be at least 1"),
+        ));
+    }
+    let bytes = dims.iter().fold(scalar.size() as u128, |product, &n| product.saturating_mul(n as u128));
+    if bytes <= isize::MAX as u128 {
+        return Ok(bytes as usize);
+    }
+    let needed = u64::try_from(bytes).unwrap_or(u64::MAX);
+    Err(FormatError::too_large(place.format, place.field, needed))
+}
+
+/// The part of `bytes` that holds the voxels.
+///
+/// # Errors
+/// Fewer bytes than `needed`, or more than [`SLACK`] beyond: then header and payload do not belong together.
+pub(super) fn exact(place: Place, bytes: &[u8], needed: usize) -> Result<&[u8], FormatError> {
+    let Some(payload) = bytes.get(..needed) else {
+        return Err(FormatError::truncated(place.format, place.field, needed, bytes.len()));
+    };
+    if bytes.len() - needed > SLACK {
+        let problem = format!("{} bytes of voxels, the header accounts for {needed}", bytes.len());
+        return Err(FormatError::invalid(place.format, place.field, problem));
+    }
+    Ok(payload)
+}
+
+/// The voxels in `bytes`, whose length is a multiple of the number's size. 64-bit integers become `f64`.
+///
+/// # Errors
+/// A 64-bit integer beyond ±2⁵³, which `f64` may not hold; too little memory.
+pub(super) fn decode(place: Place, bytes: &[u8], scalar: Scalar, big: bool) -> Result<Voxels, FormatError> {
+    Ok(match scalar {
+        Scalar::U8 => Voxels::U8(numbers(place, bytes, |[b]| b)?),
+        Scalar::I8 => Voxels::I8(numbers(place, bytes, i8::from_ne_bytes)?),
+        Scalar::U16 => {
+            Voxels::U16(numbers(place, bytes, if big { u16::from_be_bytes } else { u16::from_le_bytes })?)
+        }
+        Scalar::I16 => {
+            Voxels::I16(numbers(place, bytes, if big { i16::from_be_bytes } else { i16::from_le_bytes })?)
+        }
+        Scalar::U32 => {
+            Voxels::U32(numbers(place, bytes, if big { u32::from_be_bytes } else { u32::from_le_bytes })?)
+        }
+        Scalar::I32 => {
+            Voxels::I32(numbers(place, bytes, if big { i32::from_be_bytes } else { i32::from_le_bytes })?)
+        }
+        Scalar::F32 => {
+            Voxels::F32(numbers(place, bytes, if big { f32::from_be_bytes } else { f32::from_le_bytes })?)
+        }
+        Scalar::F64 => {
+            Voxels::F64(numbers(place, bytes, if big { f64::from_be_bytes } else { f64::from_le_bytes })?)
+        }
+        Scalar::U64 => {
+            let read = if big { u64::from_be_bytes } else { u64::from_le_bytes };
+            check_exact(place, bytes, |b| read(b))?;
+            Voxels::F64(numbers(place, bytes, |b| read(b) as f64)?)
+        }
+        Scalar::I64 => {
+            let read = if big { i64::from_be_bytes } else { i64::from_le_bytes };
+            check_exact(place, bytes, |b| read(b).unsigned_abs())?;
+            Voxels::F64(numbers(place, bytes, |b| read(b) as f64)?)
+        }
+    })
+}
+
+fn numbers<const N: usize, T>(
+    place: Place,
+    bytes: &[u8],
+    read: impl Fn([u8; N]) -> T,
+) -> Result<Vec<T>, FormatError> {
+    let (parts, _) = bytes.as_chunks::<N>();
+    let mut out = Vec::new();
+    let too_large = |_| FormatError::too_large(place.format, place.field, bytes.len() as u64);
+    out.try_reserve_exact(parts.len()).map_err(too_large)?;
+    out.extend(parts.iter().map(|&part| read(part)));
+    Ok(out)
+}
+
+fn check_exact(place: Place, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> Result<(), FormatError> {
+    match bytes.as_chunks().0.iter().map(|&b| size(b)).find(|&v| v > MAX_EXACT) {
+        None => Ok(()),
+        Some(v) => {
+            let problem = format!("a 64-bit voxel of size {v}; up to {MAX_EXACT} (2^53) is accepted");
+            Err(FormatError::invalid(place.format, place.field, problem))
+        }
+    }
+}
+
+/// `count` numbers written as text, set apart by blanks or commas; every type becomes `f64`, values are checked
+/// against what the stated type holds.
+///
+/// # Errors
+/// Too few or too many numbers, something that is none, a number that its type does not hold.
+pub(super) fn decode_text(
+    place: Place,
+    bytes: &[u8],
+    scalar: Scalar,
+    count: usize,
+) -> Result<Voxels, FormatError> {
+    // A number and the blank after it take two bytes at least: more could never be there.
+    if count > bytes.len() / 2 + 1 {
+        return Err(FormatError::truncated(place.format, place.field, count.saturating_mul(2), bytes.len()));
+    }
+    let mut out = Vec::new();
+    let too_large = |_| FormatError::too_large(place.format, place.field, count as u64 * 8);
+    out.try_reserve_exact(count).map_err(too_large)?;
+    let words = bytes.split(|&b| b.is_ascii_whitespace() || b == b',').filter(|word| !word.is_empty());
+    for word in words {
+        if out.len() == count {
+            return Err(FormatError::invalid(
+                place.format,
+                place.field,
+                format!("more than the {count} numbers the header accounts for"),
+            ));
+        }
+        out.push(text_number(place, word, scalar)?);
+    }
+    if out.len() == count {
+        return Ok(Voxels::F64(out));
+    }
+    Err(FormatError::invalid(
+        place.format,
+        place.field,
+        format!("{} numbers, the header accounts for {count}", out.len()),
+    ))
+}
+
+fn text_number(place: Place, word: &[u8], scalar: Scalar) -> Result<f64, FormatError> {
+    let text = String::from_utf8_lossy(word);
+    let value = text.parse::<f64>().ok().filter(|&v| holds(scalar, v));
+    value.ok_or_else(|| {
+        let shown: String = text.chars().take(20).collect();
+        FormatError::invalid(
+            place.format,
+            place.field,
+            format!("'{shown}' is not a number of type {scalar:?}"),
+        )
+    })
+}
+
+/// Whether a type can hold a value.
+fn holds(scalar: Scalar, v: f64) -> bool {
+    let within = |low: f64, high: f64| v >= low && v <= high && v == libm::trunc(v);
+    match scalar {
+        Scalar::U8 => within(0.0, 255.0),
+        Scalar::I8 => within(-128.0, 127.0),
+        Scalar::U16 => within(0.0, 65_535.0),
+        Scalar::I16 => within(-32_768.0, 32_767.0),
+        Scalar::U32 => within(0.0, f64::from(u32::MAX)),
+        Scalar::I32 => within(f64::from(i32::MIN), f64::from(i32::MAX)),
+        Scalar::U64 => within(0.0, MAX_EXACT as f64),
+        Scalar::I64 => within(-(MAX_EXACT as f64), MAX_EXACT as f64),
+        Scalar::F32 | Scalar::F64 => true,
+    }
+}
+
+/// A refusal by [`crate::volume::Volume`] as an error of the file that asked for it.
+pub(super) fn refused(format: &'static str, error: VolumeError) -> FormatError {
+    match error {
+        VolumeError::InvalidArgument { parameter, problem } => {
+            FormatError::invalid(format, parameter, problem)
+        }
+        VolumeError::TooLarge { bytes } => FormatError::too_large(format, "voxels", bytes),
+    }
+}
