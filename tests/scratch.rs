@@ -8,7 +8,7 @@ fn run(name: &str, volume: &vesicle::volume::Volume, options: DeformableOptions,
     let mut model = DeformableModel::new(volume, options).unwrap();
     println!("== {name}: start {} vertices chi {} delta {} crossings {}", model.mesh().vertex_count(), model.mesh().euler(), model.delta(), count_crossings(&model.mesh().to_triangles()));
     assert_eq!(model.mesh().check(), Ok(()));
-    let mut worst = 0; let mut withx = 0; let mut tsum=0.0;
+    let mut phase = String::new(); let mut worst = 0; let mut withx = 0; let mut tsum=0.0;
     for i in 0..max {
         let t = std::time::Instant::now();
         let r = model.step().unwrap();
@@ -16,7 +16,8 @@ fn run(name: &str, volume: &vesicle::volume::Volume, options: DeformableOptions,
         assert_eq!(model.mesh().check(), Ok(()));
         let x = if each == 0 { 0 } else { count_crossings(&model.mesh().to_triangles()) };
         worst = worst.max(x); if x>0 {withx+=1}
-        if (each>0 && i % each == 0) || r.done { println!("{:4} {} v {} comp {} chi {} e {:.2e} x {} {:?}", r.iteration, r.phase, r.vertices, r.components, r.euler, r.residual, x, r.events); }
+        if r.done || r.phase != phase { println!("{:4} {} v {} comp {} chi {} e {:.2e} x {}", r.iteration, r.phase, r.vertices, r.components, r.euler, r.residual, x); }
+        phase = r.phase.clone();
         if r.done { break }
     }
     println!("steps {:.2}s all {:.2}s worst crossings {worst} in {withx} iterations", tsum, t.elapsed().as_secs_f64());
@@ -36,7 +37,7 @@ fn chain() {
 fn menger() {
     let v = scenes::menger(2);
     let p = DeformableParams { iso: 0.4, rigidity: 0.05, stiffness: 0.001, ..DeformableParams::for_volume(&v) };
-    run("menger2", &v, DeformableOptions { levels: 3, params: Some(p.clone()), ..Default::default() }, 600, 10);
+    run("menger2", &v, DeformableOptions { levels: 3, params: Some(p.clone()), ..Default::default() }, 1500, 1);
     let v = scenes::menger(3);
-    run("menger3", &v, DeformableOptions { levels: 3, params: Some(p), ..Default::default() }, 600, 10);
+    run("menger3", &v, DeformableOptions { levels: 3, params: Some(p), ..Default::default() }, 1500, 1);
 }

@@ -54,17 +54,14 @@ impl Grid {
         cell.blend(|index| self.values[index])
     }
 
-    /// Like [`sample`](Self::sample), but `outside` where `p` is not in the box [-1/2, n-1/2] that the voxels fill.
+    /// Trilinear value at `p` as if the grid went on with voxels of value 0 on all sides.
+    ///
+    /// Continuous, unlike a cut at the border: a surface that looks for a value there comes to rest.
     #[inline]
-    pub fn sample_zero(&self, p: Vec3, outside: f32) -> f32 {
-        if self.contains(p) { self.sample(p) } else { outside }
-    }
-
-    /// Whether `p` lies in the box that the voxels fill, half a voxel beyond the outermost centres.
-    #[inline]
-    pub fn contains(&self, p: Vec3) -> bool {
-        let inside = |x: f32, n: usize| x >= -0.5 && x <= n as f32 - 0.5;
-        inside(p.x, self.dims[0]) && inside(p.y, self.dims[1]) && inside(p.z, self.dims[2])
+    pub fn sample_padded(&self, p: Vec3) -> f32 {
+        let last = |n: usize| (n - 1) as f32;
+        let share = inside(p.x, last(self.dims[0])) * inside(p.y, last(self.dims[1])) * inside(p.z, last(self.dims[2]));
+        if share > 0.0 { share * self.sample(p) } else { 0.0 }
     }
 
     /// Sobel gradient in intensity per voxel: differences over two voxels, smoothed by [1 2 1] across, divided by
@@ -146,5 +143,18 @@ fn push_gradients(columns: &[Columns], out: &mut Vec<Vec3>) {
             before.along_z + 2.0 * here.along_z + after.along_z,
         );
         out.push(gradient * (1.0 / 32.0));
+    }
+}
+
+/// 1 between the outermost voxel centres, falling to 0 one voxel beyond.
+#[inline]
+fn inside(x: f32, last: f32) -> f32 {
+    let beyond = if x < 0.0 { -x } else { x - last };
+    if beyond <= 0.0 {
+        1.0
+    } else if beyond < 1.0 {
+        1.0 - beyond
+    } else {
+        0.0
     }
 }
