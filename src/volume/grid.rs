@@ -60,7 +60,9 @@ impl Grid {
     #[inline]
     pub fn sample_padded(&self, p: Vec3) -> f32 {
         let last = |n: usize| (n - 1) as f32;
-        let share = inside(p.x, last(self.dims[0])) * inside(p.y, last(self.dims[1])) * inside(p.z, last(self.dims[2]));
+        let share = inside(p.x, last(self.dims[0]))
+            * inside(p.y, last(self.dims[1]))
+            * inside(p.z, last(self.dims[2]));
         if share > 0.0 { share * self.sample(p) } else { 0.0 }
     }
 
