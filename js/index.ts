@@ -9,8 +9,19 @@
 import { call } from './runtime.js';
 import { version as rawVersion } from './vesicle.js';
 
+export {
+  type Attractor,
+  DeformableModel,
+  type DeformableOptions,
+  type DeformableParams,
+  type DeformableStart,
+} from './deformable.js';
 export { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
+export { Mesh, type MeshArrays, type MeshFormat, type MeshHit, type MeshInfo, type MeshReport } from './mesh.js';
+export { type ParamSpec, paramSpecs } from './params.js';
 export { type InitInput, init as default, initSync } from './runtime.js';
+export type { RunOptions, Stepper, StepReport } from './stepper.js';
+export { type Space, type Vec3, Volume, type VolumeInit, type VoxelArray } from './volume.js';
 
 /** The version of the library, as in its package. */
 export function version(): string {

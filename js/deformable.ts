@@ -1,0 +1,245 @@
+import { finite, invalid, list, number, options, positive, typed, vec3, whole } from './check.js';
+import { Mesh, meshHandle, wrapMesh } from './mesh.js';
+import { Handle } from './runtime.js';
+import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
+import { RawDeformable, RawStart } from './vesicle.js';
+import { type Vec3, type Volume, volumeHandle } from './volume.js';
+
+/** Parameters of the deformable model; `paramSpecs('deformable')` has ranges, defaults and a sentence on each. */
+export interface DeformableParams {
+  /** Intensity of the surface, πI, in intensity units of the volume; default the middle of its range. */
+  iso?: number;
+  /** Strength of the iso force, αI; negative where the object is brighter than iso. */
+  isoForce?: number;
+  /** Strength of the gradient force along the normal, αg. */
+  gradientNormal?: number;
+  /** Strength of the gradient force along the tangent plane, βg. */
+  gradientTangent?: number;
+  /** Longest gradient that counts. */
+  gradientBound?: number;
+  /** Resistance against bending, αc. */
+  rigidity?: number;
+  /** Resistance against stretching, αe. */
+  stiffness?: number;
+  /** Length at which edges rest: no length, the mean length, or a length in world units. */
+  restLength?: 'zero' | 'mean' | number;
+  /** Mass of a vertex, m. */
+  mass?: number;
+  /** Friction, γ. */
+  damping?: number;
+  /** How the motion is integrated. */
+  integrator?: 'euler' | 'runge-kutta';
+  /** Time of one iteration, Δt. */
+  timeStep?: number;
+  /** Fraction of δ a vertex may move in one iteration. */
+  maxMove?: number;
+  /** Kinetic energy below which a level has converged, ε. */
+  energyTolerance?: number;
+  /** Whether the surface may split and join. */
+  topology?: 'adaptive' | 'fixed';
+}
+
+/** A place that pulls the surface within `radius`. */
+export interface Attractor {
+  /** World position. */
+  point: Vec3;
+  /** Spring constant. */
+  strength: number;
+  /** Reach, world units. */
+  radius: number;
+}
+
+/**
+ * The first surface: around the whole volume; n by n by n bubbles; spheres at packed world points; the iso-surface
+ * at an intensity; or a closed mesh that does not cross itself, in world space (which is copied).
+ */
+export type DeformableStart =
+  | 'enclosing'
+  | { bubbles: number }
+  | { seeds: Float32Array; radius: number }
+  | { marchingCubes: number }
+  | Mesh;
+
+/** What a {@link DeformableModel} is made of. */
+export interface DeformableOptions {
+  /** The image; it may be freed once the model is made. */
+  volume: Volume;
+  /** Of a 4D volume; default 0. */
+  frame?: number;
+  /** Default 'enclosing'. */
+  start?: DeformableStart;
+  /** Pyramid levels above the volume itself; 0 (the default) = direct. */
+  levels?: number;
+  /** Target edge at the finest level, world units; default from the voxel size. */
+  edge?: number;
+  /** Any of them; the others have their defaults. */
+  params?: DeformableParams;
+}
+
+const OPTIONS = ['volume', 'frame', 'start', 'levels', 'edge', 'params'];
+
+/**
+ * A deformable model: a closed surface that moves onto the object in a volume under forces of the image and of its
+ * own, and splits and joins on the way, coarse to fine.
+ *
+ * After Lachaud and Montanvert, "Deformable meshes with automated topology changes for coarse-to-fine 3D surface
+ * extraction". The surface is in the volume's world space.
+ *
+ * @throws All methods: {@link VesicleError} `freed` after {@link DeformableModel.free}.
+ */
+export class DeformableModel implements Stepper {
+  readonly #handle: Handle<RawDeformable>;
+  readonly #meshHandle: Handle<import('./vesicle.js').RawMesh>;
+  readonly #mesh: Mesh;
+  readonly #runner = new Runner();
+
+  /**
+   * A model at its start shape, ready to step.
+   *
+   * @throws {@link VesicleError} `invalid-argument` naming the option or parameter; `not-closed` or
+   *   `self-intersecting` for a start mesh that is; `too-large`.
+   */
+  constructor(given: DeformableOptions) {
+    const { volume, frame = 0, start = 'enclosing', levels = 0, edge, params = {} } = checked(given);
+    const image = volumeHandle('volume', volume as Volume);
+    this.#handle = new Handle('DeformableModel', () =>
+      image.use((raw) => new RawDeformable(raw, frame, rawStart(start), levels, edge, params)),
+    );
+    this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
+    this.#mesh = wrapMesh(this.#meshHandle, true);
+  }
+
+  /** The surface: the same live object from start to end, in world space. It goes when the model is freed. */
+  get mesh(): Mesh {
+    return this.#mesh;
+  }
+
+  /** Pyramid level now; 0 = the volume itself. */
+  get level(): number {
+    return this.#handle.use((raw) => raw.level());
+  }
+
+  /** The sampling distance δ now, world units: edges are between δ and 2.5 δ. */
+  get delta(): number {
+    return this.#handle.use((raw) => raw.delta());
+  }
+
+  /** All parameters as they are now; a copy. */
+  get params(): Required<DeformableParams> {
+    return this.#handle.use((raw) => raw.params() as Required<DeformableParams>);
+  }
+
+  /**
+   * Attachment points the user places, in place of those before.
+   *
+   * @throws {@link VesicleError} `invalid-argument` naming the entry.
+   */
+  setAttractors(attractors: Attractor[]): void {
+    const packed = list('attractors', attractors).flatMap((attractor, index) => numbersOf(attractor, index));
+    this.#handle.use((raw) => raw.setAttractors(Float64Array.from(packed)));
+  }
+
+  /**
+   * So many iterations at once, synchronous and deterministic; fewer where the end comes first.
+   *
+   * @returns The report of the last one, with the events of all.
+   * @throws {@link VesicleError} `invalid-argument` while a {@link DeformableModel.run} is under way.
+   */
+  step(iterations = 1): StepReport {
+    whole('iterations', iterations, { min: 1 });
+    this.#runner.refuseWhileRunning('step');
+    return this.#step(iterations);
+  }
+
+  /**
+   * To the end, yielding to the event loop between slices. Parameters and attractors may be changed meanwhile.
+   *
+   * @returns The last report.
+   * @throws `signal.reason` when aborted, and the model stays usable; what `onStep` throws;
+   *   {@link VesicleError} `invalid-argument` while another run is under way, `freed` when the model is freed meanwhile.
+   */
+  run(given?: RunOptions): Promise<StepReport> {
+    return this.#runner.run(() => this.#step(1), given);
+  }
+
+  #step(iterations: number): StepReport {
+    return this.#handle.use((raw) => raw.step(iterations) as StepReport);
+  }
+
+  /**
+   * Live parameters: any subset, validated as a whole before any of it is taken.
+   *
+   * @throws {@link VesicleError} `invalid-argument` naming the parameter that is misspelled, of the wrong type or out
+   *   of range; nothing has changed then.
+   */
+  setParams(params: DeformableParams): void {
+    object('params', params);
+    this.#handle.use((raw) => raw.setParams(params));
+  }
+
+  /** The whole state, for {@link DeformableModel.restore} of a model made with the same volume and options. */
+  save(): Uint8Array {
+    return this.#handle.use((raw) => raw.save());
+  }
+
+  /**
+   * Back to a saved state, bit for bit.
+   *
+   * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a model, which then stays as it was;
+   *   `invalid-argument` while a run is under way.
+   */
+  restore(state: Uint8Array): void {
+    typed('state', state, Uint8Array);
+    this.#runner.refuseWhileRunning('restore');
+    this.#handle.use((raw) => raw.restore(state));
+  }
+
+  /** Gives the memory back; the model and its live mesh cannot be used afterwards. */
+  free(): void {
+    this.#meshHandle.free();
+    this.#handle.free();
+  }
+
+  /** The same as {@link DeformableModel.free}, for `using`. */
+  [Symbol.dispose](): void {
+    this.free();
+  }
+}
+
+function checked(given: DeformableOptions): Partial<DeformableOptions> {
+  const known = options('options', given, OPTIONS);
+  const { frame, levels, edge, params } = known;
+  if (frame !== undefined) whole('frame', frame);
+  if (levels !== undefined) whole('levels', levels);
+  if (edge !== undefined) positive('edge', edge);
+  if (params !== undefined) object('params', params);
+  return known;
+}
+
+function object(parameter: string, value: unknown): void {
+  if (value === null || typeof value !== 'object') throw invalid(parameter, 'an object is needed');
+}
+
+// Made last, when nothing else can fail: whoever takes it frees it.
+function rawStart(start: DeformableStart): RawStart {
+  if (start === 'enclosing') return RawStart.enclosing();
+  if (start instanceof Mesh) return meshHandle('start', start).use((raw) => RawStart.mesh(raw));
+  if (start === null || typeof start !== 'object') throw unknownStart();
+  if ('bubbles' in start) return RawStart.bubbles(whole('bubbles', start.bubbles, { min: 1 }));
+  if ('marchingCubes' in start) return RawStart.marchingCubes(number('marchingCubes', start.marchingCubes));
+  if ('seeds' in start) return RawStart.seeds(finite('seeds', start.seeds, 3), positive('radius', start.radius));
+  throw unknownStart();
+}
+
+function unknownStart(): Error {
+  return invalid('start', "one of 'enclosing', { bubbles }, { seeds, radius }, { marchingCubes } or a Mesh is needed");
+}
+
+function numbersOf(attractor: Attractor, index: number): number[] {
+  const { point, strength, radius } = options(`attractors[${index}]`, attractor, ['point', 'strength', 'radius']);
+  return [
+    ...vec3(`attractors[${index}].point`, point),
+    number(`attractors[${index}].strength`, strength),
+    positive(`attractors[${index}].radius`, radius),
+  ];
+}

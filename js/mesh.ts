@@ -1,0 +1,322 @@
+import { choice, finite, invalid, number, options, positive, typed, vec3, whole } from './check.js';
+import { Handle } from './runtime.js';
+import { type RawArrays, RawMesh } from './vesicle.js';
+import { type Vec3, type Volume, volumeHandle } from './volume.js';
+
+/** A mesh's vertices and triangles, packed. */
+export interface MeshArrays {
+  /** xyz of each vertex. */
+  positions: Float32Array;
+  /** Unit normal of each vertex, outwards. */
+  normals: Float32Array;
+  /** abc of each triangle, counter-clockwise seen from outside. */
+  indices: Uint32Array;
+  /** Texture coordinates of each vertex, where the mesh has them. */
+  uvs?: Float32Array;
+  /** Colour of each vertex, rgb, 0..1, where the mesh has them. */
+  colors?: Float32Array;
+}
+
+/** Measures of a mesh. Those of the enclosed solid mean something for a closed mesh only. */
+export interface MeshInfo {
+  vertices: number;
+  triangles: number;
+  components: number;
+  /** Vertices - edges + triangles. */
+  euler: number;
+  /** Sum over components; closed orientable, so euler = 2 * components - 2 * genus. */
+  genus: number;
+  /** World units squared. */
+  area: number;
+  /** World units cubed. */
+  volume: number;
+  /** Of the enclosed solid. */
+  centroid: Vec3;
+  /** Second moments about the centroid of the enclosed solid, row-major 3x3. */
+  inertia: number[];
+  /** Lengths, world units. */
+  edge: { min: number; mean: number; max: number };
+  /** The sharpest corner of all triangles. */
+  minAngleDegrees: number;
+  bounds: { min: Vec3; max: Vec3 };
+}
+
+/** What an independent look at the mesh finds; a healthy one is closed, oriented and has all counts at 0. */
+export interface MeshReport {
+  /** Every edge has two triangles. */
+  closed: boolean;
+  /** Neighbouring triangles turn the same way. */
+  oriented: boolean;
+  /** Edges with more than two triangles. */
+  nonManifoldEdges: number;
+  /** Vertices whose triangles form more than one fan. */
+  nonManifoldVertices: number;
+  /** Triangles without area. */
+  degenerateTriangles: number;
+  /** Pairs of triangles that cross, counted exactly. */
+  selfIntersections: number;
+}
+
+/** File formats a mesh can be written in. */
+export type MeshFormat = 'glb' | 'ply' | 'stl' | 'obj' | 'vtp' | 'mz3';
+
+/** Where a ray meets a mesh. */
+export interface MeshHit {
+  /** Index of the triangle in {@link MeshArrays.indices}. */
+  triangle: number;
+  /** Weights of the triangle's corners; they sum to 1. */
+  barycentric: Vec3;
+  /** The point itself. */
+  point: Vec3;
+  /** From the ray's origin, world units. */
+  distance: number;
+}
+
+const FORMATS: readonly MeshFormat[] = ['glb', 'ply', 'stl', 'obj', 'vtp', 'mz3'];
+
+/** The handle of a mesh; for the library's own modules. */
+export let meshHandle: (parameter: string, mesh: Mesh) => Handle<RawMesh>;
+/** A mesh of a raw one. A live one belongs to its model, which frees it. For the library's own modules. */
+export let wrapMesh: (handle: Handle<RawMesh>, live?: boolean) => Mesh;
+
+/**
+ * A triangle mesh.
+ *
+ * Files and arrays may hold an open mesh, or one that crosses itself; {@link Mesh.check} says so, and what needs a
+ * closed one refuses it with `not-closed`. The mesh of a model follows the model; it can be read and copied but not
+ * edited.
+ *
+ * @throws All methods: {@link VesicleError} `freed` after {@link Mesh.free}.
+ */
+export class Mesh {
+  readonly #handle: Handle<RawMesh>;
+  readonly #live: boolean;
+
+  static {
+    wrapMesh = (handle, live = false) => new Mesh(handle, live);
+    meshHandle = (parameter, mesh) => {
+      if (mesh instanceof Mesh) return mesh.#handle;
+      throw invalid(parameter, 'a Mesh is needed');
+    };
+  }
+
+  private constructor(handle: Handle<RawMesh>, live: boolean) {
+    if (!(handle instanceof Handle)) {
+      throw invalid('Mesh', 'made by icosphere, fromArrays, parse or marchingCubes, not by `new`');
+    }
+    this.#handle = handle;
+    this.#live = live;
+  }
+
+  /**
+   * A sphere of nearly equal triangles with no edge longer than `maxEdge`.
+   *
+   * @throws {@link VesicleError} `invalid-argument`; `too-large` for more triangles than there is memory for.
+   */
+  static icosphere(center: Vec3, radius: number, maxEdge: number): Mesh {
+    const middle = vec3('center', center);
+    positive('radius', radius);
+    positive('maxEdge', maxEdge);
+    return made(() => RawMesh.icosphere(middle, radius, maxEdge));
+  }
+
+  /**
+   * A mesh of packed arrays, which are copied as they are.
+   *
+   * @param positions - xyz of each vertex.
+   * @param indices - abc of each triangle, counter-clockwise seen from outside.
+   * @param extra - `uvs`: texture coordinates of each vertex.
+   * @throws {@link VesicleError} `invalid-argument`: a wrong length, a number that is not finite, an index of no vertex.
+   */
+  static fromArrays(positions: Float32Array, indices: Uint32Array, extra: { uvs?: Float32Array } = {}): Mesh {
+    const { uvs } = options('extra', extra, ['uvs']);
+    const vertices = finite('positions', positions, 3).length / 3;
+    checkIndices(typed('indices', indices, Uint32Array, 3), vertices);
+    if (uvs !== undefined && finite('uvs', uvs, 2).length !== 2 * vertices) {
+      throw invalid('uvs', `length ${uvs.length}; two numbers a vertex are needed, ${2 * vertices}`);
+    }
+    return made(() => RawMesh.fromArrays(positions, indices, uvs));
+  }
+
+  /**
+   * The mesh in a file: glb, ply, stl or obj, detected from the bytes. Duplicate positions are welded.
+   *
+   * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`.
+   */
+  static parse(bytes: Uint8Array): Mesh {
+    typed('bytes', bytes, Uint8Array);
+    return made(() => RawMesh.parse(bytes));
+  }
+
+  /**
+   * Iso-surface of a volume in its world space, closed at the volume's border; topologically consistent. Inside is
+   * where the intensity is at least `iso`.
+   *
+   * @param options - `frame`: which one of a 4D volume; default 0.
+   * @throws {@link VesicleError} `invalid-argument`: no such frame; `too-large`.
+   */
+  static marchingCubes(volume: Volume, iso: number, options_: { frame?: number } = {}): Mesh {
+    const { frame = 0 } = options('options', options_, ['frame']);
+    number('iso', iso);
+    whole('frame', frame);
+    const handle = volumeHandle('volume', volume);
+    return handle.use((raw) => made(() => RawMesh.marchingCubes(raw, iso, frame)));
+  }
+
+  /** Number of vertices. */
+  get vertexCount(): number {
+    return this.#handle.use((raw) => raw.vertexCount());
+  }
+
+  /** Number of triangles. */
+  get triangleCount(): number {
+    return this.#handle.use((raw) => raw.triangleCount());
+  }
+
+  /** Counts up when connectivity changes. */
+  get topologyVersion(): number {
+    return this.#handle.use((raw) => raw.topologyVersion());
+  }
+
+  /** Counts up when any vertex moves. */
+  get geometryVersion(): number {
+    return this.#handle.use((raw) => raw.geometryVersion());
+  }
+
+  /** The mesh as it is now, in arrays of the caller's own. */
+  arrays(): MeshArrays {
+    const arrays = { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() };
+    this.copyTo(arrays);
+    return arrays;
+  }
+
+  /**
+   * Into the caller's buffers, which are replaced only when too small; returns the counts written. `uvs` and `colors`
+   * are set where the mesh has them, and deleted where it has none.
+   */
+  copyTo(out: MeshArrays): { vertices: number; triangles: number } {
+    const arrays = this.#handle.use((raw) => raw.arrays());
+    try {
+      return copyArrays(arrays, out);
+    } finally {
+      arrays.free();
+    }
+  }
+
+  /** Measures of the mesh. */
+  info(): MeshInfo {
+    return this.#handle.use((raw) => raw.info() as MeshInfo);
+  }
+
+  /** An independent look at the mesh, from its arrays alone. */
+  check(): MeshReport {
+    return this.#handle.use((raw) => raw.check() as MeshReport);
+  }
+
+  /** The connected parts, each as a mesh of its own. */
+  components(): Mesh[] {
+    return this.#handle.use((raw) => raw.components()).map((part) => made(() => part));
+  }
+
+  /**
+   * One sqrt(3) refinement pass: three triangles for each.
+   *
+   * @throws {@link VesicleError} `not-closed`; `invalid-argument` for the mesh of a model: `clone()` it first;
+   *   `too-large`.
+   */
+  refine(): void {
+    this.#handle.use((raw) => raw.refine());
+  }
+
+  /**
+   * The nearest place where a ray meets the surface, from either side, or nothing.
+   *
+   * @param direction - Any length but 0.
+   * @throws {@link VesicleError} `invalid-argument`.
+   */
+  pick(origin: Vec3, direction: Vec3): MeshHit | undefined {
+    const start = vec3('origin', origin);
+    const ray = nonZero('direction', vec3('direction', direction));
+    return this.#handle.use((raw) => raw.pick(start, ray) as MeshHit | undefined);
+  }
+
+  /**
+   * Line segments where a plane cuts the surface: pairs of points, six numbers a segment.
+   *
+   * @param normal - Any length but 0.
+   * @throws {@link VesicleError} `invalid-argument`.
+   */
+  crossSection(origin: Vec3, normal: Vec3): Float32Array {
+    const point = vec3('origin', origin);
+    const across = nonZero('normal', vec3('normal', normal));
+    return this.#handle.use((raw) => raw.crossSection(point, across));
+  }
+
+  /**
+   * The mesh as the bytes of a file: glb (binary glTF), ply and stl (binary), obj, vtp or mz3.
+   *
+   * @throws {@link VesicleError} `invalid-argument`: no such format.
+   */
+  toBytes(format: MeshFormat): Uint8Array {
+    choice('format', format, FORMATS);
+    return this.#handle.use((raw) => raw.toBytes(format));
+  }
+
+  /** A copy that nothing else changes; of a model's mesh, the surface as it is now. */
+  clone(): Mesh {
+    return this.#handle.use((raw) => made(() => raw.clone()));
+  }
+
+  /**
+   * Gives the memory back; the mesh cannot be used afterwards. A model's mesh belongs to the model and goes with it:
+   * freeing it alone does nothing.
+   */
+  free(): void {
+    if (!this.#live) this.#handle.free();
+  }
+
+  /** The same as {@link Mesh.free}, for `using`. */
+  [Symbol.dispose](): void {
+    this.free();
+  }
+}
+
+function made(make: () => RawMesh): Mesh {
+  return wrapMesh(new Handle('Mesh', make));
+}
+
+function checkIndices(indices: Uint32Array, vertices: number): void {
+  const wrong = indices.findIndex((index) => index >= vertices);
+  if (wrong < 0) return;
+  throw invalid('indices', `${indices[wrong]} at index ${wrong}; there are ${vertices} vertices`);
+}
+
+function nonZero(parameter: string, vector: Float64Array<ArrayBuffer>): Float64Array<ArrayBuffer> {
+  if (vector.some((entry) => entry !== 0)) return vector;
+  throw invalid(parameter, 'has no length');
+}
+
+function copyArrays(from: RawArrays, out: MeshArrays): { vertices: number; triangles: number } {
+  const vertices = from.vertices();
+  const triangles = from.triangles();
+  out.positions = roomFor(out.positions, 3 * vertices, Float32Array);
+  out.normals = roomFor(out.normals, 3 * vertices, Float32Array);
+  out.indices = roomFor(out.indices, 3 * triangles, Uint32Array);
+  from.positions(out.positions);
+  from.normals(out.normals);
+  from.indices(out.indices);
+  copyExtra(out, 'uvs', from.uvs());
+  copyExtra(out, 'colors', from.colors());
+  return { vertices, triangles };
+}
+
+function roomFor<T extends Float32Array | Uint32Array>(array: T, length: number, kind: new (length: number) => T): T {
+  return array instanceof kind && array.length >= length ? array : new kind(length);
+}
+
+function copyExtra(out: MeshArrays, name: 'uvs' | 'colors', values: Float32Array | undefined): void {
+  const room = out[name];
+  if (!values) delete out[name];
+  else if (room && room.length >= values.length) room.set(values);
+  else out[name] = values;
+}

@@ -1,0 +1,36 @@
+import { choice } from './check.js';
+import { call } from './runtime.js';
+import { deformableParamSpecs } from './vesicle.js';
+
+/** One parameter of a method, described so that a page can build a control for it. */
+export interface ParamSpec {
+  /** As in the method's parameters. */
+  name: string;
+  /** A few words for a label. */
+  label: string;
+  /** One sentence a student understands. */
+  help: string;
+  /** As in the paper: 'αc', 'πI', 'δ', 'τ'. */
+  symbol?: string;
+  type: 'number' | 'integer' | 'boolean' | 'choice';
+  default: unknown;
+  min?: number;
+  max?: number;
+  /** Of a slider. */
+  step?: number;
+  /** Of a slider. */
+  scale?: 'linear' | 'log';
+  unit?: string;
+  /** For type 'choice'. */
+  choices?: string[];
+}
+
+/**
+ * The parameters of a method, in the order they are best shown.
+ *
+ * @throws {@link VesicleError} `invalid-argument`: no such method.
+ */
+export function paramSpecs(method: 'deformable'): ParamSpec[] {
+  choice('method', method, ['deformable']);
+  return call(() => deformableParamSpecs() as ParamSpec[]);
+}

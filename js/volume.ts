@@ -1,0 +1,258 @@
+import { choice, invalid, list, number, numbers, options, positive, typed, vec3, whole } from './check.js';
+import { Handle } from './runtime.js';
+import { RawFrames, RawVolume } from './vesicle.js';
+
+/** Three numbers: a point, a direction, or one number for each of x, y and z. */
+export type Vec3 = [number, number, number];
+
+/** The array types voxels can come in. They are kept as the type they have. */
+export type VoxelArray =
+  | Uint8Array
+  | Int8Array
+  | Uint16Array
+  | Int16Array
+  | Uint32Array
+  | Int32Array
+  | Float32Array
+  | Float64Array;
+
+/** The direction of the world axes: right-anterior-superior, or left-posterior-superior. */
+export type Space = 'RAS' | 'LPS';
+
+/** What a {@link Volume} is made of. */
+export interface VolumeInit {
+  /** One number a voxel: x fastest, then y, z, t. Copied once. */
+  data: VoxelArray;
+  /** Voxels along x, y, z, and the number of frames where there are several. */
+  dims: Vec3 | [number, number, number, number];
+  /** 16 numbers, column-major, voxel index to world. Left out, `spacing` and `origin` say it. */
+  affine?: ArrayLike<number>;
+  /** Voxel size, world units; 1 where left out. Not together with `affine`. */
+  spacing?: Vec3;
+  /** World position of the centre of the first voxel; 0 where left out. Not together with `affine`. */
+  origin?: Vec3;
+  /** Intensity = stored value * slope + intercept. Default 1; not 0. */
+  slope?: number;
+  /** See `slope`. Default 0. */
+  intercept?: number;
+  /** Seconds from one frame to the next; 4D only. */
+  frameSeconds?: number;
+  /** Of the world axes. Default RAS; meshes come back in the same space. */
+  space?: Space;
+}
+
+const INIT = ['data', 'dims', 'affine', 'spacing', 'origin', 'slope', 'intercept', 'frameSeconds', 'space'];
+const ELEMENTS = [
+  ...[Uint8Array, Int8Array, Uint16Array, Int16Array],
+  ...[Uint32Array, Int32Array, Float32Array, Float64Array],
+];
+
+/** The handle of a volume; for the library's own modules. */
+export let volumeHandle: (parameter: string, volume: Volume) => Handle<RawVolume>;
+
+/**
+ * A regular grid of intensities, with one or several frames, and its place in the world.
+ *
+ * @throws All methods: {@link VesicleError} `freed` after {@link Volume.free}.
+ */
+export class Volume {
+  readonly #handle: Handle<RawVolume>;
+
+  static {
+    volumeHandle = (parameter, volume) => {
+      if (volume instanceof Volume) return volume.#handle;
+      throw invalid(parameter, 'a Volume is needed');
+    };
+  }
+
+  /**
+   * A volume of voxels in memory.
+   *
+   * @throws {@link VesicleError} `invalid-argument` naming the property that is missing, misspelled, of the wrong
+   *   length or not finite; `too-large` where there is no memory for the voxels.
+   */
+  constructor(init: VolumeInit) {
+    const made: unknown = init;
+    this.#handle = made instanceof Handle ? made : new Handle('Volume', () => fromInit(init));
+  }
+
+  /**
+   * The volume in a file: NIfTI-1 or 2 (`.nii`, `.nii.gz`), NRRD (`.nrrd`, or `.nhdr` and data) or MetaImage
+   * (`.mha`, or `.mhd` and data), detected from the bytes. gzip is handled.
+   *
+   * @param options - `data`: the payload that belongs to a detached header.
+   * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`.
+   */
+  static parse(bytes: Uint8Array, options_: { data?: Uint8Array } = {}): Volume {
+    const { data } = options('options', options_, ['data']);
+    typed('bytes', bytes, Uint8Array);
+    if (data !== undefined) typed('data', data, Uint8Array);
+    return wrap(() => RawVolume.parse(bytes, data));
+  }
+
+  /**
+   * 3D volumes of one grid, in order, as the frames of a 4D one.
+   *
+   * @throws {@link VesicleError} `invalid-argument` where the grids differ, or there is none.
+   */
+  static fromFrames(frames: Volume[], options_: { frameSeconds?: number } = {}): Volume {
+    const { frameSeconds } = options('options', options_, ['frameSeconds']);
+    if (frameSeconds !== undefined) positive('frameSeconds', frameSeconds);
+    const handles = list('frames', frames).map((frame, index) => volumeHandle(`frames[${index}]`, frame));
+    return wrap(() => {
+      const collected = new RawFrames();
+      for (const handle of handles) handle.use((raw) => collected.push(raw));
+      return collected.join(frameSeconds);
+    });
+  }
+
+  /** The volume as the bytes of a NIfTI-1 file. */
+  toNifti(): Uint8Array {
+    return this.#handle.use((raw) => raw.toNifti());
+  }
+
+  /** Voxels along x, y and z. */
+  get dims(): Vec3 {
+    return this.#handle.use((raw) => triple(raw.dims()));
+  }
+
+  /** Number of frames; 1 for a 3D volume. */
+  get frames(): number {
+    return this.#handle.use((raw) => raw.frames());
+  }
+
+  /** Voxel size along x, y and z, world units. */
+  get spacing(): Vec3 {
+    return this.#handle.use((raw) => triple(raw.spacing()));
+  }
+
+  /** Voxel index to world: 16 numbers, column-major. */
+  get affine(): Float64Array {
+    return this.#handle.use((raw) => raw.affine());
+  }
+
+  /** Direction of the world axes. */
+  get space(): Space {
+    return this.#handle.use((raw) => raw.space() as Space);
+  }
+
+  /** Smallest and largest intensity, after slope and intercept. */
+  get range(): [number, number] {
+    const [low, high] = this.#handle.use((raw) => raw.range()) as unknown as [number, number];
+    return [low, high];
+  }
+
+  /**
+   * Number of voxels in each of `bins` equal parts of {@link Volume.range}, of one frame.
+   *
+   * @throws {@link VesicleError} `invalid-argument`: no bins, or no such frame.
+   */
+  histogram(bins: number, frame = 0): Uint32Array {
+    whole('bins', bins, { min: 1 });
+    whole('frame', frame);
+    return this.#handle.use((raw) => raw.histogram(bins, frame));
+  }
+
+  /**
+   * Trilinear intensity at a world point; outside the volume the border is replicated.
+   *
+   * @throws {@link VesicleError} `invalid-argument`: no such frame, or a point that is not finite.
+   */
+  sample(world: Vec3, frame = 0): number {
+    const point = vec3('world', world);
+    whole('frame', frame);
+    return this.#handle.use((raw) => raw.sample(point, frame));
+  }
+
+  /**
+   * Intensities of one slice, row-major: for axis 0 (sagittal) rows of y, for 1 and 2 rows of x.
+   *
+   * @throws {@link VesicleError} `invalid-argument`: no such axis, slice or frame.
+   */
+  slice(axis: 0 | 1 | 2, index: number, frame = 0): Float32Array {
+    whole('axis', axis, { max: 2 });
+    whole('index', index);
+    whole('frame', frame);
+    return this.#handle.use((raw) => raw.slice(axis, index, frame));
+  }
+
+  /**
+   * All intensities of one frame, x fastest, for upload as a 3D texture.
+   *
+   * @throws {@link VesicleError} `invalid-argument`: no such frame; `too-large`.
+   */
+  intensities(frame = 0): Float32Array {
+    whole('frame', frame);
+    return this.#handle.use((raw) => raw.intensities(frame));
+  }
+
+  /**
+   * One volume a level, each smaller than the one before by `factor` along each axis; [0] = this one.
+   *
+   * @param levels - How many, this volume included.
+   * @param options - `factor`: above 1, at most 2; default the square root of 3.
+   * @throws {@link VesicleError} `invalid-argument`: factor out of range, or more levels than the size allows.
+   */
+  pyramid(levels: number, options_: { factor?: number } = {}): Volume[] {
+    const { factor = Math.sqrt(3) } = options('options', options_, ['factor']);
+    whole('levels', levels, { min: 1 });
+    number('factor', factor);
+    return this.#handle.use((raw) => raw.pyramid(levels, factor)).map((level) => wrap(() => level));
+  }
+
+  /** Gives the memory back; the volume cannot be used afterwards. What was made from it stays. */
+  free(): void {
+    this.#handle.free();
+  }
+
+  /** The same as {@link Volume.free}, for `using`. */
+  [Symbol.dispose](): void {
+    this.free();
+  }
+}
+
+function wrap(make: () => RawVolume): Volume {
+  // The constructor knows a handle from what users give it.
+  return new Volume(new Handle('Volume', make) as unknown as VolumeInit);
+}
+
+function fromInit(init: VolumeInit): RawVolume {
+  const given = options('init', init, INIT);
+  const { data, slope = 1, intercept = 0, frameSeconds, space = 'RAS' } = given;
+  if (!ELEMENTS.some((kind) => data instanceof kind)) {
+    throw invalid('data', `a typed array is needed: ${ELEMENTS.map((kind) => kind.name).join(', ')}`);
+  }
+  return new RawVolume(
+    data,
+    dims(given.dims),
+    affine(given),
+    number('slope', slope),
+    number('intercept', intercept),
+    frameSeconds === undefined ? 0 : positive('frameSeconds', frameSeconds),
+    choice('space', space, ['RAS', 'LPS']),
+  );
+}
+
+function dims(given: unknown): Uint32Array {
+  const sizes = numbers('dims', given, 3, 4);
+  for (const size of sizes) whole('dims', size, { min: 1 });
+  return Uint32Array.from([...sizes, 1].slice(0, 4));
+}
+
+function affine({ affine, spacing, origin }: Partial<VolumeInit>): Float64Array {
+  if (affine === undefined) return placed(spacing, origin);
+  if (spacing !== undefined || origin !== undefined) {
+    throw invalid('affine', 'spacing and origin cannot be given together with it: it says both');
+  }
+  return numbers('affine', affine, 16);
+}
+
+function placed(spacing: Vec3 = [1, 1, 1], origin: Vec3 = [0, 0, 0]): Float64Array {
+  const [dx, dy, dz] = triple(vec3('spacing', spacing).map((size) => positive('spacing', size)));
+  const [x, y, z] = triple(vec3('origin', origin));
+  return Float64Array.of(dx, 0, 0, 0, 0, dy, 0, 0, 0, 0, dz, 0, x, y, z, 1);
+}
+
+function triple(values: ArrayLike<number>): Vec3 {
+  return [values[0] as number, values[1] as number, values[2] as number];
+}

@@ -1,0 +1,16 @@
+// A headless Chromium for the scripts.
+import { chromium } from 'playwright-core';
+import { findChromium } from './setup.mjs';
+
+const ARGUMENTS = [
+  // WebGL2 in software, and no calls home.
+  ...['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-background-networking'],
+];
+
+/** A browser; the caller closes it. Throws where there is none. */
+export async function launchChromium() {
+  const executablePath = findChromium();
+  if (!executablePath) throw new Error('no Chromium or Chrome was found: install one, or set CHROMIUM_PATH');
+  const sandbox = process.getuid?.() === 0 ? ['--no-sandbox'] : [];
+  return chromium.launch({ executablePath, args: [...ARGUMENTS, ...sandbox] });
+}

@@ -1,0 +1,117 @@
+//! From JavaScript's arrays and objects to the core's types and back. Everything is copied: a view into the
+//! module's memory would die when the memory grows.
+
+use js_sys::{Float32Array, Float64Array, Reflect, Uint8Array, Uint32Array};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_wasm_bindgen::Serializer;
+use wasm_bindgen::JsCast;
+use wasm_bindgen::prelude::JsValue;
+
+use super::error::Failure;
+use crate::math::{DVec3, Vec2, Vec3};
+
+/// An array of `length` elements that `copy` fills, or `too-large` where there is no memory for it.
+pub fn copied<T: Clone + Default>(length: u32, copy: impl FnOnce(&mut [T])) -> Result<Vec<T>, Failure> {
+    let mut values = Vec::new();
+    let bytes = u64::from(length).saturating_mul(size_of::<T>() as u64);
+    values.try_reserve_exact(length as usize).map_err(|_| Failure::too_large(bytes))?;
+    values.resize(length as usize, T::default());
+    copy(&mut values);
+    Ok(values)
+}
+
+/// The bytes of a file.
+pub fn bytes(array: &Uint8Array) -> Result<Vec<u8>, Failure> {
+    copied(array.length(), |out| array.copy_to(out))
+}
+
+/// The numbers of a typed array.
+pub fn floats(array: &Float32Array) -> Result<Vec<f32>, Failure> {
+    copied(array.length(), |out| array.copy_to(out))
+}
+
+/// The numbers of a typed array.
+pub fn doubles(array: &Float64Array) -> Result<Vec<f64>, Failure> {
+    copied(array.length(), |out| array.copy_to(out))
+}
+
+/// Packed xyz as points.
+pub fn points(array: &Float32Array) -> Result<Vec<Vec3>, Failure> {
+    Ok(floats(array)?.chunks_exact(3).map(Vec3::from_slice).collect())
+}
+
+/// Packed uv as texture coordinates.
+pub fn coordinates(array: &Float32Array) -> Result<Vec<Vec2>, Failure> {
+    Ok(floats(array)?.chunks_exact(2).map(Vec2::from_slice).collect())
+}
+
+/// Packed abc as triangles.
+pub fn triangles(array: &Uint32Array) -> Result<Vec<[u32; 3]>, Failure> {
+    let indices = copied(array.length(), |out| array.copy_to(out))?;
+    let (triangles, _) = indices.as_chunks::<3>();
+    Ok(triangles.to_vec())
+}
+
+/// Three numbers as a point.
+pub fn point(values: &[f64]) -> Result<DVec3, Failure> {
+    match values {
+        [x, y, z] => Ok(DVec3::new(*x, *y, *z)),
+        _ => Err(Failure::invalid("point", &format!("{} numbers; 3 are needed", values.len()))),
+    }
+}
+
+/// Points as packed xyz.
+pub fn packed(points: &[Vec3]) -> Vec<f32> {
+    points.iter().flat_map(|point| point.to_array()).collect()
+}
+
+/// Something serialisable as plain objects and arrays; what is `None` stays out.
+pub fn to_js<T: Serialize>(value: &T) -> Result<JsValue, Failure> {
+    value
+        .serialize(&Serializer::new().serialize_maps_as_objects(true))
+        .map_err(|error| Failure::invalid("result", &error.to_string()))
+}
+
+/// `current` with the properties of a JavaScript object written over its own.
+///
+/// Properties that are `undefined` are skipped.
+///
+/// # Errors
+/// A name that `current` does not have, or a value of the wrong type: `invalid-argument` naming it.
+pub fn merged<T: Serialize + DeserializeOwned>(current: &T, given: &JsValue) -> Result<T, Failure> {
+    let all = to_js(current)?;
+    for name in js_sys::Object::keys(given.unchecked_ref::<js_sys::Object>()).iter() {
+        let value = property(given, &name);
+        if value.is_undefined() {
+            continue;
+        }
+        let parameter = name.as_string().unwrap_or_default();
+        if property(&all, &name).is_undefined() {
+            return Err(unknown(&parameter, &all));
+        }
+        // One at a time, so that a value of the wrong type is blamed on its own name.
+        let alone = to_js(current)?;
+        Reflect::set(&alone, &name, &value).ok();
+        read::<T>(&parameter, &alone)?;
+        Reflect::set(&all, &name, &value).ok();
+    }
+    read("params", &all)
+}
+
+fn property(object: &JsValue, name: &JsValue) -> JsValue {
+    Reflect::get(object, name).unwrap_or(JsValue::UNDEFINED)
+}
+
+fn read<T: DeserializeOwned>(parameter: &str, object: &JsValue) -> Result<T, Failure> {
+    serde_wasm_bindgen::from_value(object.clone()).map_err(|error| {
+        let problem = error.to_string().replace("f64", "a number");
+        Failure::invalid(parameter, problem.trim_start_matches("Error: "))
+    })
+}
+
+fn unknown(parameter: &str, all: &JsValue) -> Failure {
+    let names = js_sys::Object::keys(all.unchecked_ref::<js_sys::Object>());
+    let names: Vec<String> = names.iter().filter_map(|name| name.as_string()).collect();
+    Failure::invalid(parameter, &format!("no parameter has this name; there are {}", names.join(", ")))
+}

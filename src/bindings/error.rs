@@ -1,0 +1,90 @@
+//! How a failure crosses into JavaScript: as `{ code, message }`, which the TypeScript side makes a `VesicleError` of.
+
+use js_sys::{Object, Reflect};
+use wasm_bindgen::prelude::JsValue;
+
+use crate::io::FormatError;
+use crate::mesh::MeshError;
+use crate::methods::MethodError;
+use crate::volume::VolumeError;
+
+/// A failure on its way to JavaScript.
+#[derive(Debug)]
+pub struct Failure {
+    code: &'static str,
+    message: String,
+}
+
+impl Failure {
+    /// A failure of one of the kinds that the TypeScript `ErrorCode` lists.
+    pub fn new(code: &'static str, message: impl Into<String>) -> Self {
+        Self { code, message: message.into() }
+    }
+
+    /// An argument that cannot be used, named as the caller knows it.
+    pub fn invalid(parameter: &str, problem: &str) -> Self {
+        Self::new("invalid-argument", format!("{parameter}: {problem}"))
+    }
+
+    /// More memory than there is.
+    pub fn too_large(bytes: u64) -> Self {
+        Self::new(
+            "too-large",
+            format!("{bytes} bytes are needed, more than there is in this page or process"),
+        )
+    }
+}
+
+impl From<Failure> for JsValue {
+    fn from(failure: Failure) -> Self {
+        let object = Object::new();
+        for (key, value) in [("code", failure.code), ("message", &failure.message)] {
+            // Setting a property of a fresh plain object cannot fail.
+            Reflect::set(&object, &key.into(), &value.into()).ok();
+        }
+        object.into()
+    }
+}
+
+impl From<MeshError> for Failure {
+    fn from(error: MeshError) -> Self {
+        let code = match error {
+            MeshError::InvalidArgument { .. } => "invalid-argument",
+            MeshError::NotClosed { .. } => "not-closed",
+            MeshError::SelfIntersecting { .. } => "self-intersecting",
+            MeshError::TooLarge { .. } => "too-large",
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<VolumeError> for Failure {
+    fn from(error: VolumeError) -> Self {
+        let code = match error {
+            VolumeError::InvalidArgument { .. } => "invalid-argument",
+            VolumeError::TooLarge { .. } => "too-large",
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<FormatError> for Failure {
+    fn from(error: FormatError) -> Self {
+        let code = match error {
+            FormatError::TooLarge { .. } => "too-large",
+            _ => "bad-file",
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<MethodError> for Failure {
+    fn from(error: MethodError) -> Self {
+        match error {
+            MethodError::Mesh(error) => error.into(),
+            MethodError::Volume(error) => error.into(),
+            MethodError::BadState { .. } => Self::new("bad-file", error.to_string()),
+            MethodError::InvalidArgument { .. } => Self::new("invalid-argument", error.to_string()),
+        }
+    }
+}

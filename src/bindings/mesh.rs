@@ -1,0 +1,338 @@
+//! Meshes: closed ones that can be edited, plain triangles as they came, and the live surface of a model.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use js_sys::{Float32Array, Uint8Array, Uint32Array};
+use serde::Serialize;
+use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
+
+use super::convert::{bytes, coordinates, packed, point, points, to_js, triangles};
+use super::error::Failure;
+use super::volume::RawVolume;
+use crate::io::{MeshFormat, parse_mesh, write_mesh};
+use crate::math::DVec3;
+use crate::mesh::{Measures, Mesh, MeshReport, TriangleMesh, measure, report};
+use crate::methods::deformable::DeformableModel;
+use crate::spatial::{SurfacePoint, TriangleTree, cross_section};
+use crate::volume::marching_cubes_world;
+
+/// What stands behind a JavaScript `Mesh`.
+pub(super) enum Body {
+    /// Closed, and ready to be edited.
+    Surface(Box<Mesh>),
+    /// As it was given: perhaps open, perhaps crossing itself.
+    Triangles(Rc<TriangleMesh>),
+    /// The surface of a model, as it is now.
+    Live(Rc<RefCell<DeformableModel>>),
+}
+
+/// A mesh of any kind.
+#[wasm_bindgen]
+pub struct RawMesh(pub(super) Body);
+
+/// A mesh's arrays at one moment, to be copied out.
+#[wasm_bindgen]
+pub struct RawArrays(Rc<TriangleMesh>);
+
+#[wasm_bindgen]
+impl RawMesh {
+    /// A sphere of nearly equal triangles.
+    pub fn icosphere(center: &[f64], radius: f64, max_edge: f64) -> Result<RawMesh, JsValue> {
+        let mesh = Mesh::icosphere(point(center)?.as_vec3(), radius as f32, max_edge as f32);
+        Ok(RawMesh(Body::Surface(Box::new(mesh.map_err(Failure::from)?))))
+    }
+
+    /// From packed arrays, which are copied.
+    #[wasm_bindgen(js_name = fromArrays)]
+    pub fn from_arrays(
+        positions: &Float32Array,
+        indices: &Uint32Array,
+        uvs: Option<Float32Array>,
+    ) -> Result<RawMesh, JsValue> {
+        let mesh = TriangleMesh {
+            positions: points(positions)?,
+            triangles: triangles(indices)?,
+            uvs: uvs.as_ref().map(coordinates).transpose()?,
+            ..TriangleMesh::default()
+        };
+        Ok(RawMesh(loose(mesh)))
+    }
+
+    /// From the bytes of a file.
+    pub fn parse(file: &Uint8Array) -> Result<RawMesh, JsValue> {
+        let mesh = parse_mesh(&bytes(file)?).map_err(Failure::from)?;
+        Ok(RawMesh(loose(mesh)))
+    }
+
+    /// Iso-surface of one frame of a volume, in world space.
+    #[wasm_bindgen(js_name = marchingCubes)]
+    pub fn marching_cubes(volume: &RawVolume, iso: f64, frame: usize) -> Result<RawMesh, JsValue> {
+        let mesh = marching_cubes_world(&volume.0, iso, frame).map_err(Failure::from)?;
+        Ok(RawMesh(loose(mesh)))
+    }
+
+    /// Number of vertices.
+    #[wasm_bindgen(js_name = vertexCount)]
+    pub fn vertex_count(&self) -> usize {
+        match &self.0 {
+            Body::Surface(mesh) => mesh.vertex_count(),
+            Body::Triangles(mesh) => mesh.positions.len(),
+            Body::Live(model) => model.borrow().mesh().vertex_count(),
+        }
+    }
+
+    /// Number of triangles.
+    #[wasm_bindgen(js_name = triangleCount)]
+    pub fn triangle_count(&self) -> usize {
+        match &self.0 {
+            Body::Surface(mesh) => mesh.triangle_count(),
+            Body::Triangles(mesh) => mesh.triangles.len(),
+            Body::Live(model) => model.borrow().mesh().triangle_count(),
+        }
+    }
+
+    /// Counts up when connectivity changes.
+    #[wasm_bindgen(js_name = topologyVersion)]
+    pub fn topology_version(&self) -> u32 {
+        match &self.0 {
+            Body::Surface(mesh) => mesh.topology_version(),
+            Body::Triangles(_) => 0,
+            Body::Live(model) => model.borrow().mesh().topology_version(),
+        }
+    }
+
+    /// Counts up when any vertex moves.
+    #[wasm_bindgen(js_name = geometryVersion)]
+    pub fn geometry_version(&self) -> u32 {
+        match &self.0 {
+            Body::Surface(mesh) => mesh.geometry_version(),
+            Body::Triangles(_) => 0,
+            Body::Live(model) => model.borrow().mesh().geometry_version(),
+        }
+    }
+
+    /// The arrays as they are now.
+    pub fn arrays(&self) -> RawArrays {
+        let mut mesh = self.triangles();
+        if mesh.normals.is_none() {
+            let normals = mesh.vertex_normals();
+            Rc::make_mut(&mut mesh).normals = Some(normals);
+        }
+        RawArrays(mesh)
+    }
+
+    /// Measures as the contract's `MeshInfo`.
+    pub fn info(&self) -> Result<JsValue, JsValue> {
+        Ok(to_js(&Info::from(measure(&self.triangles())))?)
+    }
+
+    /// An independent report as the contract's `MeshReport`.
+    pub fn check(&self) -> Result<JsValue, JsValue> {
+        let report = report(&self.triangles()).map_err(Failure::from)?;
+        Ok(to_js(&Report::from(report))?)
+    }
+
+    /// One mesh a connected component.
+    pub fn components(&self) -> Vec<RawMesh> {
+        self.triangles().components().into_iter().map(|part| RawMesh(loose(part))).collect()
+    }
+
+    /// One sqrt(3) refinement pass.
+    pub fn refine(&mut self) -> Result<(), JsValue> {
+        self.editable()?.refine().map_err(Failure::from)?;
+        Ok(())
+    }
+
+    /// The nearest triangle a ray meets, or nothing.
+    pub fn pick(&self, origin: &[f64], direction: &[f64]) -> Result<JsValue, JsValue> {
+        let tree = TriangleTree::new(&self.triangles()).map_err(Failure::from)?;
+        let hit = tree.ray_hit(point(origin)?.as_vec3(), point(direction)?.as_vec3());
+        Ok(to_js(&hit.map(Hit::from))?)
+    }
+
+    /// Pairs of points where a plane cuts.
+    #[wasm_bindgen(js_name = crossSection)]
+    pub fn cross_section(&self, origin: &[f64], normal: &[f64]) -> Result<Vec<f32>, JsValue> {
+        let (origin, normal) = (point(origin)?.as_vec3(), point(normal)?.as_vec3());
+        let segments = cross_section(&self.triangles(), origin, normal);
+        Ok(packed(segments.as_flattened()))
+    }
+
+    /// The bytes of a file.
+    #[wasm_bindgen(js_name = toBytes)]
+    pub fn to_bytes(&self, format: &str) -> Result<Vec<u8>, JsValue> {
+        let format = MeshFormat::from_extension(format)
+            .ok_or_else(|| Failure::invalid("format", "not one of glb, ply, stl, obj, vtp, mz3"))?;
+        Ok(write_mesh(&self.arrays().0, format).map_err(Failure::from)?)
+    }
+
+    /// A copy that nothing else changes.
+    #[wasm_bindgen(js_name = clone)]
+    pub fn duplicate(&self) -> RawMesh {
+        match &self.0 {
+            Body::Surface(mesh) => RawMesh(Body::Surface(mesh.clone())),
+            Body::Triangles(_) | Body::Live(_) => RawMesh(Body::Triangles(self.triangles())),
+        }
+    }
+
+    pub(super) fn triangles(&self) -> Rc<TriangleMesh> {
+        match &self.0 {
+            Body::Surface(mesh) => Rc::new(mesh.to_triangles()),
+            Body::Triangles(mesh) => Rc::clone(mesh),
+            Body::Live(model) => Rc::new(model.borrow().surface()),
+        }
+    }
+
+    /// The mesh ready for edits; triangles become one now, if they are closed.
+    fn editable(&mut self) -> Result<&mut Mesh, Failure> {
+        if let Body::Triangles(triangles) = &self.0 {
+            self.0 = Body::Surface(Box::new(Mesh::from_triangles(triangles)?));
+        }
+        match &mut self.0 {
+            Body::Surface(mesh) => Ok(mesh),
+            _ => Err(Failure::invalid("mesh", "it belongs to a model that moves it: clone() it first")),
+        }
+    }
+}
+
+#[wasm_bindgen]
+impl RawArrays {
+    /// Number of vertices.
+    pub fn vertices(&self) -> usize {
+        self.0.positions.len()
+    }
+
+    /// Number of triangles.
+    pub fn triangles(&self) -> usize {
+        self.0.triangles.len()
+    }
+
+    /// Packed xyz.
+    pub fn positions(&self, out: &Float32Array) {
+        fill(out, &packed(&self.0.positions));
+    }
+
+    /// Packed xyz.
+    pub fn normals(&self, out: &Float32Array) {
+        fill(out, &packed(self.0.normals.as_deref().unwrap_or_default()));
+    }
+
+    /// Packed abc.
+    pub fn indices(&self, out: &Uint32Array) {
+        let indices = self.0.triangles.as_flattened();
+        out.subarray(0, indices.len() as u32).copy_from(indices);
+    }
+
+    /// Packed uv, where there are any.
+    pub fn uvs(&self) -> Option<Vec<f32>> {
+        let uvs = self.0.uvs.as_ref()?;
+        Some(uvs.iter().flat_map(|uv| uv.to_array()).collect())
+    }
+
+    /// Packed rgb, where there are any.
+    pub fn colors(&self) -> Option<Vec<f32>> {
+        self.0.colors.as_deref().map(packed)
+    }
+}
+
+fn fill(out: &Float32Array, values: &[f32]) {
+    out.subarray(0, values.len() as u32).copy_from(values);
+}
+
+fn loose(mesh: TriangleMesh) -> Body {
+    Body::Triangles(Rc::new(mesh))
+}
+
+#[derive(Serialize)]
+struct Hit {
+    triangle: u32,
+    barycentric: [f32; 3],
+    point: [f32; 3],
+    distance: f64,
+}
+
+impl From<SurfacePoint> for Hit {
+    fn from(hit: SurfacePoint) -> Self {
+        Self {
+            triangle: hit.triangle,
+            barycentric: hit.barycentric.to_array(),
+            point: hit.point.to_array(),
+            distance: hit.distance,
+        }
+    }
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct Report {
+    closed: bool,
+    oriented: bool,
+    non_manifold_edges: usize,
+    non_manifold_vertices: usize,
+    degenerate_triangles: usize,
+    self_intersections: usize,
+}
+
+impl From<MeshReport> for Report {
+    fn from(report: MeshReport) -> Self {
+        Self {
+            closed: report.closed,
+            oriented: report.oriented,
+            non_manifold_edges: report.non_manifold_edges,
+            non_manifold_vertices: report.non_manifold_vertices,
+            degenerate_triangles: report.degenerate_triangles,
+            self_intersections: report.self_intersections,
+        }
+    }
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct Info {
+    vertices: usize,
+    triangles: usize,
+    components: usize,
+    euler: f64,
+    genus: f64,
+    area: f64,
+    volume: f64,
+    centroid: [f64; 3],
+    inertia: [f64; 9],
+    edge: EdgeLengths,
+    min_angle_degrees: f64,
+    bounds: Bounds,
+}
+
+#[derive(Serialize)]
+struct EdgeLengths {
+    min: f64,
+    mean: f64,
+    max: f64,
+}
+
+#[derive(Serialize)]
+struct Bounds {
+    min: [f64; 3],
+    max: [f64; 3],
+}
+
+impl From<Measures> for Info {
+    fn from(measures: Measures) -> Self {
+        let [min, max] = measures.bounds.map(|corner: DVec3| corner.to_array());
+        Self {
+            vertices: measures.vertices,
+            triangles: measures.triangles,
+            components: measures.components,
+            euler: measures.euler as f64,
+            genus: measures.genus as f64,
+            area: measures.area,
+            volume: measures.volume,
+            centroid: measures.centroid.to_array(),
+            inertia: measures.inertia,
+            edge: EdgeLengths { min: measures.edge_min, mean: measures.edge_mean, max: measures.edge_max },
+            min_angle_degrees: measures.min_angle_degrees,
+            bounds: Bounds { min, max },
+        }
+    }
+}

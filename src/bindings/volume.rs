@@ -1,0 +1,173 @@
+//! Volumes.
+
+use js_sys::{
+    Float32Array, Float64Array, Int8Array, Int16Array, Int32Array, Uint8Array, Uint16Array, Uint32Array,
+};
+use wasm_bindgen::JsCast;
+use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
+
+use super::convert::{bytes, copied, point};
+use super::error::Failure;
+use crate::io::{parse_volume, write_nifti};
+use crate::math::DAffine3;
+use crate::volume::{Space, Volume, VolumeInit, Voxels};
+
+/// A volume.
+#[wasm_bindgen]
+pub struct RawVolume(pub(super) Volume);
+
+/// Volumes collected to become the frames of one.
+#[wasm_bindgen]
+#[derive(Default)]
+pub struct RawFrames(Vec<Volume>);
+
+#[wasm_bindgen]
+impl RawVolume {
+    /// From a typed array, x fastest; `dims` has four numbers, `affine` sixteen, column-major.
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        data: &JsValue,
+        dims: &[u32],
+        affine: &[f64],
+        slope: f64,
+        intercept: f64,
+        frame_seconds: f64,
+        space: &str,
+    ) -> Result<RawVolume, JsValue> {
+        let init = VolumeInit {
+            voxels: voxels(data)?,
+            dims: four(dims)?,
+            affine: world(affine)?,
+            slope,
+            intercept,
+            frame_seconds,
+            space: if space == "LPS" { Space::Lps } else { Space::Ras },
+        };
+        Ok(RawVolume(Volume::new(init).map_err(Failure::from)?))
+    }
+
+    /// From the bytes of a file, and those of its payload where the header is detached.
+    pub fn parse(file: &Uint8Array, data: Option<Uint8Array>) -> Result<RawVolume, JsValue> {
+        let payload = data.as_ref().map(bytes).transpose()?;
+        Ok(RawVolume(parse_volume(&bytes(file)?, payload.as_deref()).map_err(Failure::from)?))
+    }
+
+    /// NIfTI-1 bytes.
+    #[wasm_bindgen(js_name = toNifti)]
+    pub fn to_nifti(&self) -> Result<Vec<u8>, JsValue> {
+        Ok(write_nifti(&self.0).map_err(Failure::from)?)
+    }
+
+    /// Voxels along x, y and z.
+    pub fn dims(&self) -> Vec<f64> {
+        self.0.dims().map(|n| n as f64).to_vec()
+    }
+
+    /// Number of frames.
+    pub fn frames(&self) -> usize {
+        self.0.frames()
+    }
+
+    /// Voxel size along x, y and z.
+    pub fn spacing(&self) -> Vec<f64> {
+        self.0.spacing().to_vec()
+    }
+
+    /// Voxel index to world, sixteen numbers, column-major.
+    pub fn affine(&self) -> Vec<f64> {
+        let columns = self.0.affine().to_cols_array();
+        let (columns, _) = columns.as_chunks::<3>();
+        let last_row = [0.0, 0.0, 0.0, 1.0];
+        columns.iter().zip(last_row).flat_map(|(&[x, y, z], w)| [x, y, z, w]).collect()
+    }
+
+    /// `RAS` or `LPS`.
+    pub fn space(&self) -> String {
+        match self.0.space() {
+            Space::Ras => "RAS",
+            Space::Lps => "LPS",
+        }
+        .to_owned()
+    }
+
+    /// Smallest and largest intensity.
+    pub fn range(&self) -> Vec<f64> {
+        self.0.range().to_vec()
+    }
+
+    /// Counts per bin over the range.
+    pub fn histogram(&self, bins: usize, frame: usize) -> Result<Vec<u32>, JsValue> {
+        Ok(self.0.histogram(bins, frame).map_err(Failure::from)?)
+    }
+
+    /// Intensity at a world point.
+    pub fn sample(&self, world: &[f64], frame: usize) -> Result<f64, JsValue> {
+        Ok(self.0.sample(point(world)?, frame).map_err(Failure::from)?)
+    }
+
+    /// Intensities of one slice.
+    pub fn slice(&self, axis: usize, index: usize, frame: usize) -> Result<Vec<f32>, JsValue> {
+        Ok(self.0.slice(axis, index, frame).map_err(Failure::from)?)
+    }
+
+    /// Intensities of one frame.
+    pub fn intensities(&self, frame: usize) -> Result<Vec<f32>, JsValue> {
+        Ok(self.0.intensities(frame).map_err(Failure::from)?)
+    }
+
+    /// One volume a level.
+    pub fn pyramid(&self, levels: usize, factor: f64) -> Result<Vec<RawVolume>, JsValue> {
+        let levels = self.0.pyramid(levels, factor).map_err(Failure::from)?;
+        Ok(levels.into_iter().map(RawVolume).collect())
+    }
+}
+
+#[wasm_bindgen]
+impl RawFrames {
+    /// None yet.
+    #[wasm_bindgen(constructor)]
+    pub fn new() -> RawFrames {
+        Self::default()
+    }
+
+    /// One more frame. (Clones of a volume share its voxels.)
+    pub fn push(&mut self, volume: &RawVolume) {
+        self.0.push(volume.0.clone());
+    }
+
+    /// The 4D volume of all of them.
+    pub fn join(self, frame_seconds: Option<f64>) -> Result<RawVolume, JsValue> {
+        Ok(RawVolume(Volume::from_frames(&self.0, frame_seconds).map_err(Failure::from)?))
+    }
+}
+
+/// A typed array of any kind, copied once, kept as the type it has.
+fn voxels(data: &JsValue) -> Result<Voxels, Failure> {
+    macro_rules! of {
+        ($($array:ty => $voxels:ident),*) => {
+            $(if let Some(array) = data.dyn_ref::<$array>() {
+                return Ok(Voxels::$voxels(copied(array.length(), |out| array.copy_to(out))?));
+            })*
+        };
+    }
+    of!(Uint8Array => U8, Int8Array => I8, Uint16Array => U16, Int16Array => I16);
+    of!(Uint32Array => U32, Int32Array => I32, Float32Array => F32, Float64Array => F64);
+    Err(Failure::invalid("data", "not a typed array of numbers of at most 32 bits, or of 64-bit floats"))
+}
+
+fn four(dims: &[u32]) -> Result<[usize; 4], Failure> {
+    let dims: [u32; 4] =
+        dims.try_into().map_err(|_| Failure::invalid("dims", "3 or 4 whole numbers are needed"))?;
+    Ok(dims.map(|n| n as usize))
+}
+
+fn world(affine: &[f64]) -> Result<DAffine3, Failure> {
+    let (columns, _) = affine.as_chunks::<4>();
+    let last_row: Vec<f64> = columns.iter().map(|column| column[3]).collect();
+    if last_row != [0.0, 0.0, 0.0, 1.0] {
+        let problem = "16 numbers are needed, column-major: every fourth is 0, the last of all 1";
+        return Err(Failure::invalid("affine", problem));
+    }
+    let columns: Vec<f64> = columns.iter().flat_map(|&[x, y, z, _]| [x, y, z]).collect();
+    Ok(DAffine3::from_cols_slice(&columns))
+}

@@ -1,0 +1,261 @@
+/**
+ * The public surface that users, adapters and the app rely on: names, argument shapes, units and errors stay as
+ * written here; anything beyond them may be added. `types.ts` checks that the package keeps to it.
+ */
+
+// ── start ───────────────────────────────────────────────────────────────────────────────────────
+export type InitInput = RequestInfo | URL | Response | BufferSource | WebAssembly.Module;
+/** Idempotent. With no argument, fetches the .wasm beside the module (browser) or reads it (Node). */
+export default function init(options?: { module_or_path?: InitInput | Promise<InitInput> }): Promise<unknown>;
+export function initSync(options: { module: BufferSource | WebAssembly.Module }): unknown;
+export function version(): string;
+
+/** Every failure the library can foresee. `message` says what was wrong and what is accepted. */
+export class VesicleError extends Error {
+  readonly code:
+    | 'invalid-argument' // a parameter out of range, NaN, wrong length; names the parameter
+    | 'bad-file' // truncated, inconsistent or unsupported file; names the format and the field
+    | 'not-closed' // a mesh with boundary or non-manifold edges where a closed one is needed
+    | 'self-intersecting' // a start mesh that crosses itself where an embedded one is needed
+    | 'singular-system' // the linear system has no usable solution; names the likely cause
+    | 'too-large' // needs more memory than wasm32 has; says how much
+    | 'aborted'
+    | 'freed'; // use after free()
+}
+
+export type Vec3 = [number, number, number];
+export type VoxelArray =
+  | Uint8Array
+  | Int8Array
+  | Uint16Array
+  | Int16Array
+  | Uint32Array
+  | Int32Array
+  | Float32Array
+  | Float64Array;
+
+// ── volumes ─────────────────────────────────────────────────────────────────────────────────────
+export interface VolumeInit {
+  /** x fastest, then y, z, t. Copied once. */
+  data: VoxelArray;
+  dims: Vec3 | [number, number, number, number];
+  /** 16 numbers, column-major, voxel index -> world. Else spacing and origin. */
+  affine?: ArrayLike<number>;
+  spacing?: Vec3;
+  origin?: Vec3;
+  slope?: number; // stored value * slope + intercept = intensity
+  intercept?: number;
+  frameSeconds?: number; // 4D only
+  space?: 'RAS' | 'LPS'; // default RAS; meshes come back in the same space
+}
+export class Volume {
+  constructor(init: VolumeInit);
+  /**
+   * NIfTI-1/2 (.nii, .nii.gz), NRRD (.nrrd; .nhdr + data), MetaImage (.mha; .mhd + data), detected from the bytes.
+   * gzip is handled. A detached header takes its payload as `data`.
+   */
+  static parse(bytes: Uint8Array, options?: { data?: Uint8Array }): Volume;
+  /** 3D volumes of one grid, in order, as the frames of a 4D one. */
+  static fromFrames(frames: Volume[], options?: { frameSeconds?: number }): Volume;
+  /** NIfTI-1 bytes, for saving what was computed. */
+  toNifti(): Uint8Array;
+  readonly dims: Vec3;
+  readonly frames: number;
+  readonly spacing: Vec3;
+  readonly affine: Float64Array;
+  readonly space: 'RAS' | 'LPS';
+  /** Smallest and largest intensity, after slope and intercept. */
+  readonly range: [number, number];
+  histogram(bins: number, frame?: number): Uint32Array;
+  /** Trilinear intensity at a world point; outside the volume the border is replicated. */
+  sample(world: Vec3, frame?: number): number;
+  /** One slice, row-major, as intensities. axis 0 = sagittal (x), 1 = y, 2 = z. */
+  slice(axis: 0 | 1 | 2, index: number, frame?: number): Float32Array;
+  /** All intensities of one frame, for upload as a 3D texture. */
+  intensities(frame?: number): Float32Array;
+  /** One volume per level, [0] = this one; smoothed before it is thinned. */
+  pyramid(levels: number, options?: { factor?: number }): Volume[];
+  free(): void;
+  [Symbol.dispose](): void;
+}
+
+// ── the dynamic mesh ────────────────────────────────────────────────────────────────────────────
+export interface MeshArrays {
+  positions: Float32Array;
+  normals: Float32Array;
+  indices: Uint32Array;
+  uvs?: Float32Array;
+  /** rgb, 0..1 */
+  colors?: Float32Array;
+}
+export interface MeshInfo {
+  vertices: number;
+  triangles: number;
+  components: number;
+  euler: number;
+  /** Sum over components; closed orientable, so euler = 2 * components - 2 * genus. */
+  genus: number;
+  area: number;
+  volume: number;
+  centroid: Vec3;
+  /** Second moments about the centroid of the enclosed solid, row-major 3x3. */
+  inertia: number[];
+  edge: { min: number; mean: number; max: number };
+  minAngleDegrees: number;
+  bounds: { min: Vec3; max: Vec3 };
+}
+/** What an independent look at the mesh finds; a healthy one is closed, oriented and has all counts at 0. */
+export interface MeshReport {
+  closed: boolean;
+  oriented: boolean;
+  nonManifoldEdges: number;
+  nonManifoldVertices: number;
+  degenerateTriangles: number;
+  selfIntersections: number;
+}
+export type MeshFormat = 'glb' | 'ply' | 'stl' | 'obj' | 'vtp' | 'mz3';
+export class Mesh {
+  static icosphere(center: Vec3, radius: number, maxEdge: number): Mesh;
+  static fromArrays(positions: Float32Array, indices: Uint32Array, extra?: { uvs?: Float32Array }): Mesh;
+  /** glb, ply, stl, obj: detected from the bytes. Duplicate positions are welded. */
+  static parse(bytes: Uint8Array): Mesh;
+  /** Iso-surface of a volume, closed at the volume's border; topologically consistent. */
+  static marchingCubes(volume: Volume, iso: number, options?: { frame?: number }): Mesh;
+  readonly vertexCount: number;
+  readonly triangleCount: number;
+  /** Counts up when connectivity changes / when any vertex moves. */
+  readonly topologyVersion: number;
+  readonly geometryVersion: number;
+  arrays(): MeshArrays;
+  /** Into the caller's buffers, which are replaced only when too small; returns the counts written. */
+  copyTo(out: MeshArrays): { vertices: number; triangles: number };
+  info(): MeshInfo;
+  check(): MeshReport;
+  components(): Mesh[];
+  /** One sqrt(3) refinement pass. */
+  refine(): void;
+  pick(
+    origin: Vec3,
+    direction: Vec3,
+  ): { triangle: number; barycentric: Vec3; point: Vec3; distance: number } | undefined;
+  /** Line segments (pairs of points) where a plane cuts the surface. */
+  crossSection(origin: Vec3, normal: Vec3): Float32Array;
+  toBytes(format: MeshFormat): Uint8Array;
+  clone(): Mesh;
+  free(): void;
+  [Symbol.dispose](): void;
+}
+
+// ── one stepping contract for every method ──────────────────────────────────────────────────────
+export interface StepReport {
+  iteration: number;
+  done: boolean;
+  /** What the method is doing now: 'level 2', 'solve', 'extract', 'frame 7' ... */
+  phase: string;
+  /** 0..1 where it can be known, else NaN. */
+  progress: number;
+  /** The method's own convergence figure, and what it is compared with. */
+  residual: number;
+  tolerance: number;
+  vertices: number;
+  triangles: number;
+  components: number;
+  euler: number;
+  /** Counted since the last report. axial joins (or splits off) by contact, annular cuts a neck. */
+  events: {
+    creations: number;
+    deletions: number;
+    inversions: number;
+    axial: number;
+    annular: number;
+    vanished: number;
+  };
+  /** Milliseconds of the last step by part: forces, motion, normals, topology, and so on. */
+  times: Record<string, number>;
+}
+export interface RunOptions {
+  signal?: AbortSignal; // rejects with signal.reason, the model stays usable
+  maxIterations?: number;
+  budgetMs?: number; // work per slice before yielding; default 12
+  onStep?: (report: StepReport) => void;
+}
+export interface Stepper {
+  readonly mesh: Mesh; // the same live object from start to end
+  step(iterations?: number): StepReport; // synchronous and deterministic
+  run(options?: RunOptions): Promise<StepReport>; // to the end, yielding between slices
+  /** Live parameters: any subset, validated as a whole before any of it is taken. */
+  setParams(params: Record<string, unknown>): void;
+  readonly params: Record<string, unknown>;
+  /** Bit-exact: restore(save()) then step() equals step(). */
+  save(): Uint8Array;
+  restore(state: Uint8Array): void;
+  free(): void;
+}
+export interface ParamSpec {
+  name: string;
+  label: string;
+  help: string; // one sentence a student understands
+  symbol?: string; // as in the paper: 'αc', 'πI', 'δ', 'τ'
+  type: 'number' | 'integer' | 'boolean' | 'choice';
+  default: unknown;
+  min?: number;
+  max?: number;
+  step?: number;
+  scale?: 'linear' | 'log';
+  unit?: string;
+  choices?: string[];
+}
+export function paramSpecs(method: 'deformable'): ParamSpec[];
+
+// ── 1. deformable model with automatic topology changes ──────────────────
+export interface DeformableParams {
+  iso?: number; // πI, in intensity units of the volume
+  isoForce?: number; // αI; negative where the object is brighter than iso
+  gradientNormal?: number; // αg, along the normal
+  gradientTangent?: number; // βg, along the tangent plane
+  gradientBound?: number;
+  rigidity?: number; // αc
+  stiffness?: number; // αe
+  restLength?: 'zero' | 'mean' | number;
+  mass?: number;
+  damping?: number;
+  integrator?: 'euler' | 'runge-kutta';
+  timeStep?: number;
+  maxMove?: number; // fraction of δ a vertex may move in one iteration
+  energyTolerance?: number; // ε
+  topology?: 'adaptive' | 'fixed';
+}
+export interface Attractor {
+  point: Vec3;
+  strength: number;
+  radius: number;
+}
+export class DeformableModel implements Stepper {
+  constructor(options: {
+    volume: Volume;
+    frame?: number;
+    /** enclosing icosahedron | a grid of n^3 bubbles | spheres at points | iso-surface | your own closed mesh */
+    start?:
+      | 'enclosing'
+      | { bubbles: number }
+      | { seeds: Float32Array; radius: number }
+      | { marchingCubes: number }
+      | Mesh;
+    levels?: number; // pyramid levels above the volume itself; 0 = direct
+    edge?: number; // target edge at the finest level, world units; default from the voxel size
+    params?: DeformableParams;
+  });
+  readonly level: number;
+  readonly delta: number; // δ now
+  /** Attachment points the user places; pull the surface within radius. */
+  setAttractors(list: Attractor[]): void;
+  readonly mesh: Mesh;
+  readonly params: Required<DeformableParams>;
+  step(iterations?: number): StepReport;
+  run(options?: RunOptions): Promise<StepReport>;
+  setParams(params: DeformableParams): void;
+  save(): Uint8Array;
+  restore(state: Uint8Array): void;
+  free(): void;
+  [Symbol.dispose](): void;
+}

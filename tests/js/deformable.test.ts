@@ -1,0 +1,322 @@
+import { afterEach, expect, test } from 'vitest';
+import { DeformableModel, type DeformableParams, Mesh, paramSpecs, type StepReport } from '../../pkg/index.js';
+import { ball, failure, rejection, wrong } from './helpers.js';
+
+type Options = ConstructorParameters<typeof DeformableModel>[0];
+
+const volume = ball(32, 9);
+const PARAMS: DeformableParams = { iso: 100, isoForce: -1, rigidity: 0.2 };
+const models: DeformableModel[] = [];
+
+function model(more: Partial<Options> = {}): DeformableModel {
+  const made = new DeformableModel({ volume, params: PARAMS, ...more });
+  models.push(made);
+  return made;
+}
+
+afterEach(() => {
+  for (const made of models.splice(0)) made.free();
+});
+
+const bytesOf = (mesh: Mesh) => Buffer.from(mesh.arrays().positions.buffer);
+
+test('it comes to rest on the ball', async () => {
+  const fitted = model();
+  const report = await fitted.run();
+  expect(report).toMatchObject({ done: true, components: 1, euler: 2, triangles: fitted.mesh.triangleCount });
+  expect(report.residual).toBeLessThanOrEqual(report.tolerance);
+  expect(fitted.mesh.check()).toMatchObject({
+    closed: true,
+    oriented: true,
+    nonManifoldEdges: 0,
+    selfIntersections: 0,
+  });
+  const info = fitted.mesh.info();
+  expect(info.volume / ((4 / 3) * Math.PI * 9 ** 3)).toBeGreaterThan(0.93);
+  expect(info.volume / ((4 / 3) * Math.PI * 9 ** 3)).toBeLessThan(1.07);
+  for (const coordinate of info.centroid) expect(Math.abs(coordinate)).toBeLessThan(0.2);
+});
+
+test('coarse to fine it ends on the volume itself, at the edge length asked for', async () => {
+  const fitted = model({ levels: 2 });
+  expect(fitted.level).toBe(2);
+  const coarse = fitted.delta;
+  const report = await fitted.run();
+  expect(report.done).toBe(true);
+  expect(fitted.level).toBe(0);
+  expect(fitted.delta).toBeLessThan(coarse);
+});
+
+test('every start shape', async () => {
+  const starts: [Options['start'], number][] = [
+    ['enclosing', 1],
+    [{ bubbles: 3 }, 1],
+    [{ seeds: Float32Array.of(1, 0, 0), radius: 4 }, 1],
+    [{ marchingCubes: 100 }, 1],
+    [Mesh.icosphere([0, 0, 0], 6, 2), 1],
+  ];
+  for (const [start, components] of starts) {
+    const report = await model({ start: start as NonNullable<Options['start']> }).run({ maxIterations: 400 });
+    expect(report.components, JSON.stringify(start)).toBe(components);
+    expect(report.euler).toBe(2);
+  }
+});
+
+test('the live mesh is one object that follows the model', () => {
+  const fitted = model();
+  const { mesh } = fitted;
+  const before = mesh.geometryVersion;
+  fitted.step(5);
+  expect(fitted.mesh).toBe(mesh);
+  expect(mesh.geometryVersion).toBeGreaterThan(before);
+  const copy = mesh.clone();
+  copy.refine();
+  expect(copy.triangleCount).toBe(3 * mesh.triangleCount);
+  const error = failure(() => mesh.refine());
+  expect(error.code).toBe('invalid-argument');
+  expect(error.message).toContain('clone()');
+  mesh.free();
+  expect(fitted.step().iteration).toBe(6);
+});
+
+test('a step report has everything', () => {
+  const report = model().step(3);
+  expect(report.iteration).toBe(3);
+  expect(report.done).toBe(false);
+  expect(report.phase).toMatch(/level/);
+  const counts = ['creations', 'deletions', 'inversions', 'axial', 'annular', 'vanished'];
+  expect(Object.keys(report.events).sort()).toEqual([...counts].sort());
+  expect(Object.keys(report.times).length).toBeGreaterThan(0);
+  for (const milliseconds of Object.values(report.times)) expect(milliseconds).toBeGreaterThanOrEqual(0);
+});
+
+test('the events of several steps are those of each together', () => {
+  const [together, each] = [model(), model()];
+  const events = (reports: StepReport[]) => reports.reduce((sum, report) => sum + report.events.deletions, 0);
+  const single = Array.from({ length: 20 }, () => each.step());
+  expect(together.step(20).events.deletions).toBe(events(single));
+});
+
+test('the same steps give the same bits, in slices or at once', async () => {
+  const [sliced, atOnce] = [model(), model()];
+  await sliced.run({ maxIterations: 20, budgetMs: 0.01 });
+  atOnce.step(20);
+  expect(bytesOf(sliced.mesh).equals(bytesOf(atOnce.mesh))).toBe(true);
+});
+
+test('restore(save()) then step() equals step()', () => {
+  const [saved, resumed] = [model(), model()];
+  saved.step(12);
+  const state = saved.save();
+  resumed.restore(state);
+  expect(resumed.step(10)).toMatchObject({ iteration: saved.step(10).iteration });
+  expect(bytesOf(resumed.mesh).equals(bytesOf(saved.mesh))).toBe(true);
+  saved.restore(state);
+  expect(saved.step(10).iteration).toBe(22);
+  expect(bytesOf(resumed.mesh).equals(bytesOf(saved.mesh))).toBe(true);
+});
+
+test('a broken state is refused and changes nothing', () => {
+  const [fitted, untouched] = [model(), model()];
+  fitted.step(3);
+  untouched.step(3);
+  const state = fitted.save();
+  const broken = [new Uint8Array(), state.slice(0, 20), state.slice(0, -1), new Uint8Array(state.length).fill(7)];
+  for (const bytes of broken) expect(failure(() => fitted.restore(bytes)).code).toBe('bad-file');
+  expect(failure(() => fitted.restore(wrong([]))).code).toBe('invalid-argument');
+  fitted.step(3);
+  untouched.step(3);
+  expect(bytesOf(fitted.mesh).equals(bytesOf(untouched.mesh))).toBe(true);
+});
+
+test('an aborted run rejects with the reason, and goes on later', async () => {
+  const fitted = model();
+  const abort = new AbortController();
+  const reason = new Error('enough');
+  const stopped = fitted.run({
+    signal: abort.signal,
+    onStep: ({ iteration }) => {
+      if (iteration === 4) abort.abort(reason);
+    },
+  });
+  await expect(stopped).rejects.toBe(reason);
+  expect(fitted.step().iteration).toBe(5);
+  await expect(fitted.run({ signal: AbortSignal.abort(reason) })).rejects.toBe(reason);
+  expect((await fitted.run({ maxIterations: 2 })).iteration).toBe(7);
+});
+
+test('an abort from a timer is heard while the model works', async () => {
+  const abort = new AbortController();
+  setTimeout(() => abort.abort('late'), 1);
+  await expect(model().run({ signal: abort.signal, budgetMs: 1 })).rejects.toBe('late');
+});
+
+test('onStep hears every iteration, and may end the run', async () => {
+  const fitted = model();
+  const heard: number[] = [];
+  const last = await fitted.run({ maxIterations: 6, onStep: ({ iteration }) => heard.push(iteration) });
+  expect(heard).toEqual([1, 2, 3, 4, 5, 6]);
+  expect(last.iteration).toBe(6);
+  const thrown = new Error('mine');
+  const failing = fitted.run({
+    onStep: () => {
+      throw thrown;
+    },
+  });
+  await expect(failing).rejects.toBe(thrown);
+  expect(fitted.step().iteration).toBe(8);
+});
+
+test('one run at a time; parameters may change meanwhile', async () => {
+  const fitted = model();
+  const first = fitted.run({ maxIterations: 10, budgetMs: 0.01 });
+  expect((await rejection(fitted.run())).code).toBe('invalid-argument');
+  expect(failure(() => fitted.step()).message).toContain('under way');
+  expect(failure(() => fitted.restore(fitted.save())).message).toContain('under way');
+  fitted.setParams({ rigidity: 0.1 });
+  expect((await first).iteration).toBe(10);
+  expect(fitted.step().iteration).toBe(11);
+});
+
+test('a model freed during a run ends it', async () => {
+  const fitted = model();
+  const running = fitted.run({ budgetMs: 0.01 });
+  fitted.free();
+  expect((await rejection(running)).code).toBe('freed');
+});
+
+test('parameters: any subset, all or nothing', () => {
+  const fitted = model();
+  const before = fitted.params;
+  expect(before).toMatchObject(PARAMS);
+  fitted.setParams({ damping: 0.4, restLength: 'mean' });
+  expect(fitted.params).toEqual({ ...before, damping: 0.4, restLength: 'mean' });
+  fitted.setParams({ restLength: 0.5 });
+  fitted.setParams(wrong({ restLength: undefined }));
+  expect(fitted.params.restLength).toBe(0.5);
+  const now = fitted.params;
+  const refused: [string, object][] = [
+    ['dampening', { rigidity: 0.1, dampening: 1 }],
+    ['damping', { rigidity: 0.1, damping: Number.NaN }],
+    ['damping', { rigidity: 0.1, damping: '0.3' }],
+    ['mass', { rigidity: 0.1, mass: -1 }],
+    ['topology', { rigidity: 0.1, topology: 'none' }],
+  ];
+  for (const [name, params] of refused) {
+    const error = failure(() => fitted.setParams(params));
+    expect(error.code).toBe('invalid-argument');
+    expect(error.message).toContain(name);
+    expect(fitted.params).toEqual(now);
+  }
+});
+
+test('specs describe every parameter, with its default', () => {
+  const specs = paramSpecs('deformable');
+  const defaults: Record<string, unknown> = new DeformableModel({ volume }).params;
+  expect(specs.map(({ name }) => name).sort()).toEqual(Object.keys(defaults).sort());
+  for (const spec of specs) {
+    expect(spec.help.length, spec.name).toBeGreaterThan(10);
+    expect(spec.label.length, spec.name).toBeGreaterThan(0);
+    if (spec.type === 'choice') expect(spec.choices).toContain(spec.default);
+    // The iso value's own default is the middle of the volume's range.
+    if (spec.name !== 'iso') expect(defaults[spec.name], spec.name).toEqual(spec.default);
+    else expect(defaults.iso).toBe(100);
+  }
+  expect(failure(() => paramSpecs(wrong('magic'))).code).toBe('invalid-argument');
+});
+
+test('an attractor pulls the surface', () => {
+  const [pulled, free] = [model({ start: { marchingCubes: 100 } }), model({ start: { marchingCubes: 100 } })];
+  pulled.setAttractors([{ point: [13, 0, 0], strength: 0.5, radius: 8 }]);
+  pulled.step(30);
+  free.step(30);
+  expect(pulled.mesh.info().bounds.max[0]).toBeGreaterThan(free.mesh.info().bounds.max[0] + 0.5);
+});
+
+const closed = Mesh.icosphere([0, 0, 0], 6, 2);
+const REFUSED: [string, string, string, () => unknown][] = [
+  ['no options', 'invalid-argument', 'volume', () => new DeformableModel(wrong(undefined))],
+  ['no volume', 'invalid-argument', 'volume', () => new DeformableModel(wrong({}))],
+  ['a misspelled option', 'invalid-argument', 'level', () => model(wrong({ level: 1 }))],
+  ['a frame too far', 'invalid-argument', 'frame', () => model({ frame: 1 })],
+  ['half a level', 'invalid-argument', 'levels', () => model({ levels: 0.5 })],
+  ['too many levels', 'invalid-argument', 'levels', () => model({ levels: 40 })],
+  ['a negative edge', 'invalid-argument', 'edge', () => model({ edge: -1 })],
+  ['another start', 'invalid-argument', 'start', () => model({ start: wrong('inside') })],
+  ['no bubbles', 'invalid-argument', 'bubbles', () => model({ start: { bubbles: 0 } })],
+  [
+    'seeds without radius',
+    'invalid-argument',
+    'radius',
+    () => model({ start: wrong({ seeds: Float32Array.of(0, 0, 0) }) }),
+  ],
+  ['a misspelled parameter', 'invalid-argument', 'stifness', () => model({ params: wrong({ stifness: 1 }) })],
+  ['a parameter out of range', 'invalid-argument', 'damping', () => model({ params: { damping: -1 } })],
+  ['steps in parts', 'invalid-argument', 'iterations', () => model().step(0.5)],
+  [
+    'an attractor without reach',
+    'invalid-argument',
+    'radius',
+    () => model().setAttractors([{ point: [0, 0, 0], strength: 1, radius: 0 }]),
+  ],
+  [
+    'an attractor nowhere',
+    'invalid-argument',
+    'point',
+    () => model().setAttractors(wrong([{ strength: 1, radius: 1 }])),
+  ],
+  [
+    'an open start mesh',
+    'not-closed',
+    'closed',
+    () => {
+      const { positions, indices } = closed.arrays();
+      return model({ start: Mesh.fromArrays(positions, indices.slice(3)) });
+    },
+  ],
+  [
+    'a start mesh that crosses itself',
+    'self-intersecting',
+    'cross',
+    () => {
+      const { positions, indices } = closed.arrays();
+      const twice = Float32Array.from([...positions, ...positions.map((value) => value + 1)]);
+      const first = positions.length / 3;
+      return model({ start: Mesh.fromArrays(twice, Uint32Array.from([...indices, ...indices.map((i) => i + first)])) });
+    },
+  ],
+];
+
+test.each(REFUSED)('%s is refused: %s, saying %s', (_, code, word, work) => {
+  const error = failure(work);
+  expect(error.code).toBe(code);
+  expect(error.message).toContain(word);
+});
+
+test('wrong run options', async () => {
+  const refused: [string, object][] = [
+    ['maxIterations', { maxIterations: 0 }],
+    ['budgetMs', { budgetMs: -1 }],
+    ['signal', { signal: {} }],
+    ['onStep', { onStep: 1 }],
+    ['onstep', { onstep: () => {} }],
+  ];
+  for (const [name, options] of refused) {
+    const error = await rejection(model().run(wrong(options)));
+    expect(error.code).toBe('invalid-argument');
+    expect(error.message).toContain(name);
+  }
+});
+
+test('the volume may go, the model stays; a freed model is gone', () => {
+  const own = ball(16, 4);
+  const fitted = model({ volume: own });
+  own.free();
+  fitted.step(3);
+  const { mesh } = fitted;
+  fitted.free();
+  for (const use of [() => fitted.step(), () => fitted.params, () => mesh.info(), () => fitted.save()]) {
+    expect(failure(use).code).toBe('freed');
+  }
+  expect(failure(() => model({ volume: own })).code).toBe('freed');
+});

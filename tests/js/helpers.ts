@@ -1,0 +1,45 @@
+// What the tests of the package share. Importing it starts the module.
+import init, { VesicleError, Volume } from '../../pkg/index.js';
+
+await init();
+
+/** A bright ball (200) in darkness (0), `size` voxels of side 1, its centre at the world's origin. */
+export function ball(size: number, radius: number): Volume {
+  const middle = (size - 1) / 2;
+  const data = new Uint8Array(size ** 3);
+  for (let z = 0, at = 0; z < size; z++) {
+    for (let y = 0; y < size; y++) {
+      for (let x = 0; x < size; x++, at++) {
+        // One voxel of ramp, so that the surface lies where the radius says.
+        const inside = radius + 0.5 - Math.hypot(x - middle, y - middle, z - middle);
+        data[at] = 200 * Math.min(1, Math.max(0, inside));
+      }
+    }
+  }
+  return new Volume({ data, dims: [size, size, size], origin: [-middle, -middle, -middle] });
+}
+
+/** The VesicleError that something throws; fails the test where it throws none, or anything else. */
+export function failure(work: () => unknown): VesicleError {
+  try {
+    work();
+  } catch (error) {
+    if (error instanceof VesicleError) return error;
+    throw error;
+  }
+  throw new Error('nothing was thrown');
+}
+
+/** The same for a promise. */
+export async function rejection(promise: Promise<unknown>): Promise<VesicleError> {
+  const error: unknown = await promise.then(
+    () => new Error('nothing was thrown'),
+    (reason) => reason,
+  );
+  if (error instanceof VesicleError) return error;
+  throw error;
+}
+
+/** Deliberately wrong arguments, past the type checker. */
+// biome-ignore lint/suspicious/noExplicitAny: what a caller without types may pass
+export const wrong = (value: unknown): any => value;

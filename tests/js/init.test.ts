@@ -1,0 +1,89 @@
+// Starting the module, and what happens when it crashes. Each case needs a process of its own.
+import { execFileSync } from 'node:child_process';
+import { readFileSync } from 'node:fs';
+import { fileURLToPath } from 'node:url';
+import { expect, test } from 'vitest';
+
+const root = fileURLToPath(new URL('../../', import.meta.url));
+
+/** What a module script prints, run in a new Node from the project's folder. */
+function node(script: string): string {
+  return execFileSync(process.execPath, ['--input-type=module', '--eval', script], {
+    cwd: root,
+    encoding: 'utf8',
+    timeout: 30_000,
+  }).trim();
+}
+
+test('version is that of the package', () => {
+  const { version } = JSON.parse(readFileSync(`${root}/pkg/package.json`, 'utf8'));
+  expect(node(`import init, { version } from './pkg/index.js'; await init(); console.log(version())`)).toBe(version);
+});
+
+test('init is idempotent, and also takes bytes, a module, a response and an address', () => {
+  const sources = [
+    `readFileSync('pkg/vesicle_bg.wasm')`,
+    `new WebAssembly.Module(readFileSync('pkg/vesicle_bg.wasm'))`,
+    `new Response(readFileSync('pkg/vesicle_bg.wasm'))`,
+    `Promise.resolve(new URL('./pkg/vesicle_bg.wasm', 'file://' + process.cwd() + '/'))`,
+  ];
+  for (const source of sources) {
+    const script = `
+      import { readFileSync } from 'node:fs';
+      import init, { version } from './pkg/index.js';
+      const first = await init({ module_or_path: ${source} });
+      console.log((await init()) === first, version().length > 0);`;
+    expect(node(script), source).toBe('true true');
+  }
+});
+
+test('initSync starts at once', () => {
+  const script = `
+    import { readFileSync } from 'node:fs';
+    import init, { initSync, version } from './pkg/index.js';
+    const first = initSync({ module: readFileSync('pkg/vesicle_bg.wasm') });
+    console.log((await init()) === first, version().length > 0);`;
+  expect(node(script)).toBe('true true');
+});
+
+test('a failed start can be tried again', () => {
+  const script = `
+    import init, { version } from './pkg/index.js';
+    const failed = await init({ module_or_path: new Uint8Array(8) }).catch((error) => error.name);
+    await init();
+    console.log(failed, version().length > 0);`;
+  expect(node(script)).toBe('CompileError true');
+});
+
+test('anything before init says what to do', () => {
+  const script = `
+    import { version } from './pkg/index.js';
+    try { version(); } catch (error) { console.log(error.name, error.code, error.message); }`;
+  expect(node(script)).toMatch(/^VesicleError invalid-argument init: .*await init\(\)/);
+});
+
+test('importing and starting print nothing and keep no process alive', () => {
+  expect(node(`import init from './pkg/index.js'; await init();`)).toBe('');
+});
+
+// A trap cannot be had without a bug, so the raw function is made to fail as one does.
+const CRASH = `
+  import init, { Mesh } from './pkg/index.js';
+  import { RawMesh } from './pkg/vesicle.js';
+  const attempt = (work) => { try { return work(); } catch (error) { return error.name + ' ' + error.code; } };
+  await init();
+  const old = Mesh.icosphere([0, 0, 0], 1, 1);
+  const { info } = RawMesh.prototype;
+  RawMesh.prototype.info = () => { throw new WebAssembly.RuntimeError('unreachable'); };
+  const seen = [attempt(() => old.info())];
+  RawMesh.prototype.info = info;
+  seen.push(attempt(() => old.info()), attempt(() => Mesh.icosphere([0, 0, 0], 1, 1)));
+  await init();
+  seen.push(attempt(() => old.info()), attempt(() => old.free()));
+  seen.push(attempt(() => Mesh.icosphere([0, 0, 0], 1, 1).info().genus));
+  console.log(JSON.stringify(seen));`;
+
+test('after a crash everything says so, until init starts a fresh instance', () => {
+  const crash = 'VesicleCrash undefined';
+  expect(JSON.parse(node(CRASH))).toEqual([crash, crash, crash, 'VesicleError freed', null, 0]);
+});

@@ -1,0 +1,224 @@
+import { expect, test } from 'vitest';
+import { Mesh, type MeshArrays, type MeshFormat } from '../../pkg/index.js';
+import { ball, failure, wrong } from './helpers.js';
+
+const HEALTHY = {
+  closed: true,
+  oriented: true,
+  nonManifoldEdges: 0,
+  nonManifoldVertices: 0,
+  degenerateTriangles: 0,
+  selfIntersections: 0,
+};
+
+const sphere = (radius = 1, edge = 0.2) => Mesh.icosphere([0, 0, 0], radius, edge);
+
+/** A tetrahedron with its corner at the origin; without its last face it is open. */
+const CORNERS = Float32Array.from([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]);
+const FACES = Uint32Array.from([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]);
+const open = () => Mesh.fromArrays(CORNERS, FACES.slice(0, 9));
+
+/** Two meshes as one, the second moved along x. */
+function joined(a: MeshArrays, b: MeshArrays, shift: number): Mesh {
+  const moved = b.positions.map((value, index) => (index % 3 === 0 ? value + shift : value));
+  const first = a.positions.length / 3;
+  return Mesh.fromArrays(
+    Float32Array.from([...a.positions, ...moved]),
+    Uint32Array.from([...a.indices, ...b.indices.map((index) => index + first)]),
+  );
+}
+
+test('an icosphere is a sphere', () => {
+  const mesh = sphere(2, 0.2);
+  const info = mesh.info();
+  expect(info).toMatchObject({ components: 1, euler: 2, genus: 0, vertices: mesh.vertexCount });
+  expect(info.triangles).toBe(mesh.triangleCount);
+  expect(info.area / (16 * Math.PI)).toBeCloseTo(1, 1);
+  expect(info.volume / ((32 / 3) * Math.PI)).toBeCloseTo(1, 1);
+  expect(info.edge.max).toBeLessThanOrEqual(0.2);
+  expect(info.inertia).toHaveLength(9);
+  expect(mesh.check()).toEqual(HEALTHY);
+});
+
+test('arrays: outward unit normals, indices in range, nothing the mesh has not', () => {
+  const { positions, normals, indices, ...rest } = sphere().arrays();
+  expect(rest).toEqual({});
+  expect(Math.max(...indices)).toBe(positions.length / 3 - 1);
+  for (let at = 0; at < positions.length; at += 3) {
+    const [x, y, z] = positions.subarray(at, at + 3) as unknown as [number, number, number];
+    const [a, b, c] = normals.subarray(at, at + 3) as unknown as [number, number, number];
+    expect(Math.hypot(a, b, c)).toBeCloseTo(1, 5);
+    expect(x * a + y * b + z * c).toBeGreaterThan(0.99);
+  }
+});
+
+test('copyTo keeps buffers that are long enough', () => {
+  const mesh = sphere();
+  const out = mesh.arrays();
+  const room = { ...out, positions: new Float32Array(out.positions.length + 10), indices: new Uint32Array(3) };
+  const { positions, normals, indices } = room;
+  const counts = mesh.copyTo(room);
+  expect(counts).toEqual({ vertices: mesh.vertexCount, triangles: mesh.triangleCount });
+  expect(room.positions).toBe(positions);
+  expect(room.normals).toBe(normals);
+  expect(room.indices).not.toBe(indices);
+  expect(room.positions.subarray(0, out.positions.length)).toEqual(out.positions);
+  expect(room.indices).toEqual(out.indices);
+});
+
+test('from arrays, with texture coordinates', () => {
+  const uvs = Float32Array.from([0, 0, 1, 0, 0, 1, 1, 1]);
+  const mesh = Mesh.fromArrays(CORNERS, FACES, { uvs });
+  expect(mesh.info().volume).toBeCloseTo(1 / 6, 6);
+  expect(mesh.check()).toEqual(HEALTHY);
+  const arrays = mesh.arrays();
+  expect(arrays.positions).toEqual(CORNERS);
+  expect(arrays.indices).toEqual(FACES);
+  expect(arrays.uvs).toEqual(uvs);
+});
+
+test('an open mesh is taken, told, and refused where a closed one is needed', () => {
+  expect(open().check()).toMatchObject({ closed: false, oriented: true });
+  expect(failure(() => open().refine()).code).toBe('not-closed');
+});
+
+test('crossing triangles are counted', () => {
+  const tetrahedron = Mesh.fromArrays(CORNERS, FACES).arrays();
+  expect(joined(tetrahedron, tetrahedron, 0.25).check().selfIntersections).toBeGreaterThan(0);
+  expect(joined(tetrahedron, tetrahedron, 2).check().selfIntersections).toBe(0);
+});
+
+test('components', () => {
+  const tetrahedron = Mesh.fromArrays(CORNERS, FACES).arrays();
+  const parts = joined(tetrahedron, tetrahedron, 5).components();
+  expect(parts.map((part) => part.triangleCount)).toEqual([4, 4]);
+  expect(parts.map((part) => part.info().bounds.min[0])).toEqual([0, 5]);
+});
+
+test('refining triples the triangles and counts versions up', () => {
+  const mesh = sphere();
+  const [triangles, topology, geometry] = [mesh.triangleCount, mesh.topologyVersion, mesh.geometryVersion];
+  mesh.refine();
+  expect(mesh.triangleCount).toBe(3 * triangles);
+  expect(mesh.topologyVersion).toBeGreaterThan(topology);
+  expect(mesh.geometryVersion).toBeGreaterThan(geometry);
+  expect(mesh.check()).toEqual(HEALTHY);
+});
+
+test('a clone goes its own way', () => {
+  const mesh = sphere();
+  const copy = mesh.clone();
+  mesh.refine();
+  expect(mesh.triangleCount).toBe(3 * copy.triangleCount);
+  mesh.free();
+  expect(copy.check()).toEqual(HEALTHY);
+});
+
+test('marching cubes of a ball', () => {
+  const mesh = Mesh.marchingCubes(ball(24, 8), 100);
+  expect(mesh.check()).toEqual(HEALTHY);
+  const { volume, euler, centroid } = mesh.info();
+  expect(euler).toBe(2);
+  expect(volume / ((4 / 3) * Math.PI * 8 ** 3)).toBeCloseTo(1, 1);
+  for (const coordinate of centroid) expect(coordinate).toBeCloseTo(0, 3);
+});
+
+test('picking', () => {
+  const hit = sphere(1, 0.1).pick([5, 0.01, 0.02], [-3, 0, 0]);
+  expect(hit?.point[0]).toBeCloseTo(1, 2);
+  expect(hit?.distance).toBeCloseTo(4, 2);
+  expect(hit?.barycentric.reduce((sum, weight) => sum + weight)).toBeCloseTo(1, 5);
+  expect(sphere().pick([5, 0, 0], [1, 0, 0])).toBeUndefined();
+});
+
+test('a cross-section is as long as the circle it draws', () => {
+  const segments = sphere(1, 0.05).crossSection([0, 0, 0.1], [0, 0, 2]);
+  let length = 0;
+  for (let at = 0; at < segments.length; at += 6) {
+    const [ax, ay, az, bx, by, bz] = segments.subarray(at, at + 6) as unknown as number[] & { length: 6 };
+    length += Math.hypot((ax as number) - (bx as number), (ay as number) - (by as number));
+    expect(az).toBeCloseTo(0.1, 5);
+    expect(bz).toBeCloseTo(0.1, 5);
+  }
+  expect(length / (2 * Math.PI * Math.sqrt(0.99))).toBeCloseTo(1, 2);
+});
+
+test.each(['glb', 'ply', 'stl', 'obj'] as const)('%s: written and read back', (format) => {
+  const mesh = Mesh.marchingCubes(ball(16, 5), 100);
+  const back = Mesh.parse(mesh.toBytes(format));
+  expect(back.check()).toEqual(HEALTHY);
+  expect(back.vertexCount).toBe(mesh.vertexCount);
+  expect(back.triangleCount).toBe(mesh.triangleCount);
+  expect(back.info().volume).toBeCloseTo(mesh.info().volume, 2);
+});
+
+test('vtp: the arrays are in the file', () => {
+  const text = new TextDecoder().decode(sphere().toBytes('vtp'));
+  expect(text).toContain('type="PolyData"');
+  expect(text).toContain(`NumberOfPoints="${sphere().vertexCount}"`);
+  expect(text).toContain(`NumberOfPolys="${sphere().triangleCount}"`);
+});
+
+test('mz3: magic number, counts, arrays', () => {
+  const mesh = sphere();
+  const bytes = mesh.toBytes('mz3');
+  const view = new DataView(bytes.buffer, bytes.byteOffset);
+  expect(view.getUint16(0, true)).toBe(0x5a4d);
+  expect(view.getUint32(4, true)).toBe(mesh.triangleCount);
+  expect(view.getUint32(8, true)).toBe(mesh.vertexCount);
+  const skip = view.getUint32(12, true);
+  expect(bytes.length).toBeGreaterThanOrEqual(16 + skip + 12 * (mesh.triangleCount + mesh.vertexCount));
+});
+
+const REFUSED: [string, string, () => unknown][] = [
+  ['no centre', 'center', () => Mesh.icosphere(wrong(undefined), 1, 1)],
+  ['a radius of 0', 'radius', () => Mesh.icosphere([0, 0, 0], 0, 1)],
+  ['NaN for an edge', 'maxEdge', () => Mesh.icosphere([0, 0, 0], 1, Number.NaN)],
+  ['plain numbers', 'positions', () => Mesh.fromArrays(wrong([0, 0, 0]), FACES)],
+  ['half a vertex', 'positions', () => Mesh.fromArrays(CORNERS.slice(1), FACES)],
+  [
+    'NaN for a position',
+    'positions',
+    () =>
+      Mesh.fromArrays(
+        CORNERS.map(() => Number.NaN),
+        FACES,
+      ),
+  ],
+  ['half a triangle', 'indices', () => Mesh.fromArrays(CORNERS, FACES.slice(1))],
+  ['an index too far', 'indices', () => Mesh.fromArrays(CORNERS, Uint32Array.of(0, 1, 4))],
+  ['too few texture coordinates', 'uvs', () => Mesh.fromArrays(CORNERS, FACES, { uvs: new Float32Array(6) })],
+  ['a misspelled extra', 'uv', () => Mesh.fromArrays(CORNERS, FACES, wrong({ uv: CORNERS }))],
+  ['no volume', 'volume', () => Mesh.marchingCubes(wrong({}), 1)],
+  ['no iso value', 'iso', () => Mesh.marchingCubes(ball(4, 1), wrong(undefined))],
+  ['a frame too far', 'frame', () => Mesh.marchingCubes(ball(4, 1), 1, { frame: 1 })],
+  ['a ray to nowhere', 'direction', () => sphere().pick([0, 0, 0], [0, 0, 0])],
+  ['a plane without normal', 'normal', () => sphere().crossSection([0, 0, 0], [0, 0, 0])],
+  ['another format', 'format', () => sphere().toBytes('fbx' as MeshFormat)],
+  ['new', 'Mesh', () => new (wrong(Mesh))()],
+];
+
+test.each(REFUSED)('%s is refused, naming %s', (_, parameter, work) => {
+  const error = failure(work);
+  expect(error.code).toBe('invalid-argument');
+  expect(error.message).toContain(parameter);
+});
+
+test('files that are none', () => {
+  const whole = sphere().toBytes('glb');
+  const broken = [new Uint8Array(), new TextEncoder().encode('not a mesh'), whole.slice(0, 30), whole.slice(0, -50)];
+  for (const bytes of broken) expect(failure(() => Mesh.parse(bytes)).code).toBe('bad-file');
+});
+
+test('more triangles than there is memory for', () => {
+  expect(failure(() => Mesh.icosphere([0, 0, 0], 1, 1e-6)).code).toBe('too-large');
+});
+
+test('use after free', () => {
+  const mesh = sphere();
+  mesh.free();
+  mesh.free();
+  for (const use of [() => mesh.arrays(), () => mesh.vertexCount, () => mesh.clone(), () => mesh.toBytes('ply')]) {
+    expect(failure(use).code).toBe('freed');
+  }
+});

@@ -1,0 +1,50 @@
+// Compiled, never run: the package satisfies the contract, and its data types are the contract's to the letter.
+import * as built from '../../pkg/index.js';
+import type * as contract from './contract.js';
+
+/** True where two types accept the same values and give the same. */
+type Same<A, B> = (<T>() => T extends A ? 1 : 2) extends <T>() => T extends B ? 1 : 2 ? true : false;
+
+/** Does not compile with `false`. */
+const same = <T extends true>(holds: T): T => holds;
+
+same<Same<built.InitInput, contract.InitInput>>(true);
+same<Same<built.VesicleError['code'], contract.VesicleError['code']>>(true);
+same<Same<built.Vec3, contract.Vec3>>(true);
+same<Same<built.VoxelArray, contract.VoxelArray>>(true);
+same<Same<built.VolumeInit, contract.VolumeInit>>(true);
+same<Same<built.MeshArrays, contract.MeshArrays>>(true);
+same<Same<built.MeshInfo, contract.MeshInfo>>(true);
+same<Same<built.MeshReport, contract.MeshReport>>(true);
+same<Same<built.MeshFormat, contract.MeshFormat>>(true);
+same<Same<built.StepReport, contract.StepReport>>(true);
+same<Same<built.RunOptions, contract.RunOptions>>(true);
+same<Same<built.ParamSpec, contract.ParamSpec>>(true);
+same<Same<built.DeformableParams, contract.DeformableParams>>(true);
+same<Same<built.Attractor, contract.Attractor>>(true);
+
+/** The functions of a class itself, without its constructor. */
+type Statics<C> = Omit<C, 'prototype'>;
+
+export const init: typeof contract.default = built.default;
+export const initSync: typeof contract.initSync = built.initSync;
+export const version: typeof contract.version = built.version;
+export const paramSpecs: typeof contract.paramSpecs = built.paramSpecs;
+
+export const error = (error: built.VesicleError): contract.VesicleError => error;
+export const volume = (volume: built.Volume): contract.Volume => volume;
+export const mesh = (mesh: built.Mesh): contract.Mesh => mesh;
+export const stepper = (stepper: built.Stepper): contract.Stepper => stepper;
+export const model = (model: built.DeformableModel): contract.DeformableModel & built.Stepper => model;
+
+export const Volume: Statics<typeof contract.Volume> = built.Volume;
+export const Mesh: Statics<typeof contract.Mesh> = built.Mesh;
+
+// Arguments: whatever the contract takes, the package takes.
+export const newVolume = (init: contract.VolumeInit) => new built.Volume(init);
+
+type ModelOptions = ConstructorParameters<typeof contract.DeformableModel>[0];
+/** The same options with the package's own classes, which no look-alike can stand in for. */
+type Own<T> = { [K in keyof T]: Swap<T[K]> };
+type Swap<T> = T extends contract.Volume ? built.Volume : T extends contract.Mesh ? built.Mesh : T;
+export const newModel = (options: Own<ModelOptions>) => new built.DeformableModel(options);

@@ -1,0 +1,174 @@
+import { gzipSync } from 'node:zlib';
+import { expect, test } from 'vitest';
+import { type Vec3, Volume, type VoxelArray } from '../../pkg/index.js';
+import { ball, failure, wrong } from './helpers.js';
+
+const ELEMENTS = [
+  ...[Uint8Array, Int8Array, Uint16Array, Int16Array],
+  ...[Uint32Array, Int32Array, Float32Array, Float64Array],
+];
+
+/** 2 x 3 x 4 voxels that hold their own index. */
+const counted = () => Uint8Array.from({ length: 24 }, (_, index) => index);
+const grid = (more: object = {}) => new Volume({ data: counted(), dims: [2, 3, 4], ...more });
+
+test.each(ELEMENTS)('%o voxels keep their values', (Element) => {
+  const data: VoxelArray = Element.from([1, 2, 3, 4, 5, 6, 7, 8]);
+  const volume = new Volume({ data, dims: [2, 2, 2], slope: 2, intercept: -1 });
+  expect([...volume.intensities()]).toEqual([1, 3, 5, 7, 9, 11, 13, 15]);
+  expect(volume.range).toEqual([1, 15]);
+});
+
+test('the voxels are copied', () => {
+  const data = counted();
+  const volume = new Volume({ data, dims: [2, 3, 4] });
+  data.fill(99);
+  expect(volume.range).toEqual([0, 23]);
+});
+
+test('place in the world: spacing and origin, or an affine', () => {
+  const placed = grid({ spacing: [1, 2, 3], origin: [10, 20, 30] });
+  expect([...placed.affine]).toEqual([1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 3, 0, 10, 20, 30, 1]);
+  expect(placed.spacing).toEqual([1, 2, 3]);
+  expect(placed.sample([11, 22, 36])).toBe(1 + 2 * 1 + 6 * 2);
+  const turned = grid({ affine: [0, 2, 0, 0, -3, 0, 0, 0, 0, 0, 4, 0, 5, 6, 7, 1] });
+  expect(turned.spacing).toEqual([2, 3, 4]);
+  expect(turned.sample([5 - 3 * 2, 6 + 2, 7 + 4 * 3])).toBe(1 + 2 * 2 + 6 * 3);
+});
+
+test('what it says about itself', () => {
+  const volume = grid({ space: 'LPS' });
+  expect(volume.dims).toEqual([2, 3, 4]);
+  expect(volume.frames).toBe(1);
+  expect(volume.space).toBe('LPS');
+  expect(grid().space).toBe('RAS');
+});
+
+test('slices are row-major', () => {
+  expect([...grid().slice(0, 1)]).toEqual([1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23]);
+  expect([...grid().slice(1, 2)]).toEqual([4, 5, 10, 11, 16, 17, 22, 23]);
+  expect([...grid().slice(2, 3)]).toEqual([18, 19, 20, 21, 22, 23]);
+});
+
+test('the histogram counts every voxel once', () => {
+  const counts = ball(9, 3).histogram(16);
+  expect(counts).toHaveLength(16);
+  expect(counts.reduce((sum, count) => sum + count)).toBe(9 ** 3);
+});
+
+test('outside, the border is replicated', () => {
+  expect(grid().sample([-5, -5, -5])).toBe(0);
+  expect(grid().sample([9, 9, 9])).toBe(23);
+});
+
+test('frames', () => {
+  const volume = Volume.fromFrames([grid(), grid({ intercept: 100 })], { frameSeconds: 0.5 });
+  expect(volume.frames).toBe(2);
+  expect(volume.sample([1, 0, 0], 1)).toBe(101);
+  expect(volume.range).toEqual([0, 123]);
+  const four = new Volume({ data: counted(), dims: [2, 3, 2, 2], frameSeconds: 1 });
+  expect(four.frames).toBe(2);
+  expect(four.intensities(1)[0]).toBe(12);
+});
+
+test('the pyramid starts with the volume itself and shrinks', () => {
+  const levels = ball(30, 10).pyramid(3);
+  expect(levels.map((level) => level.dims)).toEqual([
+    [30, 30, 30],
+    [17, 17, 17],
+    [9, 9, 9],
+  ]);
+  const half = ball(16, 5).pyramid(2, { factor: 2 })[1] as Volume;
+  expect(half.dims).toEqual([8, 8, 8]);
+  expect(half.sample([0, 0, 0])).toBeGreaterThan(190);
+  expect(half.sample([7, 7, 7])).toBe(0);
+});
+
+test('written as NIfTI and read back, also gzipped', () => {
+  const volume = grid({ spacing: [1, 2, 3], origin: [-4, 5, 6], slope: 2, intercept: 1 });
+  const bytes = volume.toNifti();
+  for (const file of [bytes, new Uint8Array(gzipSync(bytes))]) {
+    const back = Volume.parse(file);
+    expect(back.dims).toEqual(volume.dims);
+    expect([...back.affine]).toEqual([...volume.affine]);
+    expect([...back.intensities()]).toEqual([...volume.intensities()]);
+  }
+});
+
+test('a detached header takes its payload as data', () => {
+  const header = [
+    ...['ObjectType = Image', 'NDims = 3', 'DimSize = 2 3 4', 'ElementSpacing = 1 2 3'],
+    ...['ElementType = MET_UCHAR', 'ElementDataFile = volume.raw', ''],
+  ];
+  const bytes = new TextEncoder().encode(header.join('\n'));
+  const volume = Volume.parse(bytes, { data: counted() });
+  expect(volume.dims).toEqual([2, 3, 4]);
+  expect([...volume.intensities()]).toEqual([...counted()]);
+  expect(failure(() => Volume.parse(bytes)).code).toBe('bad-file');
+});
+
+const DIMS: Vec3 = [2, 3, 4];
+const REFUSED: [string, string, () => unknown][] = [
+  ['no init', 'init', () => new Volume(wrong(null))],
+  ['no data', 'data', () => new Volume(wrong({ dims: DIMS }))],
+  ['data of another kind', 'data', () => new Volume({ data: wrong([1, 2]), dims: DIMS })],
+  ['data of 64-bit integers', 'data', () => new Volume({ data: wrong(new BigInt64Array(24)), dims: DIMS })],
+  ['data of the wrong length', 'data', () => grid({ data: new Uint8Array(23) })],
+  ['no dims', 'dims', () => new Volume(wrong({ data: counted() }))],
+  ['two dims', 'dims', () => grid({ dims: [4, 6] })],
+  ['an empty axis', 'dims', () => grid({ dims: [24, 0, 1] })],
+  ['a broken dim', 'dims', () => grid({ dims: [2.5, 3, 4] })],
+  ['dims beyond counting', 'd', () => grid({ dims: [4e9, 4e9, 4e9] })],
+  ['a short affine', 'affine', () => grid({ affine: [1, 0, 0, 0] })],
+  ['a flat affine', 'affine', () => grid({ affine: [1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1] })],
+  ['an affine with perspective', 'affine', () => grid({ affine: [1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1] })],
+  ['NaN in the affine', 'affine', () => grid({ affine: new Float64Array(16).fill(Number.NaN) })],
+  ['affine and spacing', 'affine', () => grid({ affine: grid().affine, spacing: [1, 1, 1] })],
+  ['no spacing', 'spacing', () => grid({ spacing: [1, 0, 1] })],
+  ['an endless origin', 'origin', () => grid({ origin: [1, Number.POSITIVE_INFINITY, 1] })],
+  ['slope 0', 'slope', () => grid({ slope: 0 })],
+  ['a slope in words', 'slope', () => grid({ slope: 'steep' })],
+  ['another space', 'space', () => grid({ space: 'LAS' })],
+  ['a misspelled name', 'spacings', () => grid({ spacings: [1, 1, 1] })],
+  ['a frame too far', 'frame', () => grid().intensities(1)],
+  ['an axis too far', 'axis', () => grid().slice(wrong(3), 0)],
+  ['a slice too far', 'index', () => grid().slice(2, 4)],
+  ['no bins', 'bins', () => grid().histogram(0)],
+  ['half a point', 'world', () => grid().sample(wrong([1, 2]))],
+  ['NaN for a point', 'world', () => grid().sample([1, 2, Number.NaN])],
+  ['a growing pyramid', 'factor', () => grid().pyramid(2, { factor: 0.5 })],
+  ['too many levels', 'levels', () => grid().pyramid(50)],
+  ['no frames', 'frames', () => Volume.fromFrames([])],
+  ['frames of two sizes', 'frames', () => Volume.fromFrames([grid(), ball(4, 1)])],
+  ['something else as a frame', 'frames[1]', () => Volume.fromFrames([grid(), wrong({})])],
+  ['a file as text', 'bytes', () => Volume.parse(wrong('volume.nii'))],
+];
+
+test.each(REFUSED)('%s is refused, naming %s', (_, parameter, work) => {
+  const error = failure(work);
+  expect(error.code).toBe('invalid-argument');
+  expect(error.message).toContain(parameter);
+});
+
+test('files that are none', () => {
+  const whole = grid().toNifti();
+  const broken = [new Uint8Array(), new TextEncoder().encode('not a volume'), whole.slice(0, 200), whole.slice(0, -1)];
+  for (const bytes of broken) expect(failure(() => Volume.parse(bytes)).code).toBe('bad-file');
+});
+
+test('more voxels than there is memory for', () => {
+  // Virtual memory only: the pages are never touched before the size is refused.
+  const data = new Uint8Array(4_200_000_000);
+  expect(failure(() => new Volume({ data, dims: [4_200_000_000, 1, 1] })).code).toBe('too-large');
+});
+
+test('use after free', () => {
+  const volume = grid();
+  volume.free();
+  volume.free();
+  const uses = [() => volume.dims, () => volume.sample([0, 0, 0]), () => Volume.fromFrames([volume])];
+  for (const use of uses) expect(failure(use).code).toBe('freed');
+  const scoped = grid();
+  scoped[Symbol.dispose]();
+  expect(failure(() => scoped.frames).code).toBe('freed');
+});
