@@ -1,6 +1,8 @@
 //! Volume files of every accepted format against what their usual libraries (nibabel, pynrrd, SimpleITK) read from
 //! them, and against what must happen to broken ones.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
 use vesicle::io::{FormatError, parse_volume, write_nifti};
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
