@@ -1,3 +1,9 @@
 //! Small geometry: the vector types every layer shares, and exact predicates on triangles.
 
+mod bounds;
+pub mod predicates;
+pub mod symmetric;
+pub mod triangle;
+
+pub use bounds::{Bounds, BoxTree};
 pub use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};

@@ -1,11 +1,14 @@
 //! A plain indexed triangle list, as files and graphics cards hold it.
 
-use crate::math::{Vec2, Vec3};
+use super::MeshError;
+use super::edge_table::edge_uses;
+use super::groups::Groups;
+use crate::math::{DAffine3, DVec3, Vec2, Vec3, triangle};
 
-/// Positions and triangles with optional per-vertex extras; promises nothing about closedness.
+/// Positions and triangles with optional extras; promises nothing about closedness.
 ///
 /// Triangles index `positions` and are counter-clockwise seen from outside. Each extra, where there is one,
-/// has one entry per position.
+/// has one entry per position; `corner_uvs` has one per triangle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
     /// Vertex positions.
@@ -16,6 +19,204 @@ pub struct TriangleMesh {
     pub normals: Option<Vec<Vec3>>,
     /// Texture coordinates per vertex.
     pub uvs: Option<Vec<Vec2>>,
+    /// Texture coordinates per corner of each triangle, in place of `uvs` where seams give a vertex several.
+    pub corner_uvs: Option<Vec<[Vec2; 3]>>,
     /// Colours per vertex, rgb in 0..1.
     pub colors: Option<Vec<Vec3>>,
+}
+
+impl TriangleMesh {
+    /// Nothing, where every triangle names vertices that exist, every position is finite, and every extra has its
+    /// length.
+    ///
+    /// # Errors
+    /// [`MeshError::InvalidArgument`] that names the array and the first bad entry.
+    pub fn validate(&self) -> Result<(), MeshError> {
+        let invalid = |parameter, problem| Err(MeshError::InvalidArgument { parameter, problem });
+        let (vertices, triangles) = (self.positions.len(), self.triangles.len());
+        if let Some(v) = self.positions.iter().position(|p| !p.is_finite()) {
+            return invalid(
+                "positions",
+                format!("vertex {v} is {}; finite numbers are accepted", self.positions[v]),
+            );
+        }
+        let outside = |t: &[u32; 3]| t.iter().any(|&v| v as usize >= vertices);
+        if let Some(t) = self.triangles.iter().position(outside) {
+            let named = self.triangles[t];
+            return invalid(
+                "indices",
+                format!("triangle {t} is {named:?}; indices below {vertices} are accepted"),
+            );
+        }
+        for (name, found, expected) in [
+            ("normals", self.normals.as_ref().map(Vec::len), vertices),
+            ("uvs", self.uvs.as_ref().map(Vec::len), vertices),
+            ("corner_uvs", self.corner_uvs.as_ref().map(Vec::len), triangles),
+            ("colors", self.colors.as_ref().map(Vec::len), vertices),
+        ] {
+            if let Some(found) = found.filter(|&found| found != expected) {
+                return invalid(name, format!("has {found} entries; {expected} are accepted"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The corners of each triangle. Indices must exist, as [`TriangleMesh::validate`] makes sure.
+    pub fn corners(&self) -> impl Iterator<Item = [Vec3; 3]> + '_ {
+        self.triangles.iter().map(|t| t.map(|v| self.positions[v as usize]))
+    }
+
+    /// The mesh moved by `map`: normals stay normal, and a map that mirrors turns triangles over, so that outside
+    /// stays outside.
+    pub fn transformed(&self, map: &DAffine3) -> Self {
+        let mut moved = self.clone();
+        moved.positions.iter_mut().for_each(|p| *p = map.transform_point3(p.as_dvec3()).as_vec3());
+        let mirrors = map.matrix3.determinant() < 0.0;
+        if mirrors {
+            moved.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+            moved.corner_uvs.iter_mut().flatten().for_each(|corners| corners.swap(1, 2));
+        }
+        // Cofactors instead of the inverse transpose: right for maps that flatten, too.
+        let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis];
+        let side = if mirrors { -1.0 } else { 1.0 };
+        for normal in moved.normals.iter_mut().flatten() {
+            let n = normal.as_dvec3() * side;
+            *normal = (y.cross(z) * n.x + z.cross(x) * n.y + x.cross(y) * n.z).normalize_or_zero().as_vec3();
+        }
+        moved
+    }
+
+    /// The parts joined through edges, each with its own vertices, in the order of their first triangles. Vertices of
+    /// no triangle are left out; a vertex of two parts is in both.
+    pub fn components(&self) -> Vec<Self> {
+        let mut groups = Groups::new(self.triangles.len());
+        groups.join_across_edges(&edge_uses(&self.triangles));
+        let mut members: Vec<Vec<usize>> = vec![Vec::new(); self.triangles.len()];
+        (0..self.triangles.len()).for_each(|t| members[groups.find(t)].push(t));
+        let mut slots = vec![u32::MAX; self.positions.len()];
+        members.iter().filter(|part| !part.is_empty()).map(|part| self.part(part, &mut slots)).collect()
+    }
+
+    /// The given triangles with the vertices they use, numbered in order of first use. `slots` is scratch, all
+    /// `u32::MAX` before and after.
+    fn part(&self, triangles: &[usize], slots: &mut [u32]) -> Self {
+        let mut used = Vec::new();
+        let renumbered = |t: &usize| {
+            self.triangles[*t].map(|v| {
+                let slot = &mut slots[v as usize];
+                if *slot == u32::MAX {
+                    *slot = used.len() as u32;
+                    used.push(v as usize);
+                }
+                *slot
+            })
+        };
+        let renumbered = triangles.iter().map(renumbered).collect();
+        used.iter().for_each(|&v| slots[v] = u32::MAX);
+        let part = self.gathered(&used);
+        let corner_uvs = self.corner_uvs.as_ref().map(|uvs| triangles.iter().map(|&t| uvs[t]).collect());
+        Self { triangles: renumbered, corner_uvs, ..part }
+    }
+
+    /// The given vertices with their extras, and no triangles.
+    pub(super) fn gathered(&self, vertices: &[usize]) -> Self {
+        Self {
+            positions: gather(&self.positions, vertices),
+            triangles: Vec::new(),
+            normals: self.normals.as_ref().map(|all| gather(all, vertices)),
+            uvs: self.uvs.as_ref().map(|all| gather(all, vertices)),
+            corner_uvs: None,
+            colors: self.colors.as_ref().map(|all| gather(all, vertices)),
+        }
+    }
+
+    /// Unit normals per vertex: the mean of the normals of the triangles around it, weighted by area. Zero at a
+    /// vertex of no triangle, or where they cancel.
+    pub fn vertex_normals(&self) -> Vec<Vec3> {
+        let mut sums = vec![DVec3::ZERO; self.positions.len()];
+        for (triangle, corners) in self.triangles.iter().zip(self.corners()) {
+            let normal = triangle::area_vector(corners);
+            triangle.iter().for_each(|&v| sums[v as usize] += normal);
+        }
+        sums.into_iter().map(|sum| sum.normalize_or_zero().as_vec3()).collect()
+    }
+
+    /// The mesh with as many vertices as texture needs: one for each different pair of position and texture
+    /// coordinate, so that
+    /// `uvs` stands in for `corner_uvs`. A mesh without `corner_uvs` is given back as it is.
+    pub fn split_at_seams(&self) -> Self {
+        let Some(corner_uvs) = &self.corner_uvs else { return self.clone() };
+        let mut corners: Vec<(u32, [u32; 2], usize)> = Vec::with_capacity(3 * corner_uvs.len());
+        for (at, (&v, uv)) in self.triangles.as_flattened().iter().zip(corner_uvs.as_flattened()).enumerate()
+        {
+            corners.push((v, uv.to_array().map(f32::to_bits), at));
+        }
+        corners.sort_unstable();
+        let (mut vertices, mut uvs) = (Vec::new(), Vec::new());
+        let mut triangles = vec![[0; 3]; self.triangles.len()];
+        for same in corners.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            same.iter().for_each(|&(_, _, at)| triangles[at / 3][at % 3] = vertices.len() as u32);
+            vertices.push(same[0].0 as usize);
+            uvs.push(Vec2::from_array(same[0].1.map(f32::from_bits)));
+        }
+        Self { triangles, uvs: Some(uvs), ..self.gathered(&vertices) }
+    }
+}
+
+fn gather<T: Copy>(all: &[T], which: &[usize]) -> Vec<T> {
+    which.iter().map(|&i| all[i]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{measure, shapes};
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn transformed_keeps_outside_outside() {
+        let cube = shapes::cuboid(Vec3::ONE);
+        let mesh = TriangleMesh { normals: Some(cube.vertex_normals()), ..cube };
+        let map = DAffine3::from_scale(DVec3::new(-2.0, 3.0, 1.0));
+        let moved = mesh.transformed(&map);
+        assert_eq!(measure(&moved).volume, 6.0);
+        let outward = |m: &TriangleMesh| {
+            let centre = m.positions.iter().sum::<Vec3>() / 8.0;
+            let normals = m.normals.as_ref().unwrap();
+            m.positions.iter().zip(normals).all(|(p, n)| (*p - centre).dot(*n) > 0.0)
+        };
+        assert!(outward(&mesh) && outward(&moved));
+    }
+
+    #[test]
+    fn components_come_apart() {
+        let parts = [shapes::torus(3.0, 1.0, 8, 5), shapes::cuboid(Vec3::ONE), shapes::icosahedron()];
+        let mut all = shapes::joined(&parts);
+        all.colors = Some(all.positions.clone());
+        let found = all.components();
+        assert_eq!(found.len(), 3);
+        for (part, expected) in found.iter().zip(&parts) {
+            part.validate().unwrap();
+            assert_eq!(part.colors.as_ref(), Some(&part.positions));
+            assert_eq!(measure(part), measure(expected));
+        }
+    }
+
+    #[test]
+    fn vertex_normals_of_a_ball() {
+        let ball = shapes::icosahedron();
+        for (p, n) in ball.positions.iter().zip(ball.vertex_normals()) {
+            assert!((p.normalize() - n).length() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn validate_names_the_extra() {
+        let mesh = TriangleMesh { uvs: Some(vec![Vec2::ZERO; 3]), ..shapes::icosahedron() };
+        let MeshError::InvalidArgument { parameter, problem } = mesh.validate().unwrap_err() else {
+            panic!()
+        };
+        assert_eq!((parameter, problem.as_str()), ("uvs", "has 3 entries; 12 are accepted"));
+    }
 }

@@ -54,17 +54,16 @@ impl Grid {
         cell.blend(|index| self.values[index])
     }
 
-    /// Like [`sample`](Self::sample), but `outside` where `p` is not in the box [-1/2, n-1/2] that the voxels fill.
+    /// Trilinear value at `p` as if the grid went on with voxels of value 0 on all sides.
+    ///
+    /// Continuous, unlike a cut at the border: a surface that looks for a value there comes to rest.
     #[inline]
-    pub fn sample_zero(&self, p: Vec3, outside: f32) -> f32 {
-        if self.contains(p) { self.sample(p) } else { outside }
-    }
-
-    /// Whether `p` lies in the box that the voxels fill, half a voxel beyond the outermost centres.
-    #[inline]
-    pub fn contains(&self, p: Vec3) -> bool {
-        let inside = |x: f32, n: usize| x >= -0.5 && x <= n as f32 - 0.5;
-        inside(p.x, self.dims[0]) && inside(p.y, self.dims[1]) && inside(p.z, self.dims[2])
+    pub fn sample_padded(&self, p: Vec3) -> f32 {
+        let last = |n: usize| (n - 1) as f32;
+        let share = inside(p.x, last(self.dims[0]))
+            * inside(p.y, last(self.dims[1]))
+            * inside(p.z, last(self.dims[2]));
+        if share > 0.0 { share * self.sample(p) } else { 0.0 }
     }
 
     /// Sobel gradient in intensity per voxel: differences over two voxels, smoothed by [1 2 1] across, divided by
@@ -149,6 +148,19 @@ fn push_gradients(columns: &[Columns], out: &mut Vec<Vec3>) {
     }
 }
 
+/// 1 between the outermost voxel centres, falling to 0 one voxel beyond.
+#[inline]
+fn inside(x: f32, last: f32) -> f32 {
+    let beyond = if x < 0.0 { -x } else { x - last };
+    if beyond <= 0.0 {
+        1.0
+    } else if beyond < 1.0 {
+        1.0 - beyond
+    } else {
+        0.0
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -191,12 +203,21 @@ mod tests {
     }
 
     #[test]
-    fn the_border_voxels_own_half_counts_as_inside() {
-        let g = grid([3, 3, 3], |_| 7.0);
-        assert_eq!(g.sample_zero(Vec3::new(-0.5, 1.0, 2.5), 0.0), 7.0);
-        assert_eq!(g.sample_zero(Vec3::new(-0.51, 1.0, 1.0), 0.0), 0.0);
-        assert_eq!(g.sample_zero(Vec3::new(1.0, 1.0, 2.51), -1.0), -1.0);
-        assert_eq!(g.sample_zero(Vec3::splat(f32::NAN), -1.0), -1.0);
+    fn padded_sampling_is_sampling_of_a_grid_with_zeros_around() {
+        let field = |p: Vec3| 3.0 + p.x * p.y - p.z;
+        let g = grid([4, 3, 5], field);
+        let padded = grid([8, 7, 9], |p| {
+            let q = p - Vec3::splat(2.0);
+            let inner = q.min_element() >= 0.0 && q.x <= 3.0 && q.y <= 2.0 && q.z <= 4.0;
+            if inner { field(q) } else { 0.0 }
+        });
+        for i in 0..4000 {
+            let p = Vec3::new((i % 17) as f32 * 0.45, (i / 17 % 15) as f32 * 0.43, (i / 255) as f32 * 0.57);
+            let p = p - Vec3::splat(1.9);
+            let expected = padded.sample(p + Vec3::splat(2.0));
+            assert!((g.sample_padded(p) - expected).abs() < 1e-4, "at {p}");
+        }
+        assert_eq!(g.sample_padded(Vec3::splat(f32::NAN)), 0.0);
     }
 
     #[test]

@@ -1,0 +1,309 @@
+//! Axis-aligned boxes, and a tree of them for finding the few that matter.
+
+use super::{DVec3, Vec3};
+
+/// A closed axis-aligned box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// The lowest corner.
+    pub min: Vec3,
+    /// The highest corner.
+    pub max: Vec3,
+}
+
+impl Bounds {
+    /// The box that holds nothing and meets nothing.
+    pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+
+    /// The smallest box around the points.
+    #[inline]
+    pub fn of(points: &[Vec3]) -> Self {
+        points.iter().fold(Self::EMPTY, |b, &p| b.joined(&Self { min: p, max: p }))
+    }
+
+    /// The smallest box around both.
+    #[inline]
+    pub fn joined(&self, other: &Self) -> Self {
+        let (mut min, mut max) = (self.min, self.max);
+        for axis in 0..3 {
+            // Comparisons, as f32::min by variables is a call in wasm.
+            if other.min[axis] < min[axis] {
+                min[axis] = other.min[axis];
+            }
+            if other.max[axis] > max[axis] {
+                max[axis] = other.max[axis];
+            }
+        }
+        Self { min, max }
+    }
+
+    /// Whether the boxes share a point.
+    #[inline]
+    pub fn meets(&self, other: &Self) -> bool {
+        self.min.x <= other.max.x
+            && other.min.x <= self.max.x
+            && self.min.y <= other.max.y
+            && other.min.y <= self.max.y
+            && self.min.z <= other.max.z
+            && other.min.z <= self.max.z
+    }
+
+    /// The squared distance from `p` to the box, zero inside.
+    #[inline]
+    pub fn distance_squared(&self, p: Vec3) -> f64 {
+        let (low, high) = (self.min.as_dvec3() - p.as_dvec3(), p.as_dvec3() - self.max.as_dvec3());
+        low.max(high).max(DVec3::ZERO).length_squared()
+    }
+
+    /// The distance along the ray, in lengths of `direction`, at which it enters the box; `None` where it misses.
+    /// Zero where it starts inside. Rounded so that a ray along a face counts.
+    pub fn ray_entry(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+        for axis in 0..3 {
+            let (low, high) =
+                (f64::from(self.min[axis]) - origin[axis], f64::from(self.max[axis]) - origin[axis]);
+            if direction[axis] == 0.0 {
+                // Parallel to the slab: a division would give 0 / 0 on its faces.
+                if low > 0.0 || high < 0.0 {
+                    return None;
+                }
+                continue;
+            }
+            let (a, b) = (low / direction[axis], high / direction[axis]);
+            enter = enter.max(a.min(b));
+            leave = leave.min(a.max(b));
+        }
+        (enter <= leave * ROUNDING).then_some(enter)
+    }
+
+    fn widest_axis(&self) -> usize {
+        let size = self.max - self.min;
+        if size.x >= size.y && size.x >= size.z {
+            0
+        } else if size.y >= size.z {
+            1
+        } else {
+            2
+        }
+    }
+}
+
+/// Each quotient is within an ulp; less would let a ray slip between two boxes that share a face.
+const ROUNDING: f64 = 1.0 + 4.0 * f64::EPSILON;
+
+/// Boxes in a leaf: 1 doubles the nodes, 16 tests many boxes in vain.
+const LEAF: usize = 4;
+
+/// A balanced tree over boxes: size linear in their number whatever their shapes, and the same for the same boxes.
+#[derive(Clone, Debug, Default)]
+pub struct BoxTree {
+    nodes: Vec<Node>,
+    items: Vec<(Bounds, u32)>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    bounds: Bounds,
+    /// Inner: the second child (the first is the next node). Leaf: the first item.
+    link: u32,
+    /// Items of a leaf; 0 for an inner node.
+    count: u32,
+}
+
+impl BoxTree {
+    /// The tree of `boxes`, whose items are known by their index.
+    pub fn new(boxes: &[Bounds]) -> Self {
+        let mut items: Vec<(Bounds, u32)> = boxes.iter().copied().zip(0..).collect();
+        let mut nodes = Vec::with_capacity(boxes.len());
+        if !items.is_empty() {
+            build(&mut nodes, &mut items, 0);
+        }
+        Self { nodes, items }
+    }
+
+    /// Visits each pair of items whose boxes meet, once, the lower index first. The order of the pairs is fixed, but
+    /// says nothing.
+    pub fn for_each_pair(&self, mut visit: impl FnMut(u32, u32)) {
+        let mut stack = Vec::new();
+        if !self.nodes.is_empty() {
+            stack.push((0, 0));
+        }
+        while let Some((i, j)) = stack.pop() {
+            let (a, b) = (&self.nodes[i], &self.nodes[j]);
+            match (a.count > 0, b.count > 0) {
+                _ if !a.bounds.meets(&b.bounds) => {}
+                (true, _) if i == j => self.pairs_within(a, &mut visit),
+                (false, _) if i == j => {
+                    let (left, right) = (i + 1, a.link as usize);
+                    stack.extend([(left, left), (right, right), (left, right)]);
+                }
+                (true, true) => self.pairs_between(a, b, &mut visit),
+                (false, true) => stack.extend([(i + 1, j), (a.link as usize, j)]),
+                // The second of the pair next time: both shrink in turn.
+                (_, false) => stack.extend([(j + 1, i), (b.link as usize, i)]),
+            }
+        }
+    }
+
+    /// Visits items nearest box first. `visit` gets an item and the bound so far, and gives back the new bound, a
+    /// squared distance; items whose box is further than it are left out. Ties within a bound are visited.
+    pub fn nearest(&self, p: Vec3, mut visit: impl FnMut(u32, f64) -> f64) {
+        let mut bound = f64::INFINITY;
+        self.descend(
+            |bounds| Some(bounds.distance_squared(p)),
+            |item| {
+                bound = visit(item, bound);
+                bound
+            },
+        );
+    }
+
+    /// Visits items whose boxes the ray enters, nearest entry first, leaving out those entered beyond the bound that
+    /// `visit` gave back last (in lengths of `direction`).
+    pub fn along_ray(&self, origin: DVec3, direction: DVec3, visit: impl FnMut(u32) -> f64) {
+        self.descend(|bounds| bounds.ray_entry(origin, direction), visit);
+    }
+
+    fn descend(&self, entry: impl Fn(&Bounds) -> Option<f64>, mut visit: impl FnMut(u32) -> f64) {
+        let Some(start) = self.nodes.first().and_then(|root| entry(&root.bounds)) else { return };
+        let (mut stack, mut bound) = (vec![(start, 0)], f64::INFINITY);
+        while let Some((distance, i)) = stack.pop() {
+            if distance > bound {
+                continue;
+            }
+            let node = &self.nodes[i];
+            for (bounds, item) in self.items_of(node) {
+                if entry(bounds).is_some_and(|d| d <= bound) {
+                    bound = visit(*item);
+                }
+            }
+            if node.count == 0 {
+                self.push_children(i, &entry, &mut stack);
+            }
+        }
+    }
+
+    fn push_children(
+        &self,
+        i: usize,
+        entry: &impl Fn(&Bounds) -> Option<f64>,
+        stack: &mut Vec<(f64, usize)>,
+    ) {
+        let children = [i + 1, self.nodes[i].link as usize];
+        let [a, b] = children.map(|c| entry(&self.nodes[c].bounds).map(|distance| (distance, c)));
+        let near_last = match (a, b) {
+            (Some(x), Some(y)) if x.0 <= y.0 => [b, a],
+            _ => [a, b],
+        };
+        stack.extend(near_last.into_iter().flatten());
+    }
+
+    fn items_of(&self, node: &Node) -> &[(Bounds, u32)] {
+        if node.count == 0 { &[] } else { &self.items[node.link as usize..(node.link + node.count) as usize] }
+    }
+
+    fn pairs_within(&self, leaf: &Node, visit: &mut impl FnMut(u32, u32)) {
+        let items = self.items_of(leaf);
+        for (k, (bounds, item)) in items.iter().enumerate() {
+            for (other_bounds, other) in &items[k + 1..] {
+                if bounds.meets(other_bounds) {
+                    visit(*item.min(other), *item.max(other));
+                }
+            }
+        }
+    }
+
+    fn pairs_between(&self, a: &Node, b: &Node, visit: &mut impl FnMut(u32, u32)) {
+        for (bounds, item) in self.items_of(a) {
+            if !bounds.meets(&b.bounds) {
+                continue;
+            }
+            for (other_bounds, other) in self.items_of(b) {
+                if bounds.meets(other_bounds) {
+                    visit(*item.min(other), *item.max(other));
+                }
+            }
+        }
+    }
+}
+
+fn build(nodes: &mut Vec<Node>, items: &mut [(Bounds, u32)], first: usize) {
+    let bounds = items.iter().fold(Bounds::EMPTY, |b, (item, _)| b.joined(item));
+    let at = nodes.len();
+    if items.len() <= LEAF {
+        nodes.push(Node { bounds, link: first as u32, count: items.len() as u32 });
+        return;
+    }
+    nodes.push(Node { bounds, link: 0, count: 0 });
+    let (axis, middle) = (bounds.widest_axis(), items.len() / 2);
+    items.select_nth_unstable_by(middle, |(a, i), (b, j)| {
+        (a.min[axis] + a.max[axis]).total_cmp(&(b.min[axis] + b.max[axis])).then(i.cmp(j))
+    });
+    let (left, right) = items.split_at_mut(middle);
+    build(nodes, left, first);
+    nodes[at].link = nodes.len() as u32;
+    build(nodes, right, first + middle);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn boxes(count: u32) -> Vec<Bounds> {
+        let mut state = 3_u32;
+        let mut next = || {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            (state >> 8) as f32 / 16777216.0
+        };
+        (0..count)
+            .map(|i| {
+                let min = Vec3::new(next(), next(), next()) * 10.0;
+                // One in sixteen spans everything along an axis.
+                let long = if i % 16 == 0 { 10.0 } else { 0.3 };
+                Bounds { min, max: min + Vec3::new(next() * long, next(), next() * 0.1) }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn pairs_are_those_of_brute_force() {
+        for count in [0, 1, 2, 5, 9, 300] {
+            let boxes = boxes(count);
+            let mut found = Vec::new();
+            BoxTree::new(&boxes).for_each_pair(|i, j| found.push((i, j)));
+            found.sort_unstable();
+            let all = (0..count).flat_map(|j| (0..j).map(move |i| (i, j)));
+            let mut expected: Vec<_> =
+                all.filter(|&(i, j)| boxes[i as usize].meets(&boxes[j as usize])).collect();
+            expected.sort_unstable();
+            assert_eq!(found, expected, "{count} boxes");
+        }
+    }
+
+    #[test]
+    fn a_ray_in_a_face_enters() {
+        let unit = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
+        let along = DVec3::new(1.0, 0.0, 0.0);
+        assert_eq!(unit.ray_entry(DVec3::new(-2.0, 0.0, 1.0), along), Some(2.0));
+        assert_eq!(unit.ray_entry(DVec3::new(0.5, 0.5, 0.5), along), Some(0.0));
+        assert_eq!(unit.ray_entry(DVec3::new(-2.0, 1.5, 0.5), along), None);
+        assert_eq!(unit.ray_entry(DVec3::new(2.0, 0.5, 0.5), along), None);
+    }
+
+    #[test]
+    fn nearest_visits_little_and_finds_the_nearest() {
+        let boxes = boxes(500);
+        let (tree, p) = (BoxTree::new(&boxes), Vec3::splat(5.0));
+        let (mut best, mut visited) = (f64::INFINITY, 0);
+        tree.nearest(p, |item, bound| {
+            visited += 1;
+            best = bound.min(boxes[item as usize].distance_squared(p));
+            best
+        });
+        let expected = boxes.iter().map(|b| b.distance_squared(p)).fold(f64::INFINITY, f64::min);
+        assert_eq!(best, expected);
+        assert!(visited < 100, "{visited} of 500 visited");
+    }
+}

@@ -1,0 +1,101 @@
+//! Eigenvalues and eigenvectors of symmetric 3×3 matrices.
+
+use super::{DMat3, DVec3};
+
+/// Sweeps after which rotations no longer change anything: Jacobi converges quadratically, and 6 were the most seen.
+const SWEEPS: usize = 16;
+
+/// The eigenvalues in ascending order, and their orthonormal eigenvectors as the columns of a rotation.
+///
+/// Only the symmetric part of `matrix` is looked at. Every eigenvalue is right to rounding relative to the largest.
+/// A matrix with an entry that is not finite gives values that are not finite.
+pub fn eigen(matrix: DMat3) -> (DVec3, DMat3) {
+    let (mut a, mut vectors) = ((matrix + matrix.transpose()) * 0.5, DMat3::IDENTITY);
+    for _ in 0..SWEEPS {
+        if a.y_axis.x == 0.0 && a.z_axis.x == 0.0 && a.z_axis.y == 0.0 {
+            break;
+        }
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            let rotation = rotation_clearing(&a, p, q);
+            a = rotation.transpose() * a * rotation;
+            vectors *= rotation;
+        }
+    }
+    sorted(DVec3::new(a.x_axis.x, a.y_axis.y, a.z_axis.z), vectors)
+}
+
+/// The rotation in the plane of axes `p` and `q` after which the entry `(p, q)` is zero.
+fn rotation_clearing(a: &DMat3, p: usize, q: usize) -> DMat3 {
+    let off = a.col(q)[p];
+    let gap = a.col(q)[q] - a.col(p)[p];
+    if off == 0.0 || off.abs() <= f64::EPSILON * 1e-3 * (a.col(p)[p].abs() + a.col(q)[q].abs()) && gap != 0.0
+    {
+        return DMat3::IDENTITY;
+    }
+    let ratio = gap / (2.0 * off);
+    let sign = if ratio < 0.0 { -1.0 } else { 1.0 };
+    let tangent = sign / (ratio.abs() + (ratio * ratio + 1.0).sqrt());
+    let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
+    let sine = tangent * cosine;
+    let mut rotation = DMat3::IDENTITY;
+    rotation.col_mut(p)[p] = cosine;
+    rotation.col_mut(q)[q] = cosine;
+    rotation.col_mut(q)[p] = sine;
+    rotation.col_mut(p)[q] = -sine;
+    rotation
+}
+
+fn sorted(values: DVec3, vectors: DMat3) -> (DVec3, DMat3) {
+    let mut order = [0, 1, 2];
+    order.sort_by(|&i, &j| values[i].total_cmp(&values[j]));
+    let [x, y, _] = order.map(|i| vectors.col(i));
+    (DVec3::from_array(order.map(|i| values[i])), DMat3::from_cols(x, y, x.cross(y)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn check(matrix: DMat3) {
+        let (values, vectors) = eigen(matrix);
+        let scale = matrix.to_cols_array().iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        for i in 0..3 {
+            let residual = matrix * vectors.col(i) - values[i] * vectors.col(i);
+            assert!(residual.length() <= 1e-14 * scale, "{matrix} {values} {residual}");
+        }
+        assert!((vectors.determinant() - 1.0).abs() < 1e-14);
+        assert!(values.x <= values.y && values.y <= values.z);
+    }
+
+    #[test]
+    fn known_values() {
+        let matrix = DMat3::from_cols_array(&[2.0, 1.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, -5.0]);
+        assert!((eigen(matrix).0 - DVec3::new(-5.0, 1.0, 3.0)).length() < 1e-14);
+        check(matrix);
+    }
+
+    #[test]
+    fn repeated_zero_and_tiny_values() {
+        check(DMat3::ZERO);
+        check(DMat3::IDENTITY);
+        let n = DVec3::new(1.0, -2.0, 0.5);
+        check(DMat3::from_cols(n * n.x, n * n.y, n * n.z));
+        check(DMat3::IDENTITY + 1e-12 * DMat3::from_cols(n * n.x, n * n.y, n * n.z));
+        check(1e-300 * DMat3::from_cols(n * n.x, n * n.y, n * n.z));
+    }
+
+    #[test]
+    fn seeded_matrices() {
+        let mut state = 11_u64;
+        let mut next = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        };
+        for _ in 0..1000 {
+            let [a, b, c, d, e, f] = [(); 6].map(|()| next());
+            check(DMat3::from_cols_array(&[a, b, c, b, d, e, c, e, f]));
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! An independent look at a mesh: from its arrays alone, one function an invariant.
+
+use super::crossing::count_crossings;
+use super::edge_table::{EdgeUse, by_edge, edge_uses};
+use super::groups::Groups;
+use super::{MeshError, TriangleMesh};
+use crate::math::predicates::collinear;
+
+/// What an independent look at a mesh finds; a healthy one is closed, oriented and has all counts at zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MeshReport {
+    /// No edge belongs to a single triangle. (So is a mesh without triangles.)
+    pub closed: bool,
+    /// Every edge is run through as often in one direction as in the other, as far as its triangles pair up.
+    pub oriented: bool,
+    /// Edges of more than two triangles.
+    pub non_manifold_edges: usize,
+    /// Vertices whose triangles do not form one fan, open or closed; the ends of a non-manifold edge are among them.
+    pub non_manifold_vertices: usize,
+    /// Triangles that name a corner twice or whose corners lie on one line, exactly.
+    pub degenerate_triangles: usize,
+    /// Pairs of triangles that share more than their common corners and edges, exactly; see
+    /// [`crossing_pairs`](super::crossing_pairs).
+    pub self_intersections: usize,
+}
+
+impl MeshReport {
+    /// Whether this is the report of a closed, oriented, embedded 2-manifold.
+    pub fn is_healthy(&self) -> bool {
+        self.closed
+            && self.oriented
+            && self.non_manifold_edges == 0
+            && self.non_manifold_vertices == 0
+            && self.degenerate_triangles == 0
+            && self.self_intersections == 0
+    }
+}
+
+/// The report on `mesh`. Triangles that name a corner twice are counted as degenerate and left out of all else.
+///
+/// # Errors
+/// [`MeshError::InvalidArgument`] for a triangle that names a vertex that does not exist, and for a position that is
+/// not finite.
+pub fn report(mesh: &TriangleMesh) -> Result<MeshReport, MeshError> {
+    mesh.validate()?;
+    let uses = edge_uses(&mesh.triangles);
+    Ok(MeshReport {
+        closed: is_closed(&uses),
+        oriented: is_oriented(&uses),
+        non_manifold_edges: non_manifold_edges(&uses),
+        non_manifold_vertices: non_manifold_vertices(mesh),
+        degenerate_triangles: degenerate_triangles(mesh),
+        self_intersections: count_crossings(mesh),
+    })
+}
+
+fn is_closed(uses: &[EdgeUse]) -> bool {
+    by_edge(uses).all(|edge| edge.len() != 1)
+}
+
+fn is_oriented(uses: &[EdgeUse]) -> bool {
+    by_edge(uses).all(|edge| {
+        let forward = edge.iter().filter(|u| u.forward).count();
+        forward.abs_diff(edge.len() - forward) <= edge.len() % 2
+    })
+}
+
+fn non_manifold_edges(uses: &[EdgeUse]) -> usize {
+    by_edge(uses).filter(|edge| edge.len() > 2).count()
+}
+
+fn degenerate_triangles(mesh: &TriangleMesh) -> usize {
+    // A corner named twice puts two points in one place: collinear too.
+    mesh.corners().filter(|&corners| collinear(corners)).count()
+}
+
+fn non_manifold_vertices(mesh: &TriangleMesh) -> usize {
+    let links = links(mesh);
+    links.chunk_by(|a, b| a.vertex == b.vertex).filter(|link| !is_path_or_cycle(link)).count()
+}
+
+/// An edge of the link of a vertex: the side opposite to it in one of its triangles.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct LinkEdge {
+    vertex: u32,
+    from: u32,
+    to: u32,
+}
+
+/// All links, ordered by vertex.
+fn links(mesh: &TriangleMesh) -> Vec<LinkEdge> {
+    let sound = mesh.triangles.iter().filter(|&&[a, b, c]| a != b && b != c && c != a);
+    let mut links: Vec<_> = sound
+        .flat_map(|&[a, b, c]| {
+            [(a, b, c), (b, c, a), (c, a, b)].map(|(vertex, from, to)| LinkEdge { vertex, from, to })
+        })
+        .collect();
+    links.sort_unstable();
+    links
+}
+
+/// Whether the link is connected, with at most two edges at each of its vertices.
+fn is_path_or_cycle(link: &[LinkEdge]) -> bool {
+    let mut ends: Vec<(u32, usize)> =
+        link.iter().enumerate().flat_map(|(i, edge)| [(edge.from, i), (edge.to, i)]).collect();
+    ends.sort_unstable();
+    let mut groups = Groups::new(link.len());
+    let mut valence_ok = true;
+    for at_vertex in ends.chunk_by(|a, b| a.0 == b.0) {
+        valence_ok &= at_vertex.len() <= 2;
+        at_vertex.windows(2).for_each(|pair| groups.join(pair[0].1, pair[1].1));
+    }
+    valence_ok && groups.count() == 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::crossing_pairs;
+    use super::super::shapes;
+    use super::*;
+    use crate::math::Vec3;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn healthy() -> MeshReport {
+        report(&TriangleMesh::default()).unwrap()
+    }
+
+    /// A tetrahedron with outward triangles.
+    fn tetrahedron(corners: [Vec3; 4]) -> TriangleMesh {
+        TriangleMesh {
+            positions: corners.to_vec(),
+            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+            ..Default::default()
+        }
+    }
+
+    fn corner_tetrahedron() -> TriangleMesh {
+        tetrahedron([Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z])
+    }
+
+    #[test]
+    fn exact_shapes_are_healthy() {
+        for mesh in [corner_tetrahedron(), shapes::cuboid(Vec3::ONE), shapes::torus(2.0, 0.5, 24, 12)] {
+            assert_eq!(report(&mesh).unwrap(), healthy());
+            assert!(report(&mesh).unwrap().is_healthy());
+        }
+    }
+
+    #[test]
+    fn a_missing_triangle_opens_the_mesh() {
+        let mut mesh = corner_tetrahedron();
+        mesh.triangles.pop();
+        assert_eq!(report(&mesh).unwrap(), MeshReport { closed: false, ..healthy() });
+    }
+
+    #[test]
+    fn a_turned_triangle_breaks_orientation() {
+        let mut mesh = corner_tetrahedron();
+        mesh.triangles[0].swap(0, 1);
+        assert_eq!(report(&mesh).unwrap(), MeshReport { oriented: false, ..healthy() });
+    }
+
+    #[test]
+    fn two_tetrahedra_on_one_edge() {
+        let mut mesh = corner_tetrahedron();
+        mesh.positions.extend([Vec3::new(0.5, -1.0, -1.0), Vec3::new(0.5, -1.0, -3.0)]);
+        mesh.triangles.extend([[0, 4, 1], [0, 1, 5], [1, 4, 5], [4, 0, 5]]);
+        let expected = MeshReport { non_manifold_edges: 1, non_manifold_vertices: 2, ..healthy() };
+        assert_eq!(report(&mesh).unwrap(), expected);
+    }
+
+    #[test]
+    fn two_tetrahedra_on_one_vertex() {
+        let mut mesh = corner_tetrahedron();
+        mesh.positions.extend([-Vec3::X, -Vec3::Y, -Vec3::Z]);
+        mesh.triangles.extend([[0, 4, 5], [0, 6, 4], [4, 6, 5], [5, 6, 0]]);
+        assert_eq!(report(&mesh).unwrap(), MeshReport { non_manifold_vertices: 1, ..healthy() });
+    }
+
+    #[test]
+    fn degenerate_triangles_are_counted_exactly() {
+        let mut mesh = corner_tetrahedron();
+        mesh.triangles.push([0, 0, 1]);
+        assert_eq!(report(&mesh).unwrap(), MeshReport { degenerate_triangles: 1, ..healthy() });
+        let line = |y: f32| TriangleMesh {
+            positions: vec![Vec3::ZERO, Vec3::new(1.0, y, 0.0), Vec3::new(2.0, 0.0, 0.0)],
+            triangles: vec![[0, 1, 2]],
+            ..Default::default()
+        };
+        assert_eq!(report(&line(0.0)).unwrap().degenerate_triangles, 1);
+        assert_eq!(report(&line(f32::from_bits(1))).unwrap().degenerate_triangles, 0);
+    }
+
+    #[test]
+    fn what_is_refused() {
+        let mut mesh = corner_tetrahedron();
+        mesh.triangles[2][1] = 4;
+        let MeshError::InvalidArgument { parameter, problem } = report(&mesh).unwrap_err() else { panic!() };
+        assert_eq!(parameter, "indices");
+        assert!(problem.contains("triangle 2") && problem.contains('4'), "{problem}");
+        let mut mesh = corner_tetrahedron();
+        mesh.positions[3].y = f32::NAN;
+        let MeshError::InvalidArgument { parameter, .. } = report(&mesh).unwrap_err() else { panic!() };
+        assert_eq!(parameter, "positions");
+        assert_eq!(crossing_pairs(&mesh), [[0_u32; 2]; 0]);
+    }
+
+    #[test]
+    fn crossing_tetrahedra_counted_by_hand() {
+        // The tip of a thin spike stands in a large tetrahedron, through its base z = 0
+        // alone. Three sides of the spike meet the base; nothing else is near.
+        let large = tetrahedron([
+            Vec3::new(-6.0, -6.0, 0.0),
+            Vec3::new(6.0, -6.0, 0.0),
+            Vec3::new(0.0, 6.0, 0.0),
+            Vec3::new(0.0, 0.0, 6.0),
+        ]);
+        let spike = tetrahedron([
+            Vec3::new(-1.0, -1.0, -2.0),
+            Vec3::new(0.0, 1.0, -2.0),
+            Vec3::new(1.0, -1.0, -2.0),
+            Vec3::new(0.0, 0.0, 1.0),
+        ]);
+        let mesh = shapes::joined(&[large.clone(), spike.clone()]);
+        assert_eq!(crossing_pairs(&mesh), [[0, 5], [0, 6], [0, 7]]);
+        assert_eq!(report(&mesh).unwrap(), MeshReport { self_intersections: 3, ..healthy() });
+        // With the tip just at the base its three sides touch it; a hair lower nothing does.
+        for (tip, pairs) in [(0.0, 3), (-1.0e-30, 0)] {
+            let mut lower = spike.clone();
+            lower.positions[3].z = tip;
+            assert_eq!(crossing_pairs(&shapes::joined(&[large.clone(), lower])).len(), pairs, "{tip}");
+        }
+    }
+
+    #[test]
+    fn boxes_face_to_face_touch() {
+        let cube = shapes::cuboid(Vec3::ONE);
+        let shifted = |x: f32| {
+            let mut other = cube.clone();
+            other.positions.iter_mut().for_each(|p| p.x += x);
+            crossing_pairs(&shapes::joined(&[cube.clone(), other])).len()
+        };
+        assert_eq!(shifted(1.0 + f32::EPSILON), 0);
+        assert!(shifted(1.0) >= 4);
+        assert!(shifted(0.5) > 0);
+    }
+
+    #[test]
+    fn folds_and_doubles() {
+        let mut mesh = TriangleMesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(1.0, 1.0, 0.0)],
+            triangles: vec![[0, 1, 2], [1, 0, 3]],
+            ..Default::default()
+        };
+        assert_eq!(crossing_pairs(&mesh), [[0, 1]]);
+        mesh.triangles = vec![[0, 1, 2], [2, 1, 3]];
+        assert_eq!(crossing_pairs(&mesh), [[0_u32; 2]; 0]);
+        mesh.triangles = vec![[0, 1, 2], [0, 2, 1]];
+        assert_eq!(crossing_pairs(&mesh), [[0, 1]]);
+    }
+
+    #[test]
+    fn pairs_are_those_of_brute_force() {
+        for (seed, range) in [(1, 3), (2, 8), (3, 1000)] {
+            let mesh = shapes::soup(seed, 120, range);
+            let mut expected = Vec::new();
+            for t in 0..120 {
+                for s in 0..t {
+                    let pair = [mesh.triangles[s as usize], mesh.triangles[t as usize]];
+                    let two = TriangleMesh { triangles: pair.to_vec(), ..mesh.clone() };
+                    if !crossing_pairs(&two).is_empty() {
+                        expected.push([s, t]);
+                    }
+                }
+            }
+            expected.sort_unstable();
+            assert!(!expected.is_empty());
+            assert_eq!(crossing_pairs(&mesh), expected, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn one_triangle_across_everything() {
+        let mut mesh = shapes::torus(2.0, 0.5, 64, 32);
+        let n = mesh.positions.len() as u32;
+        mesh.positions.extend([
+            Vec3::splat(-3.0e38),
+            Vec3::new(3.0e38, 0.0, 3.0e38),
+            Vec3::new(0.0, 3.0e38, 0.0),
+        ]);
+        mesh.triangles.push([n, n + 1, n + 2]);
+        let crossing = crossing_pairs(&mesh);
+        assert!(!crossing.is_empty() && crossing.len() < 1000, "{}", crossing.len());
+        assert!(crossing.iter().all(|pair| pair[1] == mesh.triangles.len() as u32 - 1));
+    }
+}

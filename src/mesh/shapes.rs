@@ -1,0 +1,79 @@
+//! Exact shapes for tests.
+
+use super::TriangleMesh;
+use crate::math::Vec3;
+
+/// A box with a corner at the origin.
+pub fn cuboid(size: Vec3) -> TriangleMesh {
+    let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * size;
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    TriangleMesh {
+        positions: (0..8).map(corner).collect(),
+        triangles: quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+        ..Default::default()
+    }
+}
+
+/// A regular icosahedron about the origin, edges of 2.
+pub fn icosahedron() -> TriangleMesh {
+    let g = 1.618_034_f32;
+    let rectangle = [(-1.0, g), (1.0, g), (-1.0, -g), (1.0, -g)];
+    let in_xy = rectangle.map(|(a, b)| Vec3::new(a, b, 0.0));
+    let in_yz = rectangle.map(|(a, b)| Vec3::new(0.0, a, b));
+    let in_zx = rectangle.map(|(a, b)| Vec3::new(b, 0.0, a));
+    let fans = [
+        [[0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11]],
+        [[1, 5, 9], [5, 11, 4], [11, 10, 2], [10, 7, 6], [7, 1, 8]],
+        [[3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9]],
+        [[4, 9, 5], [2, 4, 11], [6, 2, 10], [8, 6, 7], [9, 8, 1]],
+    ];
+    TriangleMesh { positions: [in_xy, in_yz, in_zx].concat(), triangles: fans.concat(), ..Default::default() }
+}
+
+/// A torus about z through `around × along` points.
+pub fn torus(major: f64, minor: f64, around: u32, along: u32) -> TriangleMesh {
+    let angle = |i: u32, n: u32| std::f64::consts::TAU * f64::from(i) / f64::from(n);
+    let point = |i: u32, j: u32| {
+        let (u, v) = (angle(i, around), angle(j, along));
+        let r = major + minor * libm::cos(v);
+        Vec3::new((r * libm::cos(u)) as f32, (r * libm::sin(u)) as f32, (minor * libm::sin(v)) as f32)
+    };
+    let at = |i: u32, j: u32| (i % around) * along + j % along;
+    let cells = || (0..around).flat_map(move |i| (0..along).map(move |j| (i, j)));
+    TriangleMesh {
+        positions: cells().map(|(i, j)| point(i, j)).collect(),
+        triangles: cells()
+            .flat_map(|(i, j)| {
+                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+                [[a, b, c], [a, c, d]]
+            })
+            .collect(),
+        ..Default::default()
+    }
+}
+
+/// The meshes as one, positions and triangles only.
+pub fn joined(meshes: &[TriangleMesh]) -> TriangleMesh {
+    let mut all = TriangleMesh::default();
+    for mesh in meshes {
+        let first = all.positions.len() as u32;
+        all.positions.extend(&mesh.positions);
+        all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
+    }
+    all
+}
+
+/// Triangles over points with small integer coordinates: all the coincidences there are.
+pub fn soup(seed: u64, triangles: usize, range: u64) -> TriangleMesh {
+    let mut state = seed;
+    let mut next = |limit: u64| {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 33) % limit
+    };
+    let points = triangles as u64 / 2;
+    TriangleMesh {
+        positions: (0..points).map(|_| Vec3::from_array([(); 3].map(|()| next(range) as f32))).collect(),
+        triangles: (0..triangles).map(|_| [(); 3].map(|()| next(points) as u32)).collect(),
+        ..Default::default()
+    }
+}

@@ -1,0 +1,161 @@
+//! The triangle nearest to a point, and the first one a ray meets.
+
+use crate::math::{Bounds, BoxTree, DVec3, Vec3, triangle};
+use crate::mesh::{MeshError, TriangleMesh};
+
+/// A tree over the triangles of a mesh as it was when the tree was made.
+#[derive(Clone, Debug)]
+pub struct TriangleTree {
+    boxes: BoxTree,
+    corners: Vec<[Vec3; 3]>,
+}
+
+/// A point of a surface, and how far away it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Index of the triangle; the lowest one, where the point is on several.
+    pub triangle: u32,
+    /// Weights of the triangle's corners, none negative, sum 1.
+    pub barycentric: Vec3,
+    /// Where it is.
+    pub point: Vec3,
+    /// How far from the query's point or ray origin, in the mesh's units.
+    pub distance: f64,
+}
+
+impl TriangleTree {
+    /// The tree of the mesh's triangles.
+    ///
+    /// # Errors
+    /// [`MeshError::InvalidArgument`] for indices out of range and positions that are not finite.
+    pub fn new(mesh: &TriangleMesh) -> Result<Self, MeshError> {
+        mesh.validate()?;
+        let corners: Vec<_> = mesh.corners().collect();
+        let bounds: Vec<_> = corners.iter().map(|c| Bounds::of(c)).collect();
+        Ok(Self { boxes: BoxTree::new(&bounds), corners })
+    }
+
+    /// The point of the surface nearest to `p`; `None` where there are no triangles, or `p` is not finite.
+    pub fn closest(&self, p: Vec3) -> Option<SurfacePoint> {
+        if !p.is_finite() {
+            return None;
+        }
+        let mut best: Option<(f64, u32, DVec3)> = None;
+        self.boxes.nearest(p, |item, bound| {
+            let corners = self.corners[item as usize];
+            let barycentric = triangle::closest(corners, p);
+            let distance = triangle::at(corners, barycentric).distance_squared(p.as_dvec3());
+            if best.is_none_or(|(d, t, _)| (distance, item) < (d, t)) {
+                best = Some((distance, item, barycentric));
+            }
+            if distance < bound { distance } else { bound }
+        });
+        best.map(|(squared, item, barycentric)| self.surface_point(item, barycentric, squared.sqrt()))
+    }
+
+    /// Where the ray from `origin` along `direction` (of any length) first meets the surface, from either side; `None`
+    /// where it does not, where `direction` is zero or where either is not finite.
+    pub fn ray_hit(&self, origin: Vec3, direction: Vec3) -> Option<SurfacePoint> {
+        let (origin, direction) = (origin.as_dvec3(), direction.as_dvec3().try_normalize()?);
+        if !origin.is_finite() {
+            return None;
+        }
+        let mut best: Option<(f64, u32, DVec3)> = None;
+        self.boxes.along_ray(origin, direction, |item| {
+            if let Some(hit) = triangle::ray_hit(self.corners[item as usize], origin, direction)
+                && best.is_none_or(|(d, t, _)| (hit.distance, item) < (d, t))
+            {
+                best = Some((hit.distance, item, hit.barycentric));
+            }
+            best.map_or(f64::INFINITY, |(distance, ..)| distance)
+        });
+        best.map(|(distance, item, barycentric)| self.surface_point(item, barycentric, distance))
+    }
+
+    fn surface_point(&self, item: u32, barycentric: DVec3, distance: f64) -> SurfacePoint {
+        let point = triangle::at(self.corners[item as usize], barycentric).as_vec3();
+        SurfacePoint { triangle: item, barycentric: barycentric.as_vec3(), point, distance }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Triangles of many sizes about the origin, and points to ask from.
+    fn scattered() -> (TriangleMesh, Vec<Vec3>) {
+        let mut state = 9_u32;
+        let mut next = || {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            (state >> 8) as f32 / 8388608.0 - 1.0
+        };
+        let mut point = |scale: f32| Vec3::new(next(), next(), next()) * scale;
+        let mut mesh = TriangleMesh::default();
+        for i in 0..400 {
+            let centre = point(10.0);
+            let size = if i % 20 == 0 { 5.0 } else { 0.5 };
+            mesh.positions.extend([centre + point(size), centre + point(size), centre + point(size)]);
+            mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+        }
+        (mesh, (0..300).map(|_| point(15.0)).collect())
+    }
+
+    #[test]
+    fn closest_is_that_of_brute_force() {
+        let (mesh, points) = scattered();
+        let tree = TriangleTree::new(&mesh).unwrap();
+        for p in points {
+            let found = tree.closest(p).unwrap();
+            let distance = |c: [Vec3; 3]| triangle::at(c, triangle::closest(c, p)).distance(p.as_dvec3());
+            let expected = mesh.corners().map(distance).fold(f64::INFINITY, f64::min);
+            assert_eq!(found.distance, expected);
+            assert!((found.point.distance(p) - expected as f32).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn rays_hit_what_brute_force_hits() {
+        let (mesh, points) = scattered();
+        let tree = TriangleTree::new(&mesh).unwrap();
+        let mut hits = 0;
+        for pair in points.windows(2) {
+            let (origin, direction) = (pair[0], pair[1] - pair[0]);
+            let unit = direction.as_dvec3().normalize();
+            let distances = mesh.corners().filter_map(|c| triangle::ray_hit(c, origin.as_dvec3(), unit));
+            let expected = distances.map(|hit| hit.distance).min_by(f64::total_cmp);
+            let found = tree.ray_hit(origin, direction);
+            assert_eq!(found.map(|hit| hit.distance), expected);
+            hits += usize::from(found.is_some());
+        }
+        assert!(hits > 30, "{hits}");
+    }
+
+    #[test]
+    fn a_ray_along_the_axes_meets_a_flat_square() {
+        let square = TriangleMesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..Default::default()
+        };
+        let tree = TriangleTree::new(&square).unwrap();
+        for p in [Vec3::ZERO, Vec3::X, Vec3::new(0.5, 0.5, 0.0), Vec3::new(1.0, 0.25, 0.0)] {
+            let hit = tree.ray_hit(p + Vec3::Z * 3.0, -Vec3::Z * 7.0).unwrap();
+            assert_eq!((hit.point, hit.distance), (p, 3.0));
+        }
+        assert_eq!(tree.ray_hit(Vec3::new(0.5, 0.5, 3.0), Vec3::Z), None);
+    }
+
+    #[test]
+    fn nothing_to_find() {
+        let empty = TriangleTree::new(&TriangleMesh::default()).unwrap();
+        assert_eq!(empty.closest(Vec3::ZERO), None);
+        assert_eq!(empty.ray_hit(Vec3::ZERO, Vec3::X), None);
+        let (mesh, _) = scattered();
+        let tree = TriangleTree::new(&mesh).unwrap();
+        assert_eq!(tree.ray_hit(Vec3::ZERO, Vec3::ZERO), None);
+        assert_eq!(tree.ray_hit(Vec3::NAN, Vec3::X), None);
+        assert_eq!(tree.closest(Vec3::INFINITY), None);
+    }
+}
