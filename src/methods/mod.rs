@@ -1,1 +1,10 @@
-//! Surfaces fitted to data, one folder a method.
+//! Surfaces fitted to data, one folder a method, and the stepping contract they share.
+
+pub mod deformable;
+mod error;
+mod spec;
+mod step;
+
+pub use error::MethodError;
+pub use spec::{ParamDefault, ParamKind, ParamScale, ParamSpec};
+pub use step::{StepReport, Times};

@@ -1,1 +1,17 @@
-//! Passes that keep a moving mesh well sampled and change its topology on contact.
+//! Passes that keep a moving mesh well sampled and change its topology on contact (Lachaud & Montanvert, sections
+//! 3.2, 3.3 and figure 9).
+//!
+//! [`Resolver::resolve`] is the whole of it: edges out of bounds are split, flipped, collapsed or cut through
+//! (`edges`), vertices in contact are joined (`contact`), and again until all bounds hold; what is left after
+//! [`PASSES`](resolve) stays queued for the next call. Small parts without volume are removed (`specks`).
+
+mod changes;
+mod contact;
+mod edges;
+mod resolve;
+mod sampling;
+mod specks;
+
+pub use changes::Changes;
+pub use resolve::Resolver;
+pub use sampling::Sampling;

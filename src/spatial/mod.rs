@@ -1,7 +1,9 @@
-//! Finding what is near: triangles by points, rays and planes.
+//! Finding what is near: points by points, triangles by points, rays and planes.
 
+mod grid;
 mod section;
 mod tree;
 
+pub use grid::PointGrid;
 pub use section::cross_section;
 pub use tree::{SurfacePoint, TriangleTree};

@@ -1,0 +1,48 @@
+/** What kind of failure a {@link VesicleError} is. */
+export type ErrorCode =
+  /** A parameter out of range, NaN, of the wrong length, missing or misspelled; the message names it. */
+  | 'invalid-argument'
+  /** A truncated, inconsistent or unsupported file; the message names the format and the field. */
+  | 'bad-file'
+  /** A mesh with boundary or non-manifold edges where a closed one is needed. */
+  | 'not-closed'
+  /** A start mesh that crosses itself where an embedded one is needed. */
+  | 'self-intersecting'
+  /** A linear system without a usable solution; the message names the likely cause. */
+  | 'singular-system'
+  /** More memory than there is; the message says how much. */
+  | 'too-large'
+  /** Work that was called off. */
+  | 'aborted'
+  /** An object used after its `free()`. */
+  | 'freed';
+
+/**
+ * Every failure the library can foresee. `message` says what was wrong and what is accepted, `code` what kind
+ * of failure it is.
+ */
+export class VesicleError extends Error {
+  /** What kind of failure this is. */
+  readonly code: ErrorCode;
+
+  constructor(code: ErrorCode, message: string) {
+    super(message);
+    this.name = 'VesicleError';
+    this.code = code;
+  }
+}
+
+/**
+ * A fault inside the library itself (a bug, or memory that ran out half-way). The WebAssembly instance and every
+ * object made with it are lost. `await init()` starts a new instance, with which new objects can be made.
+ */
+export class VesicleCrash extends Error {
+  constructor(what: string, options?: ErrorOptions) {
+    super(
+      `${what}. This is a fault in vesicle: every volume, mesh and model made so far is lost. ` +
+        'Call init() again to go on with new ones, and please report it.',
+      options,
+    );
+    this.name = 'VesicleCrash';
+  }
+}

@@ -1,0 +1,125 @@
+// The WebAssembly instance: how it starts, how calls into it fail, how objects of it are held.
+import { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
+import load, { initSync as loadSync, __wbg_reset_state as reset } from './vesicle.js';
+
+/** Whatever the module can be made from. */
+export type InitInput = RequestInfo | URL | Response | BufferSource | WebAssembly.Module;
+
+let starting: Promise<unknown> | undefined;
+let instance: unknown;
+let crash: VesicleCrash | undefined;
+// Counts instances, so that an object of a lost one is known.
+let generation = 0;
+
+/**
+ * Loads the WebAssembly module; everything else needs it. Idempotent: later calls give the same promise. After a
+ * {@link VesicleCrash} it starts a fresh instance.
+ *
+ * @param options - `module_or_path`: the module, its bytes or its address. Left out, the `.wasm` beside this file
+ *   is fetched (in a browser) or read (in Node).
+ * @throws Whatever fetching or compiling threw; a later call tries again.
+ */
+export function init(options: { module_or_path?: InitInput | Promise<InitInput> } = {}): Promise<unknown> {
+  if (crash) restart();
+  starting ??= begin(options.module_or_path).catch((error: unknown) => {
+    starting = undefined;
+    throw error;
+  });
+  return starting;
+}
+
+/**
+ * Like {@link init}, at once, from bytes or a compiled module. Browsers refuse to compile large modules on the
+ * main thread: use it in workers and in Node.
+ */
+export function initSync(options: { module: BufferSource | WebAssembly.Module }): unknown {
+  if (crash) restart();
+  instance ??= loadSync(options);
+  return instance;
+}
+
+async function begin(source: InitInput | Promise<InitInput> | undefined): Promise<unknown> {
+  const module = await compile((await source) ?? new URL('./vesicle_bg.wasm', import.meta.url));
+  instance ??= await load({ module_or_path: module });
+  return instance;
+}
+
+async function compile(source: InitInput): Promise<WebAssembly.Module> {
+  if (source instanceof WebAssembly.Module) return source;
+  if (source instanceof ArrayBuffer || ArrayBuffer.isView(source)) return WebAssembly.compile(source);
+  if (source instanceof URL && source.protocol === 'file:') return WebAssembly.compile(await readFile(source));
+  const response = source instanceof Response ? source : await fetch(source);
+  if (!response.ok) throw new Error(`${response.url}: ${response.status} ${response.statusText}`);
+  // Streaming needs the right media type; not every server sends it.
+  const streams = response.headers.get('Content-Type') === 'application/wasm';
+  return streams ? WebAssembly.compileStreaming(response) : WebAssembly.compile(await response.arrayBuffer());
+}
+
+async function readFile(path: URL): Promise<BufferSource> {
+  // Out of the bundlers' sight: a page never gets here.
+  const files = 'node:fs/promises';
+  const { readFile } = await import(/* @vite-ignore */ /* webpackIgnore: true */ files);
+  return readFile(path);
+}
+
+function restart(): void {
+  reset();
+  generation += 1;
+  crash = undefined;
+}
+
+/** Runs one call into the module, and turns what it throws into the library's errors. */
+export function call<T>(work: () => T): T {
+  if (crash) throw crash;
+  if (!instance) throw new VesicleError('invalid-argument', 'init: call `await init()` before anything else');
+  try {
+    return work();
+  } catch (error) {
+    throw translate(error);
+  }
+}
+
+function translate(error: unknown): unknown {
+  if (error instanceof Error) return isFatal(error) ? crashed(error.message, error) : error;
+  const { code, message } = error as { code: ErrorCode | 'panic'; message: string };
+  return code === 'panic' ? crashed(message, error) : new VesicleError(code, message);
+}
+
+// A trap, or a stack that ran out: either leaves the instance's memory in the middle of something.
+function isFatal(error: Error): boolean {
+  return error instanceof WebAssembly.RuntimeError || error instanceof RangeError;
+}
+
+function crashed(what: string, cause: unknown): VesicleCrash {
+  crash = new VesicleCrash(what, { cause });
+  return crash;
+}
+
+/** An object inside the module, until it is freed. */
+export class Handle<Raw extends { free(): void }> {
+  #raw: Raw | undefined;
+  readonly #name: string;
+  readonly #generation = generation;
+
+  constructor(name: string, make: () => Raw) {
+    this.#name = name;
+    this.#raw = call(make);
+  }
+
+  /** Runs one call with the object. Throws `freed` when it is gone. */
+  use<T>(work: (raw: Raw) => T): T {
+    const raw = this.#raw;
+    if (!raw) throw new VesicleError('freed', `this ${this.#name} was freed and cannot be used any more`);
+    if (crash === undefined && this.#generation !== generation) {
+      throw new VesicleError('freed', `this ${this.#name} was lost when the library crashed; make a new one`);
+    }
+    return call(() => work(raw));
+  }
+
+  /** Gives the memory back; again and again does no harm. */
+  free(): void {
+    const raw = this.#raw;
+    this.#raw = undefined;
+    if (raw && !crash && this.#generation === generation) call(() => raw.free());
+  }
+}

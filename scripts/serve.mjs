@@ -1,0 +1,55 @@
+// A small static server for what was built: files of one folder, nothing else.
+import { createReadStream } from 'node:fs';
+import { stat } from 'node:fs/promises';
+import { createServer } from 'node:http';
+import { extname, join, normalize, sep } from 'node:path';
+
+const TYPES = {
+  '.html': 'text/html; charset=utf-8',
+  '.js': 'text/javascript; charset=utf-8',
+  '.mjs': 'text/javascript; charset=utf-8',
+  '.css': 'text/css; charset=utf-8',
+  '.json': 'application/json',
+  '.svg': 'image/svg+xml',
+  '.png': 'image/png',
+  '.ico': 'image/x-icon',
+  '.wasm': 'application/wasm',
+};
+
+// `.gz` files are data here: without a Content-Encoding they arrive as they are stored.
+const typeOf = (path) => TYPES[extname(path)] ?? 'application/octet-stream';
+
+/** The file an address stands for, or undefined when there is none inside the folder. */
+async function resolve(folder, address) {
+  const { pathname } = new URL(address, 'http://localhost');
+  const path = normalize(join(folder, decodeURIComponent(pathname)));
+  if (path !== folder && !path.startsWith(folder + sep)) return undefined;
+  const found = await stat(path).catch(() => undefined);
+  if (found?.isFile()) return path;
+  return found?.isDirectory() ? resolve(path, '/index.html') : undefined;
+}
+
+async function answer(folder, request, response) {
+  const path = await resolve(folder, request.url).catch(() => undefined);
+  if (!path) return response.writeHead(404, { 'Content-Type': 'text/plain' }).end('not found\n');
+  response.writeHead(200, { 'Content-Type': typeOf(path), 'Cache-Control': 'no-cache' });
+  if (request.method === 'HEAD') return response.end();
+  createReadStream(path)
+    .on('error', () => response.destroy())
+    .pipe(response);
+}
+
+/**
+ * Serves a folder on a port (0 = any free one). Resolves to `{ address, close }` once it listens; rejects when the
+ * port is taken.
+ */
+export function serve(folder, port = 0) {
+  const server = createServer((request, response) => answer(normalize(folder), request, response));
+  return new Promise((resolve, reject) => {
+    server.once('error', reject);
+    server.listen(port, () => {
+      const close = () => new Promise((done) => server.close(done) && server.closeAllConnections());
+      resolve({ address: `http://localhost:${server.address().port}/`, close });
+    });
+  });
+}

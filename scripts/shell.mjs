@@ -1,0 +1,63 @@
+// What the other scripts share: where things are, and how a command is run.
+import { spawn } from 'node:child_process';
+import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+/** The project's folder. */
+export const root = dirname(dirname(fileURLToPath(import.meta.url)));
+
+/** Absolute path of something in the project. */
+export const at = (...parts) => join(root, ...parts);
+
+/** Path of a program that `npm ci` installed. */
+export const tool = (name) => at('node_modules', '.bin', process.platform === 'win32' ? `${name}.cmd` : name);
+
+/** One line of progress. */
+export function say(what, detail = '') {
+  process.stdout.write(`${what.padEnd(12)} ${detail}\n`);
+}
+
+/** The same environment with colours and progress bars off, plus `extra`. */
+function environment(extra) {
+  return { ...process.env, CARGO_TERM_PROGRESS_WHEN: 'never', ...extra };
+}
+
+/**
+ * Runs a command in the project's folder and resolves to `{ code, output }`, where output is everything it
+ * printed. With `echo` it is printed as it comes.
+ */
+export function run(command, args, { env = {}, echo = true, cwd = root } = {}) {
+  return new Promise((resolve) => {
+    const shell = process.platform === 'win32';
+    const child = spawn(command, args, { cwd, env: environment(env), stdio: ['ignore', 'pipe', 'pipe'], shell });
+    let output = '';
+    const take = (stream) => (chunk) => {
+      output += chunk;
+      if (echo) stream.write(chunk);
+    };
+    child.stdout.on('data', take(process.stdout));
+    child.stderr.on('data', take(process.stderr));
+    child.on('error', (error) => resolve({ code: 127, output: `${command}: ${error.message}\n` }));
+    child.on('close', (code) => resolve({ code: code ?? 1, output }));
+  });
+}
+
+/** Like `run`, but throws with the output when the command fails. */
+export async function must(command, args, options = {}) {
+  const { code, output } = await run(command, args, { echo: false, ...options });
+  if (code !== 0) throw new Error(`\`${command} ${args.join(' ')}\` ended with code ${code}\n${output}`);
+  return output;
+}
+
+/** Runs a script's `main`, turning an exception into one message and exit code 1. */
+export async function script(main) {
+  try {
+    await main();
+  } catch (error) {
+    process.stderr.write(`${error.message}\n`);
+    process.exitCode = 1;
+  }
+}
+
+/** True when this file was started by name and not imported. */
+export const startedAs = (url) => process.argv[1] === fileURLToPath(url);

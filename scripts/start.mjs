@@ -1,0 +1,20 @@
+// Set-up, package, app, and a server for it. PORT says where; else 5173 or, where that is taken, any free port.
+import { buildApp } from './app.mjs';
+import { build } from './build.mjs';
+import { serve } from './serve.mjs';
+import { setup } from './setup.mjs';
+import { at, say, script } from './shell.mjs';
+
+async function listen() {
+  const { PORT } = process.env;
+  if (PORT) return serve(at('dist'), Number(PORT));
+  return serve(at('dist'), 5173).catch(() => serve(at('dist'), 0));
+}
+
+await script(async () => {
+  await setup({ browser: false });
+  await build();
+  await buildApp();
+  const { address } = await listen();
+  say('ready', address);
+});

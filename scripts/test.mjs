@@ -1,0 +1,108 @@
+// Every check there is, one after the other. Goes on after a failure; the last line is the sum.
+import { existsSync } from 'node:fs';
+import { readFile, rm } from 'node:fs/promises';
+import { buildApp } from './app.mjs';
+import { build } from './build.mjs';
+import { setup } from './setup.mjs';
+import { at, run, say, tool } from './shell.mjs';
+
+const WASM = ['--target', 'wasm32-unknown-unknown'];
+const DENY = ['--', '-D', 'warnings'];
+
+/** A command that passes or fails as a whole. */
+const check = (command, args, options) => async () => {
+  const { code } = await run(command, args, options);
+  return code === 0 ? { passed: 1, failed: 0 } : { passed: 0, failed: 1 };
+};
+
+/** A function of ours that throws when it fails. */
+const works = (work) => async () => {
+  await work();
+  return { passed: 1, failed: 0 };
+};
+
+/** Counts of all `test result:` lines, as cargo's harness and the wasm runner print them. */
+export function countCargo(output) {
+  const counts = { passed: 0, failed: 0 };
+  for (const [, passed, failed] of output.matchAll(/test result: .*?(\d+) passed; (\d+) failed/g)) {
+    counts.passed += Number(passed);
+    counts.failed += Number(failed);
+  }
+  return counts;
+}
+
+const cargoTests =
+  (...args) =>
+  async () => {
+    const { code, output } = await run('cargo', ['test', '--locked', '-p', 'vesicle', '--no-fail-fast', ...args]);
+    return atLeastOneFailed(code, countCargo(output));
+  };
+
+const vitest = (folder) => async () => {
+  const report = at('target', `${folder.replace('/', '-')}.json`);
+  await rm(report, { force: true });
+  const config = at(folder, 'vitest.config.ts');
+  const { code } = await run(tool('vitest'), [
+    ...['run', '--dir', at(folder), '--reporter=default', '--reporter=json', `--outputFile.json=${report}`],
+    ...(existsSync(config) ? ['--config', config] : []),
+  ]);
+  if (!existsSync(report)) return { passed: 0, failed: 1 };
+  const { numPassedTests, numFailedTests } = JSON.parse(await readFile(report, 'utf8'));
+  return atLeastOneFailed(code, { passed: numPassedTests, failed: numFailedTests });
+};
+
+// A run that does not compile, or crashes, fails without saying how many tests it took with it.
+function atLeastOneFailed(code, { passed, failed }) {
+  if (passed + failed === 0) return { passed: 0, failed: 1 };
+  return { passed, failed: code === 0 ? failed : Math.max(failed, 1) };
+}
+
+const STAGES = [
+  ['format', check('cargo', ['fmt', '--all', '--check'])],
+  ['clippy', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--all-targets', ...DENY])],
+  ['clippy wasm', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--lib', ...WASM, ...DENY])],
+  [
+    'rust docs',
+    check('cargo', ['doc', '--locked', '-p', 'vesicle', '--no-deps'], { env: { RUSTDOCFLAGS: '-D warnings' } }),
+  ],
+  ['native', cargoTests()],
+  ['wasm', cargoTests('--lib', '--tests', ...WASM)],
+  ['build', works(build)],
+  ['biome', check(tool('biome'), ['ci', '--colors=off'])],
+  ['types', check(tool('tsc'), ['-p', at('tests/js')])],
+  ['publint', check(tool('publint'), ['run', '--strict', at('pkg')])],
+  ['package', vitest('tests/js')],
+  ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')])],
+  ['app build', works(buildApp)],
+  ['app', vitest('tests/app')],
+];
+
+async function attempt([name, work]) {
+  const started = performance.now();
+  process.stdout.write(`\n── ${name}\n`);
+  const counts = await work().catch((error) => {
+    process.stderr.write(`${error.message}\n`);
+    return { passed: 0, failed: 1 };
+  });
+  const seconds = ((performance.now() - started) / 1000).toFixed(1);
+  return { name, seconds, ...counts };
+}
+
+async function all() {
+  const results = [];
+  for (const stage of [['set-up', works(setup)], ...STAGES]) {
+    results.push(await attempt(stage));
+    // Without tools and packages nothing else can tell anything.
+    if (results.length === 1 && results[0].failed) break;
+  }
+  return results;
+}
+
+const results = await all();
+process.stdout.write('\n');
+for (const { name, seconds, passed, failed } of results) {
+  say(name, `${String(passed).padStart(5)} passed ${String(failed).padStart(4)} failed ${seconds.padStart(7)} s`);
+}
+const sum = (key) => results.reduce((total, result) => total + result[key], 0);
+process.stdout.write(`${sum('passed')} passed, ${sum('failed')} failed\n`);
+process.exitCode = sum('failed') > 0 ? 1 : 0;

@@ -1,0 +1,80 @@
+//! Per-vertex data that follows every edit.
+
+use super::VertexId;
+use crate::math::Vec3;
+
+/// Names one vector attribute of one mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VectorKey(usize);
+
+/// Names one scalar attribute of one mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ScalarKey(usize);
+
+/// All attributes of a mesh; one entry a vertex slot.
+///
+/// Edits say what becomes of the data through three words only: a slot is added, a slot takes a blend of two others,
+/// slots are reordered. So an attribute can never fall out of step with the mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Attributes {
+    vectors: Vec<Vec<Vec3>>,
+    scalars: Vec<Vec<f32>>,
+}
+
+impl Attributes {
+    pub(super) fn add_vector(&mut self, slots: usize) -> VectorKey {
+        self.vectors.push(vec![Vec3::ZERO; slots]);
+        VectorKey(self.vectors.len() - 1)
+    }
+
+    pub(super) fn add_scalar(&mut self, slots: usize) -> ScalarKey {
+        self.scalars.push(vec![0.0; slots]);
+        ScalarKey(self.scalars.len() - 1)
+    }
+
+    pub(super) fn vector(&self, key: VectorKey) -> &[Vec3] {
+        &self.vectors[key.0]
+    }
+
+    pub(super) fn vector_mut(&mut self, key: VectorKey) -> &mut [Vec3] {
+        &mut self.vectors[key.0]
+    }
+
+    pub(super) fn scalar(&self, key: ScalarKey) -> &[f32] {
+        &self.scalars[key.0]
+    }
+
+    pub(super) fn scalar_mut(&mut self, key: ScalarKey) -> &mut [f32] {
+        &mut self.scalars[key.0]
+    }
+
+    pub(super) fn grow(&mut self) {
+        self.vectors.iter_mut().for_each(|v| v.push(Vec3::ZERO));
+        self.scalars.iter_mut().for_each(|s| s.push(0.0));
+    }
+
+    /// `target` takes the data at fraction `t` of the way from `a` to `b`.
+    pub(super) fn blend(&mut self, target: VertexId, a: VertexId, b: VertexId, t: f32) {
+        let (target, a, b) = (target.index(), a.index(), b.index());
+        for v in &mut self.vectors {
+            v[target] = v[a] + (v[b] - v[a]) * t;
+        }
+        for s in &mut self.scalars {
+            s[target] = s[a] + (s[b] - s[a]) * t;
+        }
+    }
+
+    /// Keeps slot `order[i]` as the new slot `i`.
+    pub(super) fn reorder(&mut self, order: &[VertexId]) {
+        for v in &mut self.vectors {
+            *v = order.iter().map(|id| v[id.index()]).collect();
+        }
+        for s in &mut self.scalars {
+            *s = order.iter().map(|id| s[id.index()]).collect();
+        }
+    }
+
+    pub(super) fn fits(&self, slots: usize) -> bool {
+        self.vectors.iter().all(|v| v.len() == slots) && self.scalars.iter().all(|s| s.len() == slots)
+    }
+}

@@ -1,0 +1,246 @@
+//! Meshes from triangles and from shapes, and back to triangles.
+
+use super::attributes::Attributes;
+use super::{Mesh, MeshError, Ring, TriangleMesh, VertexId};
+use crate::math::Vec3;
+
+/// More corners than this around one vertex are refused: rings are searched linearly.
+const LARGEST_VALENCE: usize = 4096;
+
+impl Mesh {
+    /// The dynamic mesh of a closed, oriented, manifold triangle list. Positions in no triangle are left out.
+    ///
+    /// # Errors
+    /// [`MeshError::InvalidArgument`] for an index without a position, a position that is not finite or no triangle
+    /// at all; [`MeshError::NotClosed`] for a boundary, an edge of more than two triangles, triangles of opposite
+    /// orientation, a triangle with the same corner twice, or surfaces that touch in a vertex.
+    pub fn from_triangles(mesh: &TriangleMesh) -> Result<Self, MeshError> {
+        check_indices(mesh)?;
+        let corners = Corners::sort(mesh);
+        let mut rings = Vec::with_capacity(mesh.positions.len());
+        let mut names = vec![VertexId(u32::MAX); mesh.positions.len()];
+        let mut positions = Vec::with_capacity(mesh.positions.len());
+        for (v, &position) in mesh.positions.iter().enumerate() {
+            let links = corners.of(v);
+            if !links.is_empty() {
+                names[v] = VertexId::from_index(rings.len());
+                rings.push(chain(v, links)?);
+                positions.push(position);
+            }
+        }
+        rings.iter_mut().for_each(|ring| ring.rename(|v| names[v.index()]));
+        Ok(Self::from_rings(rings, positions))
+    }
+
+    fn from_rings(rings: Vec<Ring>, positions: Vec<Vec3>) -> Self {
+        let half_edges: usize = rings.iter().map(Ring::valence).sum();
+        let euler = rings.len() as i64 - half_edges as i64 / 2 + half_edges as i64 / 3;
+        Self { rings, positions, half_edges, euler, attributes: Attributes::default(), ..Self::default() }
+    }
+
+    /// An icosahedron with corners at distance `radius` from `center`, counter-clockwise seen from outside.
+    pub fn icosahedron(center: Vec3, radius: f32) -> Self {
+        let golden = 0.5 * (1.0 + 5.0_f32.sqrt());
+        let scale = radius / (1.0 + golden * golden).sqrt();
+        let corner = |p: &[f32; 3]| {
+            let unit = p.map(|c| if c.abs() > 1.0 { golden.copysign(c) } else { c });
+            center + Vec3::from(unit) * scale
+        };
+        let positions = ICOSAHEDRON_CORNERS.iter().map(corner).collect();
+        let rings = ICOSAHEDRON_RINGS.iter().map(|ring| Ring::new(ring.iter().map(|&v| VertexId(v))));
+        Self::from_rings(rings.collect(), positions)
+    }
+
+    /// A sphere of √3-refined triangles with no edge longer than `max_edge`, all corners at distance `radius`.
+    ///
+    /// # Errors
+    /// [`MeshError::InvalidArgument`] unless the centre is finite and radius and edge are positive and finite;
+    /// [`MeshError::TooLarge`] where more than about 16 million vertices would be needed.
+    pub fn icosphere(center: Vec3, radius: f32, max_edge: f32) -> Result<Self, MeshError> {
+        positive("radius", radius)?;
+        positive("maxEdge", max_edge)?;
+        if !center.is_finite() {
+            let problem = format!("({}, {}, {}) is not a finite point", center.x, center.y, center.z);
+            return Err(MeshError::InvalidArgument { parameter: "center", problem });
+        }
+        let mut mesh = Self::icosahedron(Vec3::ZERO, 1.0);
+        let limit = max_edge / radius;
+        while mesh.longest_edge() > limit {
+            if mesh.vertex_count() > LARGEST_SPHERE / 3 {
+                return Err(MeshError::TooLarge { bytes: 3 * mesh.vertex_count() as u64 * 64 });
+            }
+            mesh.refine()?;
+            mesh.positions.iter_mut().for_each(|p| *p = p.normalize_or(Vec3::X));
+        }
+        mesh.positions.iter_mut().for_each(|p| *p = center + *p * radius);
+        Ok(mesh)
+    }
+
+    /// The length of the longest edge; 0 for the empty mesh.
+    pub fn longest_edge(&self) -> f32 {
+        let square = |(u, v)| self.position(u).distance_squared(self.position(v));
+        self.edges().map(square).fold(0.0, |longest, d| if d > longest { d } else { longest }).sqrt()
+    }
+
+    /// The lowest and the highest corner of the box around all vertices; none for the empty mesh.
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        let mut points = self.vertices().map(|v| self.position(v));
+        let first = points.next()?;
+        Some(points.fold((first, first), |(low, high), p| (low.min(p), high.max(p))))
+    }
+
+    /// The mesh as compact arrays with area-weighted unit normals, vertices in the order of their slots.
+    pub fn to_triangles(&self) -> TriangleMesh {
+        let mut names = vec![u32::MAX; self.slots()];
+        let mut positions = Vec::with_capacity(self.vertex_count());
+        let mut normals = Vec::with_capacity(self.vertex_count());
+        for v in self.vertices() {
+            names[v.index()] = positions.len() as u32;
+            positions.push(self.position(v));
+            normals.push(self.area_normal(v).normalize_or_zero());
+        }
+        let triangles = self.triangles().map(|corners| corners.map(|v| names[v.index()])).collect();
+        TriangleMesh { positions, triangles, normals: Some(normals), ..TriangleMesh::default() }
+    }
+
+    /// Adds the vertices of `other`, a mesh without attributes; the two must not touch.
+    ///
+    /// # Errors
+    /// [`MeshError::TooLarge`] where ids would run out.
+    pub fn append(&mut self, other: &Self) -> Result<(), MeshError> {
+        if !self.has_room_for(other.vertex_count()) {
+            return Err(MeshError::TooLarge { bytes: 64 * other.vertex_count() as u64 });
+        }
+        let mut names = vec![VertexId(u32::MAX); other.slots()];
+        for v in other.vertices() {
+            names[v.index()] = self.allocate(other.position(v));
+            // Taken at once: an empty ring would be handed out again.
+            self.rings[names[v.index()].index()] = other.ring(v).clone();
+        }
+        for v in other.vertices() {
+            self.rings[names[v.index()].index()].rename(|w| names[w.index()]);
+        }
+        self.half_edges += other.half_edges;
+        self.euler += other.euler;
+        self.topology_changed();
+        Ok(())
+    }
+}
+
+/// As many vertices as fit a browser's memory with room to work in.
+const LARGEST_SPHERE: usize = 16_000_000;
+
+fn positive(parameter: &'static str, value: f32) -> Result<(), MeshError> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(MeshError::InvalidArgument { parameter, problem: format!("{value} is not a positive finite number") })
+}
+
+fn check_indices(mesh: &TriangleMesh) -> Result<(), MeshError> {
+    let fail = |parameter, problem| Err(MeshError::InvalidArgument { parameter, problem });
+    if mesh.triangles.is_empty() {
+        return fail("indices", "there is no triangle; at least four are needed to close a surface".into());
+    }
+    let count = mesh.positions.len();
+    if let Some(&bad) = mesh.triangles.iter().flatten().find(|&&i| i as usize >= count) {
+        return fail("indices", format!("index {bad} has no position; there are {count}"));
+    }
+    if let Some(bad) = mesh.positions.iter().position(|p| !p.is_finite()) {
+        return fail("positions", format!("position {bad} is not finite"));
+    }
+    Ok(())
+}
+
+/// For every vertex, the edges (a, b) opposite it in its triangles.
+struct Corners {
+    starts: Vec<usize>,
+    links: Vec<(u32, u32)>,
+}
+
+impl Corners {
+    fn sort(mesh: &TriangleMesh) -> Self {
+        let mut starts = vec![0; mesh.positions.len() + 1];
+        for &i in mesh.triangles.iter().flatten() {
+            starts[i as usize + 1] += 1;
+        }
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        let mut next = starts.clone();
+        let mut links = vec![(0, 0); mesh.triangles.len() * 3];
+        for &[a, b, c] in &mesh.triangles {
+            for (corner, from, to) in [(a, b, c), (b, c, a), (c, a, b)] {
+                links[next[corner as usize]] = (from, to);
+                next[corner as usize] += 1;
+            }
+        }
+        Self { starts, links }
+    }
+
+    fn of(&self, v: usize) -> &[(u32, u32)] {
+        &self.links[self.starts[v]..self.starts[v + 1]]
+    }
+}
+
+/// Orders the links of a vertex into one cycle.
+fn chain(v: usize, links: &[(u32, u32)]) -> Result<Ring, MeshError> {
+    let fail = |what: &str| Err(MeshError::NotClosed { problem: format!("{what} at vertex {v}") });
+    if links.len() > LARGEST_VALENCE {
+        return fail("more triangles than can be handled meet");
+    }
+    if links.iter().any(|&(a, b)| a == b || a as usize == v || b as usize == v) {
+        return fail("a triangle has the same corner twice");
+    }
+    let mut ring = Vec::with_capacity(links.len());
+    let (first, mut here) = links[0];
+    ring.push(VertexId(first));
+    while here != first {
+        if ring.contains(&VertexId(here)) {
+            return fail("an edge of more than two triangles, or triangles of opposite orientation,");
+        }
+        ring.push(VertexId(here));
+        match links.iter().find(|&&(a, _)| a == here) {
+            Some(&(_, next)) => here = next,
+            None => return fail("a boundary, or triangles of opposite orientation,"),
+        }
+    }
+    if ring.len() != links.len() {
+        return fail("two parts of the surface touch, or triangles are doubled,");
+    }
+    if ring.len() < 3 {
+        return fail("fewer than three triangles meet");
+    }
+    Ok(Ring::new(ring))
+}
+
+/// Coordinates beyond one stand for the golden ratio.
+const ICOSAHEDRON_CORNERS: [[f32; 3]; 12] = [
+    [-1.0, 2.0, 0.0],
+    [1.0, 2.0, 0.0],
+    [-1.0, -2.0, 0.0],
+    [1.0, -2.0, 0.0],
+    [0.0, -1.0, 2.0],
+    [0.0, 1.0, 2.0],
+    [0.0, -1.0, -2.0],
+    [0.0, 1.0, -2.0],
+    [2.0, 0.0, -1.0],
+    [2.0, 0.0, 1.0],
+    [-2.0, 0.0, -1.0],
+    [-2.0, 0.0, 1.0],
+];
+
+const ICOSAHEDRON_RINGS: [[u32; 5]; 12] = [
+    [11, 5, 1, 7, 10],
+    [5, 9, 8, 7, 0],
+    [11, 10, 6, 3, 4],
+    [9, 4, 2, 6, 8],
+    [5, 11, 2, 3, 9],
+    [11, 4, 9, 1, 0],
+    [10, 7, 8, 3, 2],
+    [1, 8, 6, 10, 0],
+    [1, 9, 3, 6, 7],
+    [5, 4, 3, 8, 1],
+    [0, 7, 6, 2, 11],
+    [0, 10, 2, 4, 5],
+];

@@ -1,0 +1,58 @@
+//! Connected components.
+
+use super::{Mesh, VertexId};
+
+/// Up to this size a component is searched for without an array over the whole mesh.
+const SMALL: usize = 64;
+
+impl Mesh {
+    /// The vertices connected with `v` in breadth-first order, at most `limit` of them.
+    pub fn component_of(&self, v: VertexId, limit: usize) -> Vec<VertexId> {
+        if limit <= SMALL {
+            return self.small_component_of(v, limit);
+        }
+        let mut found = self.flood(v, &mut vec![false; self.slots()]);
+        found.truncate(limit);
+        found
+    }
+
+    /// The vertices of each component, components in the order of their lowest slot.
+    pub fn component_members(&self) -> Vec<Vec<VertexId>> {
+        let mut seen = vec![false; self.slots()];
+        let starts = self.vertices();
+        starts.filter_map(|v| (!seen[v.index()]).then(|| self.flood(v, &mut seen))).collect()
+    }
+
+    /// Everything connected with `v`, breadth first.
+    fn flood(&self, v: VertexId, seen: &mut [bool]) -> Vec<VertexId> {
+        let mut found = vec![v];
+        seen[v.index()] = true;
+        let mut next = 0;
+        while next < found.len() {
+            for &w in self.ring(found[next]).as_slice() {
+                if !std::mem::replace(&mut seen[w.index()], true) {
+                    found.push(w);
+                }
+            }
+            next += 1;
+        }
+        found
+    }
+
+    fn small_component_of(&self, v: VertexId, limit: usize) -> Vec<VertexId> {
+        let mut found = vec![v];
+        let mut next = 0;
+        while next < found.len() {
+            for &w in self.ring(found[next]).as_slice() {
+                if found.len() >= limit {
+                    return found;
+                }
+                if !found.contains(&w) {
+                    found.push(w);
+                }
+            }
+            next += 1;
+        }
+        found
+    }
+}

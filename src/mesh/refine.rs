@@ -1,0 +1,100 @@
+//! Global √3 refinement.
+
+use super::{Mesh, MeshError, Ring, VertexId};
+
+impl Mesh {
+    /// Puts a vertex in the middle of every triangle and replaces every old edge by the edge between the two new
+    /// vertices beside it (section 3.4, figure 6): edges become 1/√3 as long, vertices about three times as many.
+    ///
+    /// # Errors
+    /// [`MeshError::TooLarge`] where the result would have more vertices than can be named.
+    pub fn refine(&mut self) -> Result<(), MeshError> {
+        let old = self.slots();
+        if !self.has_room_for(self.triangle_count()) {
+            let bytes = (self.triangle_count() as u64).saturating_mul(std::mem::size_of::<Ring>() as u64);
+            return Err(MeshError::TooLarge { bytes });
+        }
+        // New vertices get fresh slots, so that rings by old slots stay readable while the new ones are made.
+        let before = std::mem::take(&mut self.rings);
+        let mut points = FacePoints::new(&before);
+        let mut rings = vec![Ring::default(); old];
+        for (u, ring) in before.iter().enumerate() {
+            let u = VertexId::from_index(u);
+            rings[u.index()] = Ring::new(ring.pairs().map(|(a, b)| points.id(&before, [u, a, b])));
+        }
+        self.place_face_points(&points.corners);
+        for (k, &[a, b, c]) in points.corners.iter().enumerate() {
+            let beyond = |from: VertexId, to: VertexId| points.across(&before, from, to);
+            debug_assert_eq!(rings.len(), old + k, "face points are numbered in order");
+            rings.push(Ring::new([a, beyond(a, b), b, beyond(b, c), c, beyond(c, a)]));
+        }
+        self.rings = rings;
+        self.half_edges *= 3;
+        self.topology_changed();
+        Ok(())
+    }
+
+    fn place_face_points(&mut self, corners: &[[VertexId; 3]]) {
+        for &[a, b, c] in corners {
+            let centre = (self.position(a) + self.position(b) + self.position(c)) * (1.0 / 3.0);
+            self.positions.push(centre);
+            self.attributes.grow();
+            let point = VertexId::from_index(self.positions.len() - 1);
+            self.attributes.blend(point, a, b, 0.5);
+            self.attributes.blend(point, point, c, 1.0 / 3.0);
+        }
+    }
+}
+
+/// Numbers the triangles of a mesh by their corners.
+struct FacePoints {
+    /// For each vertex, where its ring begins in `ids`.
+    starts: Vec<usize>,
+    /// For each vertex and each pair of its ring, the face point.
+    ids: Vec<VertexId>,
+    corners: Vec<[VertexId; 3]>,
+}
+
+impl FacePoints {
+    fn new(rings: &[Ring]) -> Self {
+        let mut starts = Vec::with_capacity(rings.len());
+        let mut total = 0;
+        for ring in rings {
+            starts.push(total);
+            total += ring.valence();
+        }
+        let unset = VertexId(u32::MAX);
+        let mut points = Self { starts, ids: vec![unset; total], corners: Vec::with_capacity(total / 3) };
+        for (u, ring) in rings.iter().enumerate() {
+            let u = VertexId::from_index(u);
+            for (a, b) in ring.pairs().filter(|&(a, b)| u < a && u < b) {
+                let point = VertexId::from_index(rings.len() + points.corners.len());
+                points.corners.push([u, a, b]);
+                for [p, q] in [[u, a], [a, b], [b, u]] {
+                    points.set(rings, p, q, point);
+                }
+            }
+        }
+        points
+    }
+
+    /// Remembers the face point of the triangle to the left of `p` → `q`.
+    fn set(&mut self, rings: &[Ring], p: VertexId, q: VertexId, point: VertexId) {
+        if let Some(at) = rings[p.index()].position(q) {
+            self.ids[self.starts[p.index()] + at] = point;
+        }
+    }
+
+    fn left_of(&self, rings: &[Ring], p: VertexId, q: VertexId) -> VertexId {
+        rings[p.index()].position(q).map_or(VertexId(u32::MAX), |at| self.ids[self.starts[p.index()] + at])
+    }
+
+    fn id(&mut self, rings: &[Ring], [u, a, _]: [VertexId; 3]) -> VertexId {
+        self.left_of(rings, u, a)
+    }
+
+    /// The face point on the other side of the edge `from` → `to`.
+    fn across(&self, rings: &[Ring], from: VertexId, to: VertexId) -> VertexId {
+        self.left_of(rings, to, from)
+    }
+}

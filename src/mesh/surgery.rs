@@ -1,0 +1,152 @@
+//! Changes of topology: cut a ring of three edges and cap both sides (annular), join two discs by a tube (axial).
+
+use super::tube::shortest_tube;
+use super::{EditError, Mesh, Ring, VertexId};
+use crate::math::Vec3;
+
+/// The two triangles that close the surface after a cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cut {
+    /// The vertices that kept their ids, on the left going round the ring.
+    pub kept: [VertexId; 3],
+    /// Their copies on the right.
+    pub copies: [VertexId; 3],
+}
+
+/// The two rims that a tube now joins.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Joint {
+    /// The vertices around the first centre.
+    pub first: Vec<VertexId>,
+    /// The vertices around the second centre.
+    pub second: Vec<VertexId>,
+}
+
+impl Mesh {
+    /// Cuts the surface along the edges `u v`, `v o`, `o u` and closes both sides by a triangle (annular change,
+    /// section 3.3, figure 5). χ grows by 2.
+    ///
+    /// The copies lie where their originals are; the caller moves the two sides apart.
+    ///
+    /// # Errors
+    /// [`EditError::NotAnEdge`]; [`EditError::IsTriangle`] where the ring bounds a triangle of the surface.
+    pub fn cut(&mut self, u: VertexId, v: VertexId, o: VertexId) -> Result<Cut, EditError> {
+        for (a, b) in [(u, v), (v, o), (o, u)] {
+            let opposite = self.opposite(a, b)?;
+            if [u, v, o].contains(&opposite.left) || [u, v, o].contains(&opposite.right) {
+                return Err(EditError::IsTriangle);
+            }
+        }
+        if !self.has_room_for(3) {
+            return Err(EditError::Full);
+        }
+        let kept = [u, v, o];
+        let copies = kept.map(|w| {
+            let copy = self.allocate(self.position(w));
+            self.attributes.blend(copy, w, w, 0.0);
+            copy
+        });
+        for k in 0..3 {
+            self.part_ring(kept, copies, k);
+        }
+        self.half_edges += 6;
+        self.euler += 2;
+        self.topology_changed();
+        Ok(Cut { kept, copies })
+    }
+
+    /// Leaves the left half of ring `k` of a cut with the original and gives the right half to the copy.
+    fn part_ring(&mut self, kept: [VertexId; 3], copies: [VertexId; 3], k: usize) {
+        let (next, previous) = ((k + 1) % 3, (k + 2) % 3);
+        let ring = self.ring(kept[k]);
+        let left = ring.between(kept[next], kept[previous]);
+        let right = ring.between(kept[previous], kept[next]);
+        for &w in &right {
+            self.rings[w.index()].replace(kept[k], copies[k]);
+        }
+        let close = |from, inner: &[VertexId], to| {
+            Ring::new(std::iter::once(from).chain(inner.iter().copied()).chain([to]))
+        };
+        self.rings[kept[k].index()] = close(kept[next], &left, kept[previous]);
+        self.rings[copies[k].index()] = close(copies[previous], &right, copies[next]);
+    }
+
+    /// Replaces the discs around `u` and `v` by a tube between them (axial change, section 3.3, figure 4). χ falls
+    /// by 2.
+    ///
+    /// Intermediary points on the spokes of both, `reach` of the way from the centre (0 < reach < 1), form the ends
+    /// of the tube. They are new, so the result is simplicial even where `u` and `v` have neighbours in common.
+    ///
+    /// # Errors
+    /// [`EditError::Adjacent`] where `u` and `v` are neighbours or the same.
+    pub fn join(&mut self, u: VertexId, v: VertexId, reach: f32) -> Result<Joint, EditError> {
+        for w in [u, v] {
+            if !self.is_live(w) {
+                return Err(EditError::NotAnEdge(u, v));
+            }
+        }
+        if u == v || self.ring(u).contains(v) {
+            return Err(EditError::Adjacent(u, v));
+        }
+        let corners = self.ring(u).valence() + self.ring(v).valence();
+        if !self.has_room_for(corners) {
+            return Err(EditError::Full);
+        }
+        let first = self.open_disc(u, reach);
+        let second = self.open_disc(v, reach);
+        self.close_tube(&first, &second);
+        self.half_edges += 6 * corners;
+        self.euler -= 2;
+        self.topology_changed();
+        Ok(Joint { first, second })
+    }
+
+    /// Removes `centre` from the middle of a new rim and returns the rim in the order of its ring.
+    ///
+    /// ```text
+    ///   n1-----n0             n1-----n0
+    ///     \    /                \ \ / \
+    ///      \  /       ->        r1---r0       rim vertex ri is joined to ni and n(i+1)
+    ///     centre                  hole
+    /// ```
+    fn open_disc(&mut self, centre: VertexId, reach: f32) -> Vec<VertexId> {
+        let spokes: Vec<VertexId> = self.ring(centre).as_slice().to_vec();
+        let from = self.position(centre);
+        let rim: Vec<VertexId> = spokes.iter().map(|&w| self.spoke_point(centre, from, w, reach)).collect();
+        let n = rim.len();
+        for i in 0..n {
+            let (next, previous) = ((i + 1) % n, (i + n - 1) % n);
+            self.rings[spokes[i].index()].splice(centre, &[rim[i], rim[previous]]);
+            self.rings[rim[i].index()] = Ring::new([spokes[i], spokes[next], rim[next], rim[previous]]);
+        }
+        self.release(centre);
+        rim
+    }
+
+    fn spoke_point(&mut self, centre: VertexId, from: Vec3, w: VertexId, reach: f32) -> VertexId {
+        let point = self.allocate(from + (self.position(w) - from) * reach);
+        self.attributes.blend(point, centre, w, reach);
+        point
+    }
+
+    /// Fills the gap between two rims with the shortest tube.
+    fn close_tube(&mut self, first: &[VertexId], second: &[VertexId]) {
+        let at = |rim: &[VertexId]| rim.iter().map(|&w| self.position(w)).collect::<Vec<_>>();
+        let tube = shortest_tube(&at(first), &at(second));
+        for i in 0..first.len() {
+            // Met in the order of falling j; around the rim vertex they stand the other way round.
+            let met: Vec<VertexId> = tube.met_by_first(i).map(|j| second[j]).collect();
+            for &s in &met {
+                let next = first[(i + 1) % first.len()];
+                self.rings[first[i].index()].insert_after(next, s);
+            }
+        }
+        for j in 0..second.len() {
+            let met: Vec<VertexId> = tube.met_by_second(j).map(|i| first[i]).collect();
+            for &r in met.iter().rev() {
+                let next = second[(j + 1) % second.len()];
+                self.rings[second[j].index()].insert_after(next, r);
+            }
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! Internal and external forces on every vertex (sections 3.7 and 3.8).
+
+use super::image::LevelImage;
+use super::params::{DeformableParams, RestLength};
+use crate::math::Vec3;
+use crate::mesh::Ring;
+
+/// A point that pulls the surface within `radius`, in the space of the model.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pull {
+    pub(super) point: Vec3,
+    pub(super) strength: f32,
+    pub(super) radius: f32,
+}
+
+/// The parameters of the forces in the units of the model: lengths in voxels, intensities in 0..1.
+#[derive(Clone, Debug)]
+pub(super) struct ForceScale {
+    iso: f32,
+    iso_force: f32,
+    gradient_across: f32,
+    gradient_along: f32,
+    gradient_bound: f32,
+    rigidity: f32,
+    stiffness: f32,
+    rest: RestLength,
+    voxel: f64,
+    delta: f32,
+}
+
+impl ForceScale {
+    /// `iso` is normalised, `voxel` the world length of a unit of the model.
+    pub(super) fn new(params: &DeformableParams, iso: f32, voxel: f64, delta: f32) -> Self {
+        Self {
+            iso,
+            iso_force: params.iso_force as f32,
+            gradient_across: (params.gradient_normal - params.gradient_tangent) as f32,
+            gradient_along: params.gradient_tangent as f32,
+            gradient_bound: params.gradient_bound as f32,
+            rigidity: params.rigidity as f32,
+            stiffness: params.stiffness as f32,
+            rest: params.rest_length,
+            voxel,
+            delta,
+        }
+    }
+
+    fn uses_gradient(&self) -> bool {
+        self.gradient_across != 0.0 || self.gradient_along != 0.0
+    }
+}
+
+/// Forces and what they are made of, by vertex slot; kept between steps to save allocations.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Forces {
+    /// L(x): the way from a vertex to the mean of its neighbours.
+    laplacian: Vec<Vec3>,
+    /// Unit normals, outwards.
+    pub(super) normal: Vec<Vec3>,
+    /// The sum of all forces.
+    pub(super) force: Vec<Vec3>,
+}
+
+impl Forces {
+    /// Normals and L of every vertex.
+    pub(super) fn look_around(&mut self, rings: &[Ring], positions: &[Vec3]) {
+        self.laplacian.resize(rings.len(), Vec3::ZERO);
+        self.normal.resize(rings.len(), Vec3::ZERO);
+        self.force.resize(rings.len(), Vec3::ZERO);
+        for (v, ring) in rings.iter().enumerate() {
+            let Some(&last) = ring.as_slice().last() else { continue };
+            let centre = positions[v];
+            let mut previous = positions[last.index()] - centre;
+            let (mut sum, mut normal) = (Vec3::ZERO, Vec3::ZERO);
+            for w in ring.as_slice() {
+                let spoke = positions[w.index()] - centre;
+                sum += spoke;
+                normal += previous.cross(spoke);
+                previous = spoke;
+            }
+            self.laplacian[v] = sum * (1.0 / ring.valence() as f32);
+            self.normal[v] = normal.normalize_or_zero();
+        }
+    }
+
+    /// The force on every vertex; needs [`Self::look_around`] at the same positions.
+    pub(super) fn evaluate(
+        &mut self,
+        rings: &[Ring],
+        positions: &[Vec3],
+        image: &LevelImage,
+        scale: &ForceScale,
+        pulls: &[Pull],
+    ) {
+        let rest = rest_length(rings, positions, scale);
+        for (v, ring) in rings.iter().enumerate() {
+            if ring.is_empty() {
+                continue;
+            }
+            let x = positions[v];
+            let mut force = self.curvature(v, ring) * scale.rigidity;
+            if scale.stiffness != 0.0 {
+                force += springs(ring, positions, x, rest) * scale.stiffness;
+            }
+            force += self.iso_attraction(v, x, image, scale);
+            if scale.uses_gradient() {
+                force += self.ridge_attraction(v, x, image, scale);
+            }
+            for pull in pulls {
+                force += attraction(pull, x);
+            }
+            self.force[v] = force;
+        }
+    }
+
+    /// f_c / α_c = L(x) − mean of L over the neighbours (5).
+    #[inline]
+    fn curvature(&self, v: usize, ring: &Ring) -> Vec3 {
+        let sum: Vec3 = ring.as_slice().iter().map(|w| self.laplacian[w.index()]).sum();
+        self.laplacian[v] - sum * (1.0 / ring.valence() as f32)
+    }
+
+    /// f_I = δ α_I (π_I − Π(x)) n (7).
+    #[inline]
+    fn iso_attraction(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> Vec3 {
+        self.normal[v] * (scale.delta * scale.iso_force * (scale.iso - image.intensity(x)))
+    }
+
+    /// f_∇I = δ ((α_g − β_g)(∇Π·n) n + β_g ∇Π) (8).
+    fn ridge_attraction(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> Vec3 {
+        let gradient = image.gradient(x, scale.gradient_bound);
+        let normal = self.normal[v];
+        (normal * (scale.gradient_across * gradient.dot(normal)) + gradient * scale.gradient_along) * scale.delta
+    }
+}
+
+/// d in the units of the model.
+fn rest_length(rings: &[Ring], positions: &[Vec3], scale: &ForceScale) -> f32 {
+    match scale.rest {
+        RestLength::Zero => 0.0,
+        RestLength::Given(length) => (length / scale.voxel) as f32,
+        RestLength::Mean if scale.stiffness == 0.0 => 0.0,
+        RestLength::Mean => {
+            let (mut sum, mut count) = (0.0f64, 0usize);
+            for (v, ring) in rings.iter().enumerate() {
+                for w in ring.as_slice() {
+                    sum += f64::from(positions[v].distance(positions[w.index()]));
+                }
+                count += ring.valence();
+            }
+            (sum / count.max(1) as f64) as f32
+        }
+    }
+}
+
+/// f_e / α_e = Σ (|y − x| − d)(y − x)/|y − x| (6).
+fn springs(ring: &Ring, positions: &[Vec3], x: Vec3, rest: f32) -> Vec3 {
+    ring.as_slice().iter().fold(Vec3::ZERO, |sum, w| {
+        let edge = positions[w.index()] - x;
+        let length = edge.length();
+        if length > 0.0 { sum + edge * ((length - rest) / length) } else { sum }
+    })
+}
+
+/// A spring to the point that fades out smoothly at its radius.
+fn attraction(pull: &Pull, x: Vec3) -> Vec3 {
+    let way = pull.point - x;
+    let far = way.length_squared() / (pull.radius * pull.radius);
+    if far >= 1.0 { Vec3::ZERO } else { way * (pull.strength * (1.0 - far) * (1.0 - far)) }
+}

@@ -1,0 +1,109 @@
+//! The image as the model feels it: one level of the pyramid, intensities scaled to 0..1.
+//!
+//! The model lives in the index space of the finest level, where every voxel is a cube of side 1 (section 4.4, second
+//! way); world space is reached through the volume's affine transform.
+
+use crate::math::Vec3;
+use crate::methods::MethodError;
+use crate::volume::{Grid, VectorGrid, Volume};
+
+/// Reduction factor ρ of the pyramid: the one that belongs to √3 refinement (15).
+pub(super) const REDUCTION: f64 = 1.732_050_807_568_877_2;
+
+/// One level of the pyramid.
+#[derive(Clone, Debug)]
+pub(super) struct LevelImage {
+    grid: Grid,
+    gradient: Option<VectorGrid>,
+    /// Voxel index of this level = position · scale + offset.
+    scale: Vec3,
+    offset: Vec3,
+}
+
+impl LevelImage {
+    fn new(grid: Grid, finest: [usize; 3]) -> Self {
+        let scale = Vec3::from([0, 1, 2].map(|axis| grid.dims[axis] as f32 / finest[axis] as f32));
+        Self { grid, gradient: None, scale, offset: (scale - Vec3::ONE) * 0.5 }
+    }
+
+    #[inline]
+    fn index(&self, p: Vec3) -> Vec3 {
+        p * self.scale + self.offset
+    }
+
+    /// Π: trilinear intensity in 0..1, and 0 outside the image, so that an enclosing surface comes in.
+    #[inline]
+    pub(super) fn intensity(&self, p: Vec3) -> f32 {
+        self.grid.sample_zero(self.index(p), 0.0)
+    }
+
+    /// ∇Π by the Sobel operator, per voxel of this level, no longer than `bound`; zero where none was prepared.
+    #[inline]
+    pub(super) fn gradient(&self, p: Vec3, bound: f32) -> Vec3 {
+        let Some(field) = &self.gradient else { return Vec3::ZERO };
+        let gradient = field.sample(self.index(p));
+        let length = gradient.length();
+        if length > bound { gradient * (bound / length) } else { gradient }
+    }
+
+    /// Makes [`Self::gradient`] usable.
+    pub(super) fn prepare_gradient(&mut self) -> Result<(), MethodError> {
+        if self.gradient.is_none() {
+            self.gradient = Some(self.grid.sobel()?);
+        }
+        Ok(())
+    }
+
+    /// The grid of this level, and the way from its voxel indices to positions of the model.
+    pub(super) fn grid(&self) -> (&Grid, impl Fn(Vec3) -> Vec3) {
+        (&self.grid, |index| (index - self.offset) / self.scale)
+    }
+}
+
+/// The pyramid of one frame, [0] the finest, and the scale of its intensities.
+#[derive(Clone, Debug)]
+pub(super) struct Pyramid {
+    pub(super) levels: Vec<LevelImage>,
+    low: f64,
+    range: f64,
+}
+
+impl Pyramid {
+    /// `above` levels above the volume itself.
+    pub(super) fn new(volume: &Volume, frame: usize, above: usize) -> Result<Self, MethodError> {
+        let possible = volume.max_pyramid_levels(REDUCTION)? - 1;
+        if above > possible {
+            let problem = format!("{above} given, 0 to {possible} are possible for {:?} voxels", volume.dims());
+            return Err(MethodError::invalid("levels", problem));
+        }
+        let [low, high] = volume.range();
+        let range = if high > low { high - low } else { 1.0 };
+        let mut grid = volume.grid(frame)?;
+        normalise(&mut grid, low, range);
+        let mut spacing = volume.spacing();
+        let mut unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
+        let mut levels = Vec::with_capacity(above + 1);
+        for _ in 0..above {
+            let (coarse, coarse_spacing) = grid.reduce(spacing, unit, REDUCTION)?;
+            levels.push(LevelImage::new(std::mem::replace(&mut grid, coarse), volume.dims()));
+            spacing = coarse_spacing;
+            unit *= REDUCTION;
+        }
+        levels.push(LevelImage::new(grid, volume.dims()));
+        Ok(Self { levels, low, range })
+    }
+
+    /// An intensity of the volume on the scale 0..1.
+    pub(super) fn normalised(&self, intensity: f64) -> f32 {
+        ((intensity - self.low) / self.range) as f32
+    }
+}
+
+/// Scales intensities to 0..1; voxels that are not a number count as the lowest.
+fn normalise(grid: &mut Grid, low: f64, range: f64) {
+    let (low, factor) = (low as f32, (1.0 / range) as f32);
+    for value in &mut grid.values {
+        let scaled = (*value - low) * factor;
+        *value = if scaled > 0.0 { scaled } else { 0.0 };
+    }
+}

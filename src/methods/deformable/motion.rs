@@ -1,0 +1,125 @@
+//! The law of motion m ẍ + γ ẋ = f (4), integrated over one iteration.
+
+use super::forces::{ForceScale, Forces, Pull};
+use super::image::LevelImage;
+use super::params::{DeformableParams, Integrator};
+use crate::math::Vec3;
+use crate::mesh::{Mesh, VectorKey};
+
+/// How much the mesh moved in one iteration.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Movement {
+    /// Mean of ½ m (v·n)² / δ², the criterion of section 5.1.
+    pub(super) energy: f64,
+    /// Largest move along a normal, in δ.
+    pub(super) fastest: f32,
+}
+
+/// What pushes the vertices.
+pub(super) struct World<'a> {
+    pub(super) image: &'a LevelImage,
+    pub(super) scale: ForceScale,
+    pub(super) pulls: &'a [Pull],
+}
+
+impl World<'_> {
+    /// The forces at given positions, with the normals there.
+    fn act(&self, forces: &mut Forces, mesh: &Mesh, positions: &[Vec3]) {
+        forces.evaluate(mesh.rings(), positions, self.image, &self.scale, self.pulls);
+    }
+}
+
+/// Moves every vertex by one time step. `forces` holds normals and L of the mesh as it is.
+pub(super) fn advance(
+    mesh: &mut Mesh,
+    velocity: VectorKey,
+    forces: &mut Forces,
+    world: &World,
+    params: &DeformableParams,
+    delta: f32,
+) -> Movement {
+    let moves = match params.integrator {
+        Integrator::Euler => euler(mesh, velocity, forces, world, params),
+        Integrator::RungeKutta => runge_kutta(mesh, velocity, forces, world, params),
+    };
+    apply(mesh, velocity, forces, moves, params, delta)
+}
+
+/// Semi-implicit Euler: the new velocity moves the vertex. The velocity attribute holds it; no moves are returned.
+fn euler(
+    mesh: &mut Mesh,
+    velocity: VectorKey,
+    forces: &mut Forces,
+    world: &World,
+    params: &DeformableParams,
+) -> Option<Vec<Vec3>> {
+    world.act(forces, mesh, mesh.positions());
+    let (step, damping) = (params.time_step as f32 / params.mass as f32, params.damping as f32);
+    for (v, force) in mesh.vector_mut(velocity).iter_mut().zip(&forces.force) {
+        *v += (*force - *v * damping) * step;
+    }
+    None
+}
+
+/// The classical fourth-order method on positions and velocities; returns the way of each vertex.
+fn runge_kutta(
+    mesh: &mut Mesh,
+    velocity: VectorKey,
+    forces: &mut Forces,
+    world: &World,
+    params: &DeformableParams,
+) -> Option<Vec<Vec3>> {
+    let (step, mass, damping) = (params.time_step as f32, params.mass as f32, params.damping as f32);
+    let (x0, v0) = (mesh.positions().to_vec(), mesh.vector(velocity).to_vec());
+    let normals = forces.normal.clone();
+    let (mut x, mut v) = (x0.clone(), v0.clone());
+    let (mut way, mut gain) = (vec![Vec3::ZERO; x.len()], vec![Vec3::ZERO; x.len()]);
+    for (stage, (weight, ahead)) in [(1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)].into_iter().enumerate() {
+        if stage > 0 {
+            forces.look_around(mesh.rings(), &x);
+        }
+        world.act(forces, mesh, &x);
+        for i in 0..x.len() {
+            let acceleration = (forces.force[i] - v[i] * damping) * (1.0 / mass);
+            way[i] += v[i] * (weight * step / 6.0);
+            gain[i] += acceleration * (weight * step / 6.0);
+            x[i] = x0[i] + v[i] * (ahead * step);
+            v[i] = v0[i] + acceleration * (ahead * step);
+        }
+    }
+    forces.normal = normals;
+    for (v, gain) in mesh.vector_mut(velocity).iter_mut().zip(gain) {
+        *v += gain;
+    }
+    Some(way)
+}
+
+/// Bounds each move, scales the velocity with it, and moves the vertices.
+fn apply(
+    mesh: &mut Mesh,
+    velocity: VectorKey,
+    forces: &Forces,
+    moves: Option<Vec<Vec3>>,
+    params: &DeformableParams,
+    delta: f32,
+) -> Movement {
+    let (step, limit) = (params.time_step as f32, params.max_move as f32 * delta);
+    let live: Vec<bool> = mesh.rings().iter().map(|ring| !ring.is_empty()).collect();
+    let count = mesh.vertex_count();
+    let (positions, velocities) = mesh.positions_and_vector_mut(velocity);
+    let mut movement = Movement::default();
+    for i in (0..live.len()).filter(|&i| live[i]) {
+        let mut way = moves.as_ref().map_or(velocities[i] * step, |moves| moves[i]);
+        let length = way.length();
+        if length > limit {
+            way *= limit / length;
+            velocities[i] *= limit / length;
+        }
+        positions[i] += way;
+        let along = (way.dot(forces.normal[i]) / delta).abs();
+        movement.energy += f64::from(along) * f64::from(along);
+        movement.fastest = if along > movement.fastest { along } else { movement.fastest };
+    }
+    movement.energy *= 0.5 * params.mass / count.max(1) as f64;
+    movement
+}

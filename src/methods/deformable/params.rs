@@ -1,0 +1,381 @@
+//! Parameters of the deformable model, their ranges and their words.
+
+use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, ParamSpec};
+use crate::volume::Volume;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// Parameters of the deformable model. All can be changed while it runs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub struct DeformableParams {
+    /// π_I: the intensity the surface looks for, in the volume's units.
+    pub iso: f64,
+    /// α_I: attraction to the iso surface; negative where the object is brighter than `iso`.
+    pub iso_force: f64,
+    /// α_g: attraction to bright ridges along the normal.
+    pub gradient_normal: f64,
+    /// β_g: attraction to bright ridges along the tangent plane.
+    pub gradient_tangent: f64,
+    /// Longest gradient that counts, in ranges of intensity a voxel.
+    pub gradient_bound: f64,
+    /// α_c: rigidity, resistance to changes of curvature.
+    pub rigidity: f64,
+    /// α_e: stiffness of the edges as springs.
+    pub stiffness: f64,
+    /// d: the length at which a spring is at rest.
+    pub rest_length: RestLength,
+    /// m: mass of a vertex.
+    pub mass: f64,
+    /// γ: damping.
+    pub damping: f64,
+    /// How the law of motion is integrated.
+    pub integrator: Integrator,
+    /// Δt: time step.
+    pub time_step: f64,
+    /// Largest move of a vertex in one iteration, as a fraction of δ.
+    pub max_move: f64,
+    /// ε: kinetic energy along the normals below which a level has come to rest.
+    pub energy_tolerance: f64,
+    /// Whether the mesh adapts its sampling and topology.
+    pub topology: Topology,
+}
+
+/// The length at which a spring is at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RestLength {
+    /// No length: the surface tends to least area.
+    Zero,
+    /// The mean edge of the mesh: edges tend to the same length.
+    Mean,
+    /// A given length in world units.
+    Given(f64),
+}
+
+/// How the law of motion is integrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Integrator {
+    /// Semi-implicit Euler: one evaluation of the forces; holds for α_c ≤ 0.4 and γ ≤ 1.
+    Euler,
+    /// Runge–Kutta of order 4: four evaluations; holds for α_c up to 3.
+    RungeKutta,
+}
+
+/// Whether the mesh may change while it moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Topology {
+    /// Sampling and topology follow the three bounds of δ.
+    Adaptive,
+    /// Vertices move; edges stay.
+    Fixed,
+}
+
+impl DeformableParams {
+    /// The defaults, with `iso` halfway between the volume's least and largest intensity.
+    pub fn for_volume(volume: &Volume) -> Self {
+        let [low, high] = volume.range();
+        Self { iso: 0.5 * (low + high), ..Self::default() }
+    }
+
+    /// Tests every value against its range.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] with the name of the first parameter out of range and what it accepts.
+    pub fn validate(&self) -> Result<(), MethodError> {
+        for (spec, value) in SPECS.iter().zip(self.numbers()) {
+            let Some(value) = value else { continue };
+            let (low, high) = (spec.min.unwrap_or(f64::MIN), spec.max.unwrap_or(f64::MAX));
+            if !(value >= low && value <= high) {
+                let range = match (spec.min, spec.max) {
+                    (Some(low), Some(high)) => format!("a number from {low} to {high}"),
+                    _ => "a finite number".into(),
+                };
+                return Err(MethodError::invalid(spec.name, format!("{value} given, {range} accepted")));
+            }
+        }
+        Ok(())
+    }
+
+    /// The values that have a range, in the order of [`SPECS`].
+    fn numbers(&self) -> [Option<f64>; 15] {
+        let rest = if let RestLength::Given(length) = self.rest_length { Some(length) } else { None };
+        [
+            Some(self.iso),
+            Some(self.iso_force),
+            Some(self.gradient_normal),
+            Some(self.gradient_tangent),
+            Some(self.gradient_bound),
+            Some(self.rigidity),
+            Some(self.stiffness),
+            rest,
+            Some(self.mass),
+            Some(self.damping),
+            None,
+            Some(self.time_step),
+            Some(self.max_move),
+            Some(self.energy_tolerance),
+            None,
+        ]
+    }
+}
+
+impl Default for DeformableParams {
+    fn default() -> Self {
+        Self {
+            iso: 0.0,
+            iso_force: -1.0,
+            gradient_normal: 0.0,
+            gradient_tangent: 0.0,
+            gradient_bound: 1.0,
+            rigidity: 0.2,
+            stiffness: 0.0,
+            rest_length: RestLength::Zero,
+            mass: 1.0,
+            damping: 0.4,
+            integrator: Integrator::Euler,
+            time_step: 1.0,
+            max_move: 0.3,
+            energy_tolerance: 1e-6,
+            topology: Topology::Adaptive,
+        }
+    }
+}
+
+/// The parameters of the deformable model, in the order a page should show them.
+pub fn param_specs() -> Vec<ParamSpec> {
+    SPECS.to_vec()
+}
+
+const NUMBER: ParamSpec = ParamSpec {
+    name: "",
+    label: "",
+    help: "",
+    symbol: None,
+    kind: ParamKind::Number,
+    default: ParamDefault::Number(0.0),
+    min: None,
+    max: None,
+    step: None,
+    scale: Some(ParamScale::Linear),
+    unit: None,
+    choices: None,
+};
+
+const SPECS: [ParamSpec; 15] = [
+    ParamSpec {
+        name: "iso",
+        label: "Iso value",
+        help: "The intensity the surface settles on; everything beyond it counts as the object.",
+        symbol: Some("πI"),
+        default: ParamDefault::FromData,
+        unit: Some("intensity"),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "isoForce",
+        label: "Image force",
+        help: "How strongly the image inflates or deflates the surface; negative where the object is brighter than the iso value.",
+        symbol: Some("αI"),
+        default: ParamDefault::Number(-1.0),
+        min: Some(-10.0),
+        max: Some(10.0),
+        step: Some(0.1),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "gradientNormal",
+        label: "Ridge force, normal",
+        help: "Pulls the surface along its normal to where the image is brightest.",
+        symbol: Some("αg"),
+        min: Some(-10.0),
+        max: Some(10.0),
+        step: Some(0.05),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "gradientTangent",
+        label: "Ridge force, tangent",
+        help: "Lets vertices slide within the surface to where the image is brightest.",
+        symbol: Some("βg"),
+        min: Some(-10.0),
+        max: Some(10.0),
+        step: Some(0.05),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "gradientBound",
+        label: "Ridge force, bound",
+        help: "Steeper image gradients count as this one, so that one sharp edge does not outweigh all others.",
+        default: ParamDefault::Number(1.0),
+        min: Some(1e-4),
+        max: Some(1.0),
+        step: Some(0.01),
+        unit: Some("range/voxel"),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "rigidity",
+        label: "Rigidity",
+        help: "Resists bending: larger values give smoother surfaces and lose fine detail.",
+        symbol: Some("αc"),
+        default: ParamDefault::Number(0.2),
+        min: Some(0.0),
+        max: Some(3.0),
+        step: Some(0.01),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "stiffness",
+        label: "Stiffness",
+        help: "Makes edges springs: a little evens out the triangles, much of it shrinks the surface.",
+        symbol: Some("αe"),
+        min: Some(0.0),
+        max: Some(1.0),
+        step: Some(0.001),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "restLength",
+        label: "Rest length",
+        help: "The edge length at which the springs are at rest: zero, the mean edge, or a given length.",
+        symbol: Some("d"),
+        kind: ParamKind::Choice,
+        default: ParamDefault::Choice("zero"),
+        min: Some(0.0),
+        max: Some(1e6),
+        scale: None,
+        unit: Some("world units"),
+        choices: Some(&["zero", "mean"]),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "mass",
+        label: "Mass",
+        help: "Inertia of a vertex: heavier ones start and stop more slowly.",
+        symbol: Some("m"),
+        default: ParamDefault::Number(1.0),
+        min: Some(0.1),
+        max: Some(100.0),
+        step: Some(0.1),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "damping",
+        label: "Damping",
+        help: "Friction: too little and the surface swings about its rest, too much and it creeps.",
+        symbol: Some("γ"),
+        default: ParamDefault::Number(0.4),
+        min: Some(0.01),
+        max: Some(2.0),
+        step: Some(0.01),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "integrator",
+        label: "Integrator",
+        help: "Euler is fast; Runge–Kutta evaluates the forces four times and stands rigidity above 0.4.",
+        kind: ParamKind::Choice,
+        default: ParamDefault::Choice("euler"),
+        scale: None,
+        choices: Some(&["euler", "runge-kutta"]),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "timeStep",
+        label: "Time step",
+        help: "Time that passes in one iteration; smaller steps are safer and slower.",
+        symbol: Some("Δt"),
+        default: ParamDefault::Number(1.0),
+        min: Some(0.01),
+        max: Some(2.0),
+        step: Some(0.01),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "maxMove",
+        label: "Largest move",
+        help: "How far a vertex may go in one iteration, as a fraction of δ; contact is found safely up to about 0.3.",
+        default: ParamDefault::Number(0.3),
+        min: Some(0.01),
+        max: Some(0.5),
+        step: Some(0.01),
+        unit: Some("δ"),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "energyTolerance",
+        label: "Rest energy",
+        help: "A level is finished when the mean kinetic energy along the normals stays below this.",
+        symbol: Some("ε"),
+        default: ParamDefault::Number(1e-6),
+        min: Some(1e-12),
+        max: Some(1.0),
+        scale: Some(ParamScale::Log),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "topology",
+        label: "Topology",
+        help: "Adaptive lets the surface refine, split and join; fixed moves the vertices only.",
+        kind: ParamKind::Choice,
+        default: ParamDefault::Choice("adaptive"),
+        scale: None,
+        choices: Some(&["adaptive", "fixed"]),
+        ..NUMBER
+    },
+];
+
+/// Words or a number for people; for saved states, which are not read by people, one number.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum RestLengthWords {
+    Word(RestWord),
+    Length(f64),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum RestWord {
+    Zero,
+    Mean,
+}
+
+impl Serialize for RestLength {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if !serializer.is_human_readable() {
+            let code = match self {
+                Self::Zero => 0.0,
+                Self::Mean => -1.0,
+                Self::Given(length) => *length,
+            };
+            return code.serialize(serializer);
+        }
+        match self {
+            Self::Zero => RestLengthWords::Word(RestWord::Zero),
+            Self::Mean => RestLengthWords::Word(RestWord::Mean),
+            Self::Given(length) => RestLengthWords::Length(*length),
+        }
+        .serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for RestLength {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        if !deserializer.is_human_readable() {
+            let code = f64::deserialize(deserializer)?;
+            return Ok(if code == 0.0 {
+                Self::Zero
+            } else if code < 0.0 {
+                Self::Mean
+            } else {
+                Self::Given(code)
+            });
+        }
+        Ok(match RestLengthWords::deserialize(deserializer)? {
+            RestLengthWords::Word(RestWord::Zero) => Self::Zero,
+            RestLengthWords::Word(RestWord::Mean) => Self::Mean,
+            RestLengthWords::Length(length) => Self::Given(length),
+        })
+    }
+}

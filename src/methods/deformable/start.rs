@@ -1,0 +1,181 @@
+//! The surface a run starts from (section 3.6), made in the space of the model and resolved before the first step.
+
+use super::image::LevelImage;
+use crate::math::{DAffine3, DVec3, Vec3};
+use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings};
+use crate::methods::MethodError;
+use crate::remesh::{Resolver, Sampling};
+use crate::volume::marching_cubes;
+
+/// What a run starts from; lengths and points in world units.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Start {
+    /// A refined icosahedron around the whole image.
+    Enclosing,
+    /// A grid of n³ small spheres that fills the image.
+    Bubbles(u32),
+    /// Spheres of one radius around points.
+    Seeds {
+        /// The centres.
+        points: Vec<DVec3>,
+        /// Their radius.
+        radius: f64,
+    },
+    /// The iso-surface at an intensity.
+    MarchingCubes(f64),
+    /// A closed mesh that does not cross itself.
+    Mesh(TriangleMesh),
+}
+
+/// What a start shape is made for.
+pub(super) struct Frame<'a> {
+    pub(super) image: &'a LevelImage,
+    /// Voxels of the finest level.
+    pub(super) dims: [usize; 3],
+    pub(super) from_world: DAffine3,
+    /// World length of a unit of the model.
+    pub(super) voxel: f64,
+    pub(super) sampling: Sampling,
+}
+
+/// The smallest sphere in δ that has its edges within bounds as an icosahedron, with room for one that is hit.
+const SMALLEST_RADIUS: f32 = 1.2;
+
+/// Radius of a bubble as a share of its cell: neighbours stay further apart than contact reaches.
+const BUBBLE_SHARE: f32 = 0.3;
+
+/// Upper bound of a sphere's edges in δ: below 2.5 with a margin, and above √3 with one, so that one refinement
+/// more does not fall below the lower bound.
+const SPHERE_EDGE: f32 = 2.2;
+
+/// The most bubbles along an axis and the most seeds: beyond them memory, not the method, is the limit.
+const MOST_BUBBLES: u32 = 100;
+const MOST_SEEDS: usize = 100_000;
+
+impl Start {
+    /// The start mesh with its edges within bounds, and no two parts in contact.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] where a sphere is too small for the sampling or two overlap, or the iso-surface
+    /// is empty; [`MethodError::Mesh`] where the caller's mesh is open, not manifold or crosses itself.
+    pub(super) fn make(&self, frame: &Frame, iso: impl Fn(f64) -> f32) -> Result<Mesh, MethodError> {
+        let mut mesh = match self {
+            Self::Enclosing => return enclosing(frame),
+            Self::Bubbles(n) => bubbles(frame, *n)?,
+            Self::Seeds { points, radius } => seeds(frame, points, *radius)?,
+            Self::MarchingCubes(value) => iso_surface(frame, iso(*value))?,
+            Self::Mesh(mesh) => given(frame, mesh)?,
+        };
+        resolve_all(&mut mesh, frame.sampling);
+        Ok(mesh)
+    }
+}
+
+fn resolve_all(mesh: &mut Mesh, sampling: Sampling) {
+    let mut resolver = Resolver::default();
+    resolver.resolve(mesh, sampling, &mesh.vertices().collect::<Vec<_>>());
+    resolver.sweep(mesh, sampling);
+}
+
+/// A rounded box around the image: |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1 through the image's corners.
+///
+/// It is refined from an icosahedron, each level pulled onto the shape and resolved: a fine icosahedron squashed onto
+/// a flat box would have triangles that no edit can mend.
+fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
+    // 3^(1/4): the rounded box through the corners of a box is this much longer than the box along each axis.
+    const THROUGH_CORNERS: f32 = 1.316_074;
+    let delta = frame.sampling.shortest();
+    let centre = Vec3::from(frame.dims.map(|n| 0.5 * (n as f32 - 1.0)));
+    let axes = Vec3::from(frame.dims.map(|n| THROUGH_CORNERS * 0.5 * (n as f32 + 1.0))).max(Vec3::splat(4.0 * delta));
+    let onto_box = |p: Vec3| {
+        let unit = (p - centre) / axes;
+        let fourth = unit * unit * unit * unit;
+        centre + unit / fourth.element_sum().sqrt().sqrt() * axes
+    };
+    let mut mesh = Mesh::icosahedron(Vec3::ZERO, 1.0);
+    mesh.positions_mut().iter_mut().for_each(|p| *p = onto_box(centre + *p * axes));
+    let mut coarse = vec![delta];
+    while Sampling::new(coarse[coarse.len() - 1]).longest() < mesh.longest_edge() {
+        coarse.push(coarse[coarse.len() - 1] * super::image::REDUCTION as f32);
+    }
+    for &delta in coarse.iter().rev().skip(1) {
+        mesh.refine()?;
+        let slots: Vec<_> = mesh.vertices().collect();
+        slots.into_iter().for_each(|v| mesh.set_position(v, onto_box(mesh.position(v))));
+        if 3.0 * delta < axes.min_element() {
+            resolve_all(&mut mesh, Sampling::new(delta));
+        }
+    }
+    resolve_all(&mut mesh, frame.sampling);
+    Ok(mesh)
+}
+
+fn sphere(frame: &Frame, centre: Vec3, radius: f32) -> Result<Mesh, MeshError> {
+    Mesh::icosphere(centre, radius, SPHERE_EDGE * frame.sampling.shortest())
+}
+
+fn bubbles(frame: &Frame, n: u32) -> Result<Mesh, MethodError> {
+    let smallest_axis = frame.dims.into_iter().min().unwrap_or(1) as f32;
+    let fitting = (smallest_axis * BUBBLE_SHARE / (SMALLEST_RADIUS * frame.sampling.shortest())) as u32;
+    let most = fitting.min(MOST_BUBBLES);
+    if n == 0 || n > most {
+        let hint = if most == 0 { "none fits: take fewer pyramid levels or shorter edges".into() } else { format!("1 to {most} fit this image and sampling") };
+        return Err(MethodError::invalid("start.bubbles", format!("{n} given, {hint}")));
+    }
+    let cell = Vec3::from(frame.dims.map(|m| m as f32 / n as f32));
+    let radius = BUBBLE_SHARE * cell.min_element();
+    let mut mesh = Mesh::default();
+    for k in 0..n * n * n {
+        let at = Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32);
+        mesh.append(&sphere(frame, (at + 0.5) * cell - 0.5, radius)?)?;
+    }
+    Ok(mesh)
+}
+
+fn seeds(frame: &Frame, points: &[DVec3], radius: f64) -> Result<Mesh, MethodError> {
+    let smallest = SMALLEST_RADIUS * frame.sampling.shortest();
+    let local = (radius / frame.voxel) as f32;
+    if points.is_empty() || points.len() > MOST_SEEDS {
+        let problem = format!("{} points given, 1 to {MOST_SEEDS} accepted", points.len());
+        return Err(MethodError::invalid("start.seeds", problem));
+    }
+    if !(local >= smallest && local.is_finite()) {
+        let least = f64::from(smallest) * frame.voxel;
+        let problem = format!("{radius} given, at least {least:.3} accepted (or fewer pyramid levels, shorter edges)");
+        return Err(MethodError::invalid("start.radius", problem));
+    }
+    let centres: Vec<Vec3> = points.iter().map(|p| frame.from_world.transform_point3(*p).as_vec3()).collect();
+    if let Some(bad) = centres.iter().position(|p| !p.is_finite()) {
+        return Err(MethodError::invalid("start.seeds", format!("point {bad} is not finite")));
+    }
+    let apart = 2.0 * local + frame.sampling.contact();
+    let mut mesh = Mesh::default();
+    for (i, &centre) in centres.iter().enumerate() {
+        if let Some(j) = centres[..i].iter().position(|other| other.distance(centre) < apart) {
+            let problem = format!("points {j} and {i} are too near: spheres of radius {radius} would touch");
+            return Err(MethodError::invalid("start.seeds", problem));
+        }
+        mesh.append(&sphere(frame, centre, local)?)?;
+    }
+    Ok(mesh)
+}
+
+fn iso_surface(frame: &Frame, iso: f32) -> Result<Mesh, MethodError> {
+    let (grid, position) = frame.image.grid();
+    let mut surface = marching_cubes(grid, iso)?;
+    if surface.triangles.is_empty() {
+        return Err(MethodError::invalid("start.marchingCubes", "the image has no surface at this intensity"));
+    }
+    surface.positions.iter_mut().for_each(|p| *p = position(*p));
+    Ok(Mesh::from_triangles(&surface)?)
+}
+
+fn given(frame: &Frame, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
+    let local = mesh.transformed(&frame.from_world);
+    let surface = Mesh::from_triangles(&local)?;
+    let pairs = count_crossings(&surface.to_triangles());
+    if pairs > 0 {
+        return Err(MeshError::SelfIntersecting { pairs }.into());
+    }
+    Ok(surface)
+}

@@ -1,0 +1,38 @@
+//! What can go wrong when a method is set up or restored.
+
+use crate::mesh::MeshError;
+use crate::volume::VolumeError;
+
+/// Why a method refuses its input.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MethodError {
+    /// A parameter or option outside what is accepted.
+    #[error("{parameter}: {problem}")]
+    InvalidArgument {
+        /// The parameter's name, as in the public contract.
+        parameter: &'static str,
+        /// What was wrong and what is accepted.
+        problem: String,
+    },
+    /// The mesh to start from cannot be used.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The volume cannot be used.
+    #[error(transparent)]
+    Volume(#[from] VolumeError),
+    /// Bytes that are not a saved state of this model.
+    #[error("saved state, {field}: {problem}")]
+    BadState {
+        /// The part of the state.
+        field: &'static str,
+        /// What was wrong and what is accepted.
+        problem: String,
+    },
+}
+
+impl MethodError {
+    /// An [`MethodError::InvalidArgument`].
+    pub fn invalid(parameter: &'static str, problem: impl Into<String>) -> Self {
+        Self::InvalidArgument { parameter, problem: problem.into() }
+    }
+}

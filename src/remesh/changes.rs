@@ -1,0 +1,39 @@
+//! What passes did to a mesh.
+
+use serde::{Deserialize, Serialize};
+use std::ops::AddAssign;
+
+/// Counts of edits, by the papers' names.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Changes {
+    /// Edges split.
+    pub creations: u32,
+    /// Edges collapsed.
+    pub deletions: u32,
+    /// Edges flipped.
+    pub inversions: u32,
+    /// Tubes made between parts in contact.
+    pub axial: u32,
+    /// Necks cut.
+    pub annular: u32,
+    /// Components removed because nothing was left of them.
+    pub vanished: u32,
+}
+
+impl Changes {
+    /// Whether connectivity between distant parts changed, not only the sampling.
+    pub fn changed_topology(self) -> bool {
+        self.axial + self.annular + self.vanished > 0
+    }
+}
+
+impl AddAssign for Changes {
+    fn add_assign(&mut self, other: Self) {
+        self.creations += other.creations;
+        self.deletions += other.deletions;
+        self.inversions += other.inversions;
+        self.axial += other.axial;
+        self.annular += other.annular;
+        self.vanished += other.vanished;
+    }
+}

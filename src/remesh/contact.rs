@@ -1,0 +1,102 @@
+//! Vertices in contact that are no neighbours: equation (3) and the axial change of figures 3 and 4.
+
+use super::{Resolver, Sampling};
+use crate::mesh::{Mesh, VertexId};
+
+/// Where the intermediary points of a joint lie on the spokes, from the centre. Nearer to the centre the tube is thin
+/// and is cut again at once; further out the strip around it is thinner than δ and collapses.
+const JOINT_REACH: f32 = 0.7;
+
+/// Two vertices in contact, nearest first.
+struct Contact {
+    square: f32,
+    u: VertexId,
+    v: VertexId,
+}
+
+impl Resolver {
+    /// Joins the stirred vertices with what they touch; says whether anything was changed.
+    pub(super) fn join_contacts(&mut self, mesh: &mut Mesh, sampling: Sampling) -> bool {
+        let contacts = self.find_contacts(mesh, sampling);
+        let mut changed = false;
+        // Contact next to a fresh tube waits until the tube is settled: joined at once, neighbouring pairs of two
+        // facing sheets would make a handle each.
+        let mut busy = vec![false; mesh.slots()];
+        for Contact { square, u, v } in contacts {
+            if !free(mesh, &busy, u) || !free(mesh, &busy, v) || mesh.ring(u).contains(v) {
+                self.touch_live(mesh, u);
+                continue;
+            }
+            let reached: Vec<VertexId> =
+                [u, v].iter().flat_map(|&w| mesh.ring(w).as_slice()).copied().collect();
+            let Some(done) = self.mend_contact(mesh, square, u, v) else { continue };
+            changed |= done;
+            busy.resize(mesh.slots(), true);
+            for w in reached.into_iter().chain([u, v]) {
+                busy[w.index()] = true;
+                self.touch_live(mesh, w);
+            }
+        }
+        changed
+    }
+
+    fn touch_live(&mut self, mesh: &Mesh, v: VertexId) {
+        if mesh.is_live(v) {
+            self.touch(v);
+        }
+    }
+
+    /// Pairs nearer than the contact distance with at least one stirred vertex, nearest first.
+    fn find_contacts(&mut self, mesh: &Mesh, sampling: Sampling) -> Vec<Contact> {
+        let mut stirred = self.take_stirred();
+        stirred.retain(|&v| mesh.is_live(v));
+        let mut contacts = Vec::new();
+        if stirred.is_empty() {
+            return contacts;
+        }
+        let points = mesh.vertices().map(|v| (v, mesh.position(v)));
+        self.grid.rebuild(points, mesh.vertex_count(), sampling.contact());
+        let mut is_stirred = vec![false; mesh.slots()];
+        stirred.iter().for_each(|v| is_stirred[v.index()] = true);
+        for &u in &stirred {
+            let ring = mesh.ring(u);
+            self.grid.near(mesh.position(u), |v, square| {
+                let counted_from_v = is_stirred[v.index()] && v < u;
+                if v != u && !counted_from_v && !ring.contains(v) {
+                    contacts.push(Contact { square, u, v });
+                }
+            });
+        }
+        contacts.sort_by(|a, b| a.square.total_cmp(&b.square).then(a.u.cmp(&b.u)).then(a.v.cmp(&b.v)));
+        contacts
+    }
+
+    /// Mends one contact: a flip where the two lie across an edge, else a tube. `None` where nothing need be done.
+    fn mend_contact(&mut self, mesh: &mut Mesh, square: f32, u: VertexId, v: VertexId) -> Option<bool> {
+        if let Some(across) = longest_edge_between(mesh, u, v) {
+            let (a, b, length) = across;
+            // The fold at a short edge is no contact: its two wings cannot meet before one of them is collapsed.
+            if length <= square || mesh.flip(a, b).is_err() {
+                return None;
+            }
+            self.changes.inversions += 1;
+            return Some(true);
+        }
+        let joint = mesh.join(u, v, JOINT_REACH).ok()?;
+        self.changes.axial += 1;
+        joint.first.iter().chain(&joint.second).for_each(|&w| self.touch(w));
+        Some(true)
+    }
+}
+
+fn free(mesh: &Mesh, busy: &[bool], v: VertexId) -> bool {
+    mesh.is_live(v) && busy.get(v.index()) == Some(&false)
+}
+
+/// The longest edge that `u` and `v` are opposite to each other across, and its squared length.
+fn longest_edge_between(mesh: &Mesh, u: VertexId, v: VertexId) -> Option<(VertexId, VertexId, f32)> {
+    let across = mesh.ring(u).pairs().filter(|&(a, b)| mesh.ring(a).before(b) == Some(v));
+    across
+        .map(|(a, b)| (a, b, mesh.position(a).distance_squared(mesh.position(b))))
+        .max_by(|x, y| x.2.total_cmp(&y.2))
+}

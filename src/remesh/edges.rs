@@ -1,0 +1,176 @@
+//! Edges out of bounds: equations (1) and (2), figure 1, and the annular change of figure 5.
+
+use super::{Resolver, Sampling};
+use crate::math::Vec3;
+use crate::mesh::{Cut, EditError, Mesh, Opposite, VertexId};
+
+/// Edits a settling may take for each vertex of the mesh before the rest is left for later. Ordinary iterations take
+/// below one; a cycle of edits that undo each other would take any number.
+const EDITS_PER_VERTEX: usize = 20;
+
+/// How far the two sides of a cut neck are moved apart, in δ. Left in place they cross as soon as they are smoothed.
+const CUT_PUSH: f32 = 0.75;
+
+/// The share of the way to its own side's neighbours that a side is pushed at most, so that no triangle turns over.
+const CUT_PUSH_LIMIT: f32 = 0.6;
+
+impl Resolver {
+    /// Works through the queue until every edge around its vertices is within bounds.
+    pub(super) fn settle_edges(&mut self, mesh: &mut Mesh, sampling: Sampling) {
+        let mut left = EDITS_PER_VERTEX * mesh.vertex_count() + 1000;
+        while let Some(u) = self.pop() {
+            if left == 0 {
+                self.touch(u);
+                return;
+            }
+            if mesh.is_live(u) && self.settle_vertex(mesh, sampling, u) {
+                left -= 1;
+            }
+        }
+    }
+
+    /// Mends the first edge around `u` that is out of bounds and can be mended; says whether one was.
+    fn settle_vertex(&mut self, mesh: &mut Mesh, sampling: Sampling, u: VertexId) -> bool {
+        let (shortest, longest) = (square(sampling.shortest()), square(sampling.longest()));
+        let from = mesh.position(u);
+        for k in 0..mesh.ring(u).valence() {
+            let v = mesh.ring(u).as_slice()[k];
+            let length = from.distance_squared(mesh.position(v));
+            let mended = if length > longest {
+                self.shorten(mesh, sampling, u, v)
+            } else if length < shortest {
+                self.remove_short(mesh, sampling, u, v)
+            } else {
+                Ok(false)
+            };
+            if mended == Ok(true) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Flips an edge that is too long where a new vertex on it would come too near its opposite ones; else splits it.
+    fn shorten(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        u: VertexId,
+        v: VertexId,
+    ) -> Result<bool, EditError> {
+        let Opposite { left, right } = mesh.opposite(u, v)?;
+        let middle = (mesh.position(u) + mesh.position(v)) * 0.5;
+        let (a, b) = (mesh.position(left), mesh.position(right));
+        let crowded = [a, b].iter().any(|p| p.distance_squared(middle) < square(sampling.shortest()));
+        let flat = a.distance_squared(b) < mesh.position(u).distance_squared(mesh.position(v));
+        if crowded && flat && mesh.flip(u, v).is_ok() {
+            self.changes.inversions += 1;
+        } else {
+            let w = mesh.split(u, v, middle)?;
+            self.changes.creations += 1;
+            self.touch(w);
+        }
+        [u, v, left, right].map(|w| self.touch(w));
+        Ok(true)
+    }
+
+    /// Collapses an edge that is too short; where a neck is in the way, cuts it; a lone tetrahedron is removed.
+    fn remove_short(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        u: VertexId,
+        v: VertexId,
+    ) -> Result<bool, EditError> {
+        match mesh.can_collapse(u, v) {
+            Ok(_) => {
+                let position = collapse_point(mesh, u, v);
+                mesh.collapse(u, v, position)?;
+                self.changes.deletions += 1;
+                // At the end of the queue: trying the survivor again at once piles up valence.
+                self.touch(u);
+                Ok(true)
+            }
+            Err(EditError::NeckInTheWay(_)) => self.cut_neck(mesh, sampling, u, v),
+            Err(EditError::ValenceTooLow(_)) if mesh.is_tetrahedron(u) => {
+                mesh.remove_tetrahedron(u)?;
+                self.changes.vanished += 1;
+                Ok(true)
+            }
+            Err(refusal) => Err(refusal),
+        }
+    }
+
+    /// Annular change through the edge `uv` and the common neighbour that makes the shortest ring.
+    fn cut_neck(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        u: VertexId,
+        v: VertexId,
+    ) -> Result<bool, EditError> {
+        let opposite = mesh.opposite(u, v)?;
+        let around = |o: &VertexId| {
+            let p = mesh.position(*o);
+            p.distance(mesh.position(u)) + p.distance(mesh.position(v))
+        };
+        let third = mesh.common_neighbours(u, v).into_iter();
+        let third = third.filter(|&o| o != opposite.left && o != opposite.right);
+        let Some(o) = third.min_by(|a, b| around(a).total_cmp(&around(b))) else {
+            return Ok(false);
+        };
+        let cut = mesh.cut(u, v, o)?;
+        self.changes.annular += 1;
+        part(mesh, cut, CUT_PUSH * sampling.shortest());
+        for side in [cut.kept, cut.copies] {
+            if !self.remove_speck(mesh, sampling, side[0]) {
+                side.map(|w| self.touch(w));
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// The middle of the edge, or that end of it at which no triangle turns over; the middle where all three turn one.
+fn collapse_point(mesh: &Mesh, u: VertexId, v: VertexId) -> Vec3 {
+    let (p, q) = (mesh.position(u), mesh.position(v));
+    let middle = (p + q) * 0.5;
+    let keeps = |&at: &Vec3| !turns_over(mesh, u, v, at) && !turns_over(mesh, v, u, at);
+    [middle, p, q].into_iter().find(keeps).unwrap_or(middle)
+}
+
+/// Whether moving `u` to `to` turns over a triangle around it that does not have `v` as a corner.
+fn turns_over(mesh: &Mesh, u: VertexId, v: VertexId, to: Vec3) -> bool {
+    let from = mesh.position(u);
+    mesh.ring(u).pairs().filter(|&(a, b)| a != v && b != v).any(|(a, b)| {
+        let (a, b) = (mesh.position(a), mesh.position(b));
+        (a - from).cross(b - from).dot((a - to).cross(b - to)) <= 0.0
+    })
+}
+
+/// Moves the two sides of a cut apart along the axis of the neck.
+fn part(mesh: &mut Mesh, cut: Cut, push: f32) {
+    let [a, b, c] = cut.kept.map(|v| mesh.position(v));
+    let centre = (a + b + c) * (1.0 / 3.0);
+    let axis = (b - a).cross(c - a).normalize_or_zero();
+    for side in [cut.kept, cut.copies] {
+        let away = (side_centre(mesh, side) - centre).dot(axis);
+        let limit = CUT_PUSH_LIMIT * away.abs();
+        let shift = axis * (if limit < push { limit } else { push }).copysign(away);
+        for v in side {
+            mesh.set_position(v, mesh.position(v) + shift);
+        }
+    }
+}
+
+/// The mean of the neighbours of a cut's side, its own corners left out.
+fn side_centre(mesh: &Mesh, side: [VertexId; 3]) -> Vec3 {
+    let outer = side.iter().flat_map(|&v| mesh.ring(v).as_slice()).filter(|w| !side.contains(w));
+    let (sum, count) =
+        outer.fold((Vec3::ZERO, 0.0), |(sum, count), &w| (sum + mesh.position(w), count + 1.0));
+    sum * (1.0 / count)
+}
+
+fn square(x: f32) -> f32 {
+    x * x
+}

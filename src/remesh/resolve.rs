@@ -1,0 +1,87 @@
+//! The loop of figure 9: edges, then contact, until every bound holds.
+
+use super::{Changes, Sampling};
+use crate::mesh::{Mesh, VertexId};
+use crate::spatial::PointGrid;
+use std::collections::VecDeque;
+
+/// Rounds of edges and contact in one call. A round mends what the round before it broke; the study of hard scenes
+/// never needed more than five, and what is left waits for the next call.
+const PASSES: usize = 8;
+
+/// Keeps the bounds of a [`Sampling`] on a mesh that moves.
+#[derive(Clone, Debug, Default)]
+pub struct Resolver {
+    queue: VecDeque<VertexId>,
+    queued: Vec<bool>,
+    /// Vertices that were moved or made since contact was last looked for.
+    stirred: Vec<VertexId>,
+    is_stirred: Vec<bool>,
+    pub(super) grid: PointGrid,
+    pub(super) changes: Changes,
+}
+
+impl Resolver {
+    /// Restores the bounds around the `active` vertices and returns what was done.
+    ///
+    /// Vertices that are not named are looked at only where an edit or a contact reaches them.
+    pub fn resolve(&mut self, mesh: &mut Mesh, sampling: Sampling, active: &[VertexId]) -> Changes {
+        self.changes = Changes::default();
+        for &v in active {
+            self.touch(v);
+        }
+        for _ in 0..PASSES {
+            self.settle_edges(mesh, sampling);
+            if !self.join_contacts(mesh, sampling) {
+                break;
+            }
+        }
+        self.changes
+    }
+
+    /// The vertices that wait for the next call.
+    pub fn waiting(&self) -> Vec<VertexId> {
+        self.queue.iter().copied().collect()
+    }
+
+    /// Forgets what waits, as before a renumbering, and lets `vertices` wait instead.
+    pub fn set_waiting(&mut self, vertices: &[VertexId]) {
+        *self = Self { grid: std::mem::take(&mut self.grid), ..Self::default() };
+        for &v in vertices {
+            self.touch(v);
+        }
+    }
+
+    /// Puts `v` at the end of the queue, and marks it for the next search for contact.
+    pub(super) fn touch(&mut self, v: VertexId) {
+        if mark(&mut self.queued, v) {
+            self.queue.push_back(v);
+        }
+        if mark(&mut self.is_stirred, v) {
+            self.stirred.push(v);
+        }
+    }
+
+    pub(super) fn pop(&mut self) -> Option<VertexId> {
+        let v = self.queue.pop_front()?;
+        self.queued[v.index()] = false;
+        Some(v)
+    }
+
+    /// The stirred vertices in the order they were touched; none are left.
+    pub(super) fn take_stirred(&mut self) -> Vec<VertexId> {
+        let stirred = std::mem::take(&mut self.stirred);
+        for v in &stirred {
+            self.is_stirred[v.index()] = false;
+        }
+        stirred
+    }
+}
+
+/// Sets a flag and says whether it was clear.
+fn mark(flags: &mut Vec<bool>, v: VertexId) -> bool {
+    if v.index() >= flags.len() {
+        flags.resize(v.index() + 1, false);
+    }
+    !std::mem::replace(&mut flags[v.index()], true)
+}

@@ -1,0 +1,44 @@
+//! Small parts that have no volume left.
+
+use super::{Resolver, Sampling};
+use crate::mesh::{Mesh, VertexId};
+
+/// Components of more vertices are never removed, whatever their volume: a cavity has a negative one.
+const LARGEST_SPECK: usize = 32;
+
+impl Resolver {
+    /// Removes the component of `v` where it is a speck, and says whether it did.
+    ///
+    /// A speck has at most 32 vertices and less than δ³ of volume. Those of negative volume would grow in empty space.
+    pub(super) fn remove_speck(&mut self, mesh: &mut Mesh, sampling: Sampling, v: VertexId) -> bool {
+        let members = mesh.component_of(v, LARGEST_SPECK + 1);
+        if members.len() > LARGEST_SPECK || volume(mesh, &members) >= sampling.smallest_volume() {
+            return false;
+        }
+        mesh.remove_component(v);
+        self.changes.vanished += 1;
+        true
+    }
+
+    /// Removes every speck of the mesh and returns how many there were.
+    pub fn sweep(&mut self, mesh: &mut Mesh, sampling: Sampling) -> u32 {
+        let before = self.changes.vanished;
+        for members in mesh.component_members() {
+            self.remove_speck(mesh, sampling, members[0]);
+        }
+        self.changes.vanished - before
+    }
+}
+
+/// The signed volume of a whole component; positive where its triangles face outwards.
+fn volume(mesh: &Mesh, members: &[VertexId]) -> f32 {
+    let origin = mesh.position(members[0]);
+    let triangle = |u: VertexId, (a, b): (VertexId, VertexId)| {
+        if u > a || u > b {
+            return 0.0;
+        }
+        let [p, q, r] = [u, a, b].map(|w| mesh.position(w) - origin);
+        p.dot(q.cross(r)) / 6.0
+    };
+    members.iter().flat_map(|&u| mesh.ring(u).pairs().map(move |pair| triangle(u, pair))).sum()
+}

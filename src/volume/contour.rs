@@ -1,0 +1,405 @@
+//! Iso-surfaces by marching cubes: closed, oriented, 2-manifold, free of crossings, for any grid.
+//!
+//! Each grid edge with one end inside carries one vertex; [`super::cube_cases`] says how a cube joins them. The
+//! grid is taken as if padded by one layer that is outside, with the surface half a voxel beyond the border voxels,
+//! which is where their cells end.
+
+use super::cube_cases::{Case, EDGES, FAR_EDGES, cases};
+use super::error::VolumeError;
+use super::{Grid, Volume};
+use crate::math::{DAffine3, Vec3};
+use crate::mesh::TriangleMesh;
+
+/// Least distance of a vertex from the ends of its grid edge, in voxels. At 0 triangles around a voxel that equals
+/// the iso value have no area; much smaller and `f32` positions of a large volume fall together. The surface moves
+/// by no more than this.
+const MARGIN: f32 = 1.0 / 256.0;
+
+/// The surface where the intensity of one frame passes `iso`, in world space.
+///
+/// Closed at the volume's border, half a voxel beyond the outermost voxel centres; counter-clockwise seen from where
+/// intensities are below `iso`.
+///
+/// # Errors
+/// `iso` not finite, `frame` out of range, [`VolumeError::TooLarge`].
+pub fn marching_cubes_world(volume: &Volume, iso: f64, frame: usize) -> Result<TriangleMesh, VolumeError> {
+    let mut mesh = marching_cubes(&volume.grid(frame)?, iso as f32)?;
+    place(&mut mesh, &volume.affine());
+    Ok(mesh)
+}
+
+/// The surface where a grid passes `iso`, in index coordinates; empty where it never does.
+///
+/// Values of `iso` and above are inside (NaN is outside), triangles counter-clockwise seen from outside. Each
+/// triangle has some area. Where inside voxels touch only along an edge or a corner of a cube they stay separate.
+///
+/// # Errors
+/// `iso` not finite, a grid whose values do not match its dimensions, [`VolumeError::TooLarge`].
+pub fn marching_cubes(grid: &Grid, iso: f32) -> Result<TriangleMesh, VolumeError> {
+    if !iso.is_finite() {
+        return Err(VolumeError::invalid("iso", format!("{iso} given; a finite number is needed")));
+    }
+    grid.check()?;
+    let mut march = March::new(grid, iso)?;
+    for z in 0..=grid.dims[2] {
+        march.layer(z)?;
+    }
+    Ok(march.mesh)
+}
+
+/// Maps positions to world, and turns triangles over where the map is a reflection.
+fn place(mesh: &mut TriangleMesh, affine: &DAffine3) {
+    for p in &mut mesh.positions {
+        *p = affine.transform_point3(p.as_dvec3()).as_vec3();
+    }
+    if affine.matrix3.determinant() < 0.0 {
+        for triangle in &mut mesh.triangles {
+            triangle.swap(1, 2);
+        }
+    }
+}
+
+/// The state of one scan. Nodes are voxels of the padded grid: node (x, y, z) is voxel (x-1, y-1, z-1).
+struct March<'a> {
+    grid: &'a Grid,
+    iso: f32,
+    cases: &'static [Case],
+    /// Nodes along a row and down a slice.
+    size: [usize; 2],
+    /// Per node of two slices, whether it (bit 0) and the next one in y (bit 1) are inside.
+    pairs: [Vec<u8>; 2],
+    /// Case of each cube in the current row.
+    row: Vec<u8>,
+    /// Vertex on each grid edge, by the node where the edge starts: x edges of an even and an odd slice, y edges of
+    /// an even and an odd slice, z edges between the two.
+    vertices: Vec<u32>,
+    mesh: TriangleMesh,
+}
+
+impl<'a> March<'a> {
+    fn new(grid: &'a Grid, iso: f32) -> Result<Self, VolumeError> {
+        let size = [grid.dims[0] + 2, grid.dims[1] + 2];
+        let plane = size[0] * size[1];
+        Ok(Self {
+            grid,
+            iso,
+            cases: cases(),
+            size,
+            pairs: [filled(0, plane)?, filled(0, plane)?],
+            row: filled(0, size[0] - 1)?,
+            vertices: filled(0, 5 * plane)?,
+            mesh: TriangleMesh::default(),
+        })
+    }
+
+    /// All cubes between node slices `z` and `z + 1`.
+    fn layer(&mut self, z: usize) -> Result<(), VolumeError> {
+        self.classify(z + 1);
+        let offsets = self.edge_offsets(z);
+        for y in 0..self.size[1] - 1 {
+            self.find_cases(y, z);
+            self.make_room()?;
+            self.emit_row(y, z, &offsets);
+        }
+        Ok(())
+    }
+
+    /// Fills `pairs` for node slice `z`.
+    fn classify(&mut self, z: usize) {
+        let [width, height] = self.size;
+        let pairs = &mut self.pairs[z % 2];
+        pairs.fill(0);
+        if z > self.grid.dims[2] {
+            return;
+        }
+        for y in 1..height - 1 {
+            let values = self.grid.row(y - 1, z - 1);
+            let (before, here) = pairs[(y - 1) * width..(y + 1) * width].split_at_mut(width);
+            let nodes = before[1..].iter_mut().zip(&mut here[1..]);
+            for ((before, here), &value) in nodes.zip(values) {
+                let inside = u8::from(value >= self.iso);
+                *before |= inside << 1;
+                *here = inside;
+            }
+        }
+    }
+
+    /// Fills `row` with the cases of the cubes at (.., y, z).
+    fn find_cases(&mut self, y: usize, z: usize) {
+        let width = self.size[0];
+        let low = &self.pairs[z % 2][y * width..(y + 1) * width];
+        let high = &self.pairs[(z + 1) % 2][y * width..(y + 1) * width];
+        let near = low.iter().zip(high);
+        let far = low[1..].iter().zip(&high[1..]);
+        for (case, (near, far)) in self.row.iter_mut().zip(near.zip(far)) {
+            *case = near.0 | near.1 << 2 | far.0 << 4 | far.1 << 6;
+        }
+    }
+
+    /// Room for all that one row of cubes can add: three vertices and five triangles a cube.
+    fn make_room(&mut self) -> Result<(), VolumeError> {
+        let (vertices, triangles) = (3 * self.row.len(), 5 * self.row.len());
+        let mesh = &mut self.mesh;
+        let bytes = 12 * (mesh.positions.len() + mesh.triangles.len() + vertices + triangles) as u64;
+        let too_large = VolumeError::TooLarge { bytes };
+        if mesh.positions.len() + vertices > u32::MAX as usize {
+            return Err(too_large);
+        }
+        let room = mesh.positions.try_reserve(vertices).and_then(|()| mesh.triangles.try_reserve(triangles));
+        room.map_err(|_| too_large)
+    }
+
+    /// Vertices and triangles of one row of cubes.
+    fn emit_row(&mut self, y: usize, z: usize, offsets: &[usize; 12]) {
+        let row = std::mem::take(&mut self.row);
+        for (chunk, cubes) in row.chunks(16).enumerate() {
+            let (all_out, all_in) = cubes.iter().fold((0, 255), |(or, and), &case| (or | case, and & case));
+            if all_out == 0 || all_in == 255 {
+                continue;
+            }
+            for (i, &case) in cubes.iter().enumerate() {
+                if case != 0 && case != 255 {
+                    self.emit_cube([chunk * 16 + i, y, z], case, offsets);
+                }
+            }
+        }
+        self.row = row;
+    }
+
+    fn emit_cube(&mut self, origin: [usize; 3], case: u8, offsets: &[usize; 12]) {
+        let case = &self.cases[usize::from(case)];
+        let node = origin[1] * self.size[0] + origin[0];
+        for (bit, &edge) in FAR_EDGES.iter().enumerate() {
+            if case.far_cuts >> bit & 1 == 1 {
+                self.vertices[node + offsets[edge]] = self.mesh.positions.len() as u32;
+                self.mesh.positions.push(self.vertex(origin, edge));
+            }
+        }
+        for triangle in &case.triangles {
+            let corners = triangle.map(|edge| self.vertices[node + offsets[usize::from(edge)]]);
+            self.mesh.triangles.push(corners);
+        }
+    }
+
+    /// Where the surface cuts an edge of the cube at `origin`.
+    fn vertex(&self, origin: [usize; 3], edge: usize) -> Vec3 {
+        let (axis, offset) = EDGES[edge];
+        let from = [0, 1, 2].map(|k| origin[k] + offset[k]);
+        let mut to = from;
+        to[axis] += 1;
+        let mut p = Vec3::from(from.map(|k| k as f32 - 1.0));
+        p[axis] += match (self.value(from), self.value(to)) {
+            (Some(a), Some(b)) => fraction(a, b, self.iso),
+            _ => 0.5,
+        };
+        p
+    }
+
+    /// The value at a node, or `None` in the padding.
+    fn value(&self, node: [usize; 3]) -> Option<f32> {
+        let [nx, ny, nz] = self.grid.dims;
+        let [x, y, z] = node.map(|k| k.wrapping_sub(1));
+        if x < nx && y < ny && z < nz { self.grid.values.get((z * ny + y) * nx + x).copied() } else { None }
+    }
+
+    /// Where the vertex of each edge of a cube at node n stands in `vertices`, less n, for the layer above slice `z`.
+    fn edge_offsets(&self, z: usize) -> [usize; 12] {
+        let plane = self.size[0] * self.size[1];
+        EDGES.map(|(axis, [dx, dy, dz])| {
+            let table = if axis == 2 { 4 } else { axis * 2 + (z + dz) % 2 };
+            table * plane + dy * self.size[0] + dx
+        })
+    }
+}
+
+/// Fraction of the way from `a` to `b` at which a line reaches `iso`, kept [`MARGIN`] away from both ends.
+fn fraction(a: f32, b: f32, iso: f32) -> f32 {
+    let t = (iso - a) / (b - a);
+    if t > 1.0 - MARGIN {
+        1.0 - MARGIN
+    } else if t > MARGIN {
+        t
+    } else {
+        MARGIN
+    }
+}
+
+fn filled<T: Clone>(value: T, count: usize) -> Result<Vec<T>, VolumeError> {
+    let mut out = super::error::reserve(count)?;
+    out.resize(count, value);
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DVec3;
+    use crate::volume::{Space, VolumeInit, Voxels};
+    use std::collections::BTreeMap;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn field(dims: [usize; 3], f: impl Fn(Vec3) -> f32) -> Grid {
+        let mut values = Vec::new();
+        for z in 0..dims[2] {
+            for y in 0..dims[1] {
+                values.extend((0..dims[0]).map(|x| f(Vec3::new(x as f32, y as f32, z as f32))));
+            }
+        }
+        Grid { dims, values }
+    }
+
+    fn noise(dims: [usize; 3], seed: u64, levels: u64) -> Grid {
+        let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+        let mut grid = field(dims, |_| 0.0);
+        for v in &mut grid.values {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            *v = ((state >> 33) % levels) as f32;
+        }
+        grid
+    }
+
+    /// V - E + F, after making sure that the mesh is closed, oriented, 2-manifold and without empty triangles.
+    fn euler(mesh: &TriangleMesh) -> i64 {
+        let mut edges = BTreeMap::new();
+        let mut links: Vec<BTreeMap<u32, u32>> = vec![BTreeMap::new(); mesh.positions.len()];
+        for &[a, b, c] in &mesh.triangles {
+            for [p, q, r] in [[a, b, c], [b, c, a], [c, a, b]] {
+                assert!(edges.insert((p, q), r).is_none(), "edge {p}-{q} is used twice the same way");
+                assert!(links[p as usize].insert(q, r).is_none());
+            }
+            let [pa, pb, pc] = [a, b, c].map(|v| mesh.positions[v as usize]);
+            assert!((pb - pa).cross(pc - pa).length() > 0.0, "triangle {a} {b} {c} has no area");
+        }
+        assert!(edges.keys().all(|&(p, q)| edges.contains_key(&(q, p))), "an edge is open");
+        for (vertex, link) in links.iter().enumerate() {
+            let start = *link.keys().next().expect("a vertex in no triangle");
+            let (mut at, mut steps) = (link[&start], 1);
+            while at != start {
+                (at, steps) = (link[&at], steps + 1);
+            }
+            assert_eq!(steps, link.len(), "vertex {vertex} joins two fans");
+        }
+        mesh.positions.len() as i64 - edges.len() as i64 / 2 + mesh.triangles.len() as i64
+    }
+
+    fn enclosed(mesh: &TriangleMesh) -> f64 {
+        let corner = |v: u32| mesh.positions[v as usize].as_dvec3();
+        let six = |t: &[u32; 3]| corner(t[0]).cross(corner(t[1])).dot(corner(t[2]));
+        mesh.triangles.iter().map(six).sum::<f64>() / 6.0
+    }
+
+    fn ball(n: usize, radius: f32) -> Grid {
+        let centre = Vec3::splat((n - 1) as f32 / 2.0);
+        field([n; 3], |p| radius - p.distance(centre))
+    }
+
+    #[test]
+    fn a_ball_is_a_sphere_of_the_right_volume_turned_outwards() {
+        let mesh = marching_cubes(&ball(40, 14.0), 0.0).unwrap();
+        assert_eq!(euler(&mesh), 2);
+        let exact = 4.0 / 3.0 * std::f64::consts::PI * 14.0f64 * 14.0 * 14.0;
+        assert!((enclosed(&mesh) / exact - 1.0).abs() < 0.005, "{} against {exact}", enclosed(&mesh));
+        let centre = Vec3::splat(19.5);
+        assert!(mesh.positions.iter().all(|p| (p.distance(centre) - 14.0).abs() < 0.02));
+    }
+
+    #[test]
+    fn a_ball_cut_by_the_border_is_closed_flat_there() {
+        let grid = field([24, 24, 10], |p| 8.0 - p.distance(Vec3::new(11.5, 11.5, 1.0)));
+        let mesh = marching_cubes(&grid, 0.0).unwrap();
+        assert_eq!(euler(&mesh), 2);
+        let lowest = mesh.positions.iter().map(|p| p.z).fold(f32::MAX, f32::min);
+        assert_eq!(lowest, -0.5);
+    }
+
+    #[test]
+    fn a_torus_has_a_hole() {
+        let grid = field([48, 48, 20], |p| {
+            let (dx, dy, dz) = (p.x - 23.5, p.y - 23.5, p.z - 9.5);
+            let from_ring = (dx * dx + dy * dy).sqrt() - 15.0;
+            5.0 - (from_ring * from_ring + dz * dz).sqrt()
+        });
+        let mesh = marching_cubes(&grid, 0.0).unwrap();
+        assert_eq!(euler(&mesh), 0);
+        let exact = 2.0 * std::f64::consts::PI * std::f64::consts::PI * 15.0 * 25.0;
+        assert!((enclosed(&mesh) / exact - 1.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_full_grid_is_its_box() {
+        let mesh = marching_cubes(&field([3, 4, 5], |_| 1.0), 0.5).unwrap();
+        assert_eq!(euler(&mesh), 2);
+        // The corners and rims of the box are cut off by the cubes outside them.
+        let outer = 3.0 * 4.0 * 5.0;
+        let rims = 0.125 * 4.0 * (2.0 + 3.0 + 4.0);
+        let corners = 8.0 * (0.125 - 1.0 / 48.0);
+        assert!((enclosed(&mesh) - (outer - rims - corners)).abs() < 1e-5, "{}", enclosed(&mesh));
+    }
+
+    #[test]
+    fn an_empty_grid_gives_nothing_and_one_voxel_an_octahedron() {
+        assert_eq!(marching_cubes(&field([5; 3], |_| 0.0), 0.5).unwrap(), TriangleMesh::default());
+        let one = marching_cubes(&field([1; 3], |_| 1.0), 1.0).unwrap();
+        assert_eq!((one.positions.len(), one.triangles.len(), euler(&one)), (6, 8, 2));
+    }
+
+    #[test]
+    fn noise_of_every_density_is_a_closed_manifold() {
+        for seed in 0..40 {
+            for iso in [0.5, 3.0, 5.0, 7.5, 9.0] {
+                let mesh = marching_cubes(&noise([9, 8, 10], seed, 10), iso).unwrap();
+                let chi = euler(&mesh);
+                assert!(chi % 2 == 0 && enclosed(&mesh) > 0.0, "seed {seed}, iso {iso}: chi {chi}");
+            }
+        }
+    }
+
+    #[test]
+    fn values_that_equal_iso_or_are_not_numbers_leave_no_empty_triangle() {
+        let mut grid = noise([8, 8, 8], 3, 3);
+        for (i, v) in grid.values.iter_mut().enumerate() {
+            *v = match i % 17 {
+                3 => f32::NAN,
+                5 => f32::INFINITY,
+                11 => f32::NEG_INFINITY,
+                _ => *v,
+            };
+        }
+        let mesh = marching_cubes(&grid, 1.0).unwrap();
+        assert_eq!(euler(&mesh) % 2, 0);
+    }
+
+    #[test]
+    fn world_positions_follow_the_affine_and_a_reflection_keeps_triangles_outward() {
+        let grid = ball(16, 5.0);
+        let volume = |x: f64| {
+            Volume::new(VolumeInit {
+                voxels: Voxels::F32(grid.values.clone()),
+                dims: [16, 16, 16, 1],
+                affine: DAffine3::from_scale(DVec3::new(x, 2.0, 1.0)),
+                slope: 1.0,
+                intercept: 0.0,
+                frame_seconds: 0.0,
+                space: Space::Ras,
+            })
+            .unwrap()
+        };
+        let straight = marching_cubes_world(&volume(3.0), 0.0, 0).unwrap();
+        let mirrored = marching_cubes_world(&volume(-3.0), 0.0, 0).unwrap();
+        assert!((enclosed(&straight) - enclosed(&mirrored)).abs() < 1e-3);
+        let inner = enclosed(&marching_cubes(&grid, 0.0).unwrap());
+        assert!((enclosed(&straight) / (6.0 * inner) - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn bad_arguments_are_named() {
+        let grid = ball(4, 1.0);
+        let named = |result: Result<TriangleMesh, VolumeError>| match result {
+            Err(VolumeError::InvalidArgument { parameter, .. }) => parameter,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(named(marching_cubes(&grid, f32::NAN)), "iso");
+        assert_eq!(named(marching_cubes(&Grid { dims: [4, 4, 5], ..grid }, 0.0)), "values");
+    }
+}

@@ -1,0 +1,267 @@
+//! What marching cubes puts into a cube, derived from the cube's own geometry for each of the 256 cases.
+//!
+//! Corner c of a cube lies at dx = bit 2, dz = bit 1, dy = bit 0 of c, and bit c of a case says that corner c is
+//! inside. On each face the surface runs once round every connected run of inside corners; where two inside corners
+//! face each other diagonally they stay apart. The rule looks at one face only, so that the two cubes sharing it
+//! always agree, and every cut edge of a cube lies on exactly one closed loop.
+//!
+//! Each loop is filled by the triangulation of least area (vertices at the edges' midpoints) among those in which
+//! no diagonal joins two edges of one face. A diagonal within a face could be used by the neighbour too, and four
+//! triangles would meet there. For loops of up to six any such triangulation is free of crossings wherever the
+//! vertices lie on their edges; of the sixteen for a loop of seven some are not, and the least area is one that is.
+//! `tests::no_case_crosses_itself` holds us to it.
+
+use std::sync::OnceLock;
+
+/// Axis of each of the twelve edges (0 = x, 1 = y, 2 = z) and its offset [dx, dy, dz] from the cube's origin.
+pub(super) const EDGES: [(usize, [usize; 3]); 12] = [
+    (0, [0, 0, 0]),
+    (0, [0, 1, 0]),
+    (0, [0, 0, 1]),
+    (0, [0, 1, 1]),
+    (1, [0, 0, 0]),
+    (1, [1, 0, 0]),
+    (1, [0, 0, 1]),
+    (1, [1, 0, 1]),
+    (2, [0, 0, 0]),
+    (2, [1, 0, 0]),
+    (2, [0, 1, 0]),
+    (2, [1, 1, 0]),
+];
+
+/// The edges along x, y, z that end in the cube's far corner. Scanning in index order, no earlier cube has them.
+pub(super) const FAR_EDGES: [usize; 3] = [3, 7, 11];
+
+/// The triangles of one case, as edge numbers, counter-clockwise seen from outside.
+pub(super) struct Case {
+    /// Corners of the triangles.
+    pub(super) triangles: Vec<[u8; 3]>,
+    /// Which of [`FAR_EDGES`] are cut, bit by bit.
+    pub(super) far_cuts: u8,
+}
+
+/// All 256 cases, derived at the first call.
+pub(super) fn cases() -> &'static [Case] {
+    static CASES: OnceLock<Vec<Case>> = OnceLock::new();
+    CASES.get_or_init(|| (0..256).map(derive).collect())
+}
+
+fn derive(case: usize) -> Case {
+    let mut triangles = Vec::new();
+    let mut far_cuts = 0;
+    for contour in loops(case) {
+        triangulate(&contour, &mut triangles);
+        for (bit, edge) in FAR_EDGES.iter().enumerate() {
+            far_cuts |= u8::from(contour.contains(edge)) << bit;
+        }
+    }
+    Case { triangles, far_cuts }
+}
+
+/// Corner number at an offset from the cube's origin.
+pub(super) fn corner([dx, dy, dz]: [usize; 3]) -> usize {
+    dy | dz << 1 | dx << 2
+}
+
+/// The edge between each two neighbouring corners; other entries mean nothing.
+fn edges_between() -> [[usize; 8]; 8] {
+    let mut table = [[0; 8]; 8];
+    for (edge, &(axis, offset)) in EDGES.iter().enumerate() {
+        let mut far = offset;
+        far[axis] += 1;
+        let (a, b) = (corner(offset), corner(far));
+        (table[a][b], table[b][a]) = (edge, edge);
+    }
+    table
+}
+
+/// The four corners of each face, counter-clockwise seen from outside the cube.
+fn faces() -> [[usize; 4]; 6] {
+    [0, 1, 2, 3, 4, 5].map(|face| {
+        let (axis, side) = (face / 2, face % 2);
+        let round = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[u, v]| {
+            let mut offset = [0; 3];
+            (offset[axis], offset[(axis + 1) % 3], offset[(axis + 2) % 3]) = (side, u, v);
+            corner(offset)
+        });
+        if side == 1 { round } else { [round[3], round[2], round[1], round[0]] }
+    })
+}
+
+/// The closed loops of cut edges, oriented so that their triangles face outside.
+fn loops(case: usize) -> Vec<Vec<usize>> {
+    let mut next = follow_faces(case);
+    let mut out = Vec::new();
+    for start in 0..EDGES.len() {
+        let mut contour = Vec::new();
+        let mut edge = start;
+        while let Some(after) = next[edge].take() {
+            contour.push(edge);
+            edge = after;
+        }
+        if !contour.is_empty() {
+            out.push(contour);
+        }
+    }
+    out
+}
+
+/// For each cut edge, the cut edge that the surface's border runs to next.
+fn follow_faces(case: usize) -> [Option<usize>; 12] {
+    let inside = |corner: usize| case >> corner & 1 == 1;
+    let between = edges_between();
+    let mut next = [None; 12];
+    for face in faces() {
+        for k in 0..4 {
+            if inside(face[k]) || !inside(face[(k + 1) % 4]) {
+                continue;
+            }
+            let mut last = (k + 1) % 4;
+            while inside(face[(last + 1) % 4]) {
+                last = (last + 1) % 4;
+            }
+            let leave = between[face[last]][face[(last + 1) % 4]];
+            let enter = between[face[k]][face[(k + 1) % 4]];
+            next[enter] = Some(leave);
+        }
+    }
+    next
+}
+
+/// Whether two edges of the cube lie on one face.
+fn share_face(a: usize, b: usize) -> bool {
+    let on = |edge: usize, axis: usize, side: usize| EDGES[edge].0 != axis && EDGES[edge].1[axis] == side;
+    (0..3).any(|axis| (0..2).any(|side| on(a, axis, side) && on(b, axis, side)))
+}
+
+/// Fills a loop, by dynamic programming over its stretches i..=j: best[i][j] is the least area of a fan-out of
+/// triangles over the stretch, closed by the diagonal from i to j, and the corner k that achieves it.
+fn triangulate(contour: &[usize], out: &mut Vec<[u8; 3]>) {
+    let n = contour.len();
+    let mut best = vec![vec![(0.0, 0); n]; n];
+    for length in 2..n {
+        for i in 0..n - length {
+            let j = i + length;
+            let closes = length == n - 1 || !share_face(contour[i], contour[j]);
+            best[i][j] = (f64::INFINITY, i + 1);
+            for k in i + 1..j {
+                let area = best[i][k].0 + best[k][j].0 + midpoint_area([contour[i], contour[k], contour[j]]);
+                if closes && area < best[i][j].0 {
+                    best[i][j] = (area, k);
+                }
+            }
+        }
+    }
+    collect(contour, &best, 0, n - 1, out);
+}
+
+fn collect(contour: &[usize], best: &[Vec<(f64, usize)>], i: usize, j: usize, out: &mut Vec<[u8; 3]>) {
+    if j < i + 2 {
+        return;
+    }
+    let k = best[i][j].1;
+    collect(contour, best, i, k, out);
+    collect(contour, best, k, j, out);
+    out.push([contour[i], contour[k], contour[j]].map(|edge| edge as u8));
+}
+
+/// Twice the area of the triangle between three edges' midpoints.
+fn midpoint_area(edges: [usize; 3]) -> f64 {
+    let [a, b, c] = edges.map(|edge| point_on(edge, 0.5));
+    (b - a).cross(c - a).length()
+}
+
+/// The point at fraction `t` of an edge, in the unit cube.
+fn point_on(edge: usize, t: f64) -> crate::math::DVec3 {
+    let (axis, offset) = EDGES[edge];
+    let mut p = offset.map(|o| o as f64);
+    p[axis] += t;
+    p.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DVec3;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Fractions in [1/256, 255/256], crowded at both ends, where crossings are likeliest.
+    fn random_fraction(state: &mut u64) -> f64 {
+        let mut next = || {
+            *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (*state >> 33) as f64 / (1u64 << 31) as f64
+        };
+        let t = match (next() * 3.0) as u32 {
+            0 => next(),
+            1 => next() * 0.02,
+            _ => 1.0 - next() * 0.02,
+        };
+        t.clamp(1.0 / 256.0, 255.0 / 256.0)
+    }
+
+    fn volume6(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> f64 {
+        (b - a).cross(c - a).dot(d - a)
+    }
+
+    /// Whether the open segment p-q passes through the open triangle.
+    fn pierces(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
+        let ends = volume6(a, b, c, p) * volume6(a, b, c, q);
+        let around = [volume6(p, q, a, b), volume6(p, q, b, c), volume6(p, q, c, a)];
+        ends < -1e-24 && (around.iter().all(|&v| v > 1e-12) || around.iter().all(|&v| v < -1e-12))
+    }
+
+    fn sides(t: [u8; 3]) -> [[u8; 2]; 3] {
+        [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]
+    }
+
+    fn one_pierces(a: [u8; 3], b: [u8; 3], points: &[DVec3; 12]) -> bool {
+        let at = |edge: u8| points[usize::from(edge)];
+        sides(a).iter().any(|[p, q]| !b.contains(p) && !b.contains(q) && pierces(at(*p), at(*q), b.map(at)))
+    }
+
+    #[test]
+    fn no_case_crosses_itself() {
+        let mut state = 7;
+        for (number, case) in cases().iter().enumerate() {
+            for _ in 0..200 {
+                let points: [DVec3; 12] = std::array::from_fn(|e| point_on(e, random_fraction(&mut state)));
+                for (i, &a) in case.triangles.iter().enumerate() {
+                    for &b in &case.triangles[..i] {
+                        let crosses = one_pierces(a, b, &points) || one_pierces(b, a, &points);
+                        assert!(!crosses, "case {number}: {a:?} and {b:?} cross at {points:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_diagonal_lies_in_a_face() {
+        for case in cases() {
+            for t in &case.triangles {
+                for [a, b] in sides(*t) {
+                    let uses =
+                        |p, q| case.triangles.iter().flat_map(|t| sides(*t)).filter(|s| *s == [p, q]).count();
+                    assert_eq!(uses(a, b), 1);
+                    let is_diagonal = uses(b, a) == 1;
+                    assert_eq!(is_diagonal, !share_face(usize::from(a), usize::from(b)));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_cut_edge_has_a_vertex() {
+        for (number, case) in cases().iter().enumerate() {
+            for (edge, &(axis, offset)) in EDGES.iter().enumerate() {
+                let mut far = offset;
+                far[axis] += 1;
+                let cut = (number >> corner(offset) ^ number >> corner(far)) & 1 == 1;
+                let used = case.triangles.iter().flatten().any(|&e| usize::from(e) == edge);
+                assert_eq!(cut, used, "case {number}, edge {edge}");
+            }
+            assert!(case.triangles.len() <= 5);
+        }
+    }
+}

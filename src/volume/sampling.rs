@@ -1,0 +1,85 @@
+//! Trilinear interpolation on a grid whose border is replicated.
+
+use crate::math::{DVec3, Vec3};
+use std::ops::{Add, Mul, Sub};
+
+/// The eight voxels around a point: index of the lowest, steps to the next along each axis (0 at the last voxel),
+/// and the fractions of the way there.
+pub(super) struct Cell {
+    base: usize,
+    step: [usize; 3],
+    fraction: [f32; 3],
+}
+
+impl Cell {
+    /// The cell around `p`, moved to the border where `p` is outside (and to the first voxel where it is NaN).
+    #[inline]
+    pub(super) fn at(dims: [usize; 3], p: Vec3) -> Self {
+        let (x, fx) = locate(p.x, dims[0]);
+        let (y, fy) = locate(p.y, dims[1]);
+        let (z, fz) = locate(p.z, dims[2]);
+        let [row, plane] = [dims[0], dims[0] * dims[1]];
+        Self {
+            base: x + y * row + z * plane,
+            step: [
+                if x + 1 < dims[0] { 1 } else { 0 },
+                if y + 1 < dims[1] { row } else { 0 },
+                if z + 1 < dims[2] { plane } else { 0 },
+            ],
+            fraction: [fx, fy, fz],
+        }
+    }
+
+    /// Interpolates what `value` gives for the eight voxels.
+    #[inline]
+    pub(super) fn blend<T, F>(&self, value: F) -> T
+    where
+        T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>,
+        F: Fn(usize) -> T,
+    {
+        let [sx, sy, sz] = self.step;
+        let [fx, fy, fz] = self.fraction;
+        let along_x = |index: usize| mix(value(index), value(index + sx), fx);
+        let along_xy = |index: usize| mix(along_x(index), along_x(index + sy), fy);
+        mix(along_xy(self.base), along_xy(self.base + sz), fz)
+    }
+}
+
+#[inline]
+fn mix<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>>(a: T, b: T, fraction: f32) -> T {
+    a + (b - a) * fraction
+}
+
+/// Voxel at or below `x`, and the fraction of the way to the next, with `x` held in [0, n-1].
+/// Written with comparisons: `f32::clamp` by variables becomes two function calls in wasm.
+#[inline]
+fn locate(x: f32, n: usize) -> (usize, f32) {
+    let last = (n - 1) as f32;
+    let x = if x > 0.0 { x } else { 0.0 };
+    let x = if x < last { x } else { last };
+    let index = x as usize;
+    (index, x - index as f32)
+}
+
+/// Trilinear interpolation in `f64` of what `value` gives for a voxel's index.
+pub(super) fn trilinear(dims: [usize; 3], p: DVec3, value: impl Fn(usize) -> f64) -> f64 {
+    let axes = [0, 1, 2].map(|axis| locate_f64(p[axis], dims[axis]));
+    let at = |corner: [usize; 3]| {
+        let [x, y, z] = [0, 1, 2].map(|axis| axes[axis].0[corner[axis]]);
+        value(x + dims[0] * (y + dims[1] * z))
+    };
+    let mix = |a: f64, b: f64, axis: usize| a + (b - a) * axes[axis].1;
+    let along_x = |y, z| mix(at([0, y, z]), at([1, y, z]), 0);
+    let along_xy = |z| mix(along_x(0, z), along_x(1, z), 1);
+    mix(along_xy(0), along_xy(1), 2)
+}
+
+/// The two voxels around `x` and the fraction between them, with `x` held in [0, n-1].
+pub(super) fn locate_f64(x: f64, n: usize) -> ([usize; 2], f64) {
+    let last = (n - 1) as f64;
+    let x = if x > 0.0 { x } else { 0.0 };
+    let x = if x < last { x } else { last };
+    let index = x as usize;
+    let next = if index + 1 < n { index + 1 } else { index };
+    ([index, next], x - index as f64)
+}

@@ -1,0 +1,81 @@
+//! A sequence of volumes as the frames of one.
+
+use super::error::VolumeError;
+use super::voxels::Voxels;
+use super::{Volume, VolumeInit};
+use crate::math::DVec3;
+
+/// How far apart two frames' corners may lie, in voxels: rounding in a file's header, and no more.
+const GRID_TOLERANCE: f64 = 1e-3;
+
+impl Volume {
+    /// 3D volumes of one grid, in order, as the frames of a 4D one. A 4D volume gives all its frames.
+    ///
+    /// `frame_seconds`, where left out, is that of the first volume. The affine is the first volume's.
+    ///
+    /// # Errors
+    /// No frame; a frame with other dimensions, another place in the world or another space than the first; a
+    /// negative time; [`VolumeError::TooLarge`].
+    pub fn from_frames(frames: &[Volume], frame_seconds: Option<f64>) -> Result<Volume, VolumeError> {
+        let Some(first) = frames.first() else {
+            return Err(VolumeError::invalid("frames", "none given; at least one volume is needed"));
+        };
+        for (index, frame) in frames.iter().enumerate() {
+            check_same_grid(first, frame, index)?;
+        }
+        let [nx, ny, nz] = first.dims();
+        let count = frames.iter().map(Volume::frames).sum();
+        let (voxels, slope, intercept) = join(frames)?;
+        let volume = Volume::new(VolumeInit {
+            voxels,
+            dims: [nx, ny, nz, count],
+            affine: first.affine,
+            slope,
+            intercept,
+            frame_seconds: frame_seconds.unwrap_or(first.frame_seconds),
+            space: first.space,
+        })?;
+        Ok(volume.with_unit(first.unit))
+    }
+}
+
+/// The stored numbers with their common slope and intercept, or, where frames differ in those or in type, the
+/// intensities themselves.
+fn join(frames: &[Volume]) -> Result<(Voxels, f64, f64), VolumeError> {
+    let (slope, intercept) = (frames[0].slope, frames[0].intercept);
+    if frames.iter().all(|f| f.slope == slope && f.intercept == intercept) {
+        let parts: Vec<&Voxels> = frames.iter().map(|f| f.voxels.as_ref()).collect();
+        if let Some(voxels) = Voxels::concatenate(&parts)? {
+            return Ok((voxels, slope, intercept));
+        }
+    }
+    let mut all = Vec::new();
+    for frame in frames {
+        for t in 0..frame.frames() {
+            all.push(Voxels::F32(frame.intensities(t)?));
+        }
+    }
+    let parts: Vec<&Voxels> = all.iter().collect();
+    let voxels = Voxels::concatenate(&parts)?.unwrap_or(Voxels::F32(Vec::new()));
+    Ok((voxels, 1.0, 0.0))
+}
+
+fn check_same_grid(first: &Volume, frame: &Volume, index: usize) -> Result<(), VolumeError> {
+    let differs = |what: &str| {
+        let problem = format!("frame {index} has {what} than frame 0; all must share one grid");
+        Err(VolumeError::invalid("frames", problem))
+    };
+    if frame.dims() != first.dims() {
+        return differs("other dimensions");
+    }
+    if frame.space != first.space || frame.unit != first.unit {
+        return differs("another space or unit");
+    }
+    let last = DVec3::from(first.dims().map(|n| n as f64));
+    let corners = [DVec3::ZERO, last.with_y(0.0).with_z(0.0), last.with_x(0.0).with_z(0.0), last];
+    let moved = |p: DVec3| first.inverse.transform_point3(frame.affine.transform_point3(p)).distance(p);
+    if corners.iter().any(|&p| moved(p) > GRID_TOLERANCE) {
+        return differs("another place in the world");
+    }
+    Ok(())
+}

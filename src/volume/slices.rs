@@ -1,0 +1,77 @@
+//! Reading a volume as pictures and as counts.
+
+use super::Volume;
+use super::error::{VolumeError, reserve};
+use super::voxels::{Voxels, each};
+
+/// More bins than this say nothing more about 16-bit data.
+const MAX_BINS: usize = 65_536;
+
+impl Volume {
+    /// How many voxels of one frame fall into each of `bins` equal parts of [`range`](Self::range).
+    ///
+    /// The range is that of all frames, so that the histograms of two frames compare. The largest intensity counts
+    /// in the last bin; voxels that are not finite numbers count nowhere.
+    ///
+    /// # Errors
+    /// `bins` not in 1..=65536, `frame` out of range.
+    pub fn histogram(&self, bins: usize, frame: usize) -> Result<Vec<u32>, VolumeError> {
+        if bins == 0 || bins > MAX_BINS {
+            return Err(VolumeError::invalid("bins", format!("{bins} given; 1 to {MAX_BINS} are accepted")));
+        }
+        let start = self.frame_start(frame)?;
+        let end = start + self.frame_len();
+        Ok(each!(self.voxels.as_ref(), values => self.count(&values[start..end], bins)))
+    }
+
+    fn count<T: Copy + Into<f64>>(&self, stored: &[T], bins: usize) -> Vec<u32> {
+        let [low, high] = self.range();
+        let scale = if high > low { bins as f64 / (high - low) } else { 0.0 };
+        let mut counts = vec![0u32; bins];
+        for &v in stored {
+            let value = v.into() * self.slope + self.intercept;
+            if value.is_finite() {
+                let bin = ((value - low) * scale) as usize;
+                let bin = if bin < bins { bin } else { bins - 1 };
+                counts[bin] = counts[bin].saturating_add(1);
+            }
+        }
+        counts
+    }
+
+    /// One slice as intensities, row-major.
+    ///
+    /// `axis` 0, 1, 2 fixes x, y, z at `index`. Of the two axes left, the lower one runs along the rows: a slice of
+    /// fixed z has rows of x, one per y; fixed y rows of x, one per z; fixed x rows of y, one per z.
+    ///
+    /// # Errors
+    /// `axis`, `index` or `frame` out of range.
+    pub fn slice(&self, axis: usize, index: usize, frame: usize) -> Result<Vec<f32>, VolumeError> {
+        let start = self.frame_start(frame)?;
+        let strides = [1, self.dims[0], self.dims[0] * self.dims[1]];
+        let (across, down) = match axis {
+            0 => (1, 2),
+            1 => (0, 2),
+            2 => (0, 1),
+            _ => return Err(VolumeError::invalid("axis", format!("{axis} given; 0, 1 or 2 is accepted"))),
+        };
+        self.check_slice(axis, index)?;
+        let mut out = reserve(self.dims[across] * self.dims[down])?;
+        for row in 0..self.dims[down] {
+            let first = start + index * strides[axis] + row * strides[down];
+            out.extend((0..self.dims[across]).map(|i| self.intensity_at(first + i * strides[across]) as f32));
+        }
+        Ok(out)
+    }
+
+    fn check_slice(&self, axis: usize, index: usize) -> Result<(), VolumeError> {
+        let count = self.dims[axis];
+        if index < count {
+            return Ok(());
+        }
+        Err(VolumeError::invalid(
+            "index",
+            format!("{index} is out of range; axis {axis} has {count} slices, the first is 0"),
+        ))
+    }
+}

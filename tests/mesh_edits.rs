@@ -1,0 +1,272 @@
+//! Every edit and every refusal, and long seeded runs of random edits with all invariants checked after each.
+
+mod common;
+
+use common::Random;
+use vesicle::math::Vec3;
+use vesicle::mesh::{EditError, Mesh, TriangleMesh, VectorKey, VertexId};
+#[cfg(target_arch = "wasm32")]
+use wasm_bindgen_test::wasm_bindgen_test as test;
+
+fn tetrahedron() -> Mesh {
+    let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+    let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+    Mesh::from_triangles(&TriangleMesh { positions, triangles, ..Default::default() }).unwrap()
+}
+
+/// A torus of `n` × `m` vertices; `n` = 3 gives rings of three edges to cut.
+fn torus(n: u32, m: u32) -> Mesh {
+    let mut mesh = TriangleMesh::default();
+    for i in 0..n {
+        for j in 0..m {
+            let (a, b) = (i as f32 / n as f32 * 6.283, j as f32 / m as f32 * 6.283);
+            let r = 3.0 + libm::cosf(b);
+            mesh.positions.push(Vec3::new(r * libm::cosf(a), r * libm::sinf(a), libm::sinf(b)));
+            let at = |i: u32, j: u32| (i % n) * m + j % m;
+            mesh.triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            mesh.triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    Mesh::from_triangles(&mesh).unwrap()
+}
+
+fn sphere() -> Mesh {
+    Mesh::icosphere(Vec3::ZERO, 1.0, 0.6).unwrap()
+}
+
+fn v(i: u32) -> VertexId {
+    VertexId(i)
+}
+
+#[test]
+fn shapes_are_sound() {
+    for (mesh, euler) in
+        [(tetrahedron(), 2), (torus(7, 5), 0), (sphere(), 2), (Mesh::icosahedron(Vec3::ONE, 2.0), 2)]
+    {
+        assert_eq!(mesh.check(), Ok(()));
+        assert_eq!(mesh.euler(), euler);
+        assert_eq!(mesh.triangles().count(), mesh.triangle_count());
+        assert_eq!(mesh.edges().count(), mesh.edge_count());
+    }
+}
+
+#[test]
+fn normals_of_a_sphere_point_outwards() {
+    let mesh = sphere();
+    assert!(mesh.vertices().all(|v| mesh.area_normal(v).normalize().dot(mesh.position(v)) > 0.99));
+}
+
+#[test]
+fn split_then_collapse_restores_the_mesh() {
+    let mut mesh = sphere();
+    let (vertices, ring) = (mesh.vertex_count(), mesh.ring(v(0)).clone());
+    let other = ring.as_slice()[0];
+    let w = mesh.split(v(0), other, Vec3::ZERO).unwrap();
+    assert_eq!((mesh.vertex_count(), mesh.ring(w).valence()), (vertices + 1, 4));
+    assert_eq!(mesh.check(), Ok(()));
+    mesh.collapse(other, w, mesh.position(other)).unwrap();
+    assert_eq!((mesh.vertex_count(), mesh.ring(v(0))), (vertices, &ring));
+    assert_eq!(mesh.check(), Ok(()));
+}
+
+#[test]
+fn flip_twice_restores_the_edges() {
+    let mut mesh = sphere();
+    let before: Vec<_> = mesh.edges().collect();
+    let (a, b) = before[10];
+    let across = mesh.opposite(a, b).unwrap();
+    mesh.flip(a, b).unwrap();
+    assert!(!mesh.ring(a).contains(b) && mesh.ring(across.left).contains(across.right));
+    assert_eq!(mesh.check(), Ok(()));
+    mesh.flip(across.left, across.right).unwrap();
+    let mut after: Vec<_> = mesh.edges().collect();
+    after.sort();
+    assert_eq!(after, {
+        let mut sorted = before;
+        sorted.sort();
+        sorted
+    });
+}
+
+#[test]
+fn refusals_leave_the_mesh_as_it_was() {
+    let mut mesh = tetrahedron();
+    let before = mesh.clone();
+    assert_eq!(
+        mesh.flip(v(0), v(1)),
+        Err(EditError::Adjacent(v(2), v(3))).or(Err(EditError::Adjacent(v(3), v(2))))
+    );
+    assert_eq!(mesh.split(v(0), v(0), Vec3::ZERO), Err(EditError::NotAnEdge(v(0), v(0))));
+    assert_eq!(mesh.split(v(0), v(9), Vec3::ZERO), Err(EditError::NotAnEdge(v(0), v(9))));
+    assert!(matches!(mesh.collapse(v(0), v(1), Vec3::ZERO), Err(EditError::ValenceTooLow(_))));
+    assert_eq!(mesh.cut(v(0), v(1), v(2)), Err(EditError::IsTriangle));
+    assert_eq!(mesh.join(v(0), v(1), 0.7), Err(EditError::Adjacent(v(0), v(1))));
+    assert_eq!(mesh.join(v(0), v(0), 0.7), Err(EditError::Adjacent(v(0), v(0))));
+    assert_eq!(mesh, before);
+
+    let mut ring = torus(3, 8);
+    let before = ring.clone();
+    assert!(matches!(ring.collapse(v(0), v(8), Vec3::ZERO), Err(EditError::NeckInTheWay(o)) if o == v(16)));
+    assert_eq!(ring.remove_tetrahedron(v(0)), Err(EditError::NotATetrahedron(v(0))));
+    assert_eq!(ring, before);
+}
+
+#[test]
+fn cutting_a_torus_gives_a_sphere() {
+    let mut mesh = torus(8, 3);
+    assert_eq!(mesh.euler(), 0);
+    let cut = mesh.cut(v(0), v(1), v(2)).unwrap();
+    assert_eq!((mesh.check(), mesh.euler()), (Ok(()), 2));
+    assert_eq!(mesh.component_of(v(0), usize::MAX).len(), 8 * 3 + 3);
+    for (kept, copy) in cut.kept.into_iter().zip(cut.copies) {
+        assert_eq!(mesh.position(kept), mesh.position(copy));
+        assert!(!mesh.ring(kept).contains(copy));
+    }
+}
+
+#[test]
+fn cutting_a_neck_parts_a_sphere() {
+    let mut mesh = torus(8, 3);
+    mesh.cut(v(0), v(1), v(2)).unwrap();
+    mesh.cut(v(12), v(13), v(14)).unwrap();
+    assert_eq!((mesh.check(), mesh.euler()), (Ok(()), 4));
+    assert!(mesh.component_of(v(0), usize::MAX).len() < mesh.vertex_count());
+}
+
+#[test]
+fn joining_parts_takes_two_from_chi() {
+    for (a, b) in [(sphere(), sphere()), (tetrahedron(), sphere()), (tetrahedron(), tetrahedron())] {
+        let mut mesh = a;
+        let other = VertexId::from_index(mesh.slots());
+        mesh.append(&b).unwrap();
+        assert_eq!(mesh.euler(), 4);
+        let joint = mesh.join(v(0), other, 0.7).unwrap();
+        assert_eq!((mesh.check(), mesh.euler()), (Ok(()), 2));
+        assert!(!mesh.is_live(v(0)) || joint.first.contains(&v(0)) || joint.second.contains(&v(0)));
+        assert_eq!(mesh.component_of(joint.first[0], usize::MAX).len(), mesh.vertex_count());
+    }
+}
+
+#[test]
+fn joining_vertices_with_common_neighbours_stays_simplicial() {
+    // Both ends of a double pyramid share every neighbour.
+    let mut mesh = torus(8, 3);
+    let ring = mesh.ring(v(0)).as_slice().to_vec();
+    let far = *mesh.ring(ring[0]).as_slice().iter().find(|&&w| w != v(0) && !ring.contains(&w)).unwrap();
+    mesh.join(v(0), far, 0.66).unwrap();
+    assert_eq!((mesh.check(), mesh.euler()), (Ok(()), -2));
+}
+
+#[test]
+fn refinement_triples_the_triangles_and_keeps_chi() {
+    for mut mesh in [tetrahedron(), torus(7, 5), sphere()] {
+        let (triangles, edge, euler) = (mesh.triangle_count(), mesh.longest_edge(), mesh.euler());
+        mesh.refine().unwrap();
+        assert_eq!((mesh.check(), mesh.euler()), (Ok(()), euler));
+        assert_eq!(mesh.triangle_count(), 3 * triangles);
+        assert!(mesh.longest_edge() < edge);
+    }
+}
+
+#[test]
+fn reordering_keeps_shape_and_attributes() {
+    let mut mesh = sphere();
+    let copy = mesh.add_vector();
+    for w in mesh.vertices().collect::<Vec<_>>() {
+        mesh.vector_mut(copy)[w.index()] = mesh.position(w);
+    }
+    for (a, b) in mesh.edges().step_by(7).collect::<Vec<_>>() {
+        let middle = (mesh.position(a) + mesh.position(b)) * 0.5;
+        let _ = mesh.collapse(a, b, middle);
+    }
+    assert!(mesh.occupancy() < 1.0);
+    mesh.reorder();
+    assert_eq!((mesh.check(), mesh.occupancy()), (Ok(()), 1.0));
+    assert!(mesh.vertices().all(|w| mesh.vector(copy)[w.index()].distance(mesh.position(w)) < 1e-6));
+}
+
+#[test]
+fn open_and_broken_triangle_lists_are_refused_with_words() {
+    let four = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+    let refusal = |positions: &Vec<Vec3>, triangles: Vec<[u32; 3]>| {
+        let mesh = TriangleMesh { positions: positions.clone(), triangles, ..Default::default() };
+        Mesh::from_triangles(&mesh).unwrap_err().to_string()
+    };
+    assert!(refusal(&four, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3]]).contains("boundary"));
+    assert!(refusal(&four, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 2, 3]]).contains("orientation"));
+    assert!(refusal(&four, vec![[0, 1, 9]]).contains("index 9"));
+    assert!(refusal(&four, vec![]).contains("no triangle"));
+    assert!(refusal(&four, vec![[0, 0, 1]]).contains("same corner"));
+    assert!(refusal(&four, vec![[0, 1, 2], [0, 2, 1]]).contains("fewer than three"));
+    let bad = vec![Vec3::NAN, Vec3::X, Vec3::Y, Vec3::Z];
+    assert!(refusal(&bad, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]).contains("finite"));
+}
+
+/// One random edit on a random place, refused or done.
+fn random_edit(mesh: &mut Mesh, random: &mut Random, live: &[VertexId]) -> Result<i64, EditError> {
+    let u = live[random.below(live.len())];
+    let ring = mesh.ring(u).as_slice().to_vec();
+    let w = ring[random.below(ring.len())];
+    let middle = (mesh.position(u) + mesh.position(w)) * 0.5;
+    match random.below(32) {
+        0..6 => mesh.split(u, w, middle).map(|_| 0),
+        6..14 => mesh.flip(u, w).map(|()| 0),
+        14..25 => mesh.collapse(u, w, middle).map(|()| 0),
+        25 => mesh.join(u, live[random.below(live.len())], 0.5 + 0.4 * random.unit()).map(|_| -2),
+        26..28 => mesh.remove_tetrahedron(u).map(|()| -2),
+        _ => {
+            let opposite = mesh.opposite(u, w)?;
+            let third = |o: &VertexId| *o != opposite.left && *o != opposite.right;
+            let common = mesh.common_neighbours(u, w);
+            let o = *common.iter().find(|o| third(o)).ok_or(EditError::IsTriangle)?;
+            mesh.cut(u, w, o).map(|_| 2)
+        }
+    }
+}
+
+/// Edits until `edits` are done; the attribute, a copy of the positions moved by midpoints only, must follow.
+fn run_random_edits(start: fn() -> Mesh, seed: u64, edits: usize) -> usize {
+    let mut random = Random(seed);
+    let (mut mesh, mut key) = followed(start());
+    let (mut done, mut refused) = (0, 0);
+    while done < edits {
+        let live: Vec<_> = mesh.vertices().collect();
+        if live.is_empty() || live.len() > 200 {
+            (mesh, key) = followed(start());
+            continue;
+        }
+        let (before, euler) = (mesh.clone(), mesh.euler());
+        match random_edit(&mut mesh, &mut random, &live) {
+            Ok(change) => {
+                done += 1;
+                assert_eq!(mesh.euler(), euler + change, "seed {seed}, edit {done}");
+            }
+            Err(_) => {
+                refused += 1;
+                assert_eq!(mesh, before, "a refusal changed the mesh: seed {seed}, edit {done}");
+            }
+        }
+        assert_eq!(mesh.check(), Ok(()), "seed {seed}, edit {done}");
+        let follows = mesh.vertices().all(|v| mesh.vector(key)[v.index()].distance(mesh.position(v)) < 1e-3);
+        assert!(follows, "an attribute fell behind: seed {seed}, edit {done}");
+    }
+    refused
+}
+
+/// The mesh with its positions once more as an attribute.
+fn followed(mut mesh: Mesh) -> (Mesh, VectorKey) {
+    let key = mesh.add_vector();
+    let positions = mesh.positions().to_vec();
+    mesh.vector_mut(key).copy_from_slice(&positions);
+    (mesh, key)
+}
+
+/// 100,000 edits in all; a seed that fails prints itself.
+#[test]
+fn random_edits_keep_every_invariant() {
+    let starts: [fn() -> Mesh; 5] =
+        [tetrahedron, sphere, || torus(3, 7), || torus(9, 3), || Mesh::icosahedron(Vec3::ZERO, 1.0)];
+    let refused: usize =
+        (0..20).map(|seed| run_random_edits(starts[seed % starts.len()], seed as u64, 5_000)).sum();
+    assert!(refused > 1_000, "only {refused} edits were refused: refusals are not tested");
+}
