@@ -70,7 +70,7 @@ impl Resolver {
             self.changes.creations += 1;
             self.touch(w);
         }
-        [u, v, left, right].map(|w| self.touch(w));
+        [u, v, left, right].into_iter().for_each(|w| self.touch(w));
         Ok(true)
     }
 
@@ -124,7 +124,7 @@ impl Resolver {
         part(mesh, cut, CUT_PUSH * sampling.shortest());
         for side in [cut.kept, cut.copies] {
             if !self.remove_speck(mesh, sampling, side[0]) {
-                side.map(|w| self.touch(w));
+                side.into_iter().for_each(|w| self.touch(w));
             }
         }
         Ok(true)

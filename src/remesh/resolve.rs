@@ -3,6 +3,7 @@
 use super::{Changes, Sampling};
 use crate::mesh::{Mesh, VertexId};
 use crate::spatial::PointGrid;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// Rounds of edges and contact in one call. A round mends what the round before it broke; the study of hard scenes
@@ -19,6 +20,23 @@ pub struct Resolver {
     is_stirred: Vec<bool>,
     pub(super) grid: PointGrid,
     pub(super) changes: Changes,
+}
+
+/// Vertices that the last call left over, in order.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Waiting {
+    /// Whose edges are to be looked at.
+    pub queue: Vec<VertexId>,
+    /// Whose contacts are to be looked at.
+    pub stirred: Vec<VertexId>,
+}
+
+impl Waiting {
+    /// The same vertices after a renumbering; those that are gone are left out.
+    pub fn renamed(&self, names: &[Option<VertexId>]) -> Self {
+        let rename = |list: &[VertexId]| list.iter().filter_map(|v| *names.get(v.index())?).collect();
+        Self { queue: rename(&self.queue), stirred: rename(&self.stirred) }
+    }
 }
 
 impl Resolver {
@@ -39,17 +57,19 @@ impl Resolver {
         self.changes
     }
 
-    /// The vertices that wait for the next call.
-    pub fn waiting(&self) -> Vec<VertexId> {
-        self.queue.iter().copied().collect()
+    /// What waits for the next call.
+    pub fn waiting(&self) -> Waiting {
+        Waiting { queue: self.queue.iter().copied().collect(), stirred: self.stirred.clone() }
     }
 
-    /// Forgets what waits, as before a renumbering, and lets `vertices` wait instead.
-    pub fn set_waiting(&mut self, vertices: &[VertexId]) {
-        *self = Self { grid: std::mem::take(&mut self.grid), ..Self::default() };
-        for &v in vertices {
-            self.touch(v);
-        }
+    /// Lets `waiting` wait in place of what waits now.
+    pub fn set_waiting(&mut self, waiting: Waiting) {
+        self.queued.clear();
+        self.is_stirred.clear();
+        waiting.queue.iter().for_each(|&v| _ = mark(&mut self.queued, v));
+        waiting.stirred.iter().for_each(|&v| _ = mark(&mut self.is_stirred, v));
+        self.queue = waiting.queue.into();
+        self.stirred = waiting.stirred;
     }
 
     /// Puts `v` at the end of the queue, and marks it for the next search for contact.

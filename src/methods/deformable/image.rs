@@ -73,7 +73,8 @@ impl Pyramid {
     pub(super) fn new(volume: &Volume, frame: usize, above: usize) -> Result<Self, MethodError> {
         let possible = volume.max_pyramid_levels(REDUCTION)? - 1;
         if above > possible {
-            let problem = format!("{above} given, 0 to {possible} are possible for {:?} voxels", volume.dims());
+            let problem =
+                format!("{above} given, 0 to {possible} are possible for {:?} voxels", volume.dims());
             return Err(MethodError::invalid("levels", problem));
         }
         let [low, high] = volume.range();
