@@ -43,7 +43,16 @@ const vitest = (folder) => async () => {
   await rm(report, { force: true });
   const config = at(folder, 'vitest.config.ts');
   const { code } = await run(tool('vitest'), [
-    ...['run', '--dir', at(folder), '--reporter=default', '--reporter=json', `--outputFile.json=${report}`],
+    // A busy machine is slow, not wrong.
+    ...[
+      'run',
+      '--testTimeout=60000',
+      '--dir',
+      at(folder),
+      '--reporter=default',
+      '--reporter=json',
+      `--outputFile.json=${report}`,
+    ],
     ...(existsSync(config) ? ['--config', config] : []),
   ]);
   if (!existsSync(report)) return { passed: 0, failed: 1 };

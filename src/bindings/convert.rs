@@ -115,4 +115,3 @@ fn unknown(parameter: &str, all: &JsValue) -> Failure {
     let names: Vec<String> = names.iter().filter_map(|name| name.as_string()).collect();
     Failure::invalid(parameter, &format!("no parameter has this name; there are {}", names.join(", ")))
 }
-

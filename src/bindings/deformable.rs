@@ -72,7 +72,7 @@ impl RawDeformable {
         params: &JsValue,
     ) -> Result<RawDeformable, JsValue> {
         let params = merged(&DeformableParams::for_volume(&volume.0), params)?;
-        let options = DeformableOptions { frame, start: start.0, levels, edge, params };
+        let options = DeformableOptions { frame, start: start.0, levels, edge, params: Some(params) };
         let mut model = DeformableModel::new(&volume.0, options).map_err(Failure::from)?;
         model.set_clock(now);
         Ok(RawDeformable(Rc::new(RefCell::new(model))))
@@ -86,13 +86,13 @@ impl RawDeformable {
     /// Iterations until the end or `iterations` of them; the report of the last, with the events of all.
     pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
         let mut model = self.0.borrow_mut();
-        let mut report = model.step();
+        let mut report = model.step().map_err(Failure::from)?;
         let mut events = report.events;
         for _ in 1..iterations {
             if report.done {
                 break;
             }
-            report = model.step();
+            report = model.step().map_err(Failure::from)?;
             events += report.events;
         }
         report.events = events;

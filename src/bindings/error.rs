@@ -28,7 +28,10 @@ impl Failure {
 
     /// More memory than there is.
     pub fn too_large(bytes: u64) -> Self {
-        Self::new("too-large", format!("{bytes} bytes are needed, more than there is in this page or process"))
+        Self::new(
+            "too-large",
+            format!("{bytes} bytes are needed, more than there is in this page or process"),
+        )
     }
 }
 

@@ -12,7 +12,7 @@ use super::error::Failure;
 use super::volume::RawVolume;
 use crate::io::{MeshFormat, parse_mesh, write_mesh};
 use crate::math::DVec3;
-use crate::mesh::{Mesh, MeshReport, Measures, TriangleMesh, measure, report};
+use crate::mesh::{Measures, Mesh, MeshReport, TriangleMesh, measure, report};
 use crate::methods::deformable::DeformableModel;
 use crate::spatial::{SurfacePoint, TriangleTree, cross_section};
 use crate::volume::marching_cubes_world;

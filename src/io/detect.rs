@@ -65,6 +65,6 @@ fn signature(bytes: &[u8]) -> &'static str {
         () if line(b"<?xml") || line(b"<VTKFile") => "XML",
         () if at(0, b"# vtk") => "VTK legacy",
         () if at(0, b"\x89PNG") || at(0, &[0xFF, 0xD8, 0xFF]) => "a flat picture",
-        () => "no known signature",
+        () => "a file of no known signature",
     }
 }

@@ -2,13 +2,22 @@
 
 mod detect;
 mod error;
+mod glb;
+mod gltf;
 mod gzip;
+mod mesh_file;
 mod metaimage;
+mod mz3;
 mod nifti;
 mod nrrd;
+mod obj;
+mod ply;
 mod raw;
+mod stl;
 mod text;
+mod vtp;
 
 pub use detect::parse_volume;
 pub use error::FormatError;
+pub use mesh_file::{MeshFormat, parse_mesh, write_mesh};
 pub use nifti::write_nifti;

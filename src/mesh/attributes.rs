@@ -2,6 +2,7 @@
 
 use super::VertexId;
 use crate::math::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// Names one vector attribute of one mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,7 +16,7 @@ pub struct ScalarKey(usize);
 ///
 /// Edits say what becomes of the data through three words only: a slot is added, a slot takes a blend of two others,
 /// slots are reordered. So an attribute can never fall out of step with the mesh.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Attributes {
     vectors: Vec<Vec<Vec3>>,
     scalars: Vec<Vec<f32>>,
@@ -72,6 +73,11 @@ impl Attributes {
         for s in &mut self.scalars {
             *s = order.iter().map(|id| s[id.index()]).collect();
         }
+    }
+
+    /// How many vectors and scalars a vertex has.
+    pub(super) fn counts(&self) -> [usize; 2] {
+        [self.vectors.len(), self.scalars.len()]
     }
 
     pub(super) fn fits(&self, slots: usize) -> bool {

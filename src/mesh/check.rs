@@ -54,8 +54,19 @@ impl Mesh {
     fn check_arrays(&self) -> Result<(), Flaw> {
         let empty = self.rings.iter().filter(|ring| ring.is_empty()).count();
         let fits = self.positions.len() == self.rings.len() && self.attributes.fits(self.rings.len());
-        let free = self.free.len() == empty && self.free.iter().all(|&v| !self.is_live(v));
-        if fits && free { Ok(()) } else { Err(Flaw::OutOfStep) }
+        if fits && self.free.len() == empty && self.free_slots_are_distinct() {
+            Ok(())
+        } else {
+            Err(Flaw::OutOfStep)
+        }
+    }
+
+    fn free_slots_are_distinct(&self) -> bool {
+        let mut listed = vec![false; self.slots()];
+        self.free.iter().all(|v| {
+            let empty = self.rings.get(v.index()).is_some_and(|ring| ring.is_empty());
+            empty && !std::mem::replace(&mut listed[v.index()], true)
+        })
     }
 
     fn check_valence(&self, v: VertexId) -> Result<(), Flaw> {

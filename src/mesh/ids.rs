@@ -1,9 +1,11 @@
 //! The handle of a vertex.
 
+use serde::{Deserialize, Serialize};
+
 /// Names one vertex of one [`Mesh`](super::Mesh).
 ///
 /// An id stays with its vertex until the vertex is deleted or the mesh is compacted; freed ids are used again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct VertexId(pub u32);
 
 impl VertexId {

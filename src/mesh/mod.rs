@@ -46,9 +46,10 @@ pub use triangles::TriangleMesh;
 
 use crate::math::Vec3;
 use attributes::Attributes;
+use serde::{Deserialize, Serialize};
 
 /// A closed oriented triangle mesh with dynamic connectivity.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mesh {
     rings: Vec<Ring>,
     positions: Vec<Vec3>,
@@ -174,6 +175,11 @@ impl Mesh {
     /// Adds a number per vertex, zero at first, which follows every edit from now on.
     pub fn add_scalar(&mut self) -> ScalarKey {
         self.attributes.add_scalar(self.slots())
+    }
+
+    /// How many vector and scalar attributes a vertex has.
+    pub fn attribute_counts(&self) -> [usize; 2] {
+        self.attributes.counts()
     }
 
     /// A vector attribute by slot.

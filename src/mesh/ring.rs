@@ -1,6 +1,7 @@
 //! The oriented one-ring of a vertex.
 
 use super::VertexId;
+use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
 /// Neighbours held without a heap allocation: with fewer, common vertices spill over; with more, cache lines are
@@ -11,7 +12,7 @@ const INLINE: usize = 10;
 ///
 /// Consecutive neighbours `a`, `b` (the last one is followed by the first) form the triangle `(vertex, a, b)`. The
 /// empty ring marks a free slot.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ring(SmallVec<[VertexId; INLINE]>);
 
 impl Ring {

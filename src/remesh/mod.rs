@@ -13,5 +13,5 @@ mod sampling;
 mod specks;
 
 pub use changes::Changes;
-pub use resolve::Resolver;
+pub use resolve::{Resolver, Waiting};
 pub use sampling::Sampling;

@@ -3,6 +3,7 @@
 use super::{Changes, Sampling};
 use crate::mesh::{Mesh, VertexId};
 use crate::spatial::PointGrid;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// Rounds of edges and contact in one call. A round mends what the round before it broke; the study of hard scenes
@@ -17,8 +18,27 @@ pub struct Resolver {
     /// Vertices that were moved or made since contact was last looked for.
     stirred: Vec<VertexId>,
     is_stirred: Vec<bool>,
+    /// Vertices made or displaced by the last call.
+    edited: Vec<VertexId>,
     pub(super) grid: PointGrid,
     pub(super) changes: Changes,
+}
+
+/// Vertices that the last call left over, in order.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Waiting {
+    /// Whose edges are to be looked at.
+    pub queue: Vec<VertexId>,
+    /// Whose contacts are to be looked at.
+    pub stirred: Vec<VertexId>,
+}
+
+impl Waiting {
+    /// The same vertices after a renumbering; those that are gone are left out.
+    pub fn renamed(&self, names: &[Option<VertexId>]) -> Self {
+        let rename = |list: &[VertexId]| list.iter().filter_map(|v| *names.get(v.index())?).collect();
+        Self { queue: rename(&self.queue), stirred: rename(&self.stirred) }
+    }
 }
 
 impl Resolver {
@@ -27,6 +47,7 @@ impl Resolver {
     /// Vertices that are not named are looked at only where an edit or a contact reaches them.
     pub fn resolve(&mut self, mesh: &mut Mesh, sampling: Sampling, active: &[VertexId]) -> Changes {
         self.changes = Changes::default();
+        self.edited.clear();
         for &v in active {
             self.touch(v);
         }
@@ -39,17 +60,24 @@ impl Resolver {
         self.changes
     }
 
-    /// The vertices that wait for the next call.
-    pub fn waiting(&self) -> Vec<VertexId> {
-        self.queue.iter().copied().collect()
+    /// The vertices that edits of the last call made or displaced; some may be gone again.
+    pub fn edited(&self) -> &[VertexId] {
+        &self.edited
     }
 
-    /// Forgets what waits, as before a renumbering, and lets `vertices` wait instead.
-    pub fn set_waiting(&mut self, vertices: &[VertexId]) {
-        *self = Self { grid: std::mem::take(&mut self.grid), ..Self::default() };
-        for &v in vertices {
-            self.touch(v);
-        }
+    /// What waits for the next call.
+    pub fn waiting(&self) -> Waiting {
+        Waiting { queue: self.queue.iter().copied().collect(), stirred: self.stirred.clone() }
+    }
+
+    /// Lets `waiting` wait in place of what waits now.
+    pub fn set_waiting(&mut self, waiting: Waiting) {
+        self.queued.clear();
+        self.is_stirred.clear();
+        waiting.queue.iter().for_each(|&v| _ = mark(&mut self.queued, v));
+        waiting.stirred.iter().for_each(|&v| _ = mark(&mut self.is_stirred, v));
+        self.queue = waiting.queue.into();
+        self.stirred = waiting.stirred;
     }
 
     /// Puts `v` at the end of the queue, and marks it for the next search for contact.
@@ -60,6 +88,12 @@ impl Resolver {
         if mark(&mut self.is_stirred, v) {
             self.stirred.push(v);
         }
+    }
+
+    /// [`Self::touch`] for a vertex that an edit made or displaced.
+    pub(super) fn touch_edited(&mut self, v: VertexId) {
+        self.edited.push(v);
+        self.touch(v);
     }
 
     pub(super) fn pop(&mut self) -> Option<VertexId> {

@@ -6,9 +6,9 @@ use crate::mesh::TriangleMesh;
 /// The segments where the plane through `origin` cuts the surface, in the order of the triangles.
 ///
 /// A vertex exactly on the plane is taken as just above it, so that an edge is either cut or not and triangles that
-/// share it agree to the bit: in a closed mesh the segments form closed loops. Each runs with what lies inside to its left, seen
-/// against `normal`. Segments of no length, where the surface only touches, are left out.
-/// Nothing where `normal` is zero, or where it or `origin` is not finite. Indices must exist.
+/// share it agree to the bit: in a closed mesh the segments form closed loops. Each runs with what lies inside to its
+/// left, seen against `normal`. Segments of no length, where the surface only touches, are left out. Nothing where
+/// `normal` is zero, or where it or `origin` is not finite. Indices must exist.
 pub fn cross_section(mesh: &TriangleMesh, origin: Vec3, normal: Vec3) -> Vec<[Vec3; 2]> {
     let (origin, normal) = (origin.as_dvec3(), normal.as_dvec3());
     if !origin.is_finite() || !normal.is_finite() || normal == DVec3::ZERO {

@@ -53,8 +53,8 @@ impl TriangleTree {
         best.map(|(squared, item, barycentric)| self.surface_point(item, barycentric, squared.sqrt()))
     }
 
-    /// Where the ray from `origin` along `direction` (of any length) first meets the surface, from either side; `None`
-    /// where it does not, where `direction` is zero or where either is not finite.
+    /// Where the ray from `origin` along `direction` (of any length) first meets the surface, from either side;
+    /// `None` where it does not, where `direction` is zero or where either is not finite.
     pub fn ray_hit(&self, origin: Vec3, direction: Vec3) -> Option<SurfacePoint> {
         let (origin, direction) = (origin.as_dvec3(), direction.as_dvec3().try_normalize()?);
         if !origin.is_finite() {

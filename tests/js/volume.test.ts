@@ -80,7 +80,8 @@ test('the pyramid starts with the volume itself and shrinks', () => {
   ]);
   const half = ball(16, 5).pyramid(2, { factor: 2 })[1] as Volume;
   expect(half.dims).toEqual([8, 8, 8]);
-  expect(half.sample([0, 0, 0])).toBeCloseTo(200, 0);
+  expect(half.sample([0, 0, 0])).toBeGreaterThan(190);
+  expect(half.sample([7, 7, 7])).toBe(0);
 });
 
 test('written as NIfTI and read back, also gzipped', () => {

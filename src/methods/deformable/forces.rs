@@ -130,7 +130,8 @@ impl Forces {
     fn ridge_attraction(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> Vec3 {
         let gradient = image.gradient(x, scale.gradient_bound);
         let normal = self.normal[v];
-        (normal * (scale.gradient_across * gradient.dot(normal)) + gradient * scale.gradient_along) * scale.delta
+        (normal * (scale.gradient_across * gradient.dot(normal)) + gradient * scale.gradient_along)
+            * scale.delta
     }
 }
 

@@ -86,7 +86,8 @@ fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
     const THROUGH_CORNERS: f32 = 1.316_074;
     let delta = frame.sampling.shortest();
     let centre = Vec3::from(frame.dims.map(|n| 0.5 * (n as f32 - 1.0)));
-    let axes = Vec3::from(frame.dims.map(|n| THROUGH_CORNERS * 0.5 * (n as f32 + 1.0))).max(Vec3::splat(4.0 * delta));
+    let axes = Vec3::from(frame.dims.map(|n| THROUGH_CORNERS * 0.5 * (n as f32 + 1.0)))
+        .max(Vec3::splat(4.0 * delta));
     let onto_box = |p: Vec3| {
         let unit = (p - centre) / axes;
         let fourth = unit * unit * unit * unit;
@@ -119,7 +120,11 @@ fn bubbles(frame: &Frame, n: u32) -> Result<Mesh, MethodError> {
     let fitting = (smallest_axis * BUBBLE_SHARE / (SMALLEST_RADIUS * frame.sampling.shortest())) as u32;
     let most = fitting.min(MOST_BUBBLES);
     if n == 0 || n > most {
-        let hint = if most == 0 { "none fits: take fewer pyramid levels or shorter edges".into() } else { format!("1 to {most} fit this image and sampling") };
+        let hint = if most == 0 {
+            "none fits: take fewer pyramid levels or shorter edges".into()
+        } else {
+            format!("1 to {most} fit this image and sampling")
+        };
         return Err(MethodError::invalid("start.bubbles", format!("{n} given, {hint}")));
     }
     let cell = Vec3::from(frame.dims.map(|m| m as f32 / n as f32));
@@ -141,7 +146,8 @@ fn seeds(frame: &Frame, points: &[DVec3], radius: f64) -> Result<Mesh, MethodErr
     }
     if !(local >= smallest && local.is_finite()) {
         let least = f64::from(smallest) * frame.voxel;
-        let problem = format!("{radius} given, at least {least:.3} accepted (or fewer pyramid levels, shorter edges)");
+        let problem =
+            format!("{radius} given, at least {least:.3} accepted (or fewer pyramid levels, shorter edges)");
         return Err(MethodError::invalid("start.radius", problem));
     }
     let centres: Vec<Vec3> = points.iter().map(|p| frame.from_world.transform_point3(*p).as_vec3()).collect();
@@ -164,7 +170,10 @@ fn iso_surface(frame: &Frame, iso: f32) -> Result<Mesh, MethodError> {
     let (grid, position) = frame.image.grid();
     let mut surface = marching_cubes(grid, iso)?;
     if surface.triangles.is_empty() {
-        return Err(MethodError::invalid("start.marchingCubes", "the image has no surface at this intensity"));
+        return Err(MethodError::invalid(
+            "start.marchingCubes",
+            "the image has no surface at this intensity",
+        ));
     }
     surface.positions.iter_mut().for_each(|p| *p = position(*p));
     Ok(Mesh::from_triangles(&surface)?)

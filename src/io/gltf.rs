@@ -1,0 +1,443 @@
+//! The triangles that a glTF 2.0 document describes.
+//!
+//! The document is looked at as plain JSON, field by field: a tenth of the code that the whole format would take, and
+//! every index and range is checked here before it is used.
+
+use super::FormatError;
+use super::glb::FORMAT;
+use crate::math::{DAffine3, DVec3, Vec2, Vec3};
+use crate::mesh::TriangleMesh;
+use glam::{DMat4, DQuat};
+use serde_json::Value;
+
+/// Triangle corners in all: nodes may repeat a mesh, so the file's size bounds nothing.
+const CORNER_LIMIT: u64 = 3 << 23;
+
+/// What a primitive counts at least, so that empty ones repeated by many nodes come to an end, too.
+const PRIMITIVE_COST: u64 = 64;
+
+/// The extensions that a file may demand: they leave positions and triangles alone, or are read here.
+fn is_harmless(extension: &str) -> bool {
+    extension.starts_with("KHR_materials_")
+        || ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_texture_basisu", "EXT_texture_webp"]
+            .contains(&extension)
+}
+
+/// All triangles of the default scene, each where its node puts it. Normals, texture coordinates and colours are
+/// taken where every part has them.
+pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, FormatError> {
+    let document = Document { root, binary };
+    document.check_extensions()?;
+    let parts = document.parts()?;
+    let mut mesh: Option<TriangleMesh> = None;
+    for part in &parts {
+        let read = part.primitive.read()?.transformed(&part.to_world);
+        mesh = Some(match mesh {
+            Some(before) => joined(before, read),
+            None => read,
+        });
+    }
+    mesh.ok_or_else(|| {
+        FormatError::invalid(FORMAT, "meshes", "the scene has no triangles; at least one is needed")
+    })
+}
+
+fn joined(mut mesh: TriangleMesh, part: TriangleMesh) -> TriangleMesh {
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend(part.positions);
+    mesh.triangles.extend(part.triangles.into_iter().map(|t| t.map(|v| v + first)));
+    mesh.normals = both(mesh.normals, part.normals);
+    mesh.uvs = both(mesh.uvs, part.uvs);
+    mesh.colors = both(mesh.colors, part.colors);
+    mesh
+}
+
+fn both<T>(a: Option<Vec<T>>, b: Option<Vec<T>>) -> Option<Vec<T>> {
+    let mut a = a?;
+    a.extend(b?);
+    Some(a)
+}
+
+#[derive(Clone, Copy)]
+struct Document<'a> {
+    root: &'a Value,
+    binary: &'a [u8],
+}
+
+/// A primitive and the place it is to go.
+struct Part<'a> {
+    to_world: DAffine3,
+    primitive: Primitive<'a>,
+}
+
+impl<'a> Document<'a> {
+    fn check_extensions(&self) -> Result<(), FormatError> {
+        let required = self.root["extensionsRequired"].as_array().map_or(&[][..], Vec::as_slice);
+        match required.iter().filter_map(Value::as_str).find(|name| !is_harmless(name)) {
+            None => Ok(()),
+            Some(name) => {
+                let accepted = "files without compression (save the mesh without it)";
+                Err(FormatError::unsupported(FORMAT, "extensionsRequired", name, accepted))
+            }
+        }
+    }
+
+    /// An entry of one of the document's tables.
+    fn entry(&self, table: &'static str, index: u64) -> Result<&'a Value, FormatError> {
+        let entries = self.root[table].as_array().map_or(&[][..], Vec::as_slice);
+        let found = usize::try_from(index).ok().and_then(|i| entries.get(i));
+        let problem = || format!("number {index} is named; there are {}", entries.len());
+        found.ok_or_else(|| FormatError::invalid(FORMAT, table, problem()))
+    }
+
+    /// All triangle primitives of the default scene, in the order of its nodes.
+    fn parts(&self) -> Result<Vec<Part<'a>>, FormatError> {
+        let nodes = self.root["nodes"].as_array().map_or(0, Vec::len);
+        let mut seen = vec![false; nodes];
+        let mut stack: Vec<(u64, DAffine3)> =
+            self.roots()?.into_iter().map(|n| (n, DAffine3::IDENTITY)).collect();
+        stack.reverse();
+        let (mut parts, mut corners) = (Vec::new(), 0_u64);
+        while let Some((index, parent)) = stack.pop() {
+            let node = self.entry("nodes", index)?;
+            if std::mem::replace(&mut seen[index as usize], true) {
+                let problem = "is reached twice; a tree of nodes is accepted";
+                return Err(FormatError::invalid(FORMAT, format!("nodes[{index}]"), problem));
+            }
+            let to_world = parent * transform(node, index)?;
+            for value in self.primitives(node)? {
+                let primitive = Primitive::new(self, value)?;
+                let cost = primitive.as_ref().map_or(0, |p| p.corners).max(PRIMITIVE_COST);
+                corners = corners.saturating_add(cost);
+                if corners > CORNER_LIMIT {
+                    return Err(FormatError::too_large(FORMAT, "accessors", corners.saturating_mul(12)));
+                }
+                parts.extend(primitive.map(|primitive| Part { to_world, primitive }));
+            }
+            let children = unsigned_list(&node["children"], "children")?;
+            stack.extend(children.into_iter().rev().map(|child| (child, to_world)));
+        }
+        Ok(parts)
+    }
+
+    /// The nodes at the top of the default scene; of the first one, or of the whole document, where none is named.
+    fn roots(&self) -> Result<Vec<u64>, FormatError> {
+        if self.root["scenes"].as_array().is_some_and(|scenes| !scenes.is_empty()) {
+            let scene = unsigned(self.root, "scene")?.unwrap_or(0);
+            return unsigned_list(&self.entry("scenes", scene)?["nodes"], "nodes");
+        }
+        let nodes = self.root["nodes"].as_array().map_or(&[][..], Vec::as_slice);
+        let mut is_child = vec![false; nodes.len()];
+        for node in nodes {
+            for child in unsigned_list(&node["children"], "children")? {
+                self.entry("nodes", child)?;
+                is_child[child as usize] = true;
+            }
+        }
+        Ok((0..).zip(is_child).filter_map(|(n, is)| (!is).then_some(n)).collect())
+    }
+
+    /// Those of the node's mesh, if it has one.
+    fn primitives(&self, node: &Value) -> Result<&'a [Value], FormatError> {
+        let Some(mesh) = unsigned(node, "mesh")? else { return Ok(&[]) };
+        Ok(self.entry("meshes", mesh)?["primitives"].as_array().map_or(&[][..], Vec::as_slice))
+    }
+
+    /// The data of accessor `index`, whose elements must have one of the given numbers of components.
+    fn accessor(&self, index: u64, widths: &[usize]) -> Result<Accessor<'a>, FormatError> {
+        let value = self.entry("accessors", index)?;
+        let field = format!("accessors[{index}]");
+        if !value["sparse"].is_null() {
+            return Err(FormatError::unsupported(FORMAT, field, "sparse data", "data without gaps"));
+        }
+        let component = Component::parse(value, &field)?;
+        let width = element_width(value, widths, &field)?;
+        let count = required(value, "count", &field)?;
+        let view = self.view(required(value, "bufferView", &field)?)?;
+        let element = component.size() * width;
+        let stride = view.stride.unwrap_or(element as u64);
+        if stride < element as u64 {
+            return Err(FormatError::invalid(
+                FORMAT,
+                field,
+                format!("elements of {element} bytes are {stride} apart"),
+            ));
+        }
+        let start = unsigned(value, "byteOffset")?.unwrap_or(0);
+        let last = count.saturating_sub(1).saturating_mul(stride);
+        let needed = if count == 0 { 0 } else { start.saturating_add(last).saturating_add(element as u64) };
+        if needed > view.bytes.len() as u64 {
+            let found = view.bytes.len() as u64;
+            return Err(FormatError::Truncated { format: FORMAT, field, needed, found });
+        }
+        let normalized = value["normalized"].as_bool().unwrap_or(false);
+        let bytes = view.bytes.get(start as usize..).unwrap_or_default();
+        Ok(Accessor { bytes, count: count as usize, stride: stride as usize, width, component, normalized })
+    }
+
+    fn view(&self, index: u64) -> Result<View<'a>, FormatError> {
+        let value = self.entry("bufferViews", index)?;
+        let field = format!("bufferViews[{index}]");
+        let buffer = required(value, "buffer", &field)?;
+        if buffer != 0 || !self.entry("buffers", buffer)?["uri"].is_null() {
+            let accepted = "the file's own binary chunk";
+            return Err(FormatError::unsupported(
+                FORMAT,
+                field,
+                format!("buffer {buffer}, outside the file"),
+                accepted,
+            ));
+        }
+        let (start, length) =
+            (unsigned(value, "byteOffset")?.unwrap_or(0), required(value, "byteLength", &field)?);
+        let (needed, found) = (start.saturating_add(length), self.binary.len() as u64);
+        let bytes = self.binary.get(start as usize..needed as usize).filter(|_| needed <= found);
+        let bytes = bytes.ok_or(FormatError::Truncated { format: FORMAT, field, needed, found })?;
+        Ok(View { bytes, stride: unsigned(value, "byteStride")? })
+    }
+}
+
+struct View<'a> {
+    bytes: &'a [u8],
+    stride: Option<u64>,
+}
+
+/// How corners are told by the order of vertices.
+#[derive(Clone, Copy)]
+enum Mode {
+    List,
+    Strip,
+    Fan,
+}
+
+struct Primitive<'a> {
+    document: Document<'a>,
+    attributes: &'a Value,
+    mode: Mode,
+    positions: Accessor<'a>,
+    indices: Option<Accessor<'a>>,
+    /// A bound on the corners of its triangles and on its vertices.
+    corners: u64,
+}
+
+impl<'a> Primitive<'a> {
+    /// `None` for points and lines.
+    fn new(document: &Document<'a>, value: &'a Value) -> Result<Option<Self>, FormatError> {
+        let mode = match unsigned(value, "mode")?.unwrap_or(4) {
+            4 => Mode::List,
+            5 => Mode::Strip,
+            6 => Mode::Fan,
+            _ => return Ok(None),
+        };
+        let attributes = &value["attributes"];
+        let positions = document.accessor(required(attributes, "POSITION", "attributes")?, &[3])?;
+        let indices = unsigned(value, "indices")?.map(|i| document.accessor(i, &[1])).transpose()?;
+        let vertices = indices.as_ref().map_or(positions.count, |indices| indices.count) as u64;
+        let corners = match mode {
+            Mode::List => vertices,
+            Mode::Strip | Mode::Fan => vertices.saturating_mul(3),
+        };
+        let corners = corners.max(positions.count as u64);
+        Ok(Some(Self { document: *document, attributes, mode, positions, indices, corners }))
+    }
+
+    fn read(&self) -> Result<TriangleMesh, FormatError> {
+        let vectors = |a: Accessor| (0..a.count).map(|i| a.vector(i)).collect();
+        Ok(TriangleMesh {
+            positions: (0..self.positions.count).map(|i| self.positions.vector(i)).collect(),
+            triangles: self.triangles()?,
+            normals: self.attribute("NORMAL", &[3])?.map(vectors),
+            uvs: self.attribute("TEXCOORD_0", &[2])?.map(|a| {
+                (0..a.count).map(|i| Vec2::new(a.number(i, 0) as f32, a.number(i, 1) as f32)).collect()
+            }),
+            corner_uvs: None,
+            colors: self.attribute("COLOR_0", &[3, 4])?.map(vectors),
+        })
+    }
+
+    fn attribute(&self, name: &str, widths: &[usize]) -> Result<Option<Accessor<'a>>, FormatError> {
+        let Some(index) = unsigned(self.attributes, name)? else { return Ok(None) };
+        let accessor = self.document.accessor(index, widths)?;
+        if accessor.count != self.positions.count {
+            let problem = format!("has {} entries for {} positions", accessor.count, self.positions.count);
+            return Err(FormatError::invalid(FORMAT, name, problem));
+        }
+        Ok(Some(accessor))
+    }
+
+    fn triangles(&self) -> Result<Vec<[u32; 3]>, FormatError> {
+        let vertices = self.positions.count;
+        let order: Vec<u32> = match &self.indices {
+            Some(indices) => (0..indices.count).map(|i| indices.number(i, 0) as u32).collect(),
+            None => (0..vertices as u32).collect(),
+        };
+        if let Some(bad) = order.iter().find(|&&v| v as usize >= vertices) {
+            let problem = format!("vertex {bad} is named; {vertices} are there");
+            return Err(FormatError::invalid(FORMAT, "indices", problem));
+        }
+        Ok(match self.mode {
+            Mode::List => order.as_chunks().0.to_vec(),
+            Mode::Strip => {
+                (0..).zip(order.windows(3)).map(|(i, w)| [w[0], w[1 + i % 2], w[2 - i % 2]]).collect()
+            }
+            Mode::Fan => order.windows(2).skip(1).map(|w| [order[0], w[0], w[1]]).collect(),
+        })
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Component {
+    I8,
+    U8,
+    I16,
+    U16,
+    U32,
+    F32,
+}
+
+impl Component {
+    fn parse(accessor: &Value, field: &str) -> Result<Self, FormatError> {
+        Ok(match required(accessor, "componentType", field)? {
+            5120 => Self::I8,
+            5121 => Self::U8,
+            5122 => Self::I16,
+            5123 => Self::U16,
+            5125 => Self::U32,
+            5126 => Self::F32,
+            other => {
+                let accepted = "5120 to 5123, 5125 and 5126";
+                return Err(FormatError::unsupported(
+                    FORMAT,
+                    format!("{field}.componentType"),
+                    other.to_string(),
+                    accepted,
+                ));
+            }
+        })
+    }
+
+    fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::U32 | Self::F32 => 4,
+        }
+    }
+
+    /// The integer that stands for 1 in normalised data.
+    fn full(self) -> f64 {
+        match self {
+            Self::I8 => 127.0,
+            Self::U8 => 255.0,
+            Self::I16 => 32767.0,
+            Self::U16 => 65535.0,
+            Self::U32 => 4294967295.0,
+            Self::F32 => 1.0,
+        }
+    }
+}
+
+/// Elements whose range in the file has been checked.
+struct Accessor<'a> {
+    bytes: &'a [u8],
+    count: usize,
+    stride: usize,
+    width: usize,
+    component: Component,
+    normalized: bool,
+}
+
+impl Accessor<'_> {
+    /// Component `k` of element `i`.
+    fn number(&self, i: usize, k: usize) -> f64 {
+        debug_assert!(i < self.count && k < self.width);
+        let at = i * self.stride + k * self.component.size();
+        let byte = |n: usize| self.bytes.get(at + n).copied().unwrap_or(0);
+        let value = match self.component {
+            Component::I8 => f64::from(byte(0) as i8),
+            Component::U8 => f64::from(byte(0)),
+            Component::I16 => f64::from(i16::from_le_bytes([byte(0), byte(1)])),
+            Component::U16 => f64::from(u16::from_le_bytes([byte(0), byte(1)])),
+            Component::U32 => f64::from(u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])),
+            Component::F32 => f64::from(f32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])),
+        };
+        if self.normalized { (value / self.component.full()).max(-1.0) } else { value }
+    }
+
+    fn vector(&self, i: usize) -> Vec3 {
+        Vec3::from_array([0, 1, 2].map(|k| self.number(i, k) as f32))
+    }
+}
+
+fn element_width(accessor: &Value, widths: &[usize], field: &str) -> Result<usize, FormatError> {
+    let name = accessor["type"].as_str().unwrap_or("nothing");
+    let width = match name {
+        "SCALAR" => 1,
+        "VEC2" => 2,
+        "VEC3" => 3,
+        "VEC4" => 4,
+        _ => 0,
+    };
+    if widths.contains(&width) {
+        return Ok(width);
+    }
+    let found: String = name.chars().take(20).collect();
+    let problem = format!("is {found}; elements of {widths:?} components are accepted");
+    Err(FormatError::invalid(FORMAT, format!("{field}.type"), problem))
+}
+
+/// The node's own transform, from a matrix or from scale, rotation and translation.
+fn transform(node: &Value, index: u64) -> Result<DAffine3, FormatError> {
+    let field = |name: &str| format!("nodes[{index}].{name}");
+    if let Some(m) = numbers::<16>(&node["matrix"], || field("matrix"))? {
+        let matrix = DMat4::from_cols_array(&m);
+        return Ok(DAffine3::from_mat4(matrix));
+    }
+    let scale = numbers(&node["scale"], || field("scale"))?.unwrap_or([1.0; 3]);
+    let rotation = numbers(&node["rotation"], || field("rotation"))?.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+    let translation = numbers(&node["translation"], || field("translation"))?.unwrap_or([0.0; 3]);
+    let rotation = DQuat::from_array(rotation);
+    if rotation.length_squared() <= 0.0 {
+        return Err(FormatError::invalid(
+            FORMAT,
+            field("rotation"),
+            "is zero; a unit quaternion is accepted",
+        ));
+    }
+    Ok(DAffine3::from_scale_rotation_translation(
+        DVec3::from_array(scale),
+        rotation.normalize(),
+        DVec3::from_array(translation),
+    ))
+}
+
+fn numbers<const N: usize>(
+    value: &Value,
+    field: impl Fn() -> String,
+) -> Result<Option<[f64; N]>, FormatError> {
+    if value.is_null() {
+        return Ok(None);
+    }
+    let list = value.as_array().map(|all| all.iter().filter_map(Value::as_f64).collect::<Vec<_>>());
+    let found = list.and_then(|all| <[f64; N]>::try_from(all).ok());
+    found.map(Some).ok_or_else(|| FormatError::invalid(FORMAT, field(), format!("is no list of {N} numbers")))
+}
+
+/// A whole number that may be missing.
+fn unsigned(object: &Value, key: &str) -> Result<Option<u64>, FormatError> {
+    let value = &object[key];
+    if value.is_null() {
+        return Ok(None);
+    }
+    value.as_u64().map(Some).ok_or_else(|| FormatError::invalid(FORMAT, key, "is no whole number from 0"))
+}
+
+fn required(object: &Value, key: &str, field: &str) -> Result<u64, FormatError> {
+    unsigned(object, key)?.ok_or_else(|| FormatError::invalid(FORMAT, format!("{field}.{key}"), "is missing"))
+}
+
+fn unsigned_list(value: &Value, field: &str) -> Result<Vec<u64>, FormatError> {
+    let Some(list) = value.as_array() else { return Ok(Vec::new()) };
+    let found: Option<Vec<u64>> = list.iter().map(Value::as_u64).collect();
+    found.ok_or_else(|| FormatError::invalid(FORMAT, field, "is no list of whole numbers"))
+}

@@ -1,0 +1,202 @@
+//! Wavefront OBJ: vertices, texture coordinates, normals and faces; everything else in a file is passed over.
+
+use super::FormatError;
+use super::mesh_file::is_text;
+use crate::math::{Vec2, Vec3};
+use crate::mesh::TriangleMesh;
+use std::fmt::Write;
+
+const FORMAT: &str = "OBJ";
+
+/// Whether some line is a vertex, in what is text.
+pub(super) fn is_obj(bytes: &[u8]) -> bool {
+    is_text(bytes) && lines(bytes).any(|line| words(line).next() == Some(b"v"))
+}
+
+fn lines(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
+    bytes.split(|&b| b == b'\n' || b == b'\r')
+}
+
+fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
+
+/// Texture coordinates are taken where every face has them, and colours where every vertex has; normals likewise, the
+/// mean per vertex.
+pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
+    let mut reader = Reader::default();
+    let mut continued = Vec::new();
+    for (number, line) in (1..).zip(lines(bytes)) {
+        // A backslash at the end joins the next line to this one.
+        if let Some(start) = line.strip_suffix(b"\\") {
+            continued.extend_from_slice(start);
+            continued.push(b' ');
+            continue;
+        }
+        if continued.is_empty() {
+            reader.line(line, number)?;
+        } else {
+            continued.extend_from_slice(line);
+            reader.line(&continued, number)?;
+            continued.clear();
+        }
+    }
+    reader.finish()
+}
+
+/// Indices from 0 into the tables of the file.
+#[derive(Clone, Copy)]
+struct Corner {
+    position: u32,
+    uv: Option<u32>,
+    normal: Option<u32>,
+}
+
+#[derive(Default)]
+struct Reader {
+    positions: Vec<Vec3>,
+    colors: Vec<Vec3>,
+    uvs: Vec<Vec2>,
+    normals: Vec<Vec3>,
+    corners: Vec<[Corner; 3]>,
+}
+
+impl Reader {
+    fn line(&mut self, line: &[u8], number: usize) -> Result<(), FormatError> {
+        let mut words = words(line);
+        match words.next() {
+            Some(b"v") => self.vertex(&numbers(words, number, 3)?),
+            Some(b"vt") => {
+                let uv = numbers(words, number, 1)?;
+                self.uvs.push(Vec2::new(uv[0], uv.get(1).copied().unwrap_or(0.0)));
+            }
+            Some(b"vn") => self.normals.push(Vec3::from_slice(&numbers(words, number, 3)?)),
+            Some(b"f") => self.face(words, number)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Position, and a colour where three more numbers follow (a fourth alone, or before the colour, is a weight).
+    fn vertex(&mut self, numbers: &[f32]) {
+        self.positions.push(Vec3::from_slice(numbers));
+        match numbers {
+            [_, _, _, r, g, b] | [_, _, _, _, r, g, b] => self.colors.push(Vec3::new(*r, *g, *b)),
+            _ => {}
+        }
+    }
+
+    fn face<'a>(&mut self, words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<(), FormatError> {
+        let corners = words.map(|word| self.corner(word, line)).collect::<Result<Vec<_>, _>>()?;
+        let [first, rest @ ..] = corners.as_slice() else { return Err(face_size(line, 0)) };
+        if rest.len() < 2 {
+            return Err(face_size(line, corners.len()));
+        }
+        self.corners.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+        Ok(())
+    }
+
+    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`.
+    fn corner(&self, word: &[u8], line: usize) -> Result<Corner, FormatError> {
+        let mut parts = word.split(|&b| b == b'/');
+        let mut part = |table: &str, count: usize| match parts.next() {
+            None | Some(b"") => Ok(None),
+            Some(digits) => index(digits, table, count, line).map(Some),
+        };
+        let position = part("v", self.positions.len())?;
+        let uv = part("vt", self.uvs.len())?;
+        let normal = part("vn", self.normals.len())?;
+        let problem =
+            || FormatError::invalid(FORMAT, format!("line {line}"), "a corner of a face names no vertex");
+        Ok(Corner { position: position.ok_or_else(problem)?, uv, normal })
+    }
+
+    fn finish(self) -> Result<TriangleMesh, FormatError> {
+        let triangles: Vec<[u32; 3]> = self.corners.iter().map(|c| c.map(|corner| corner.position)).collect();
+        let corner_uvs = self.per_corner(|corner| corner.uv.map(|i| self.uvs[i as usize]));
+        let corner_normals = self.per_corner(|corner| corner.normal.map(|i| self.normals[i as usize]));
+        let normals = corner_normals.map(|normals| {
+            let mut sums = vec![Vec3::ZERO; self.positions.len()];
+            let corners = triangles.as_flattened().iter().zip(normals.as_flattened());
+            corners.for_each(|(&v, n)| sums[v as usize] += n.normalize_or_zero());
+            sums.into_iter().map(|n| n.normalize_or_zero()).collect()
+        });
+        let colors = (self.colors.len() == self.positions.len()).then_some(self.colors);
+        Ok(TriangleMesh { positions: self.positions, triangles, normals, uvs: None, corner_uvs, colors })
+    }
+
+    /// What `read` finds, if it finds it at every corner.
+    fn per_corner<T>(&self, read: impl Fn(&Corner) -> Option<T>) -> Option<Vec<[T; 3]>> {
+        self.corners.iter().map(|[a, b, c]| Some([read(a)?, read(b)?, read(c)?])).collect()
+    }
+}
+
+fn face_size(line: usize, corners: usize) -> FormatError {
+    let problem = format!("a face has {corners} corners; three or more are accepted");
+    FormatError::invalid(FORMAT, format!("line {line}"), problem)
+}
+
+/// An index from 0, out of one that counts from 1, or from −1 backwards.
+fn index(digits: &[u8], table: &str, count: usize, line: usize) -> Result<u32, FormatError> {
+    let number = std::str::from_utf8(digits).ok().and_then(|text| text.parse::<i64>().ok());
+    let resolved = number.and_then(|n| if n < 0 { n.checked_add(count as i64) } else { n.checked_sub(1) });
+    resolved.and_then(|i| u32::try_from(i).ok()).filter(|&i| (i as usize) < count).ok_or_else(|| {
+        let found = String::from_utf8_lossy(&digits[..digits.len().min(20)]).into_owned();
+        let problem =
+            format!("a face names {table} {found}; 1 to {count} (or −1 to −{count}) are there so far");
+        FormatError::invalid(FORMAT, format!("line {line}"), problem)
+    })
+}
+
+fn numbers<'a>(
+    words: impl Iterator<Item = &'a [u8]>,
+    line: usize,
+    least: usize,
+) -> Result<Vec<f32>, FormatError> {
+    let number = |word: &[u8]| std::str::from_utf8(word).ok()?.parse::<f32>().ok();
+    let found: Option<Vec<f32>> = words.take_while(|word| !word.starts_with(b"#")).map(number).collect();
+    found.filter(|numbers| numbers.len() >= least).ok_or_else(|| {
+        FormatError::invalid(FORMAT, format!("line {line}"), format!("{least} or more numbers are accepted"))
+    })
+}
+
+/// Text; numbers in the shortest form that reads back the same.
+pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
+    let mut text = String::from("# vertices and faces\n");
+    for (i, p) in mesh.positions.iter().enumerate() {
+        line(&mut text, "v", &[p.x, p.y, p.z]);
+        if let Some(c) = mesh.colors.as_ref().map(|colors| colors[i]) {
+            text.pop();
+            line(&mut text, "", &[c.x, c.y, c.z]);
+        }
+    }
+    let uvs = mesh.corner_uvs.as_ref().map(|corners| corners.as_flattened()).or(mesh.uvs.as_deref());
+    uvs.into_iter().flatten().for_each(|uv| line(&mut text, "vt", &[uv.x, uv.y]));
+    mesh.normals.iter().flatten().for_each(|n| line(&mut text, "vn", &[n.x, n.y, n.z]));
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        text.push('f');
+        (0..3).for_each(|k| face_corner(&mut text, mesh, 3 * t + k, triangle[k]));
+        text.push('\n');
+    }
+    text.into_bytes()
+}
+
+fn line(text: &mut String, keyword: &str, numbers: &[f32]) {
+    text.push_str(keyword);
+    for x in numbers {
+        // Writing to a string cannot fail.
+        let _ = write!(text, " {x:?}");
+    }
+    text.push('\n');
+}
+
+fn face_corner(text: &mut String, mesh: &TriangleMesh, corner: usize, vertex: u32) {
+    let v = vertex as usize + 1;
+    let vt = if mesh.corner_uvs.is_some() { Some(corner + 1) } else { mesh.uvs.as_ref().map(|_| v) };
+    let _ = match (vt, &mesh.normals) {
+        (None, None) => write!(text, " {v}"),
+        (Some(vt), None) => write!(text, " {v}/{vt}"),
+        (None, Some(_)) => write!(text, " {v}//{v}"),
+        (Some(vt), Some(_)) => write!(text, " {v}/{vt}/{v}"),
+    };
+}

@@ -1,0 +1,442 @@
+//! PLY: text and binary of both byte orders; elements and properties beyond those of a mesh are passed over.
+
+use super::FormatError;
+use super::mesh_file::{color_bytes, push_floats};
+use crate::math::{Vec2, Vec3};
+use crate::mesh::TriangleMesh;
+
+const FORMAT: &str = "PLY";
+
+pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
+    let (header, body) = Header::parse(bytes)?;
+    let mut body = Body { encoding: header.encoding, bytes: body };
+    let mut reader = Reader::default();
+    for element in &header.elements {
+        element.check_size(&body)?;
+        match element.name.as_str() {
+            "vertex" => reader.vertices(element, &mut body)?,
+            "face" => reader.faces(element, &mut body)?,
+            _ => pass_over(element, &mut body)?,
+        }
+    }
+    reader.finish()
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Encoding {
+    Text,
+    LittleEndian,
+    BigEndian,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Kind {
+    fn parse(name: &str) -> Result<Self, FormatError> {
+        Ok(match name {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => {
+                let accepted = "char, uchar, short, ushort, int, uint, float, double";
+                return Err(FormatError::unsupported(FORMAT, "property type", clipped(name), accepted));
+            }
+        })
+    }
+
+    fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    /// The value that stands for a full colour channel.
+    fn full(self) -> f64 {
+        match self {
+            Self::U8 => 255.0,
+            Self::U16 => 65535.0,
+            _ => 1.0,
+        }
+    }
+
+    /// From little-endian bytes, of its size.
+    fn decode(self, b: [u8; 8]) -> f64 {
+        let [b0, b1, b2, b3, ..] = b;
+        match self {
+            Self::I8 => f64::from(b0 as i8),
+            Self::U8 => f64::from(b0),
+            Self::I16 => f64::from(i16::from_le_bytes([b0, b1])),
+            Self::U16 => f64::from(u16::from_le_bytes([b0, b1])),
+            Self::I32 => f64::from(i32::from_le_bytes([b0, b1, b2, b3])),
+            Self::U32 => f64::from(u32::from_le_bytes([b0, b1, b2, b3])),
+            Self::F32 => f64::from(f32::from_le_bytes([b0, b1, b2, b3])),
+            Self::F64 => f64::from_le_bytes(b),
+        }
+    }
+}
+
+struct Property {
+    name: String,
+    kind: Kind,
+    /// The type of a list's length; `None` for a single value.
+    length: Option<Kind>,
+}
+
+struct Element {
+    name: String,
+    count: usize,
+    properties: Vec<Property>,
+}
+
+impl Element {
+    /// Refuses a count that the rest of the file cannot hold, before anything is made ready for it.
+    fn check_size(&self, body: &Body) -> Result<(), FormatError> {
+        let smallest = |p: &Property| {
+            if body.encoding == Encoding::Text { 1 } else { p.length.unwrap_or(p.kind).size() }
+        };
+        let record: usize = self.properties.iter().map(smallest).sum();
+        let needed = (record as u64).saturating_mul(self.count as u64);
+        let found = body.bytes.len() as u64;
+        if needed <= found {
+            return Ok(());
+        }
+        Err(FormatError::Truncated { format: FORMAT, field: format!("element {}", self.name), needed, found })
+    }
+
+    fn index_of(&self, names: &[&str]) -> Option<usize> {
+        self.properties.iter().position(|p| names.contains(&p.name.as_str()))
+    }
+
+    /// Where the first set of names that are all there stands among the properties.
+    fn indices_of<const N: usize>(&self, sets: &[[&str; N]]) -> Option<[usize; N]> {
+        sets.iter().find_map(|names| {
+            let found: Vec<usize> = names.iter().filter_map(|name| self.index_of(&[name])).collect();
+            found.try_into().ok()
+        })
+    }
+}
+
+struct Header {
+    encoding: Encoding,
+    elements: Vec<Element>,
+}
+
+impl Header {
+    fn parse(bytes: &[u8]) -> Result<(Self, &[u8]), FormatError> {
+        let mut rest = bytes;
+        let (mut encoding, mut elements) = (None, Vec::new());
+        loop {
+            let line = take_line(&mut rest)?;
+            let words: Vec<&str> = line.split_ascii_whitespace().collect();
+            match words.as_slice() {
+                ["end_header"] => break,
+                ["format", name, version] => encoding = Some(parse_encoding(name, version)?),
+                ["element", name, count] => elements.push(parse_element(name, count)?),
+                ["property", property @ ..] => {
+                    let element: Option<&mut Element> = elements.last_mut();
+                    let missing = || FormatError::invalid(FORMAT, "property", "comes before any element");
+                    element.ok_or_else(missing)?.properties.push(parse_property(property)?);
+                }
+                [] | ["ply"] | ["comment" | "obj_info", ..] => {}
+                _ => {
+                    return Err(FormatError::invalid(
+                        FORMAT,
+                        "header",
+                        format!("\"{}\" is no line of it", clipped(line)),
+                    ));
+                }
+            }
+        }
+        let encoding = encoding.ok_or_else(|| FormatError::invalid(FORMAT, "format", "is missing"))?;
+        Ok((Self { encoding, elements }, rest))
+    }
+}
+
+/// A line of the header, without its end.
+fn take_line<'a>(rest: &mut &'a [u8]) -> Result<&'a str, FormatError> {
+    let invalid = |problem| FormatError::invalid(FORMAT, "header", problem);
+    let end =
+        rest.iter().position(|&b| b == b'\n' || b == b'\r').ok_or_else(|| invalid("has no end_header"))?;
+    let (line, after) = rest.split_at(end);
+    let ended = if after.starts_with(b"\r\n") { 2 } else { 1 };
+    *rest = &after[ended..];
+    // Comments may be in any encoding.
+    if line.starts_with(b"comment") || line.starts_with(b"obj_info") {
+        return Ok("comment");
+    }
+    std::str::from_utf8(line).map_err(|_| invalid("is not text"))
+}
+
+fn parse_encoding(name: &str, version: &str) -> Result<Encoding, FormatError> {
+    let encoding = match name {
+        "ascii" => Some(Encoding::Text),
+        "binary_little_endian" => Some(Encoding::LittleEndian),
+        "binary_big_endian" => Some(Encoding::BigEndian),
+        _ => None,
+    };
+    encoding.filter(|_| version == "1.0").ok_or_else(|| {
+        let accepted = "ascii, binary_little_endian and binary_big_endian, all 1.0";
+        FormatError::unsupported(FORMAT, "format", clipped(&format!("{name} {version}")), accepted)
+    })
+}
+
+fn parse_element(name: &str, count: &str) -> Result<Element, FormatError> {
+    // Indices have 32 bits.
+    let parsed = count.parse::<u32>().map_err(|_| {
+        FormatError::invalid(
+            FORMAT,
+            format!("element {}", clipped(name)),
+            format!("count {}; 0 to {} are accepted", clipped(count), u32::MAX),
+        )
+    })?;
+    Ok(Element { name: name.into(), count: parsed as usize, properties: Vec::new() })
+}
+
+fn parse_property(words: &[&str]) -> Result<Property, FormatError> {
+    match words {
+        ["list", length, kind, name] => {
+            let length = Kind::parse(length)?;
+            if matches!(length, Kind::F32 | Kind::F64) {
+                return Err(FormatError::invalid(
+                    FORMAT,
+                    format!("property {}", clipped(name)),
+                    "a list's length is an integer",
+                ));
+            }
+            Ok(Property { name: (*name).into(), kind: Kind::parse(kind)?, length: Some(length) })
+        }
+        [kind, name] => Ok(Property { name: (*name).into(), kind: Kind::parse(kind)?, length: None }),
+        _ => Err(FormatError::invalid(
+            FORMAT,
+            "property",
+            format!("\"{}\" is no type and name", clipped(&words.join(" "))),
+        )),
+    }
+}
+
+/// Short enough for a message.
+fn clipped(text: &str) -> String {
+    text.chars().take(60).collect()
+}
+
+struct Body<'a> {
+    encoding: Encoding,
+    bytes: &'a [u8],
+}
+
+impl Body<'_> {
+    fn number(&mut self, kind: Kind, field: &str) -> Result<f64, FormatError> {
+        if self.encoding == Encoding::Text {
+            return self.text_number(field);
+        }
+        let size = kind.size();
+        let Some((head, rest)) = self.bytes.split_at_checked(size) else {
+            return Err(FormatError::truncated(FORMAT, field, size, self.bytes.len()));
+        };
+        self.bytes = rest;
+        let mut buffer = [0; 8];
+        buffer[..size].copy_from_slice(head);
+        if self.encoding == Encoding::BigEndian {
+            buffer[..size].reverse();
+        }
+        Ok(kind.decode(buffer))
+    }
+
+    fn text_number(&mut self, field: &str) -> Result<f64, FormatError> {
+        let text = self.bytes.trim_ascii_start();
+        let end = text.iter().position(u8::is_ascii_whitespace).unwrap_or(text.len());
+        let (word, rest) = text.split_at(end);
+        self.bytes = rest;
+        if word.is_empty() {
+            return Err(FormatError::truncated(FORMAT, field, 1, 0));
+        }
+        std::str::from_utf8(word).ok().and_then(|word| word.parse().ok()).ok_or_else(|| {
+            let found = clipped(&String::from_utf8_lossy(word));
+            FormatError::invalid(FORMAT, field, format!("\"{found}\" is no number"))
+        })
+    }
+
+    /// All values of the property, into `values`.
+    fn property(&mut self, property: &Property, values: &mut Vec<f64>) -> Result<(), FormatError> {
+        values.clear();
+        let Some(length) = property.length else {
+            values.push(self.number(property.kind, &property.name)?);
+            return Ok(());
+        };
+        let count = self.number(length, &property.name)?;
+        // Each takes a byte at least, so this bounds the memory.
+        if !(0.0..=self.bytes.len() as f64).contains(&count) {
+            let problem = format!("a list of {count} values; {} bytes are left", self.bytes.len());
+            return Err(FormatError::invalid(FORMAT, property.name.as_str(), problem));
+        }
+        for _ in 0..count as usize {
+            values.push(self.number(property.kind, &property.name)?);
+        }
+        Ok(())
+    }
+}
+
+fn pass_over(element: &Element, body: &mut Body) -> Result<(), FormatError> {
+    let mut values = Vec::new();
+    // Without properties there is nothing to read, however often.
+    let count = if element.properties.is_empty() { 0 } else { element.count };
+    for _ in 0..count {
+        element.properties.iter().try_for_each(|property| body.property(property, &mut values))?;
+    }
+    Ok(())
+}
+
+#[derive(Default)]
+struct Reader {
+    mesh: TriangleMesh,
+    corner_uvs: Vec<[Vec2; 3]>,
+}
+
+impl Reader {
+    fn vertices(&mut self, element: &Element, body: &mut Body) -> Result<(), FormatError> {
+        let Some(position) = element.indices_of(&[["x", "y", "z"]]) else {
+            return Err(FormatError::invalid(FORMAT, "element vertex", "has no properties x, y and z"));
+        };
+        let normal = element.indices_of(&[["nx", "ny", "nz"]]);
+        let uv = element.indices_of(&[["s", "t"], ["u", "v"], ["texture_u", "texture_v"]]);
+        let color = element.indices_of(&[["red", "green", "blue"], ["r", "g", "b"]]);
+        let (mut record, mut values) = (vec![0.0; element.properties.len()], Vec::new());
+        for _ in 0..element.count {
+            for (slot, property) in record.iter_mut().zip(&element.properties) {
+                body.property(property, &mut values)?;
+                *slot = values.first().copied().unwrap_or(0.0);
+            }
+            let vector = |at: [usize; 3]| Vec3::from_array(at.map(|i| record[i] as f32));
+            self.mesh.positions.push(vector(position));
+            if let Some(at) = normal {
+                self.mesh.normals.get_or_insert_default().push(vector(at));
+            }
+            if let Some(at) = uv {
+                let uv = Vec2::from_array(at.map(|i| record[i] as f32));
+                self.mesh.uvs.get_or_insert_default().push(uv);
+            }
+            if let Some(at) = color {
+                let channel = |i: usize| (record[i] / element.properties[i].kind.full()) as f32;
+                self.mesh.colors.get_or_insert_default().push(Vec3::from_array(at.map(channel)));
+            }
+        }
+        Ok(())
+    }
+
+    fn faces(&mut self, element: &Element, body: &mut Body) -> Result<(), FormatError> {
+        let Some(indices_at) = element.index_of(&["vertex_indices", "vertex_index"]) else {
+            return Err(FormatError::invalid(FORMAT, "element face", "has no property vertex_indices"));
+        };
+        let uvs_at = element.index_of(&["texcoord"]);
+        let (mut indices, mut uvs, mut other) = (Vec::new(), Vec::new(), Vec::new());
+        for face in 0..element.count {
+            for (i, property) in element.properties.iter().enumerate() {
+                let target = match i {
+                    _ if i == indices_at => &mut indices,
+                    _ if Some(i) == uvs_at => &mut uvs,
+                    _ => &mut other,
+                };
+                body.property(property, target)?;
+            }
+            self.fan(&indices, &uvs, face)?;
+        }
+        Ok(())
+    }
+
+    fn fan(&mut self, indices: &[f64], uvs: &[f64], face: usize) -> Result<(), FormatError> {
+        let invalid = |problem| Err(FormatError::invalid(FORMAT, format!("face {face}"), problem));
+        let limit = self.mesh.positions.len() as f64;
+        if let Some(bad) = indices.iter().find(|&&i| !(i >= 0.0 && i < limit && i.fract() == 0.0)) {
+            return invalid(format!(
+                "names vertex {bad}; whole numbers from 0 to below {limit} are accepted"
+            ));
+        }
+        if indices.len() < 3 {
+            return invalid(format!("has {} corners; three or more are accepted", indices.len()));
+        }
+        for k in 1..indices.len() - 1 {
+            self.mesh.triangles.push([0, k, k + 1].map(|i| indices[i] as u32));
+            if uvs.len() == 2 * indices.len() {
+                let uv = |i: usize| Vec2::new(uvs[2 * i] as f32, uvs[2 * i + 1] as f32);
+                self.corner_uvs.push([0, k, k + 1].map(uv));
+            }
+        }
+        Ok(())
+    }
+
+    /// Texture coordinates per corner count where every face has them.
+    fn finish(mut self) -> Result<TriangleMesh, FormatError> {
+        let per_corner = !self.corner_uvs.is_empty() && self.corner_uvs.len() == self.mesh.triangles.len();
+        self.mesh.corner_uvs = per_corner.then_some(self.corner_uvs);
+        Ok(self.mesh)
+    }
+}
+
+/// Binary little-endian; colours in 8 bits.
+pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
+    let mut out = header(mesh).into_bytes();
+    for (i, p) in mesh.positions.iter().enumerate() {
+        push_floats(&mut out, &p.to_array());
+        if let Some(normals) = &mesh.normals {
+            push_floats(&mut out, &normals[i].to_array());
+        }
+        if let Some(uvs) = &mesh.uvs {
+            push_floats(&mut out, &uvs[i].to_array());
+        }
+        if let Some(colors) = &mesh.colors {
+            out.extend(color_bytes(colors[i]));
+        }
+    }
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        out.push(3);
+        triangle.iter().for_each(|v| out.extend(v.to_le_bytes()));
+        if let Some(uvs) = &mesh.corner_uvs {
+            out.push(6);
+            uvs[t].iter().for_each(|uv| push_floats(&mut out, &uv.to_array()));
+        }
+    }
+    out
+}
+
+fn header(mesh: &TriangleMesh) -> String {
+    let mut lines = vec!["ply".into(), "format binary_little_endian 1.0".into()];
+    let properties = |lines: &mut Vec<String>, kind: &str, names: &[&str]| {
+        lines.extend(names.iter().map(|name| format!("property {kind} {name}")));
+    };
+    lines.push(format!("element vertex {}", mesh.positions.len()));
+    properties(&mut lines, "float", &["x", "y", "z"]);
+    if mesh.normals.is_some() {
+        properties(&mut lines, "float", &["nx", "ny", "nz"]);
+    }
+    if mesh.uvs.is_some() {
+        properties(&mut lines, "float", &["s", "t"]);
+    }
+    if mesh.colors.is_some() {
+        properties(&mut lines, "uchar", &["red", "green", "blue"]);
+    }
+    lines.push(format!("element face {}", mesh.triangles.len()));
+    properties(&mut lines, "list uchar int", &["vertex_indices"]);
+    if mesh.corner_uvs.is_some() {
+        properties(&mut lines, "list uchar float", &["texcoord"]);
+    }
+    lines.push("end_header\n".into());
+    lines.join("\n")
+}

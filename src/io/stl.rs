@@ -1,0 +1,105 @@
+//! STL, binary and text: a list of triangles, each with corners of its own.
+
+use super::FormatError;
+use super::mesh_file::{is_text, push_floats};
+use crate::math::{Vec3, triangle};
+use crate::mesh::TriangleMesh;
+
+const FORMAT: &str = "STL";
+
+/// Bytes before the triangles of a binary file.
+pub(super) const HEADER: usize = 84;
+
+/// Bytes of a triangle: normal, three corners, two unused.
+const RECORD: usize = 50;
+
+/// Whether the number of triangles explains the length; no other mark tells a binary file.
+pub(super) fn is_binary(bytes: &[u8]) -> bool {
+    triangle_count(bytes).is_some_and(|count| HEADER as u64 + count * RECORD as u64 == bytes.len() as u64)
+}
+
+fn triangle_count(bytes: &[u8]) -> Option<u64> {
+    let count = bytes.get(80..HEADER)?;
+    Some(u64::from(u32::from_le_bytes(count.try_into().ok()?)))
+}
+
+/// Why bytes that can be nothing else are no binary file either.
+pub(super) fn wrong_length(bytes: &[u8]) -> FormatError {
+    let needed = triangle_count(bytes).map_or(0, |count| HEADER as u64 + count * RECORD as u64);
+    let found = bytes.len() as u64;
+    if needed > found {
+        return FormatError::Truncated { format: FORMAT, field: "triangles".into(), needed, found };
+    }
+    let problem =
+        format!("stands for {needed} bytes, the file has {found} (and no other mesh format's mark)");
+    FormatError::invalid(FORMAT, "triangle count", problem)
+}
+
+pub(super) fn parse_binary(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
+    let records = bytes.get(HEADER..).ok_or_else(|| wrong_length(bytes))?;
+    Ok(from_corners(
+        records.chunks_exact(RECORD).flat_map(|r| [12, 24, 36].map(|at| point(&r[at..at + 12]))).collect(),
+    ))
+}
+
+fn point(bytes: &[u8]) -> Vec3 {
+    let number = |k: usize| f32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[4 * k + i]));
+    Vec3::new(number(0), number(1), number(2))
+}
+
+fn from_corners(positions: Vec<Vec3>) -> TriangleMesh {
+    let triangles = (0..positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    TriangleMesh { positions, triangles, ..Default::default() }
+}
+
+/// Whether the bytes start as a text file does: `solid`, and not as a sentence of something else.
+pub(super) fn is_text_stl(bytes: &[u8]) -> bool {
+    let bytes = bytes.trim_ascii_start();
+    let starts = bytes.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    starts && bytes.get(5).is_none_or(u8::is_ascii_whitespace) && is_text(bytes)
+}
+
+pub(super) fn parse_text(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
+    let mut corners = Vec::new();
+    let mut ended = false;
+    for (number, line) in (1..).zip(bytes.split(|&b| b == b'\n' || b == b'\r')) {
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let Some(keyword) = words.next() else { continue };
+        if keyword.eq_ignore_ascii_case(b"vertex") {
+            corners.push(text_point(words, number)?);
+        } else if keyword.eq_ignore_ascii_case(b"endloop") && corners.len() % 3 != 0 {
+            let problem = "closes a facet without three vertices; three are accepted";
+            return Err(FormatError::invalid(FORMAT, format!("line {number}"), problem));
+        }
+        ended |= keyword.eq_ignore_ascii_case(b"endsolid");
+    }
+    if !ended || corners.len() % 3 != 0 {
+        return Err(FormatError::invalid(FORMAT, "endsolid", "is missing: the file ends too early"));
+    }
+    Ok(from_corners(corners))
+}
+
+fn text_point<'a>(words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<Vec3, FormatError> {
+    let mut numbers = words.map(|word| std::str::from_utf8(word).ok()?.parse::<f32>().ok());
+    let mut next = || numbers.next().flatten();
+    match (next(), next(), next()) {
+        (Some(x), Some(y), Some(z)) => Ok(Vec3::new(x, y, z)),
+        _ => Err(FormatError::invalid(FORMAT, format!("line {line}"), "a vertex has three numbers")),
+    }
+}
+
+/// A binary file.
+pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
+    let mut out = Vec::with_capacity(HEADER + RECORD * mesh.triangles.len());
+    // Not "solid", which would pass for text.
+    out.extend(b"binary STL");
+    out.resize(80, b' ');
+    out.extend((mesh.triangles.len() as u32).to_le_bytes());
+    for corners in mesh.corners() {
+        let normal = triangle::area_vector(corners).normalize_or_zero().as_vec3();
+        push_floats(&mut out, &normal.to_array());
+        corners.iter().for_each(|p| push_floats(&mut out, &p.to_array()));
+        out.extend([0, 0]);
+    }
+    out
+}

@@ -1,0 +1,99 @@
+//! VTP, VTK's XML poly data, written with its arrays inline as base64.
+
+use super::mesh_file::{color_bytes, push_floats};
+use crate::math::Vec3;
+use crate::mesh::TriangleMesh;
+
+/// Points and triangles; normals, texture coordinates and colours as point data.
+pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
+    let split;
+    let mesh = if mesh.corner_uvs.is_some() {
+        split = mesh.split_at_seams();
+        &split
+    } else {
+        mesh
+    };
+    let mut xml = String::from("<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" ");
+    xml += "byte_order=\"LittleEndian\" header_type=\"UInt32\">\n<PolyData>\n";
+    xml += &format!(
+        "<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"{}\">\n",
+        mesh.positions.len(),
+        mesh.triangles.len()
+    );
+    xml += &point_data(mesh);
+    xml += &format!("<Points>\n{}</Points>\n", vectors("Points", &mesh.positions));
+    let offsets = (1..=mesh.triangles.len() as u32).flat_map(|t| (3 * t).to_le_bytes()).collect();
+    let connectivity = mesh.triangles.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
+    xml += "<Polys>\n";
+    xml += &data_array("Int32", "connectivity", 1, connectivity);
+    xml += &data_array("Int32", "offsets", 1, offsets);
+    xml += "</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n";
+    xml.into_bytes()
+}
+
+fn point_data(mesh: &TriangleMesh) -> String {
+    let mut active = String::new();
+    let mut arrays = String::new();
+    if let Some(normals) = &mesh.normals {
+        active += " Normals=\"Normals\"";
+        arrays += &vectors("Normals", normals);
+    }
+    if let Some(uvs) = &mesh.uvs {
+        active += " TCoords=\"TCoords\"";
+        let mut bytes = Vec::with_capacity(8 * uvs.len());
+        uvs.iter().for_each(|uv| push_floats(&mut bytes, &uv.to_array()));
+        arrays += &data_array("Float32", "TCoords", 2, bytes);
+    }
+    if let Some(colors) = &mesh.colors {
+        active += " Scalars=\"Colors\"";
+        arrays += &data_array("UInt8", "Colors", 3, colors.iter().copied().flat_map(color_bytes).collect());
+    }
+    format!("<PointData{active}>\n{arrays}</PointData>\n")
+}
+
+fn vectors(name: &str, values: &[Vec3]) -> String {
+    let mut bytes = Vec::with_capacity(12 * values.len());
+    values.iter().for_each(|v| push_floats(&mut bytes, &v.to_array()));
+    data_array("Float32", name, 3, bytes)
+}
+
+/// The length of the array stands before it, inside the base64.
+fn data_array(kind: &str, name: &str, components: usize, bytes: Vec<u8>) -> String {
+    let mut block = (bytes.len() as u32).to_le_bytes().to_vec();
+    block.extend(bytes);
+    format!(
+        "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"binary\">\n{}\n</DataArray>\n",
+        base64(&block)
+    )
+}
+
+fn base64(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for chunk in bytes.chunks(3) {
+        let at = |i: usize| u32::from(chunk.get(i).copied().unwrap_or(0));
+        let word = at(0) << 16 | at(1) << 8 | at(2);
+        for digit in 0..4 {
+            let shown = digit <= chunk.len();
+            text.push(if shown { char::from(DIGITS[(word >> (18 - 6 * digit) & 63) as usize]) } else { '=' });
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::base64;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn base64_of_every_remainder() {
+        // The examples of RFC 4648, section 10.
+        for (plain, coded) in
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")]
+        {
+            assert_eq!(base64(plain.as_bytes()), coded);
+        }
+    }
+}

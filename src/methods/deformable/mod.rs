@@ -1,0 +1,419 @@
+//! Deformable model with automatic topology changes, coarse to fine.
+//!
+//! Lachaud & Montanvert, *Deformable meshes with automated topology changes for coarse-to-fine 3D surface extraction*.
+//! A closed mesh moves under internal forces and forces of the image (`forces`, `motion`; sections 3.5–3.8). After each
+//! move its edges are kept within bounds derived from δ, parts that meet are joined and necks cut (the `remesh` layer;
+//! sections 3.2–3.3). It first comes to rest on a coarse level of an image pyramid (`image`; section 4), then is
+//! refined by √3 and goes on one level down (`schedule`; section 5.1).
+//!
+//! # What it guarantees
+//! After every step the mesh is closed, oriented and 2-manifold, and χ is what the edits predict. The same input gives
+//! the same bits, natively and in wasm, also after [`DeformableModel::save`] and [`DeformableModel::restore`].
+//!
+//! # What it does not
+//! The distance bounds of the paper keep the surface from crossing itself nearly always, not always: in hard scenes a
+//! few pairs of triangles cross for some iterations.
+//!
+//! # Example
+//! ```
+//! use vesicle::math::{DAffine3, DVec3};
+//! use vesicle::methods::deformable::{DeformableModel, DeformableOptions};
+//! use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let ball = |i: usize| {
+//!     let p = DVec3::new((i % 32) as f64, (i / 32 % 32) as f64, (i / 1024) as f64) - 15.5;
+//!     (100.0 - 8.0 * (p.length() - 8.0)).clamp(0.0, 200.0) as f32
+//! };
+//! let volume = Volume::new(VolumeInit {
+//!     voxels: Voxels::F32((0..32 * 32 * 32).map(ball).collect()),
+//!     dims: [32, 32, 32, 1],
+//!     affine: DAffine3::IDENTITY,
+//!     slope: 1.0,
+//!     intercept: 0.0,
+//!     frame_seconds: 0.0,
+//!     space: Space::Ras,
+//! })?;
+//! let mut model = DeformableModel::new(&volume, DeformableOptions { levels: 1, ..Default::default() })?;
+//! while !model.step()?.done {}
+//! assert_eq!(model.mesh().euler(), 2);
+//! # Ok(())
+//! # }
+//! ```
+
+mod forces;
+mod image;
+mod motion;
+mod params;
+mod schedule;
+mod start;
+mod state;
+
+pub use params::{DeformableParams, Integrator, RestLength, Topology, param_specs};
+pub use start::Start;
+
+use super::{MethodError, StepReport, Times};
+use crate::math::{DAffine3, DVec3};
+use crate::mesh::{Mesh, ScalarKey, TriangleMesh, VectorKey, VertexId};
+use crate::remesh::{Changes, Resolver, Sampling};
+use crate::volume::Volume;
+use forces::{ForceScale, Forces, Pull};
+use image::Pyramid;
+use motion::{Movement, World, advance};
+use schedule::Rest;
+use start::Frame;
+
+/// How a [`DeformableModel`] is set up.
+#[derive(Clone, Debug)]
+pub struct DeformableOptions {
+    /// The frame of a 4D volume.
+    pub frame: usize,
+    /// What to start from.
+    pub start: Start,
+    /// Pyramid levels above the volume itself; 0 is direct.
+    pub levels: usize,
+    /// Mean edge at the finest level in world units; else from the voxel size.
+    pub edge: Option<f64>,
+    /// Parameters; else [`DeformableParams::for_volume`].
+    pub params: Option<DeformableParams>,
+}
+
+impl Default for DeformableOptions {
+    fn default() -> Self {
+        Self { frame: 0, start: Start::Enclosing, levels: 0, edge: None, params: None }
+    }
+}
+
+/// An attachment point that pulls the surface within `radius`.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Attractor {
+    /// Where, in world space.
+    pub point: DVec3,
+    /// Spring constant; negative pushes away.
+    pub strength: f64,
+    /// Beyond this distance in world units nothing is felt.
+    pub radius: f64,
+}
+
+/// Mean edge of a resolved mesh in δ, measured on converged spheres and skulls.
+const MEAN_EDGE: f64 = 1.55;
+
+/// δ at the finest level in voxels, where no edge is asked for: inside 0.693 ≤ δ/U ≤ 1 (14), near its upper end,
+/// because vertices grow as 1/δ².
+const DEFAULT_DELTA: f64 = 0.9;
+
+/// δ in voxels that is accepted: below, a mesh of the whole image no longer fits memory; above, it misses it.
+const DELTA_RANGE: [f64; 2] = [0.2, 20.0];
+
+/// A vertex is looked at again when it has gone this far since the last time, in δ…
+const CHECK_TRAVEL: f32 = 0.1;
+
+/// …or after so many iterations. Rules by momentary speed miss slow vertices that go far.
+const CHECK_PERIOD: f32 = 50.0;
+
+/// Slots in use below which the mesh is put in order again.
+const LEAST_OCCUPANCY: f32 = 0.7;
+
+/// The per-vertex attributes of the model.
+#[derive(Clone, Copy, Debug)]
+struct Keys {
+    velocity: VectorKey,
+    /// Where the vertex was when its bounds were last looked at.
+    checked: VectorKey,
+    /// Iterations since then.
+    age: ScalarKey,
+    /// Iterations since an edit made or displaced the vertex.
+    calm: ScalarKey,
+}
+
+/// The deformable model.
+#[derive(Clone, Debug)]
+pub struct DeformableModel {
+    pyramid: Pyramid,
+    to_world: DAffine3,
+    voxel: f64,
+    fingerprint: u64,
+    params: DeformableParams,
+    attractors: Vec<Attractor>,
+    finest_delta: f64,
+    level: usize,
+    mesh: Mesh,
+    keys: Keys,
+    resolver: Resolver,
+    forces: Forces,
+    iteration: u32,
+    rest: Rest,
+    movement: Movement,
+    components: u32,
+    clock: fn() -> f64,
+}
+
+impl DeformableModel {
+    /// A model of one frame of `volume`, before its first step.
+    ///
+    /// # Errors
+    /// [`MethodError`] naming the option or parameter that cannot be used, and what is accepted.
+    pub fn new(volume: &Volume, options: DeformableOptions) -> Result<Self, MethodError> {
+        let params = options.params.unwrap_or_else(|| DeformableParams::for_volume(volume));
+        params.validate()?;
+        let voxel = libm::cbrt(volume.affine().matrix3.determinant().abs());
+        let finest_delta = finest_delta(options.edge, voxel)?;
+        let pyramid = Pyramid::new(volume, options.frame, options.levels)?;
+        let delta = delta_at(finest_delta, options.levels);
+        let frame = Frame {
+            image: &pyramid.levels[options.levels],
+            dims: volume.dims(),
+            from_world: volume.inverse_affine(),
+            voxel,
+            sampling: Sampling::new(delta),
+        };
+        let mut mesh = options.start.make(&frame, |value| pyramid.normalised(value))?;
+        let keys = Keys {
+            velocity: mesh.add_vector(),
+            checked: mesh.add_vector(),
+            age: mesh.add_scalar(),
+            calm: mesh.add_scalar(),
+        };
+        let mut model = Self {
+            to_world: volume.affine(),
+            fingerprint: state::fingerprint(volume, options.frame, options.levels),
+            pyramid,
+            voxel,
+            params,
+            attractors: Vec::new(),
+            finest_delta,
+            level: options.levels,
+            mesh,
+            keys,
+            resolver: Resolver::default(),
+            forces: Forces::default(),
+            iteration: 0,
+            rest: Rest::default(),
+            movement: Movement::default(),
+            components: 0,
+            clock: || 0.0,
+        };
+        model.settle_in();
+        model.prepare_gradient()?;
+        Ok(model)
+    }
+
+    /// One iteration of figure 9, and the way one level down where the surface has come to rest.
+    ///
+    /// After the end the model stays as it is and reports `done`.
+    ///
+    /// # Errors
+    /// [`MethodError::Mesh`] where refinement would need more memory than there is; the model is then as it was.
+    pub fn step(&mut self) -> Result<StepReport, MethodError> {
+        let mut times = Times::default();
+        let mut changes = Changes::default();
+        if !self.is_done() {
+            self.move_vertices(&mut times);
+            if self.params.topology == Topology::Adaptive {
+                let active = self.vertices_to_check();
+                changes += self.restore_bounds(&active, &mut times);
+            }
+            self.iteration += 1;
+            changes += self.come_to_rest(&mut times)?;
+            self.count_components(changes);
+        }
+        Ok(self.report(changes, times))
+    }
+
+    fn move_vertices(&mut self, times: &mut Times) {
+        let begin = (self.clock)();
+        self.forces.look_around(self.mesh.rings(), self.mesh.positions());
+        let normals = (self.clock)();
+        let delta = self.model_delta();
+        let iso = self.pyramid.normalised(self.params.iso);
+        let pulls = self.pulls();
+        let world = World {
+            image: &self.pyramid.levels[self.level],
+            scale: ForceScale::new(&self.params, iso, self.voxel, delta),
+            pulls: &pulls,
+        };
+        self.movement = advance(&mut self.mesh, self.keys, &mut self.forces, &world, &self.params, delta);
+        times.add("normals", normals - begin);
+        times.add("motion", (self.clock)() - normals);
+    }
+
+    /// Vertices that have travelled far enough since their bounds were last looked at, and those long not looked at.
+    fn vertices_to_check(&mut self) -> Vec<VertexId> {
+        let limit = CHECK_TRAVEL * self.model_delta();
+        let far = limit * limit;
+        let mut active = Vec::new();
+        for i in 0..self.mesh.slots() {
+            let v = VertexId::from_index(i);
+            if !self.mesh.is_live(v) {
+                continue;
+            }
+            let position = self.mesh.position(v);
+            let age = self.mesh.scalar(self.keys.age)[i] + 1.0;
+            let travelled = self.mesh.vector(self.keys.checked)[i].distance_squared(position);
+            let due = travelled > far || age >= CHECK_PERIOD;
+            self.mesh.scalar_mut(self.keys.age)[i] = if due { 0.0 } else { age };
+            if due {
+                self.mesh.vector_mut(self.keys.checked)[i] = position;
+                active.push(v);
+            }
+        }
+        active
+    }
+
+    /// Restores the bounds around `active`, and memory order where it has suffered.
+    fn restore_bounds(&mut self, active: &[VertexId], times: &mut Times) -> Changes {
+        let begin = (self.clock)();
+        let sampling = Sampling::new(self.model_delta());
+        let changes = self.resolver.resolve(&mut self.mesh, sampling, active);
+        let calm = self.mesh.scalar_mut(self.keys.calm);
+        self.resolver.edited().iter().for_each(|v| calm[v.index()] = 0.0);
+        if self.mesh.occupancy() < LEAST_OCCUPANCY {
+            self.reorder();
+        }
+        times.add("topology", (self.clock)() - begin);
+        changes
+    }
+
+    fn reorder(&mut self) {
+        let names = self.mesh.reorder();
+        let waiting = self.resolver.waiting().renamed(&names);
+        self.resolver.set_waiting(waiting);
+    }
+
+    fn count_components(&mut self, changes: Changes) {
+        if changes.changed_topology() {
+            self.components = self.mesh.component_members().len() as u32;
+        }
+    }
+
+    /// Marks every vertex as just looked at.
+    fn settle_in(&mut self) {
+        self.reorder();
+        let positions = self.mesh.positions().to_vec();
+        self.mesh.vector_mut(self.keys.checked).copy_from_slice(&positions);
+        self.mesh.scalar_mut(self.keys.age).fill(0.0);
+        self.components = self.mesh.component_members().len() as u32;
+    }
+
+    fn report(&self, events: Changes, times: Times) -> StepReport {
+        let levels = self.pyramid.levels.len();
+        let done = self.is_done();
+        StepReport {
+            iteration: self.iteration,
+            done,
+            phase: if done { "done".into() } else { format!("level {}", self.level) },
+            progress: if done { 1.0 } else { (levels - 1 - self.level) as f64 / levels as f64 },
+            residual: self.movement.energy,
+            tolerance: self.params.energy_tolerance,
+            vertices: self.mesh.vertex_count() as u32,
+            triangles: self.mesh.triangle_count() as u32,
+            components: self.components,
+            euler: self.mesh.euler() as i32,
+            events,
+            times,
+        }
+    }
+
+    /// Takes all parameters, from the next step on.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`]; nothing is taken then. [`MethodError::Volume`] where the gradient image does
+    /// not fit memory.
+    pub fn set_params(&mut self, params: DeformableParams) -> Result<(), MethodError> {
+        params.validate()?;
+        let before = std::mem::replace(&mut self.params, params);
+        if let Err(error) = self.prepare_gradient() {
+            self.params = before;
+            return Err(error);
+        }
+        self.rest.wake();
+        Ok(())
+    }
+
+    /// The parameters now.
+    pub fn params(&self) -> &DeformableParams {
+        &self.params
+    }
+
+    /// Takes the attachment points, from the next step on.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] where a number is not finite or a radius is not positive.
+    pub fn set_attractors(&mut self, attractors: Vec<Attractor>) -> Result<(), MethodError> {
+        for (i, a) in attractors.iter().enumerate() {
+            if !(a.point.is_finite() && a.strength.is_finite() && a.radius.is_finite() && a.radius > 0.0) {
+                let problem =
+                    format!("attractor {i} needs a finite point and strength and a positive radius");
+                return Err(MethodError::invalid("attractors", problem));
+            }
+        }
+        self.attractors = attractors;
+        self.rest.wake();
+        Ok(())
+    }
+
+    fn pulls(&self) -> Vec<Pull> {
+        let from_world = self.to_world.inverse();
+        let local = |a: &Attractor| Pull {
+            point: from_world.transform_point3(a.point).as_vec3(),
+            strength: a.strength as f32,
+            radius: (a.radius / self.voxel) as f32,
+        };
+        self.attractors.iter().map(local).collect()
+    }
+
+    fn prepare_gradient(&mut self) -> Result<(), MethodError> {
+        if self.params.gradient_normal != 0.0 || self.params.gradient_tangent != 0.0 {
+            self.pyramid.levels[self.level].prepare_gradient()?;
+        }
+        Ok(())
+    }
+
+    /// The pyramid level the surface is on; 0 is the volume itself.
+    pub fn level(&self) -> usize {
+        self.level
+    }
+
+    /// δ now, in world units.
+    pub fn delta(&self) -> f64 {
+        f64::from(self.model_delta()) * self.voxel
+    }
+
+    fn model_delta(&self) -> f32 {
+        delta_at(self.finest_delta, self.level)
+    }
+
+    /// The mesh in the space of the model, where voxels are unit cubes.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    /// The surface in world space with normals, counter-clockwise seen from outside.
+    pub fn surface(&self) -> TriangleMesh {
+        self.mesh.to_triangles().transformed(&self.to_world)
+    }
+
+    /// Takes a clock in milliseconds, by which reports tell the time of each part.
+    pub fn set_clock(&mut self, clock: fn() -> f64) {
+        self.clock = clock;
+    }
+}
+
+/// δ at the finest level in voxels.
+fn finest_delta(edge: Option<f64>, voxel: f64) -> Result<f64, MethodError> {
+    let Some(edge) = edge else { return Ok(DEFAULT_DELTA) };
+    let delta = edge / voxel / MEAN_EDGE;
+    if delta >= DELTA_RANGE[0] && delta <= DELTA_RANGE[1] {
+        return Ok(delta);
+    }
+    let [low, high] = DELTA_RANGE.map(|d| d * MEAN_EDGE * voxel);
+    Err(MethodError::invalid(
+        "edge",
+        format!("{edge} given, {low:.4} to {high:.4} accepted for these voxels"),
+    ))
+}
+
+/// δ in voxels of the finest level, on any level: it grows with the unit of the image (15).
+fn delta_at(finest: f64, level: usize) -> f32 {
+    (0..level).fold(finest, |delta, _| delta * image::REDUCTION) as f32
+}

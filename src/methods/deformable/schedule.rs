@@ -1,0 +1,75 @@
+//! When a level is finished, and the way down to the next (section 5.1, figures 12 and 13).
+
+use super::{DeformableModel, Topology};
+use crate::mesh::VertexId;
+use crate::methods::{MethodError, Times};
+use crate::remesh::{Changes, Sampling};
+use serde::{Deserialize, Serialize};
+
+/// Iterations running that must be quiet: one alone may be a turning point of a swing.
+const QUIET_ITERATIONS: u32 = 3;
+
+/// The fastest vertex of a surface at rest, in δ an iteration. The mean energy hides a few vertices that still travel,
+/// such as a front in a hole; with no bound the model stops before it has passed.
+const REST_SPEED: f32 = 0.03;
+
+/// Where the model stands between moving and done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Rest {
+    quiet: u32,
+    done: bool,
+}
+
+impl Rest {
+    /// Something changed from outside: the surface may move again.
+    pub(super) fn wake(&mut self) {
+        *self = Self::default();
+    }
+}
+
+impl DeformableModel {
+    pub(super) fn is_done(&self) -> bool {
+        self.rest.done
+    }
+
+    /// Counts quiet iterations; after enough of them checks the whole mesh and goes one level down, or ends.
+    pub(super) fn come_to_rest(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
+        let quiet = self.movement.energy < self.params.energy_tolerance && self.movement.fastest < REST_SPEED;
+        self.rest.quiet = if quiet { self.rest.quiet + 1 } else { 0 };
+        if self.rest.quiet < QUIET_ITERATIONS {
+            return Ok(Changes::default());
+        }
+        let mut changes = self.check_everything(times);
+        if self.level == 0 {
+            self.rest.done = true;
+        } else {
+            self.descend()?;
+            changes += self.check_everything(times);
+        }
+        Ok(changes)
+    }
+
+    /// Looks at every vertex whether it has moved or not, and removes specks.
+    fn check_everything(&mut self, times: &mut Times) -> Changes {
+        if self.params.topology == Topology::Fixed {
+            return Changes::default();
+        }
+        let all: Vec<VertexId> = self.mesh.vertices().collect();
+        let mut changes = self.restore_bounds(&all, times);
+        let sampling = Sampling::new(self.model_delta());
+        changes.vanished += self.resolver.sweep(&mut self.mesh, sampling);
+        self.settle_in();
+        changes
+    }
+
+    /// Refines the mesh and takes the next finer image (figure 13).
+    fn descend(&mut self) -> Result<(), MethodError> {
+        if self.params.topology == Topology::Adaptive {
+            self.mesh.refine()?;
+        }
+        self.level -= 1;
+        self.rest.quiet = 0;
+        self.settle_in();
+        self.prepare_gradient()
+    }
+}

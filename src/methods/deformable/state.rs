@@ -1,0 +1,129 @@
+//! Saving a run and going on with it, bit for bit.
+
+use super::motion::Movement;
+use super::schedule::Rest;
+use super::{Attractor, DeformableModel, DeformableParams};
+use crate::mesh::Mesh;
+use crate::methods::MethodError;
+use crate::remesh::Waiting;
+use crate::volume::Volume;
+use serde::{Deserialize, Serialize};
+
+/// Begins every saved state; the last byte counts versions of the layout.
+const MAGIC: [u8; 8] = *b"VSCLDEF\x01";
+
+/// Everything a run has beside its volume.
+#[derive(Serialize, Deserialize)]
+struct State {
+    fingerprint: u64,
+    params: DeformableParams,
+    attractors: Vec<Attractor>,
+    finest_delta: f64,
+    level: usize,
+    mesh: Mesh,
+    waiting: Waiting,
+    iteration: u32,
+    rest: Rest,
+    energy: f64,
+    fastest: f32,
+}
+
+impl DeformableModel {
+    /// The run as bytes, without the volume.
+    pub fn save(&self) -> Vec<u8> {
+        let state = State {
+            fingerprint: self.fingerprint,
+            params: self.params.clone(),
+            attractors: self.attractors.clone(),
+            finest_delta: self.finest_delta,
+            level: self.level,
+            mesh: self.mesh.clone(),
+            waiting: self.resolver.waiting(),
+            iteration: self.iteration,
+            rest: self.rest,
+            energy: self.movement.energy,
+            fastest: self.movement.fastest,
+        };
+        let mut bytes = MAGIC.to_vec();
+        // Serialising plain data into memory has no way to fail.
+        bytes.extend(postcard::to_allocvec(&state).unwrap_or_default());
+        bytes
+    }
+
+    /// Goes on from bytes that [`Self::save`] gave, for a model of the same volume, frame and levels.
+    ///
+    /// # Errors
+    /// [`MethodError::BadState`] where the bytes are none of those; the model is then as it was.
+    pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
+        let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
+        let Some(body) = bytes.strip_prefix(&MAGIC) else {
+            return bad("header", "these bytes are no saved state of this version");
+        };
+        let Ok((state, rest)) = postcard::take_from_bytes::<State>(body) else {
+            return bad("contents", "the bytes are cut off or damaged");
+        };
+        if !rest.is_empty() {
+            return bad("contents", "there are bytes after the end");
+        }
+        if state.fingerprint != self.fingerprint {
+            return bad("volume", "the state belongs to another volume, frame or number of levels");
+        }
+        self.check_state(&state)?;
+        self.take_state(state)
+    }
+
+    fn check_state(&self, state: &State) -> Result<(), MethodError> {
+        let bad = |field, problem: String| Err(MethodError::BadState { field, problem });
+        state.params.validate()?;
+        if let Err(flaw) = state.mesh.check() {
+            return bad("mesh", flaw.to_string());
+        }
+        if state.mesh.attribute_counts() != self.mesh.attribute_counts() {
+            return bad("mesh", "the vertices do not carry the data of this method".into());
+        }
+        let named = state.waiting.queue.iter().chain(&state.waiting.stirred);
+        if let Some(v) = named.into_iter().find(|v| v.index() >= state.mesh.slots()) {
+            return bad("queue", format!("{v:?} does not exist"));
+        }
+        let delta_fits =
+            state.finest_delta >= super::DELTA_RANGE[0] && state.finest_delta <= super::DELTA_RANGE[1];
+        if state.level >= self.pyramid.levels.len() || !delta_fits {
+            return bad("level", "level or edge is out of range".into());
+        }
+        Ok(())
+    }
+
+    fn take_state(&mut self, state: State) -> Result<(), MethodError> {
+        let mut next = self.clone_without_mesh();
+        next.set_attractors(state.attractors)?;
+        next.params = state.params;
+        next.finest_delta = state.finest_delta;
+        next.level = state.level;
+        next.mesh = state.mesh;
+        next.resolver.set_waiting(state.waiting);
+        next.iteration = state.iteration;
+        next.rest = state.rest;
+        next.movement = Movement { energy: state.energy, fastest: state.fastest };
+        next.components = next.mesh.component_members().len() as u32;
+        next.prepare_gradient()?;
+        *self = next;
+        Ok(())
+    }
+
+    fn clone_without_mesh(&self) -> Self {
+        self.clone()
+    }
+}
+
+/// A number that tells volumes, frames and pyramids apart (FNV-1a over shape, place and intensities).
+pub(super) fn fingerprint(volume: &Volume, frame: usize, levels: usize) -> u64 {
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut mix = |word: u64| hash = (hash ^ word).wrapping_mul(0x100_0000_01b3);
+    volume.dims().into_iter().chain([frame, levels]).for_each(|n| mix(n as u64));
+    volume.affine().to_cols_array().into_iter().for_each(|x| mix(x.to_bits()));
+    volume.range().into_iter().for_each(|x| mix(x.to_bits()));
+    if let Ok(values) = volume.intensities(frame) {
+        values.into_iter().for_each(|x| mix(u64::from(x.to_bits())));
+    }
+    hash
+}
