@@ -1,0 +1,393 @@
+//! The deformable model against shapes with a known answer, and its promises: sound at every iteration, the same bits
+//! every time, clear refusals.
+
+mod common;
+#[path = "common/scenes.rs"]
+mod scenes;
+
+use vesicle::math::{DAffine3, DMat3, DVec3, Vec3};
+use vesicle::mesh::{Measures, MeshError, TriangleMesh, count_crossings, measure};
+use vesicle::methods::deformable::{
+    Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Start, Topology,
+};
+use vesicle::methods::{MethodError, StepReport};
+use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
+#[cfg(target_arch = "wasm32")]
+use wasm_bindgen_test::wasm_bindgen_test as test;
+
+/// What was seen on the way to the end.
+struct Run {
+    last: StepReport,
+    /// The first iteration from which on components and χ never changed.
+    settled: u32,
+    /// Iterations with crossing triangles, and the most pairs in one.
+    crossing: (u32, usize),
+}
+
+/// Steps to the end or `most` iterations; every iteration is checked for soundness and counted for crossings.
+fn run(model: &mut DeformableModel, most: u32) -> Run {
+    let mut run = Run { last: model.step().unwrap(), settled: 1, crossing: (0, 0) };
+    while !run.last.done && run.last.iteration < most {
+        let report = model.step().unwrap();
+        assert_eq!(model.mesh().check(), Ok(()), "iteration {}", report.iteration);
+        assert_eq!(report.euler as i64, model.mesh().euler());
+        let pairs = count_crossings(&model.mesh().to_triangles());
+        run.crossing = (run.crossing.0 + u32::from(pairs > 0), run.crossing.1.max(pairs));
+        if (report.components, report.euler) != (run.last.components, run.last.euler) {
+            run.settled = report.iteration;
+        }
+        run.last = report;
+    }
+    run
+}
+
+/// χ of each component of the model, lowest first.
+fn euler_of_parts(model: &DeformableModel) -> Vec<i64> {
+    let mut parts: Vec<i64> = model.surface().components().iter().map(|part| measure(part).euler).collect();
+    parts.sort();
+    parts
+}
+
+fn params(volume: &Volume, iso: f64, rigidity: f64, stiffness: f64) -> DeformableParams {
+    DeformableParams { iso, rigidity, stiffness, ..DeformableParams::for_volume(volume) }
+}
+
+fn print_crossings(scene: &str, run: &Run) {
+    let (iterations, pairs) = run.crossing;
+    println!(
+        "{scene}: done after {}, topology right from {}, crossings in {iterations} iterations, at most {pairs} pairs",
+        run.last.iteration, run.settled
+    );
+}
+
+/// Edge of the chain scene: its gap of seven voxels is then four δ wide.
+const CHAIN_EDGE: f64 = 1.8 * 1.6;
+
+#[test]
+fn chain_from_an_enclosing_icosahedron_in_ninety_iterations() {
+    let volume = scenes::chain();
+    let params = Some(params(&volume, 0.5, 0.1, 0.1));
+    let options = DeformableOptions { edge: Some(CHAIN_EDGE), params, ..Default::default() };
+    let mut model = DeformableModel::new(&volume, options).unwrap();
+    let run = run(&mut model, 200);
+    print_crossings("chain from an icosahedron", &run);
+    assert!(run.last.done && run.last.iteration <= 90, "done after {}", run.last.iteration);
+    assert_eq!(euler_of_parts(&model), [0, 0]);
+}
+
+#[test]
+fn chain_from_bubbles() {
+    let volume = scenes::chain();
+    let params = Some(params(&volume, 0.5, 0.0, 0.0));
+    let options =
+        DeformableOptions { start: Start::Bubbles(11), edge: Some(1.1 * 1.6), params, ..Default::default() };
+    let mut model = DeformableModel::new(&volume, options).unwrap();
+    let run = run(&mut model, 200);
+    print_crossings("chain from 11³ bubbles", &run);
+    assert!(run.last.done && run.last.iteration <= 160, "done after {}", run.last.iteration);
+    assert_eq!(euler_of_parts(&model), [0, 0]);
+}
+
+#[test]
+fn menger_sponge_of_depth_two() {
+    let volume = scenes::menger(2);
+    let params = Some(params(&volume, 0.4, 0.05, 0.001));
+    let mut model =
+        DeformableModel::new(&volume, DeformableOptions { levels: 3, params, ..Default::default() }).unwrap();
+    let run = run(&mut model, 1000);
+    print_crossings("Menger sponge, depth 2", &run);
+    assert!(run.last.done);
+    assert_eq!(euler_of_parts(&model), [-160]);
+}
+
+fn ball(dims: [usize; 3], radius: f32) -> Volume {
+    let centre = Vec3::from(dims.map(|n| 0.5 * (n as f32 - 1.0)));
+    scenes::volume(dims, |p| scenes::potential(p.distance(centre), radius))
+}
+
+fn surface_of(volume: &Volume, options: DeformableOptions) -> (DeformableModel, Measures) {
+    let mut model = DeformableModel::new(volume, options).unwrap();
+    let run = run(&mut model, 600);
+    assert!(run.last.done, "not at rest after {} iterations: {:?}", run.last.iteration, run.last);
+    let measures = measure(&model.surface());
+    (model, measures)
+}
+
+fn close(what: &str, value: f64, expected: f64, tolerance: f64) {
+    let off = (value - expected).abs() / expected;
+    assert!(off < tolerance, "{what}: {value} for {expected}, off by {off:.4}");
+}
+
+#[test]
+fn a_ball_is_found_from_every_start() {
+    let volume = ball([40, 40, 40], 11.0);
+    let centre = DVec3::splat(19.5);
+    let seeds = Start::Seeds { points: vec![centre, centre + DVec3::X * 9.0], radius: 2.5 };
+    let given = vesicle::mesh::Mesh::icosphere(Vec3::splat(19.5), 6.0, 1.5).unwrap().to_triangles();
+    let starts = [Start::Enclosing, Start::Bubbles(3), seeds, Start::MarchingCubes(0.6), Start::Mesh(given)];
+    for start in starts {
+        let params = Some(params(&volume, 0.5, 0.1, 0.0));
+        let (_, found) =
+            surface_of(&volume, DeformableOptions { start: start.clone(), params, ..Default::default() });
+        assert_eq!((found.components, found.euler), (1, 2), "{start:?}");
+        close("radius", (found.volume * 3.0 / (4.0 * std::f64::consts::PI)).cbrt(), 11.0, 0.01);
+        close("area", found.area, 4.0 * std::f64::consts::PI * 121.0, 0.02);
+    }
+}
+
+#[test]
+fn the_mean_edge_is_the_edge_asked_for() {
+    let volume = ball([40, 40, 40], 13.0);
+    for edge in [1.2, 2.0, 3.0] {
+        let options = DeformableOptions { edge: Some(edge), levels: 1, ..Default::default() };
+        let (_, found) = surface_of(&volume, options);
+        close("mean edge", found.edge_mean, edge, 0.12);
+    }
+}
+
+#[test]
+fn coarse_to_fine_and_direct_agree() {
+    let volume = ball([40, 40, 40], 13.0);
+    let of = |levels| surface_of(&volume, DeformableOptions { levels, ..Default::default() }).1;
+    let direct = of(0);
+    for levels in [1, 2] {
+        let found = of(levels);
+        close("area", found.area, direct.area, 0.01);
+        close("volume", found.volume, direct.volume, 0.003);
+    }
+}
+
+#[test]
+fn the_darker_object_is_found_with_the_opposite_sign() {
+    let volume = scenes::volume([32, 32, 32], |p| {
+        10.0 * (1.0 - scenes::potential(p.distance(Vec3::splat(15.5)), 8.0))
+    });
+    let start = Start::Seeds { points: vec![DVec3::splat(15.5)], radius: 3.0 };
+    let params = Some(DeformableParams { iso_force: 1.0, ..params(&volume, 5.0, 0.1, 0.0) });
+    let (_, found) = surface_of(&volume, DeformableOptions { start, params, ..Default::default() });
+    close("radius", (found.volume * 3.0 / (4.0 * std::f64::consts::PI)).cbrt(), 8.0, 0.015);
+}
+
+/// Voxels of 1 × 2 × 4 in a sheared, mirrored world: the model evolves where voxels are cubes and answers in world.
+#[test]
+fn anisotropic_mirrored_volumes_come_out_right_in_world_space() {
+    let linear =
+        DMat3::from_cols(DVec3::new(-1.0, 0.2, 0.0), DVec3::new(0.0, 2.0, 0.3), DVec3::new(0.5, 0.0, 4.0));
+    let affine = DAffine3 { matrix3: linear, translation: DVec3::new(100.0, -50.0, 7.0) };
+    let dims = [80, 40, 24];
+    let centre = affine.transform_point3(DVec3::new(39.5, 19.5, 11.5));
+    let at = |i: usize| {
+        let index = DVec3::new((i % 80) as f64, (i / 80 % 40) as f64, (i / 3200) as f64);
+        scenes::potential(affine.transform_point3(index).distance(centre) as f32, 22.0)
+    };
+    let init = VolumeInit {
+        voxels: Voxels::F32((0..80 * 40 * 24).map(at).collect()),
+        dims: [dims[0], dims[1], dims[2], 1],
+        affine,
+        slope: 1.0,
+        intercept: 0.0,
+        frame_seconds: 0.0,
+        space: Space::Ras,
+    };
+    let volume = Volume::new(init).unwrap();
+    let params = Some(params(&volume, 0.5, 0.05, 0.0));
+    let (_, found) = surface_of(&volume, DeformableOptions { levels: 1, params, ..Default::default() });
+    assert_eq!((found.components, found.euler), (1, 2));
+    close(
+        "volume, positive in spite of the mirror",
+        found.volume,
+        4.0 / 3.0 * std::f64::consts::PI * 22.0f64.powi(3),
+        0.03,
+    );
+    assert!(found.centroid.distance(centre) < 0.2, "centroid {} for {centre}", found.centroid);
+}
+
+#[test]
+fn a_ridge_is_found_by_the_gradient_force_and_runge_kutta() {
+    let shell = |p: Vec3| (1.0 - 0.2 * (p.distance(Vec3::splat(19.5)) - 11.0).abs()).max(0.0);
+    let volume = scenes::volume([40, 40, 40], shell);
+    let params = DeformableParams {
+        iso_force: 0.0,
+        gradient_normal: 1.0,
+        rigidity: 0.5,
+        integrator: Integrator::RungeKutta,
+        ..DeformableParams::for_volume(&volume)
+    };
+    let start = Start::Seeds { points: vec![DVec3::splat(19.5)], radius: 8.0 };
+    let mut model = DeformableModel::new(
+        &volume,
+        DeformableOptions { start, params: Some(params), ..Default::default() },
+    )
+    .unwrap();
+    run(&mut model, 400);
+    let found = measure(&model.surface());
+    close("radius", (found.volume * 3.0 / (4.0 * std::f64::consts::PI)).cbrt(), 11.0, 0.5 / 11.0);
+}
+
+#[test]
+fn fixed_topology_moves_vertices_and_keeps_every_edge() {
+    let volume = ball([32, 32, 32], 9.0);
+    let start = Start::Seeds { points: vec![DVec3::splat(15.5)], radius: 7.0 };
+    let params = DeformableParams { topology: Topology::Fixed, ..params(&volume, 0.5, 0.1, 0.0) };
+    let mut model = DeformableModel::new(
+        &volume,
+        DeformableOptions { start, params: Some(params), ..Default::default() },
+    )
+    .unwrap();
+    let before = model.surface();
+    run(&mut model, 300);
+    let after = model.surface();
+    assert_eq!(before.triangles, after.triangles);
+    assert!(measure(&after).volume > 1.5 * measure(&before).volume);
+}
+
+#[test]
+fn stiffness_and_rest_lengths_even_out_edges() {
+    let volume = ball([32, 32, 32], 9.0);
+    let spread = |stiffness, rest_length| {
+        let params = Some(DeformableParams { rest_length, ..params(&volume, 0.5, 0.1, stiffness) });
+        let (_, found) = surface_of(&volume, DeformableOptions { params, ..Default::default() });
+        found.edge_max / found.edge_min
+    };
+    let loose = spread(0.0, RestLength::Zero);
+    assert!(spread(0.05, RestLength::Mean) < loose);
+    assert!(spread(0.05, RestLength::Given(1.4)) < loose);
+}
+
+#[test]
+fn an_attractor_pulls_the_surface_and_lets_go() {
+    let volume = ball([40, 40, 40], 9.0);
+    let (mut model, before) = surface_of(&volume, DeformableOptions::default());
+    let point = DVec3::new(34.0, 19.5, 19.5);
+    model.set_attractors(vec![Attractor { point, strength: 0.3, radius: 12.0 }]).unwrap();
+    run(&mut model, 300);
+    let pulled = measure(&model.surface());
+    assert!(pulled.bounds[1].x > before.bounds[1].x + 1.0);
+    model.set_attractors(vec![]).unwrap();
+    run(&mut model, 900);
+    close("volume", measure(&model.surface()).volume, before.volume, 0.01);
+}
+
+#[test]
+fn a_state_goes_on_bit_for_bit() {
+    let volume = scenes::chain();
+    let options = || DeformableOptions {
+        start: Start::Bubbles(9),
+        edge: Some(1.9),
+        params: Some(params(&volume, 0.5, 0.1, 0.05)),
+        ..Default::default()
+    };
+    let mut model = DeformableModel::new(&volume, options()).unwrap();
+    for _ in 0..6 {
+        model.step().unwrap();
+    }
+    let state = model.save();
+    let mut other = DeformableModel::new(&volume, options()).unwrap();
+    other.restore(&state).unwrap();
+    assert_eq!(other.save(), state);
+    for _ in 0..20 {
+        assert_eq!(model.step().unwrap(), other.step().unwrap());
+        assert_eq!(model.mesh(), other.mesh());
+    }
+    assert_eq!(model.save(), other.save());
+}
+
+#[test]
+fn damaged_states_are_refused_and_nothing_is_lost() {
+    let volume = ball([24, 24, 24], 6.0);
+    let mut model = DeformableModel::new(&volume, DeformableOptions::default()).unwrap();
+    for _ in 0..5 {
+        model.step().unwrap();
+    }
+    let state = model.save();
+    let mut random = common::Random(1);
+    for length in [0, 4, 8, 9, 100, state.len() - 1] {
+        assert!(matches!(model.restore(&state[..length]), Err(MethodError::BadState { .. })));
+    }
+    for _ in 0..500 {
+        let mut bytes = state.clone();
+        let at = random.below(bytes.len());
+        bytes[at] ^= 1 << random.below(8);
+        // Most flips change a number and are a state of their own; all others are refused. None is a panic.
+        if model.restore(&bytes).is_ok() {
+            model.step().unwrap();
+            model.restore(&state).unwrap();
+        }
+        assert_eq!(model.save(), state);
+    }
+    let other = ball([24, 24, 24], 7.0);
+    let mut stranger = DeformableModel::new(&other, DeformableOptions::default()).unwrap();
+    assert!(stranger.restore(&state).unwrap_err().to_string().contains("another volume"));
+}
+
+#[test]
+fn live_parameters_are_taken_whole_or_not_at_all() {
+    let volume = ball([24, 24, 24], 6.0);
+    let (mut model, small) = surface_of(&volume, DeformableOptions::default());
+    let bad = DeformableParams { damping: -1.0, iso: 0.9, ..model.params().clone() };
+    let refusal = model.set_params(bad).unwrap_err().to_string();
+    assert!(refusal.contains("damping") && refusal.contains("0.01 to 2"), "{refusal}");
+    assert_eq!(model.params().iso, 0.5);
+    model.set_params(DeformableParams { iso: 0.3, ..model.params().clone() }).unwrap();
+    let run = run(&mut model, 400);
+    assert!(run.last.done && measure(&model.surface()).volume > 1.2 * small.volume);
+}
+
+#[test]
+fn refusals_name_the_option_and_what_is_accepted() {
+    let volume = ball([24, 24, 24], 6.0);
+    let refusal = |options| DeformableModel::new(&volume, options).unwrap_err().to_string();
+    let of = |start| refusal(DeformableOptions { start, ..Default::default() });
+    assert!(
+        refusal(DeformableOptions { levels: 40, ..Default::default() }).contains("levels: 40 given, 0 to")
+    );
+    assert!(refusal(DeformableOptions { edge: Some(1e-9), ..Default::default() }).starts_with("edge"));
+    assert!(refusal(DeformableOptions { edge: Some(f64::NAN), ..Default::default() }).starts_with("edge"));
+    assert!(refusal(DeformableOptions { frame: 3, ..Default::default() }).contains("frame"));
+    assert!(of(Start::Bubbles(0)).contains("start.bubbles"));
+    assert!(of(Start::Bubbles(500)).contains("1 to"));
+    assert!(of(Start::MarchingCubes(1e9)).contains("no surface"));
+    let near = vec![DVec3::splat(12.0), DVec3::splat(13.0)];
+    assert!(of(Start::Seeds { points: near, radius: 3.0 }).contains("too near"));
+    assert!(of(Start::Seeds { points: vec![], radius: 3.0 }).contains("0 points"));
+    assert!(of(Start::Seeds { points: vec![DVec3::NAN], radius: 3.0 }).contains("not finite"));
+    assert!(of(Start::Seeds { points: vec![DVec3::ONE], radius: 0.1 }).contains("at least"));
+
+    let open = TriangleMesh {
+        positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+        triangles: vec![[0, 1, 2]],
+        ..Default::default()
+    };
+    let error =
+        DeformableModel::new(&volume, DeformableOptions { start: Start::Mesh(open), ..Default::default() });
+    assert!(matches!(error, Err(MethodError::Mesh(MeshError::NotClosed { .. }))));
+    let mut two = vesicle::mesh::Mesh::icosphere(Vec3::splat(12.0), 4.0, 1.0).unwrap();
+    two.append(&vesicle::mesh::Mesh::icosphere(Vec3::splat(14.0), 4.0, 1.0).unwrap()).unwrap();
+    let start = Start::Mesh(two.to_triangles());
+    let error = DeformableModel::new(&volume, DeformableOptions { start, ..Default::default() });
+    assert!(matches!(error, Err(MethodError::Mesh(MeshError::SelfIntersecting { .. }))));
+}
+
+#[test]
+fn flat_and_tiny_volumes_have_an_enclosing_start() {
+    for dims in [[64, 64, 6], [5, 5, 5], [2, 2, 2], [1, 1, 1], [100, 3, 3]] {
+        let volume = scenes::volume(dims, |p| p.x);
+        for edge in [0.8, 1.5, 3.0] {
+            let options = DeformableOptions { edge: Some(edge), ..Default::default() };
+            let model = DeformableModel::new(&volume, options).unwrap();
+            assert_eq!((model.mesh().check(), model.mesh().euler()), (Ok(()), 2), "{dims:?} {edge}");
+            assert_eq!(count_crossings(&model.mesh().to_triangles()), 0, "{dims:?} {edge}");
+        }
+    }
+}
+
+#[test]
+fn an_empty_image_lets_the_surface_vanish() {
+    let volume = scenes::volume([12, 12, 12], |_| 0.0);
+    let params = Some(params(&volume, 0.5, 0.1, 0.0));
+    let mut model =
+        DeformableModel::new(&volume, DeformableOptions { levels: 1, params, ..Default::default() }).unwrap();
+    let run = run(&mut model, 400);
+    assert!(run.last.done && run.last.vertices == 0 && run.last.euler == 0 && run.last.components == 0);
+    assert!(model.surface().triangles.is_empty());
+}
