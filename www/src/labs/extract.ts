@@ -186,6 +186,7 @@ export class ExtractLab {
 
   #adoptVolume(volume: VolumeView, example: Example | undefined): void {
     this.#volume = volume;
+    this.#measures.unit = example?.unit ?? 'mm';
     this.#histogram.setVolume(volume);
     this.#data.show(volume, example);
     this.#stage.setVolume(volume);
