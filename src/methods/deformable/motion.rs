@@ -29,8 +29,8 @@ pub(super) struct World<'a> {
 
 impl World<'_> {
     /// The forces at given positions, with the normals there.
-    fn act(&self, forces: &mut Forces, mesh: &Mesh, positions: &[Vec3]) {
-        forces.evaluate(mesh.rings(), positions, self.image, &self.scale, self.pulls);
+    fn act(&self, forces: &mut Forces, mesh: &Mesh, positions: &[Vec3], velocities: &[Vec3]) {
+        forces.evaluate(mesh.rings(), positions, velocities, self.image, &self.scale, self.pulls);
     }
 }
 
@@ -58,7 +58,7 @@ fn euler(
     world: &World,
     params: &DeformableParams,
 ) -> Option<Vec<Vec3>> {
-    world.act(forces, mesh, mesh.positions());
+    world.act(forces, mesh, mesh.positions(), mesh.vector(keys.velocity));
     let (step, damping) = (params.time_step as f32 / params.mass as f32, params.damping as f32);
     for (v, force) in mesh.vector_mut(keys.velocity).iter_mut().zip(&forces.force) {
         *v += (*force - *v * damping) * step;
@@ -83,7 +83,7 @@ fn runge_kutta(
         if stage > 0 {
             forces.look_around(mesh.rings(), &x);
         }
-        world.act(forces, mesh, &x);
+        world.act(forces, mesh, &x, &v);
         for i in 0..x.len() {
             let acceleration = (forces.force[i] - v[i] * damping) * (1.0 / mass);
             way[i] += v[i] * (weight * step / 6.0);
