@@ -18,7 +18,7 @@ export interface Example {
 
 const HEAD_CREDIT =
   'Head CT: Visible Human Project, U.S. National Library of Medicine, public domain; volume from ipyvolume (MIT).';
-const BONE = { iso: 95, isoForce: -1, rigidity: 0.4 };
+const BONE = { iso: 95, isoForce: -1, rigidity: 0.1 };
 
 /** The first is shown when the page opens. */
 export const EXAMPLES: Example[] = [
@@ -27,7 +27,8 @@ export const EXAMPLES: Example[] = [
     name: 'Head, CT: bone',
     source: { file: 'visible-human-head.nii.gz' },
     unit: 'mm',
-    levels: 3,
+    // Bone is thin: on a coarser copy it would blur away, and the surface with it.
+    levels: 1,
     params: BONE,
     credit: HEAD_CREDIT,
   },
@@ -45,7 +46,7 @@ export const EXAMPLES: Example[] = [
     name: 'Head, CT at full size: bone',
     source: { file: 'visible-human-head-full.nii.gz' },
     unit: 'mm',
-    levels: 3,
+    levels: 2,
     params: BONE,
     credit: HEAD_CREDIT,
   },
@@ -54,8 +55,8 @@ export const EXAMPLES: Example[] = [
     name: 'Tooth, CT',
     source: { file: 'tooth.nrrd' },
     unit: '',
-    levels: 3,
-    params: { iso: 400, isoForce: -1, rigidity: 0.4 },
+    levels: 2,
+    params: { iso: 400, isoForce: -1, rigidity: 0.2 },
     credit: 'Tooth CT: Scientific Computing and Imaging Institute, University of Utah, Seg3D data (MIT).',
   },
   {
@@ -63,7 +64,7 @@ export const EXAMPLES: Example[] = [
     name: 'Plant ovule, microscope',
     source: { file: 'ovule.nrrd' },
     unit: 'µm',
-    levels: 2,
+    levels: 1,
     params: { iso: 120, isoForce: -1, rigidity: 0.2 },
     credit: 'Cell membranes of an ovule: Heidelberg Collaboratory for Image Processing, PlantSeg (MIT).',
   },
