@@ -19,7 +19,7 @@ const SHAPES: { kind: Kind; label: string; help: string }[] = [
 ];
 const DEFAULT_LEVELS = 1;
 const MOST_LEVELS = 6;
-const DEFAULT_BUBBLES = 6;
+const DEFAULT_BUBBLES = 5;
 
 export interface StartChoice {
   kind: Kind;
