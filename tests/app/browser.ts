@@ -61,6 +61,18 @@ export async function reach(page: Page, ...states: string[]): Promise<string> {
   return state;
 }
 
+/** Writes down every state the lab goes through from now on; returns how to read the list. */
+export async function recordStates(page: Page): Promise<() => Promise<string[]>> {
+  const list = await page.evaluateHandle(() => {
+    const states: string[] = [];
+    const lab = document.querySelector<HTMLElement>('[data-state]');
+    const note = () => states.push(lab?.dataset.state ?? '');
+    if (lab) new MutationObserver(note).observe(lab, { attributeFilter: ['data-state'] });
+    return states;
+  });
+  return () => list.jsonValue();
+}
+
 export interface Measures {
   vertices: number;
   triangles: number;

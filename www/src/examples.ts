@@ -1,12 +1,16 @@
 import type { ParamValues } from './protocol';
 import type { Shape } from './shapes';
 
+export type Unit = 'mm' | 'µm' | '';
+
 /** A volume that comes with the page, the settings that suit it, and whom to thank. */
 export interface Example {
   id: string;
   name: string;
   /** A file beside the page, or a shape to compute. */
   source: { file: string } | { shape: Shape };
+  /** Of lengths in its world space; empty where the file does not say. */
+  unit: Unit;
   levels: number;
   params: ParamValues & { iso: number };
   credit: string;
@@ -14,21 +18,61 @@ export interface Example {
 
 const HEAD_CREDIT =
   'Head CT: Visible Human Project, U.S. National Library of Medicine, public domain; volume from ipyvolume (MIT).';
+const BONE = { iso: 95, isoForce: -1, rigidity: 0.1 };
 
 /** The first is shown when the page opens. */
 export const EXAMPLES: Example[] = [
   {
-    id: 'visible-human-head',
+    id: 'head-bone',
     name: 'Head, CT: bone',
     source: { file: 'visible-human-head.nii.gz' },
-    levels: 3,
-    params: { iso: 95, isoForce: -1, rigidity: 0.4 },
+    unit: 'mm',
+    // Bone is thin: on a coarser copy it would blur away, and the surface with it.
+    levels: 1,
+    params: BONE,
     credit: HEAD_CREDIT,
+  },
+  {
+    id: 'head-skin',
+    name: 'Head, CT: skin',
+    source: { file: 'visible-human-head.nii.gz' },
+    unit: 'mm',
+    levels: 3,
+    params: { ...BONE, iso: 35 },
+    credit: HEAD_CREDIT,
+  },
+  {
+    id: 'head-full',
+    name: 'Head, CT at full size: bone',
+    source: { file: 'visible-human-head-full.nii.gz' },
+    unit: 'mm',
+    levels: 2,
+    params: BONE,
+    credit: HEAD_CREDIT,
+  },
+  {
+    id: 'tooth',
+    name: 'Tooth, CT',
+    source: { file: 'tooth.nrrd' },
+    unit: '',
+    levels: 2,
+    params: { iso: 400, isoForce: -1, rigidity: 0.2 },
+    credit: 'Tooth CT: Scientific Computing and Imaging Institute, University of Utah, Seg3D data (MIT).',
+  },
+  {
+    id: 'ovule',
+    name: 'Plant ovule, microscope',
+    source: { file: 'ovule.nrrd' },
+    unit: 'µm',
+    levels: 1,
+    params: { iso: 120, isoForce: -1, rigidity: 0.2 },
+    credit: 'Cell membranes of an ovule: Heidelberg Collaboratory for Image Processing, PlantSeg (MIT).',
   },
   {
     id: 'linked-rings',
     name: 'Two linked rings',
     source: { shape: 'linked rings' },
+    unit: '',
     levels: 1,
     params: { iso: 127.5, isoForce: -1, rigidity: 0.1, stiffness: 0.1 },
     credit: 'Computed. One surface goes in; two come out, each with one hole: χ = 0.',
@@ -37,6 +81,7 @@ export const EXAMPLES: Example[] = [
     id: 'sponge',
     name: 'Menger sponge',
     source: { shape: 'sponge' },
+    unit: '',
     levels: 3,
     params: { iso: 102, isoForce: -1, rigidity: 0.05, stiffness: 0.001 },
     credit: 'Computed. A cube pierced on two scales has 81 tunnels: one component, χ = −160.',

@@ -99,7 +99,7 @@ export class DataPanel {
     const facts: [string, string][] = [
       ['File', volume.name],
       ['Voxels', volume.dims.join(' × ')],
-      ['Voxel size', `${spacing} mm`],
+      ['Voxel size', `${spacing} ${example?.unit ?? 'mm'}`.trim()],
       ['Intensities', `${figure(volume.range[0])} to ${figure(volume.range[1])}`],
     ];
     if (volume.frames > 1) facts.push(['Frames', `${volume.frames}, the first is shown`]);

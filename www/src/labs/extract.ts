@@ -38,6 +38,9 @@ const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, byComponent: fa
 /** Radius of the sphere placed at the crosshair, as a part of the volume's smallest side. */
 const SPHERE_PART = 0.1;
 
+const VANISHED =
+  'It found nothing to hold it: try fewer pyramid levels (thin parts blur away on coarse ones), another iso value or start shape, or less rigidity.';
+
 /** What the present volume was made of, to open it again after a failure of the engine. */
 interface Source {
   name: string;
@@ -186,6 +189,7 @@ export class ExtractLab {
 
   #adoptVolume(volume: VolumeView, example: Example | undefined): void {
     this.#volume = volume;
+    this.#measures.unit = example?.unit ?? 'mm';
     this.#histogram.setVolume(volume);
     this.#data.show(volume, example);
     this.#stage.setVolume(volume);
@@ -377,6 +381,7 @@ export class ExtractLab {
     this.#state.value = state;
     const last = this.#history.reports.at(-1);
     this.#status.say(describe(state, last));
+    if (last?.vertices === 0) this.#banner.show('The surface has vanished.', VANISHED);
   }
 
   #showState(state: LabState): void {

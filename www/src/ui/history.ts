@@ -33,7 +33,8 @@ export class History {
   #addOne(report: StepReport): void {
     this.reports.push(report);
     const { iteration, phase } = report;
-    if (this.phases.at(-1)?.phase !== phase) this.phases.push({ iteration, phase });
+    // Being done is no phase of its own.
+    if (!report.done && this.phases.at(-1)?.phase !== phase) this.phases.push({ iteration, phase });
     const { axial, annular, vanished } = report.events;
     if (axial + annular + vanished > 0) this.changes.push({ iteration, axial, annular, vanished });
     for (const [part, time] of Object.entries(report.times)) this.times.set(part, (this.times.get(part) ?? 0) + time);

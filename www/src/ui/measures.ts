@@ -1,3 +1,4 @@
+import type { Unit } from '../examples';
 import type { Measures, StepReport } from '../protocol';
 import { h } from './dom';
 import { count, figure } from './format';
@@ -42,10 +43,11 @@ const ROWS: { name: Name; label: string; help: string }[] = [
   },
 ];
 
-/** The measures of the surface. Volume and area are in millimetres, as medical files mean them. */
+/** The measures of the surface. */
 export class MeasurePanel {
   readonly element: HTMLElement;
   readonly #cells = new Map<Name, HTMLElement>();
+  #unit: Unit = 'mm';
   #values: Partial<MeasureValues> = {};
 
   constructor() {
@@ -57,8 +59,10 @@ export class MeasurePanel {
     }
   }
 
-  clear(): void {
-    this.#show({});
+  /** Of lengths, for volume and area. */
+  set unit(unit: Unit) {
+    this.#unit = unit;
+    this.#show(this.#values);
   }
 
   /** What every step reports anyway. What was found by a check no longer holds once the surface moves on. */
@@ -92,20 +96,24 @@ export class MeasurePanel {
     this.element.dataset.measures = JSON.stringify(values);
     for (const [name, cell] of this.#cells) {
       const value = values[name];
-      const text = value === undefined ? '–' : textOf(name, value);
+      const text = value === undefined ? '–' : textOf(name, value, this.#unit);
       if (cell.textContent !== text) cell.textContent = text;
       cell.classList.toggle('bad', value === false || (name === 'crossings' && Number(value) > 0));
     }
   }
 }
 
-function textOf(name: Name, value: number | boolean): string {
+function textOf(name: Name, value: number | boolean, unit: Unit): string {
   if (typeof value === 'boolean') return value ? 'yes' : 'no';
-  if (name === 'volume') return volumeText(value);
-  if (name === 'area') return `${figure(value / 100)} cm²`;
+  if (name === 'volume') return sized(value, 3, unit);
+  if (name === 'area') return sized(value, 2, unit);
   return count(value);
 }
 
-function volumeText(cubicMillimetres: number): string {
-  return `${figure(cubicMillimetres / 1000)} cm³`;
+/** An area (power 2) or volume (power 3) with its unit; millimetres become centimetres where that reads better. */
+function sized(value: number, power: 2 | 3, unit: Unit): string {
+  const raised = power === 2 ? '²' : '³';
+  const inCentimetres = value / 10 ** power;
+  if (unit === 'mm' && inCentimetres >= 10) return `${figure(inCentimetres)} cm${raised}`;
+  return unit ? `${figure(value)} ${unit}${raised}` : figure(value);
 }

@@ -17,9 +17,9 @@ const SHAPES: { kind: Kind; label: string; help: string }[] = [
     help: 'Marching cubes at the iso value, then smoothed and cleaned by the model.',
   },
 ];
-const DEFAULT_LEVELS = 3;
+const DEFAULT_LEVELS = 1;
 const MOST_LEVELS = 6;
-const DEFAULT_BUBBLES = 6;
+const DEFAULT_BUBBLES = 5;
 
 export interface StartChoice {
   kind: Kind;

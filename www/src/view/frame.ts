@@ -9,6 +9,7 @@ import {
   Matrix4,
   Sprite,
   SpriteMaterial,
+  SRGBColorSpace,
 } from 'three';
 import type { Vec3 } from '../protocol';
 import { anatomyOf, type Grid, toWorld } from './anatomy';
@@ -34,8 +35,8 @@ export class VolumeFrame {
     this.object.add(this.#box);
     for (const [axis, { anatomical, positive }] of anatomyOf(grid).entries()) {
       const [high, low] = positive ? LETTERS[anatomical] : [LETTERS[anatomical][1], LETTERS[anatomical][0]];
-      this.#addLetter(high, sideCentre(grid, axis, 1 + STAND_OFF), color);
-      this.#addLetter(low, sideCentre(grid, axis, -STAND_OFF), color);
+      this.#addLetter(high, sideCentre(grid, axis, 1 + STAND_OFF));
+      this.#addLetter(low, sideCentre(grid, axis, -STAND_OFF));
     }
   }
 
@@ -48,13 +49,8 @@ export class VolumeFrame {
     }
   }
 
-  #addLetter(letter: string, at: Vec3, color: ColorRepresentation): void {
-    const material = new SpriteMaterial({
-      map: letterTexture(letter),
-      color,
-      sizeAttenuation: false,
-      depthWrite: false,
-    });
+  #addLetter(letter: string, at: Vec3): void {
+    const material = new SpriteMaterial({ map: letterTexture(letter), sizeAttenuation: false, depthWrite: false });
     const sprite = new Sprite(material);
     sprite.position.set(...at);
     sprite.scale.setScalar(LETTER_SIZE);
@@ -79,6 +75,7 @@ function sideCentre(grid: Grid, axis: number, part: number): Vec3 {
   return toWorld(grid.affine, at);
 }
 
+/** White with a dark rim, so that it reads on any background. */
 function letterTexture(letter: string): CanvasTexture {
   const canvas = document.createElement('canvas');
   canvas.width = 64;
@@ -88,8 +85,14 @@ function letterTexture(letter: string): CanvasTexture {
     context.font = '600 44px system-ui, sans-serif';
     context.textAlign = 'center';
     context.textBaseline = 'middle';
+    context.lineJoin = 'round';
+    context.lineWidth = 7;
+    context.strokeStyle = '#1c2024';
+    context.strokeText(letter, 32, 34);
     context.fillStyle = '#fff';
     context.fillText(letter, 32, 34);
   }
-  return new CanvasTexture(canvas);
+  const texture = new CanvasTexture(canvas);
+  texture.colorSpace = SRGBColorSpace;
+  return texture;
 }

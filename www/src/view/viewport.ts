@@ -67,7 +67,7 @@ export class Viewport {
     const [x, y, z] = anatomicalSigns(grid.space);
     const direction = new Vector3(-0.55 * x, 1 * y, 0.32 * z).normalize();
     const narrow = Math.min(1, this.#camera.aspect);
-    const distance = (0.9 * radius) / Math.sin((FIELD_OF_VIEW * Math.PI) / 360) / narrow;
+    const distance = (0.97 * radius) / Math.sin((FIELD_OF_VIEW * Math.PI) / 360) / narrow;
     this.#home = { position: target.clone().addScaledVector(direction, distance), target };
     this.#camera.near = radius / 50;
     this.#camera.far = radius * 50;
