@@ -1,7 +1,8 @@
 //! The triangles that a glTF 2.0 document describes.
 //!
-//! The document is looked at as plain JSON, field by field: a tenth of the code that the whole format would take, and
-//! every index and range is checked here before it is used.
+//! The document is looked at as plain JSON, field by field, and every index and range is checked before it is used.
+//! Why not the `gltf` crate: it adds 96 kB of compressed wasm (this, with the readers of all other mesh formats, 55),
+//! and takes the container's length for granted. It is the oracle of our writer, in the tests.
 
 use super::FormatError;
 use super::glb::FORMAT;
