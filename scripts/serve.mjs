@@ -26,7 +26,7 @@ async function resolve(folder, address) {
   if (path !== folder && !path.startsWith(folder + sep)) return undefined;
   const found = await stat(path).catch(() => undefined);
   if (found?.isFile()) return path;
-  return found?.isDirectory() ? resolve(path, '/index.html') : undefined;
+  return found?.isDirectory() ? resolve(folder, `${pathname.replace(/\/$/, '')}/index.html`) : undefined;
 }
 
 async function answer(folder, request, response) {

@@ -1,6 +1,8 @@
 //! Volume files of every accepted format against what their usual libraries (nibabel, pynrrd, SimpleITK) read from
 //! them, and against what must happen to broken ones.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
 use vesicle::io::{FormatError, parse_volume, write_nifti};
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
@@ -395,8 +397,11 @@ fn header_and_payload_that_do_not_belong_together_are_refused() {
     assert_eq!(refusal(made!("pair.hdr"), Some(&raw)).1, "voxel data");
 }
 
-/// Every small file with its payload, where it has one.
-fn corpus() -> Vec<(&'static str, &'static [u8], Option<&'static [u8]>)> {
+/// A file's name, its bytes, and its payload, where it has one.
+type Sample = (&'static str, &'static [u8], Option<&'static [u8]>);
+
+/// Every small file.
+fn corpus() -> Vec<Sample> {
     vec![
         ("u1.nii", made!("u1.nii"), None),
         ("f8_big.nii", made!("f8_big.nii"), None),

@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn every_truncation_and_most_flips_are_errors() {
+    fn every_truncation_and_every_flip_that_matters_is_an_error() {
         let whole = member(&text(3000), 0, b"");
         for n in 0..whole.len() {
             assert!(gunzip("t", &whole[..n], 3000).is_err(), "cut at {n}");
@@ -284,7 +284,9 @@ mod tests {
         for at in 10..whole.len() {
             let mut broken = whole.clone();
             broken[at] ^= 0x10;
-            assert!(gunzip("t", &broken, 3000).is_err(), "flip at {at}");
+            // The last bits before the trailer are padding: there the content is the same.
+            let same = |content| content == text(3000);
+            assert!(gunzip("t", &broken, 3000).is_ok_and(same) == (at == whole.len() - 9), "flip at {at}");
         }
     }
 }

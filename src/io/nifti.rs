@@ -256,7 +256,7 @@ impl Fields {
     fn offset(&self, pair: bool) -> Result<usize, FormatError> {
         let least = if self.version == 1 { 352 } else { 544 };
         let stated = self.vox_offset;
-        let whole = stated >= 0.0 && stated <= MAX_OFFSET && stated == libm::trunc(stated);
+        let whole = (0.0..=MAX_OFFSET).contains(&stated) && stated == libm::trunc(stated);
         match (whole, pair) {
             (true, true) => Ok(stated as usize),
             (true, false) if stated == 0.0 => Ok(least),

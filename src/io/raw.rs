@@ -106,7 +106,7 @@ pub(super) fn decode(place: Place, bytes: &[u8], scalar: Scalar, big: bool) -> R
         }
         Scalar::U64 => {
             let read = if big { u64::from_be_bytes } else { u64::from_le_bytes };
-            check_exact(place, bytes, |b| read(b))?;
+            check_exact(place, bytes, read)?;
             Voxels::F64(numbers(place, bytes, |b| read(b) as f64)?)
         }
         Scalar::I64 => {

@@ -84,7 +84,7 @@ impl Resolver {
         }
         let joint = mesh.join(u, v, JOINT_REACH).ok()?;
         self.changes.axial += 1;
-        joint.first.iter().chain(&joint.second).for_each(|&w| self.touch(w));
+        joint.first.iter().chain(&joint.second).for_each(|&w| self.touch_edited(w));
         Some(true)
     }
 }

@@ -68,7 +68,7 @@ impl Resolver {
         } else {
             let w = mesh.split(u, v, middle)?;
             self.changes.creations += 1;
-            self.touch(w);
+            self.touch_edited(w);
         }
         [u, v, left, right].into_iter().for_each(|w| self.touch(w));
         Ok(true)
@@ -88,7 +88,7 @@ impl Resolver {
                 mesh.collapse(u, v, position)?;
                 self.changes.deletions += 1;
                 // At the end of the queue: trying the survivor again at once piles up valence.
-                self.touch(u);
+                self.touch_edited(u);
                 Ok(true)
             }
             Err(EditError::NeckInTheWay(_)) => self.cut_neck(mesh, sampling, u, v),
@@ -124,7 +124,7 @@ impl Resolver {
         part(mesh, cut, CUT_PUSH * sampling.shortest());
         for side in [cut.kept, cut.copies] {
             if !self.remove_speck(mesh, sampling, side[0]) {
-                side.into_iter().for_each(|w| self.touch(w));
+                side.into_iter().for_each(|w| self.touch_edited(w));
             }
         }
         Ok(true)

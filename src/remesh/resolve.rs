@@ -18,6 +18,8 @@ pub struct Resolver {
     /// Vertices that were moved or made since contact was last looked for.
     stirred: Vec<VertexId>,
     is_stirred: Vec<bool>,
+    /// Vertices made or displaced by the last call.
+    edited: Vec<VertexId>,
     pub(super) grid: PointGrid,
     pub(super) changes: Changes,
 }
@@ -45,6 +47,7 @@ impl Resolver {
     /// Vertices that are not named are looked at only where an edit or a contact reaches them.
     pub fn resolve(&mut self, mesh: &mut Mesh, sampling: Sampling, active: &[VertexId]) -> Changes {
         self.changes = Changes::default();
+        self.edited.clear();
         for &v in active {
             self.touch(v);
         }
@@ -55,6 +58,11 @@ impl Resolver {
             }
         }
         self.changes
+    }
+
+    /// The vertices that edits of the last call made or displaced; some may be gone again.
+    pub fn edited(&self) -> &[VertexId] {
+        &self.edited
     }
 
     /// What waits for the next call.
@@ -80,6 +88,12 @@ impl Resolver {
         if mark(&mut self.is_stirred, v) {
             self.stirred.push(v);
         }
+    }
+
+    /// [`Self::touch`] for a vertex that an edit made or displaced.
+    pub(super) fn touch_edited(&mut self, v: VertexId) {
+        self.edited.push(v);
+        self.touch(v);
     }
 
     pub(super) fn pop(&mut self) -> Option<VertexId> {

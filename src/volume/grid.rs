@@ -54,17 +54,16 @@ impl Grid {
         cell.blend(|index| self.values[index])
     }
 
-    /// Like [`sample`](Self::sample), but `outside` where `p` is not in the box [-1/2, n-1/2] that the voxels fill.
+    /// Trilinear value at `p` as if the grid went on with voxels of value 0 on all sides.
+    ///
+    /// Continuous, unlike a cut at the border: a surface that looks for a value there comes to rest.
     #[inline]
-    pub fn sample_zero(&self, p: Vec3, outside: f32) -> f32 {
-        if self.contains(p) { self.sample(p) } else { outside }
-    }
-
-    /// Whether `p` lies in the box that the voxels fill, half a voxel beyond the outermost centres.
-    #[inline]
-    pub fn contains(&self, p: Vec3) -> bool {
-        let inside = |x: f32, n: usize| x >= -0.5 && x <= n as f32 - 0.5;
-        inside(p.x, self.dims[0]) && inside(p.y, self.dims[1]) && inside(p.z, self.dims[2])
+    pub fn sample_padded(&self, p: Vec3) -> f32 {
+        let last = |n: usize| (n - 1) as f32;
+        let share = inside(p.x, last(self.dims[0]))
+            * inside(p.y, last(self.dims[1]))
+            * inside(p.z, last(self.dims[2]));
+        if share > 0.0 { share * self.sample(p) } else { 0.0 }
     }
 
     /// Sobel gradient in intensity per voxel: differences over two voxels, smoothed by [1 2 1] across, divided by
@@ -146,5 +145,126 @@ fn push_gradients(columns: &[Columns], out: &mut Vec<Vec3>) {
             before.along_z + 2.0 * here.along_z + after.along_z,
         );
         out.push(gradient * (1.0 / 32.0));
+    }
+}
+
+/// 1 between the outermost voxel centres, falling to 0 one voxel beyond.
+#[inline]
+fn inside(x: f32, last: f32) -> f32 {
+    let beyond = if x < 0.0 { -x } else { x - last };
+    if beyond <= 0.0 {
+        1.0
+    } else if beyond < 1.0 {
+        1.0 - beyond
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn grid(dims: [usize; 3], f: impl Fn(Vec3) -> f32) -> Grid {
+        let mut values = Vec::new();
+        for z in 0..dims[2] {
+            for y in 0..dims[1] {
+                values.extend((0..dims[0]).map(|x| f(Vec3::new(x as f32, y as f32, z as f32))));
+            }
+        }
+        Grid::new(dims, values).unwrap()
+    }
+
+    fn ramp(p: Vec3) -> f32 {
+        1.0 + 2.0 * p.x - 3.0 * p.y + 0.5 * p.z
+    }
+
+    #[test]
+    fn a_linear_field_is_sampled_exactly_between_voxels() {
+        let g = grid([5, 4, 6], ramp);
+        for p in [Vec3::ZERO, Vec3::new(0.25, 2.5, 4.75), Vec3::new(4.0, 3.0, 5.0), Vec3::new(3.5, 0.0, 0.5)]
+        {
+            assert!((g.sample(p) - ramp(p)).abs() < 1e-5, "at {p}");
+        }
+    }
+
+    #[test]
+    fn outside_the_border_goes_on() {
+        let g = grid([5, 4, 6], ramp);
+        let held = Vec3::new(0.0, 3.0, 2.5);
+        assert_eq!(g.sample(Vec3::new(-7.0, 9.0, 2.5)), g.sample(held));
+        assert_eq!(
+            g.sample(Vec3::new(f32::INFINITY, f32::NEG_INFINITY, 0.0)),
+            g.sample(Vec3::new(4.0, 0.0, 0.0))
+        );
+        assert_eq!(g.sample(Vec3::new(f32::NAN, 0.0, 0.0)), g.sample(Vec3::ZERO));
+    }
+
+    #[test]
+    fn padded_sampling_is_sampling_of_a_grid_with_zeros_around() {
+        let field = |p: Vec3| 3.0 + p.x * p.y - p.z;
+        let g = grid([4, 3, 5], field);
+        let padded = grid([8, 7, 9], |p| {
+            let q = p - Vec3::splat(2.0);
+            let inner = q.min_element() >= 0.0 && q.x <= 3.0 && q.y <= 2.0 && q.z <= 4.0;
+            if inner { field(q) } else { 0.0 }
+        });
+        for i in 0..4000 {
+            let p = Vec3::new((i % 17) as f32 * 0.45, (i / 17 % 15) as f32 * 0.43, (i / 255) as f32 * 0.57);
+            let p = p - Vec3::splat(1.9);
+            let expected = padded.sample(p + Vec3::splat(2.0));
+            assert!((g.sample_padded(p) - expected).abs() < 1e-4, "at {p}");
+        }
+        assert_eq!(g.sample_padded(Vec3::splat(f32::NAN)), 0.0);
+    }
+
+    #[test]
+    fn a_grid_of_one_voxel_is_the_same_everywhere() {
+        let g = grid([1, 1, 1], |_| 4.0);
+        assert_eq!(g.sample(Vec3::new(0.3, -2.0, 9.0)), 4.0);
+        assert_eq!(g.sobel().unwrap().values, [Vec3::ZERO]);
+    }
+
+    #[test]
+    fn sobel_of_a_ramp_is_its_slope_and_halves_at_the_border() {
+        let gradient = grid([6, 5, 4], ramp).sobel().unwrap();
+        let inner = gradient.values[1 + 6 * (2 + 5 * 2)];
+        assert!(inner.distance(Vec3::new(2.0, -3.0, 0.5)) < 1e-5, "{inner}");
+        let border = gradient.values[6 * (2 + 5 * 2)];
+        assert!(border.distance(Vec3::new(1.0, -3.0, 0.5)) < 1e-5, "{border}");
+        assert!(gradient.sample(Vec3::new(2.5, 2.2, 1.5)).distance(Vec3::new(2.0, -3.0, 0.5)) < 1e-5);
+    }
+
+    #[test]
+    fn sobel_is_the_sum_over_27_voxels_that_defines_it() {
+        let g = grid([4, 5, 3], |p| (p.x * 7.0 + p.y * p.y * 3.0 + p.z * p.x * 5.0) % 11.0);
+        let at = |x: i32, y: i32, z: i32| {
+            let held = |v: i32, n: usize| v.clamp(0, n as i32 - 1) as usize;
+            g.values[held(x, 4) + 4 * (held(y, 5) + 5 * held(z, 3))]
+        };
+        let gradient = g.sobel().unwrap();
+        for (index, found) in gradient.values.iter().enumerate() {
+            let [x, y, z] = [index % 4, index / 4 % 5, index / 20].map(|v| v as i32);
+            let mut sum = Vec3::ZERO;
+            for (dx, dy, dz) in (0..27).map(|k| (k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)) {
+                let smooth = |d: i32| (2 - d.abs()) as f32;
+                let weight = Vec3::new(
+                    dx as f32 * smooth(dy) * smooth(dz),
+                    dy as f32 * smooth(dx) * smooth(dz),
+                    dz as f32 * smooth(dx) * smooth(dy),
+                );
+                sum += weight * at(x + dx, y + dy, z + dz);
+            }
+            assert!(found.distance(sum / 32.0) < 1e-5, "voxel {index}: {found}, not {}", sum / 32.0);
+        }
+    }
+
+    #[test]
+    fn values_and_dimensions_must_match() {
+        assert!(Grid::new([2, 2, 2], vec![0.0; 7]).is_err());
+        assert!(Grid::new([0, 2, 2], vec![]).is_err());
+        assert!(Grid::new([usize::MAX, 2, 2], vec![0.0]).is_err());
     }
 }

@@ -351,3 +351,92 @@ fn intensity_range(voxels: &Voxels, slope: f64, intercept: f64) -> Result<[f64; 
         format!("intensities reach {range:?}; at most 3.4e38 (f32) is accepted"),
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn init(voxels: Voxels, dims: [usize; 4]) -> VolumeInit {
+        let affine = DAffine3::from_scale(DVec3::new(2.0, -1.0, 0.5));
+        VolumeInit {
+            voxels,
+            dims,
+            affine,
+            slope: 2.0,
+            intercept: -1.0,
+            frame_seconds: 0.1,
+            space: Space::Ras,
+        }
+    }
+
+    fn refused(init: VolumeInit) -> &'static str {
+        match Volume::new(init) {
+            Err(VolumeError::InvalidArgument { parameter, .. }) => parameter,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn intensities_are_scaled_and_keep_their_order() {
+        let v = Volume::new(init(Voxels::I8((-4..8).collect()), [3, 2, 2, 1])).unwrap();
+        assert_eq!(v.range(), [-9.0, 13.0]);
+        assert_eq!(v.intensities(0).unwrap(), (-4..8).map(|i| (2 * i - 1) as f32).collect::<Vec<_>>());
+        assert_eq!((v.dims(), v.frames(), v.spacing()), ([3, 2, 2], 1, [2.0, 1.0, 0.5]));
+        assert!(v.intensities(1).is_err());
+    }
+
+    #[test]
+    fn a_negative_slope_turns_the_range_round() {
+        let turned = VolumeInit { slope: -1.0, intercept: 0.0, ..init(Voxels::U8(vec![1, 5]), [2, 1, 1, 1]) };
+        assert_eq!(Volume::new(turned).unwrap().range(), [-5.0, -1.0]);
+    }
+
+    #[test]
+    fn world_points_are_sampled_through_the_affine() {
+        let v = Volume::new(init(Voxels::U8((0..12).collect()), [3, 2, 2, 1])).unwrap();
+        let at = |x: f64, y: f64, z: f64| v.sample(DVec3::new(x, y, z), 0).unwrap();
+        assert_eq!(at(0.0, 0.0, 0.0), -1.0);
+        assert_eq!(at(3.0, -0.5, 0.25), 2.0 * (1.5 + 1.5 + 3.0) - 1.0);
+        assert_eq!(at(-50.0, 0.0, 0.0), -1.0);
+        assert!(v.sample(DVec3::NAN, 0).is_err());
+        assert!(v.sample(DVec3::ZERO, 1).is_err());
+    }
+
+    #[test]
+    fn what_is_not_a_finite_number_reads_as_an_end_of_the_range() {
+        let voxels = vec![f32::NAN, 1.0, f32::INFINITY, 3.0, f32::NEG_INFINITY, 2.0];
+        let plain = VolumeInit { slope: 1.0, intercept: 0.0, ..init(Voxels::F32(voxels), [6, 1, 1, 1]) };
+        let v = Volume::new(plain).unwrap();
+        assert_eq!(v.range(), [1.0, 3.0]);
+        assert_eq!(v.intensities(0).unwrap(), [1.0, 1.0, 3.0, 3.0, 1.0, 2.0]);
+        assert_eq!(v.histogram(2, 0).unwrap(), [1, 2]);
+        assert_eq!(v.slice(2, 0, 0).unwrap(), v.intensities(0).unwrap());
+    }
+
+    #[test]
+    fn wrong_arguments_are_named() {
+        let good = || init(Voxels::U8(vec![1; 8]), [2, 2, 2, 1]);
+        let affine = |m: [f64; 9]| {
+            DAffine3::from_cols_array(&[m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], 0., 0., 0.])
+        };
+        assert_eq!(refused(VolumeInit { dims: [2, 2, 3, 1], ..good() }), "data");
+        assert_eq!(refused(VolumeInit { dims: [2, 0, 2, 1], ..good() }), "dims");
+        assert_eq!(refused(VolumeInit { dims: [usize::MAX, 2, 2, 1], ..good() }), "data");
+        assert_eq!(refused(VolumeInit { slope: 0.0, ..good() }), "slope");
+        assert_eq!(refused(VolumeInit { slope: f64::NAN, ..good() }), "slope");
+        assert_eq!(refused(VolumeInit { intercept: f64::INFINITY, ..good() }), "intercept");
+        assert_eq!(refused(VolumeInit { frame_seconds: -1.0, ..good() }), "frameSeconds");
+        assert_eq!(
+            refused(VolumeInit { affine: affine([1., 0., 0., 0., 1., 0., 1., 1., 0.]), ..good() }),
+            "affine"
+        );
+        assert_eq!(
+            refused(VolumeInit { affine: affine([1., 0., 0., 0., f64::NAN, 0., 0., 0., 1.]), ..good() }),
+            "affine"
+        );
+        assert_eq!(refused(VolumeInit { voxels: Voxels::F64(vec![f64::NAN; 8]), ..good() }), "data");
+        assert_eq!(refused(VolumeInit { voxels: Voxels::F64(vec![1e300; 8]), ..good() }), "data");
+    }
+}

@@ -217,3 +217,127 @@ fn smallest([x, y, z]: [f64; 3]) -> f64 {
     let xy = if x < y { x } else { y };
     if xy < z { xy } else { z }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn volume(dims: [usize; 3], affine: DAffine3, f: impl Fn(DVec3) -> f64) -> Volume {
+        let mut values = Vec::new();
+        for i in 0..dims.iter().product::<usize>() {
+            let index =
+                DVec3::from([i % dims[0], i / dims[0] % dims[1], i / (dims[0] * dims[1])].map(|v| v as f64));
+            values.push(f(affine.transform_point3(index)) as f32);
+        }
+        Volume::new(VolumeInit {
+            voxels: Voxels::F32(values),
+            dims: [dims[0], dims[1], dims[2], 1],
+            affine,
+            slope: 1.0,
+            intercept: 0.0,
+            frame_seconds: 0.0,
+            space: crate::volume::Space::Ras,
+        })
+        .unwrap()
+    }
+
+    fn oblique() -> DAffine3 {
+        let axes = DMat3::from_cols(
+            DVec3::new(0.8, 0.6, 0.0),
+            DVec3::new(-0.9, 1.2, 0.0),
+            DVec3::new(0.0, 0.0, 2.5),
+        );
+        DAffine3::from_mat3_translation(axes, DVec3::new(-20.0, 5.0, 7.0))
+    }
+
+    #[test]
+    fn sizes_carry_on_and_the_box_stays() {
+        let v = volume([40, 31, 17], oblique(), |p| p.x);
+        for factor in [1.3, 3f64.sqrt(), 2.0] {
+            let levels = v.pyramid(3, factor).unwrap();
+            assert_eq!(levels.len(), 3);
+            let mut dims = v.dims();
+            for level in &levels[1..] {
+                dims = dims.map(|n| (n as f64 / factor).floor() as usize);
+                assert_eq!(level.dims(), dims);
+                let ends = |v: &Volume| {
+                    let far = DVec3::from(v.dims().map(|n| n as f64 - 0.5));
+                    [DVec3::splat(-0.5), far].map(|p| v.affine().transform_point3(p))
+                };
+                for (a, b) in ends(&v).iter().zip(ends(level)) {
+                    assert!(a.distance(b) < 1e-9);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_constant_stays_and_a_ramp_stays_away_from_the_border() {
+        let ramp = |p: DVec3| 0.7 * p.x - 0.4 * p.y + 0.2 * p.z;
+        let v = volume([40, 36, 30], oblique(), ramp);
+        for level in &v.pyramid(3, 3f64.sqrt()).unwrap()[1..] {
+            let middle = DVec3::from(level.dims().map(|n| (n / 2) as f64));
+            let p = level.affine().transform_point3(middle);
+            assert!((level.sample(p, 0).unwrap() - ramp(p)).abs() < 1e-4, "{:?}", level.dims());
+        }
+        let flat = volume([13, 9, 11], oblique(), |_| 5.0);
+        for level in flat.pyramid(3, 1.7).unwrap() {
+            assert!(level.range().iter().all(|v| (v - 5.0).abs() < 1e-5));
+        }
+    }
+
+    #[test]
+    fn one_level_is_the_kernel_of_the_paper() {
+        // One axis by hand: 6 voxels to 3, unit 1, centres at 0.5, 2.5, 4.5, each tap half way between two voxels.
+        let row = [3.0f32, 8.0, 1.0, 4.0, 9.0, 2.0];
+        let grid = Grid { dims: [6, 1, 1], values: row.to_vec() };
+        let (coarse, spacing) = grid.reduce([1.0; 3], 1.0, 2.0).unwrap();
+        assert_eq!((coarse.dims, spacing), ([3, 1, 1], [2.0, 1.0, 1.0]));
+        let at = |i: i32| row[i.clamp(0, 5) as usize];
+        let tap = |i: i32| 0.5 * (at(i) + at(i + 1));
+        for (i, found) in coarse.values.iter().enumerate() {
+            let c = 2 * i as i32;
+            // A tap outside the border reads the border itself, not a mean across it.
+            let held = |i: i32| {
+                if i < 0 {
+                    at(0)
+                } else if i > 4 {
+                    at(5)
+                } else {
+                    tap(i)
+                }
+            };
+            let expected =
+                (held(c - 2) + 4.0 * held(c - 1) + 6.0 * held(c) + 4.0 * held(c + 1) + held(c + 2)) / 16.0;
+            assert!((found - expected).abs() < 1e-6, "voxel {i}: {found}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn every_frame_is_reduced() {
+        let a = volume([8, 8, 8], DAffine3::IDENTITY, |_| 1.0);
+        let b = volume([8, 8, 8], DAffine3::IDENTITY, |_| 2.0);
+        let both = Volume::from_frames(&[a, b], Some(0.5)).unwrap();
+        let coarse = &both.pyramid(2, 2.0).unwrap()[1];
+        assert_eq!((coarse.frames(), coarse.frame_seconds()), (2, 0.5));
+        assert_eq!(coarse.intensities(1).unwrap(), vec![2.0; 64]);
+    }
+
+    #[test]
+    fn what_cannot_be_built_is_refused_with_what_can() {
+        let v = volume([20, 16, 9], DAffine3::IDENTITY, |p| p.x);
+        for factor in [1.0, 2.1, 0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(v.pyramid(2, factor).is_err(), "{factor}");
+        }
+        assert!(v.pyramid(0, 2.0).is_err());
+        assert_eq!(v.pyramid(3, 2.0).unwrap()[2].dims(), [5, 4, 2]);
+        let message = v.pyramid(4, 2.0).unwrap_err().to_string();
+        assert!(message.contains("1 to 3 are possible"), "{message}");
+        assert!(v.pyramid(usize::MAX, 1.000_001).is_err());
+        let flat = volume([20, 16, 1], DAffine3::IDENTITY, |p| p.x);
+        assert_eq!(flat.pyramid(1, 2.0).unwrap().len(), 1);
+        assert!(flat.pyramid(2, 2.0).is_err());
+    }
+}

@@ -79,3 +79,58 @@ fn check_same_grid(first: &Volume, frame: &Volume, index: usize) -> Result<(), V
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DAffine3;
+    use crate::volume::{LengthUnit, Space};
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn still(values: Voxels, slope: f64, shift: f64) -> Volume {
+        Volume::new(VolumeInit {
+            voxels: values,
+            dims: [2, 1, 1, 1],
+            affine: DAffine3::from_translation(DVec3::X * shift),
+            slope,
+            intercept: 0.0,
+            frame_seconds: 0.0,
+            space: Space::Lps,
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn frames_of_one_type_stay_as_stored() {
+        let frames = [still(Voxels::U8(vec![1, 2]), 3.0, 0.0), still(Voxels::U8(vec![3, 4]), 3.0, 1e-5)];
+        let all = Volume::from_frames(&frames, Some(0.05)).unwrap();
+        assert_eq!(
+            (all.dims(), all.frames(), all.frame_seconds(), all.space()),
+            ([2, 1, 1], 2, 0.05, Space::Lps)
+        );
+        assert_eq!(all.voxels(), &Voxels::U8(vec![1, 2, 3, 4]));
+        assert_eq!(all.intensities(1).unwrap(), [9.0, 12.0]);
+        let longer = Volume::from_frames(&[all.clone(), all], None).unwrap();
+        assert_eq!((longer.frames(), longer.frame_seconds()), (4, 0.05));
+    }
+
+    #[test]
+    fn frames_of_several_types_or_slopes_become_intensities() {
+        let one = still(Voxels::U8(vec![1, 2]), 1.0, 0.0);
+        for other in [still(Voxels::I16(vec![-7, 300]), 1.0, 0.0), still(Voxels::U8(vec![3, 4]), 0.5, 0.0)] {
+            let all = Volume::from_frames(&[one.clone(), other.clone()], None).unwrap();
+            assert_eq!(all.intensities(0).unwrap(), [1.0, 2.0]);
+            assert_eq!(all.intensities(1).unwrap(), other.intensities(0).unwrap());
+        }
+    }
+
+    #[test]
+    fn frames_that_do_not_match_are_refused() {
+        let one = still(Voxels::U8(vec![1, 2]), 1.0, 0.0);
+        assert!(Volume::from_frames(&[], None).is_err());
+        assert!(Volume::from_frames(&[one.clone(), still(Voxels::U8(vec![1, 2]), 1.0, 0.5)], None).is_err());
+        assert!(Volume::from_frames(&[one.clone(), one.clone().with_unit(LengthUnit::Metre)], None).is_err());
+        assert!(Volume::from_frames(&[one], Some(f64::NAN)).is_err());
+    }
+}

@@ -75,3 +75,57 @@ impl Volume {
         ))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::math::DAffine3;
+    use crate::volume::{Space, Volume, VolumeInit, Voxels};
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Voxel (x, y, z) of frame t holds x + 10y + 100z + 50t.
+    fn volume() -> Volume {
+        let value = |i: usize| (i % 4 + 10 * (i / 4 % 3) + 100 * (i / 12 % 2) + 50 * (i / 24)) as u8;
+        Volume::new(VolumeInit {
+            voxels: Voxels::U8((0..48).map(value).collect()),
+            dims: [4, 3, 2, 2],
+            affine: DAffine3::IDENTITY,
+            slope: 1.0,
+            intercept: 0.0,
+            frame_seconds: 0.0,
+            space: Space::Ras,
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn slices_run_along_the_lower_axis_first() {
+        let v = volume();
+        assert_eq!(v.slice(0, 3, 0).unwrap(), [3., 13., 23., 103., 113., 123.]);
+        assert_eq!(v.slice(1, 2, 0).unwrap(), [20., 21., 22., 23., 120., 121., 122., 123.]);
+        assert_eq!(v.slice(2, 1, 1).unwrap()[..5], [150., 151., 152., 153., 160.]);
+        assert_eq!(v.slice(2, 0, 0).unwrap().len(), 12);
+    }
+
+    #[test]
+    fn slices_out_of_range_are_refused() {
+        let v = volume();
+        assert!(v.slice(3, 0, 0).is_err());
+        assert!(v.slice(0, 4, 0).is_err());
+        assert!(v.slice(2, 2, 0).is_err());
+        assert!(v.slice(2, 0, 2).is_err());
+    }
+
+    #[test]
+    fn histograms_count_every_voxel_of_a_frame_over_the_range_of_all() {
+        let v = volume();
+        assert_eq!(v.range(), [0.0, 173.0]);
+        for bins in [1, 7, 256] {
+            assert_eq!(v.histogram(bins, 1).unwrap().iter().sum::<u32>(), 24);
+        }
+        let exact = v.histogram(173, 0).unwrap();
+        assert_eq!((exact[0], exact[13], exact[123], exact[172]), (1, 1, 1, 0));
+        assert_eq!(v.histogram(173, 1).unwrap()[172], 2, "the largest shares the last bin with the next");
+        assert!(v.histogram(0, 0).is_err() && v.histogram(65_537, 0).is_err() && v.histogram(4, 2).is_err());
+    }
+}

@@ -53,7 +53,7 @@ impl Voxels {
 
     /// The stored number at `index`, or `None` past the end.
     pub fn get(&self, index: usize) -> Option<f64> {
-        each!(self, values => values.get(index).map(|&v| f64::from(v)))
+        each!(self, values => number_at(values, index))
     }
 
     /// Smallest and largest finite number, or `None` when there is none.
@@ -101,6 +101,10 @@ impl Voxels {
         let mut all = first.empty_like(count)?;
         Ok(parts.iter().all(|part| all.append(part)).then_some(all))
     }
+}
+
+fn number_at<T: Copy + Into<f64>>(values: &[T], index: usize) -> Option<f64> {
+    values.get(index).map(|&v| v.into())
 }
 
 fn finite_range<T: Copy + PartialOrd + Into<f64>>(values: &[T]) -> Option<[f64; 2]> {

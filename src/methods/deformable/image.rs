@@ -31,10 +31,10 @@ impl LevelImage {
         p * self.scale + self.offset
     }
 
-    /// Π: trilinear intensity in 0..1, and 0 outside the image, so that an enclosing surface comes in.
+    /// Π: trilinear intensity in 0..1, and 0 beyond the image, so that an enclosing surface comes in.
     #[inline]
     pub(super) fn intensity(&self, p: Vec3) -> f32 {
-        self.grid.sample_zero(self.index(p), 0.0)
+        self.grid.sample_padded(self.index(p))
     }
 
     /// ∇Π by the Sobel operator, per voxel of this level, no longer than `bound`; zero where none was prepared.

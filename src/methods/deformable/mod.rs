@@ -114,7 +114,7 @@ const CHECK_PERIOD: f32 = 50.0;
 /// Slots in use below which the mesh is put in order again.
 const LEAST_OCCUPANCY: f32 = 0.7;
 
-/// The three per-vertex attributes of the model.
+/// The per-vertex attributes of the model.
 #[derive(Clone, Copy, Debug)]
 struct Keys {
     velocity: VectorKey,
@@ -122,6 +122,8 @@ struct Keys {
     checked: VectorKey,
     /// Iterations since then.
     age: ScalarKey,
+    /// Iterations since an edit made or displaced the vertex.
+    calm: ScalarKey,
 }
 
 /// The deformable model.
@@ -166,7 +168,12 @@ impl DeformableModel {
             sampling: Sampling::new(delta),
         };
         let mut mesh = options.start.make(&frame, |value| pyramid.normalised(value))?;
-        let keys = Keys { velocity: mesh.add_vector(), checked: mesh.add_vector(), age: mesh.add_scalar() };
+        let keys = Keys {
+            velocity: mesh.add_vector(),
+            checked: mesh.add_vector(),
+            age: mesh.add_scalar(),
+            calm: mesh.add_scalar(),
+        };
         let mut model = Self {
             to_world: volume.affine(),
             fingerprint: state::fingerprint(volume, options.frame, options.levels),
@@ -225,8 +232,7 @@ impl DeformableModel {
             scale: ForceScale::new(&self.params, iso, self.voxel, delta),
             pulls: &pulls,
         };
-        self.movement =
-            advance(&mut self.mesh, self.keys.velocity, &mut self.forces, &world, &self.params, delta);
+        self.movement = advance(&mut self.mesh, self.keys, &mut self.forces, &world, &self.params, delta);
         times.add("normals", normals - begin);
         times.add("motion", (self.clock)() - normals);
     }
@@ -259,6 +265,8 @@ impl DeformableModel {
         let begin = (self.clock)();
         let sampling = Sampling::new(self.model_delta());
         let changes = self.resolver.resolve(&mut self.mesh, sampling, active);
+        let calm = self.mesh.scalar_mut(self.keys.calm);
+        self.resolver.edited().iter().for_each(|v| calm[v.index()] = 0.0);
         if self.mesh.occupancy() < LEAST_OCCUPANCY {
             self.reorder();
         }

@@ -1,19 +1,24 @@
 //! The law of motion m ẍ + γ ẋ = f (4), integrated over one iteration.
 
+use super::Keys;
 use super::forces::{ForceScale, Forces, Pull};
 use super::image::LevelImage;
 use super::params::{DeformableParams, Integrator};
 use crate::math::Vec3;
-use crate::mesh::{Mesh, VectorKey};
+use crate::mesh::Mesh;
 
 /// How much the mesh moved in one iteration.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Movement {
     /// Mean of ½ m (v·n)² / δ², the criterion of section 5.1.
     pub(super) energy: f64,
-    /// Largest move along a normal, in δ.
+    /// Largest move along a normal, in δ, of a vertex that no edit displaced lately. Edits of a surface at rest throw
+    /// single vertices off it; they come back in a few iterations and are no sign that the surface still travels.
     pub(super) fastest: f32,
 }
+
+/// Iterations after which a vertex has come back from an edit.
+const CALM: f32 = 6.0;
 
 /// What pushes the vertices.
 pub(super) struct World<'a> {
@@ -24,38 +29,38 @@ pub(super) struct World<'a> {
 
 impl World<'_> {
     /// The forces at given positions, with the normals there.
-    fn act(&self, forces: &mut Forces, mesh: &Mesh, positions: &[Vec3]) {
-        forces.evaluate(mesh.rings(), positions, self.image, &self.scale, self.pulls);
+    fn act(&self, forces: &mut Forces, mesh: &Mesh, positions: &[Vec3], velocities: &[Vec3]) {
+        forces.evaluate(mesh.rings(), positions, velocities, self.image, &self.scale, self.pulls);
     }
 }
 
 /// Moves every vertex by one time step. `forces` holds normals and L of the mesh as it is.
 pub(super) fn advance(
     mesh: &mut Mesh,
-    velocity: VectorKey,
+    keys: Keys,
     forces: &mut Forces,
     world: &World,
     params: &DeformableParams,
     delta: f32,
 ) -> Movement {
     let moves = match params.integrator {
-        Integrator::Euler => euler(mesh, velocity, forces, world, params),
-        Integrator::RungeKutta => runge_kutta(mesh, velocity, forces, world, params),
+        Integrator::Euler => euler(mesh, keys, forces, world, params),
+        Integrator::RungeKutta => runge_kutta(mesh, keys, forces, world, params),
     };
-    apply(mesh, velocity, forces, moves, params, delta)
+    apply(mesh, keys, forces, moves, params, delta)
 }
 
 /// Semi-implicit Euler: the new velocity moves the vertex. The velocity attribute holds it; no moves are returned.
 fn euler(
     mesh: &mut Mesh,
-    velocity: VectorKey,
+    keys: Keys,
     forces: &mut Forces,
     world: &World,
     params: &DeformableParams,
 ) -> Option<Vec<Vec3>> {
-    world.act(forces, mesh, mesh.positions());
+    world.act(forces, mesh, mesh.positions(), mesh.vector(keys.velocity));
     let (step, damping) = (params.time_step as f32 / params.mass as f32, params.damping as f32);
-    for (v, force) in mesh.vector_mut(velocity).iter_mut().zip(&forces.force) {
+    for (v, force) in mesh.vector_mut(keys.velocity).iter_mut().zip(&forces.force) {
         *v += (*force - *v * damping) * step;
     }
     None
@@ -64,13 +69,13 @@ fn euler(
 /// The classical fourth-order method on positions and velocities; returns the way of each vertex.
 fn runge_kutta(
     mesh: &mut Mesh,
-    velocity: VectorKey,
+    keys: Keys,
     forces: &mut Forces,
     world: &World,
     params: &DeformableParams,
 ) -> Option<Vec<Vec3>> {
     let (step, mass, damping) = (params.time_step as f32, params.mass as f32, params.damping as f32);
-    let (x0, v0) = (mesh.positions().to_vec(), mesh.vector(velocity).to_vec());
+    let (x0, v0) = (mesh.positions().to_vec(), mesh.vector(keys.velocity).to_vec());
     let normals = forces.normal.clone();
     let (mut x, mut v) = (x0.clone(), v0.clone());
     let (mut way, mut gain) = (vec![Vec3::ZERO; x.len()], vec![Vec3::ZERO; x.len()]);
@@ -78,7 +83,7 @@ fn runge_kutta(
         if stage > 0 {
             forces.look_around(mesh.rings(), &x);
         }
-        world.act(forces, mesh, &x);
+        world.act(forces, mesh, &x, &v);
         for i in 0..x.len() {
             let acceleration = (forces.force[i] - v[i] * damping) * (1.0 / mass);
             way[i] += v[i] * (weight * step / 6.0);
@@ -88,7 +93,7 @@ fn runge_kutta(
         }
     }
     forces.normal = normals;
-    for (v, gain) in mesh.vector_mut(velocity).iter_mut().zip(gain) {
+    for (v, gain) in mesh.vector_mut(keys.velocity).iter_mut().zip(gain) {
         *v += gain;
     }
     Some(way)
@@ -97,7 +102,7 @@ fn runge_kutta(
 /// Bounds each move, scales the velocity with it, and moves the vertices.
 fn apply(
     mesh: &mut Mesh,
-    velocity: VectorKey,
+    keys: Keys,
     forces: &Forces,
     moves: Option<Vec<Vec3>>,
     params: &DeformableParams,
@@ -106,7 +111,9 @@ fn apply(
     let (step, limit) = (params.time_step as f32, params.max_move as f32 * delta);
     let live: Vec<bool> = mesh.rings().iter().map(|ring| !ring.is_empty()).collect();
     let count = mesh.vertex_count();
-    let (positions, velocities) = mesh.positions_and_vector_mut(velocity);
+    let calm = mesh.scalar(keys.calm).to_vec();
+    mesh.scalar_mut(keys.calm).iter_mut().for_each(|calm| *calm += 1.0);
+    let (positions, velocities) = mesh.positions_and_vector_mut(keys.velocity);
     let mut movement = Movement::default();
     for i in (0..live.len()).filter(|&i| live[i]) {
         let mut way = moves.as_ref().map_or(velocities[i] * step, |moves| moves[i]);
@@ -118,7 +125,9 @@ fn apply(
         positions[i] += way;
         let along = (way.dot(forces.normal[i]) / delta).abs();
         movement.energy += f64::from(along) * f64::from(along);
-        movement.fastest = if along > movement.fastest { along } else { movement.fastest };
+        if along > movement.fastest && calm[i] >= CALM {
+            movement.fastest = along;
+        }
     }
     movement.energy *= 0.5 * params.mass / count.max(1) as f64;
     movement

@@ -1,0 +1,98 @@
+import { existsSync } from 'node:fs';
+import { type Browser, chromium, type Page } from 'playwright-core';
+import { buildApp } from '../../scripts/app.mjs';
+import { serve } from '../../scripts/serve.mjs';
+import { findChromium } from '../../scripts/setup.mjs';
+import { at } from '../../scripts/shell.mjs';
+
+const FLAGS = [
+  '--use-angle=swiftshader',
+  '--enable-unsafe-swiftshader',
+  '--no-sandbox',
+  '--disable-background-networking',
+];
+
+export interface App {
+  page: Page;
+  address: string;
+  /** What should never happen: console errors, uncaught errors, requests to anywhere but the page's own address. */
+  complaints: string[];
+  close: () => Promise<void>;
+}
+
+/** The built app in a browser of its own. */
+export async function openApp(viewport = { width: 1280, height: 800 }): Promise<App> {
+  if (!existsSync(at('dist/index.html'))) await buildApp();
+  const executablePath = findChromium();
+  if (!executablePath) throw new Error('no Chromium or Chrome found: install one, or set CHROMIUM_PATH');
+  const server = await serve(at('dist'), 0);
+  const browser = await chromium.launch({ executablePath, args: FLAGS });
+  const page = await browser.newPage({ viewport });
+  const complaints = listen(page, server.address);
+  await page.goto(server.address);
+  return { page, address: server.address, complaints, close: () => closeAll(browser, server) };
+}
+
+async function closeAll(browser: Browser, server: { close: () => unknown }): Promise<void> {
+  await browser.close();
+  await server.close();
+}
+
+function listen(page: Page, address: string): string[] {
+  const complaints: string[] = [];
+  page.on('console', (message) => {
+    if (message.type() === 'error') complaints.push(`console: ${message.text()}`);
+  });
+  page.on('pageerror', (error) => complaints.push(`uncaught: ${error.message}`));
+  page.on('request', (request) => {
+    const url = request.url();
+    if (new URL(url).origin !== new URL(address).origin && !/^(blob|data):/.test(url))
+      complaints.push(`foreign: ${url}`);
+  });
+  return complaints;
+}
+
+/** Waits until the lab is in one of the states; an error that is not among them fails with its message. */
+export async function reach(page: Page, ...states: string[]): Promise<string> {
+  const selector = [...new Set([...states, 'error'])].map((state) => `[data-state=${state}]`).join(', ');
+  const lab = await page.waitForSelector(selector, { timeout: 50_000 });
+  const state = (await lab.getAttribute('data-state')) ?? '';
+  if (!states.includes(state)) throw new Error(`the lab is in error: ${await page.textContent('.banner')}`);
+  return state;
+}
+
+export interface Measures {
+  vertices: number;
+  triangles: number;
+  components: number;
+  chi: number;
+  genus: number;
+  volume: number;
+  area: number;
+  closed: boolean;
+  oriented: boolean;
+  crossings: number;
+}
+
+export async function measures(page: Page): Promise<Measures> {
+  return JSON.parse((await page.getAttribute('[data-measures]', 'data-measures')) ?? '{}');
+}
+
+export async function iteration(page: Page): Promise<number> {
+  return Number((await page.textContent('.iteration'))?.replace(/\D/g, ''));
+}
+
+/** Drops files on the page, as from the desktop. */
+export async function drop(page: Page, files: { name: string; bytes: Uint8Array }[]): Promise<void> {
+  const encoded = files.map(({ name, bytes }) => ({ name, base64: Buffer.from(bytes).toString('base64') }));
+  await page.evaluate((list) => {
+    const transfer = new DataTransfer();
+    for (const { name, base64 } of list) {
+      const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
+      transfer.items.add(new File([bytes], name));
+    }
+    for (const type of ['dragover', 'drop']) {
+      window.dispatchEvent(new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true }));
+    }
+  }, encoded);
+}

@@ -1,0 +1,113 @@
+import type { Example } from '../examples';
+import type { VolumeView } from '../protocol';
+import { h, section, uniqueId } from '../ui/dom';
+import { figure } from '../ui/format';
+
+/** The parts the page is put together from. */
+export interface Parts {
+  chooser: HTMLElement;
+  data: DataPanel;
+  histogram: HTMLElement;
+  start: HTMLElement;
+  params: HTMLElement;
+  transport: HTMLElement;
+  options: HTMLElement;
+  banner: HTMLElement;
+  status: HTMLElement;
+  canvas: HTMLElement;
+  slices: HTMLElement;
+  drop: HTMLElement;
+  measures: HTMLElement;
+  exports: HTMLElement;
+  plots: HTMLElement;
+  times: HTMLElement;
+  log: HTMLElement;
+}
+
+/** Lays the lab out: set-up on one side, the view in the middle, what comes of it on the other side. */
+export function layOut(root: HTMLElement, parts: Parts): void {
+  root.className = 'lab';
+  const view = h('div', { class: 'view' }, parts.canvas, parts.options, parts.banner, parts.drop);
+  const params = h(
+    'details',
+    { class: 'panel', open: matchMedia('(min-width: 700px)').matches },
+    h('summary', {}, h('h2', {}, 'Parameters')),
+    parts.params,
+  );
+  root.replaceChildren(
+    h('div', { class: 'stage' }, view, parts.transport, parts.status, parts.slices),
+    h(
+      'div',
+      { class: 'column setup' },
+      section('Data', parts.data.element),
+      section('Intensities', parts.histogram),
+      section('Start', parts.start),
+      params,
+    ),
+    h(
+      'div',
+      { class: 'column results' },
+      section('Surface', parts.measures),
+      section('Save', parts.exports),
+      section('Progress', parts.plots),
+      section('Events', parts.log),
+      section('Time per part', parts.times),
+    ),
+  );
+}
+
+/** What is told of a volume, so that its place is there before one is open. */
+const FACTS = ['File', 'Voxels', 'Voxel size', 'Intensities'];
+
+/** Which volume is open, and how to open another. */
+export class DataPanel {
+  readonly element: HTMLElement;
+  readonly #examples: HTMLSelectElement;
+  readonly #own = h('option', { value: '', hidden: true }, 'Your file');
+  readonly #facts = h('dl', { class: 'facts' });
+  readonly #credit = h('p', { class: 'help credit' });
+
+  constructor(examples: Example[], chooser: HTMLElement, onExample: (example: Example) => void) {
+    const id = uniqueId('example');
+    const options = examples.map((example) => h('option', { value: example.id }, example.name));
+    this.#examples = h('select', { id }, this.#own, ...options);
+    this.#examples.addEventListener('change', () => {
+      const example = examples.find((one) => one.id === this.#examples.value);
+      if (example) onExample(example);
+    });
+    this.#showFacts(FACTS.map((name) => [name, '–']));
+    this.#credit.textContent = examples[0]?.credit ?? '';
+    this.element = h(
+      'div',
+      { class: 'data' },
+      h('div', { class: 'row' }, h('label', { for: id }, 'Example'), h('span', { class: 'value' }, this.#examples)),
+      h('div', { class: 'row' }, chooser),
+      h(
+        'p',
+        { class: 'help' },
+        'Or drop NIfTI, NRRD or MetaImage anywhere on the page; a detached header together with its data. It stays on this machine.',
+      ),
+      this.#facts,
+      this.#credit,
+    );
+  }
+
+  show(volume: VolumeView, example: Example | undefined): void {
+    this.#own.hidden = example !== undefined;
+    this.#examples.value = example?.id ?? '';
+    const spacing = volume.spacing.map(figure).join(' × ');
+    const facts: [string, string][] = [
+      ['File', volume.name],
+      ['Voxels', volume.dims.join(' × ')],
+      ['Voxel size', `${spacing} mm`],
+      ['Intensities', `${figure(volume.range[0])} to ${figure(volume.range[1])}`],
+    ];
+    if (volume.frames > 1) facts.push(['Frames', `${volume.frames}, the first is shown`]);
+    this.#showFacts(facts);
+    this.#credit.textContent = example?.credit ?? '';
+  }
+
+  #showFacts(facts: [string, string][]): void {
+    this.#facts.replaceChildren(...facts.map(([name, value]) => h('div', {}, h('dt', {}, name), h('dd', {}, value))));
+  }
+}

@@ -1,0 +1,439 @@
+import { Client, RequestError } from '../client';
+import { EXAMPLES, type Example, exampleUrl } from '../examples';
+import type {
+  Failure,
+  MeshFormat,
+  ParamValues,
+  Plane,
+  Ready,
+  Setup,
+  SnapshotEvent,
+  StartShape,
+  StepReport,
+  VolumeSource,
+  VolumeView,
+  WorkerEvent,
+} from '../protocol';
+import { type LabState, Observable } from '../state';
+import { h } from '../ui/dom';
+import { ExportButtons } from '../ui/exports';
+import { acceptDrops, download, fileChooser, readFiles } from '../ui/files';
+import { count, plural } from '../ui/format';
+import { Histogram } from '../ui/histogram';
+import { History } from '../ui/history';
+import { EventLog } from '../ui/log';
+import { MeasurePanel } from '../ui/measures';
+import { ParamControls } from '../ui/params';
+import { Plots } from '../ui/plots';
+import { listenForShortcuts, type Shortcut, shortcutDialog } from '../ui/shortcuts';
+import { StartControls } from '../ui/start';
+import { ErrorBanner, StatusLine } from '../ui/status';
+import { TimeTable } from '../ui/times';
+import { Transport } from '../ui/transport';
+import { type ViewOptions, viewOptions } from '../ui/view-options';
+import { Stage } from '../view/stage';
+import { DataPanel, layOut } from './extract-page';
+
+const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, byComponent: false, slices: 'walls' };
+/** Radius of the sphere placed at the crosshair, as a part of the volume's smallest side. */
+const SPHERE_PART = 0.1;
+
+/** What the present volume was made of, to open it again after a failure of the engine. */
+interface Source {
+  name: string;
+  volume: () => Promise<VolumeSource>;
+  example?: Example;
+}
+
+/** The Extract lab: a deformable surface grows onto a volume. */
+export class ExtractLab {
+  readonly #root: HTMLElement;
+  readonly #state = new Observable<LabState>('loading');
+  readonly #client = new Client((event) => this.#onEvent(event));
+  readonly #history = new History();
+  readonly #status = new StatusLine();
+  readonly #banner = new ErrorBanner(() => this.#dismiss());
+  readonly #canvas = h('canvas', {
+    tabindex: 0,
+    role: 'img',
+    'aria-label': '3D view of the surface and the slices. Arrow keys turn it, plus and minus zoom.',
+  });
+  readonly #slices = h('div', { class: 'slices' });
+  readonly #drop = h('div', { class: 'drop', hidden: true }, 'Drop a volume to open it');
+  readonly #stage = new Stage(this.#canvas, this.#slices, INITIAL_VIEW, (planes) => this.#setPlanes(planes));
+  readonly #histogram = new Histogram((iso) => this.#setParam('iso', iso));
+  readonly #start = new StartControls(() => void this.#rebuild(true));
+  readonly #paramsHolder = h('div');
+  readonly #measures = new MeasurePanel();
+  readonly #exports = new ExportButtons((format, type) => void this.#export(format, type));
+  readonly #plots = new Plots(this.#history);
+  readonly #times = new TimeTable();
+  readonly #log = new EventLog();
+  readonly #transport = new Transport({
+    onToggle: () => this.#toggle(),
+    onStep: (steps) => this.#step(steps),
+    onReset: () => void this.#rebuild(false),
+  });
+  readonly #data: DataPanel;
+  readonly #shortcuts: Shortcut[] = [
+    { key: ' ', shown: 'Space', text: 'play or pause', act: () => this.#toggle() },
+    { key: 's', shown: 's', text: 'one step', act: () => this.#step(1) },
+    { key: 'd', shown: 'd', text: 'ten steps', act: () => this.#step(10) },
+    { key: 'r', shown: 'r', text: 'reset', act: () => void this.#rebuild(false) },
+  ];
+  #paramControls: ParamControls | undefined;
+  /** The parameters in force; they outlive a reset. */
+  #params: ParamValues = {};
+  #volume: VolumeView | undefined;
+  #source: Source | undefined;
+  /** The state to return to when an error has been read. */
+  #calm: LabState = 'loading';
+  #engineBroken = false;
+  #snapshot: SnapshotEvent | undefined;
+  #framePending = 0;
+
+  constructor(root: HTMLElement, help: HTMLElement) {
+    this.#root = root;
+    const chooser = fileChooser((files) => void this.#openFiles(files));
+    this.#data = new DataPanel(EXAMPLES, chooser, (example) => void this.#openExample(example));
+    this.#layOut(chooser);
+    this.#state.follow((state) => this.#showState(state));
+    acceptDrops(this.#drop, (files) => void this.#openFiles(files));
+    const dialog = shortcutDialog(
+      [...this.#shortcuts, { key: '?', shown: '?', text: 'this list', act: () => undefined }],
+      help,
+    );
+    document.body.append(dialog);
+    listenForShortcuts([
+      ...this.#shortcuts,
+      { key: '?', shown: '?', text: 'this list', act: () => dialog.showModal() },
+    ]);
+  }
+
+  /** Opens the built-in example and runs it. */
+  async start(): Promise<void> {
+    try {
+      await this.#greet();
+    } catch (error) {
+      this.#fail('Vesicle could not start.', error);
+      return;
+    }
+    const [example] = EXAMPLES;
+    if (example) await this.#openExample(example);
+  }
+
+  #layOut(chooser: HTMLElement): void {
+    layOut(this.#root, {
+      chooser,
+      data: this.#data,
+      histogram: this.#histogram.element,
+      start: this.#start.element,
+      params: this.#paramsHolder,
+      transport: this.#transport.element,
+      options: viewOptions(INITIAL_VIEW, (options) => this.#stage.setOptions(options)),
+      banner: this.#banner.element,
+      status: this.#status.element,
+      canvas: this.#canvas,
+      slices: this.#slices,
+      drop: this.#drop,
+      measures: this.#measures.element,
+      exports: this.#exports.element,
+      plots: this.#plots.element,
+      times: this.#times.element,
+      log: this.#log.element,
+    });
+  }
+
+  async #greet(): Promise<void> {
+    const { specs } = await this.#client.request('hello', undefined);
+    if (this.#paramControls) return;
+    this.#paramControls = new ParamControls(specs, ['iso'], (name, value) => this.#setParam(name, value));
+    this.#paramsHolder.replaceWith(this.#paramControls.element);
+  }
+
+  // ── opening ───────────────────────────────────────────────────────────────────────────────────
+
+  #openExample(example: Example): Promise<void> {
+    const { source } = example;
+    if ('shape' in source) return this.#open({ name: source.shape, volume: async () => source, example });
+    const { file } = source;
+    const volume = async () => ({ files: [{ name: file, bytes: await fetchBytes(exampleUrl(file)) }] });
+    return this.#open({ name: file, volume, example });
+  }
+
+  #openFiles(files: File[]): Promise<void> {
+    const name = files.map((file) => file.name).join(' + ');
+    return this.#open({ name, volume: async () => ({ files: await readFiles(files) }) });
+  }
+
+  /** Opens a volume and runs the model on it. When that fails, everything stays as it was. */
+  async #open(source: Source): Promise<void> {
+    if (this.#state.value === 'loading' && this.#volume) return;
+    this.#enterLoading(`Opening ${source.name}.`);
+    try {
+      if (this.#engineBroken) await this.#restartEngine();
+      const body = { name: source.name, source: await source.volume(), setup: this.#setupFor(source) };
+      const loaded = await this.#client.request('load', body, transferable(body.source));
+      this.#source = source;
+      if (source.example) this.#start.show({ kind: 'enclosing', levels: source.example.levels });
+      this.#adoptVolume(loaded.volume, source.example);
+      this.#adoptModel(loaded);
+      await this.#play();
+    } catch (error) {
+      this.#fail(`${source.name} could not be opened.`, error);
+    }
+  }
+
+  #adoptVolume(volume: VolumeView, example: Example | undefined): void {
+    this.#volume = volume;
+    this.#histogram.setVolume(volume);
+    this.#data.show(volume, example);
+    this.#stage.setVolume(volume);
+  }
+
+  #adoptModel({ params }: Ready): void {
+    this.#showParams(params);
+    this.#history.clear();
+    this.#log.clear();
+    this.#transport.showReport(undefined);
+    this.#showHistory();
+    this.#state.value = 'paused';
+  }
+
+  /** Starts the model over, with the parameters as they are; plays on when asked to or when it was running. */
+  async #rebuild(play: boolean): Promise<void> {
+    if (!this.#volume || this.#state.value === 'loading') return;
+    if (this.#engineBroken && this.#source) return this.#open(this.#source);
+    this.#enterLoading('Starting over.');
+    try {
+      this.#adoptModel(await this.#client.request('rebuild', this.#setup()));
+      if (play) await this.#play();
+      else this.#status.say('Ready to start.');
+    } catch (error) {
+      this.#fail('The model could not be built.', error);
+    }
+  }
+
+  #setup(): Setup {
+    const { levels } = this.#start.value;
+    return { start: this.#startShape(), levels, params: this.#params };
+  }
+
+  /** What suits an example; for a file, the settings as they are, except the iso value, which no other volume shares. */
+  #setupFor({ example }: Source): Setup {
+    if (example) return { start: { kind: 'enclosing' }, levels: example.levels, params: example.params };
+    const { iso: _, ...params } = this.#params;
+    return { ...this.#setup(), params };
+  }
+
+  #startShape(): StartShape {
+    const { kind, bubbles } = this.#start.value;
+    switch (kind) {
+      case 'bubbles':
+        return { kind, count: bubbles };
+      case 'sphere':
+        return { kind, center: this.#stage.crosshair, radius: this.#sphereRadius() };
+      default:
+        return { kind };
+    }
+  }
+
+  #sphereRadius(): number {
+    const { dims = [1, 1, 1], spacing = [1, 1, 1] } = this.#volume ?? {};
+    return SPHERE_PART * Math.min(...dims.map((n, axis) => n * (spacing[axis] ?? 1)));
+  }
+
+  async #restartEngine(): Promise<void> {
+    this.#client.restart({ code: 'internal', message: 'the engine was started again' });
+    await this.#greet();
+    this.#engineBroken = false;
+  }
+
+  // ── running ───────────────────────────────────────────────────────────────────────────────────
+
+  async #play(): Promise<void> {
+    await this.#client.request('play', undefined);
+  }
+
+  #toggle(): void {
+    const running = this.#state.value === 'running';
+    if (!running && !this.#canRun()) return;
+    this.#banner.hide();
+    this.#ask(running ? this.#client.request('pause', undefined) : this.#play());
+  }
+
+  #step(steps: number): void {
+    if (!this.#canRun()) return;
+    this.#banner.hide();
+    this.#ask(this.#client.request('step', { count: steps }));
+  }
+
+  /** Whether a model stands still and has further to go. */
+  #canRun(): boolean {
+    return this.#volume !== undefined && !this.#engineBroken && this.#modelState === 'paused';
+  }
+
+  /** The state beneath an error that is being shown. */
+  get #modelState(): LabState {
+    return this.#state.value === 'error' ? this.#calm : this.#state.value;
+  }
+
+  #ask(request: Promise<unknown>): void {
+    request.catch((error) => this.#fail('That did not work.', error));
+  }
+
+  #setPlanes(planes: Plane[]): void {
+    this.#ask(this.#client.request('planes', planes));
+  }
+
+  async #setParam(name: string, value: unknown): Promise<void> {
+    if (!this.#volume) return;
+    try {
+      this.#showParams(await this.#client.request('setParams', { [name]: value }));
+      // A model that had settled has further to go under other parameters.
+      if (this.#modelState === 'done') this.#ask(this.#play());
+    } catch (error) {
+      this.#refuseParam(name, error);
+    }
+  }
+
+  #refuseParam(name: string, error: unknown): void {
+    const { message } = toFailure(error);
+    this.#showParams(this.#params);
+    if (name === 'iso') this.#histogram.complain(message);
+    else this.#paramControls?.complain(name, message);
+  }
+
+  #showParams(params: ParamValues): void {
+    this.#params = params;
+    this.#paramControls?.show(params);
+    if (typeof params.iso === 'number') this.#histogram.setIso(params.iso);
+  }
+
+  // ── what the worker tells ─────────────────────────────────────────────────────────────────────
+
+  #onEvent(event: WorkerEvent): void {
+    switch (event.event) {
+      case 'snapshot':
+        this.#onSnapshot(event);
+        break;
+      case 'sections':
+        this.#stage.showSections(event.sections);
+        break;
+      case 'state':
+        this.#enter(event.state);
+        break;
+      case 'failure':
+        this.#fail('The run has stopped.', new RequestError(event.failure));
+    }
+  }
+
+  /** Shows a snapshot at the next animation frame; only then the worker may send another. */
+  #onSnapshot(event: SnapshotEvent): void {
+    if (this.#history.add(event.reports)) this.#transport.showReport(event.reports.at(-1));
+    if (this.#snapshot) this.#client.giveBack(this.#snapshot.surface);
+    this.#snapshot = event;
+    this.#showMeasures(event);
+    this.#framePending ||= requestAnimationFrame(() => this.#showSnapshot());
+  }
+
+  #showSnapshot(): void {
+    this.#framePending = 0;
+    const snapshot = this.#snapshot;
+    if (!snapshot) return;
+    this.#snapshot = undefined;
+    this.#stage.showSurface(snapshot.surface);
+    this.#stage.showSections(snapshot.sections);
+    this.#client.giveBack(snapshot.surface);
+    this.#showHistory();
+  }
+
+  #showMeasures({ measures, reports }: SnapshotEvent): void {
+    const last = reports.at(-1);
+    if (measures) this.#measures.showMeasures(measures);
+    else if (last) this.#measures.showReport(last);
+  }
+
+  #showHistory(): void {
+    this.#plots.update();
+    this.#times.update(this.#history);
+    this.#log.update(this.#history);
+  }
+
+  // ── states ────────────────────────────────────────────────────────────────────────────────────
+
+  #enterLoading(text: string): void {
+    this.#banner.hide();
+    this.#state.value = 'loading';
+    this.#status.say(text);
+  }
+
+  #enter(state: 'running' | 'paused' | 'done'): void {
+    // While something is being opened, the model it may replace has nothing to say.
+    if (this.#state.value === 'loading') {
+      this.#calm = state === 'done' ? 'done' : 'paused';
+      return;
+    }
+    this.#state.value = state;
+    const last = this.#history.reports.at(-1);
+    this.#status.say(describe(state, last));
+  }
+
+  #showState(state: LabState): void {
+    this.#root.dataset.state = state;
+    if (state === 'paused' || state === 'done') this.#calm = state;
+    const ready = this.#volume !== undefined;
+    this.#transport.showState(this.#modelState, ready);
+    this.#exports.enabled = ready && state !== 'loading';
+  }
+
+  #fail(title: string, error: unknown): void {
+    const failure = toFailure(error);
+    if (failure.code === 'internal') this.#engineBroken = true;
+    const hint =
+      failure.code === 'internal' && this.#volume
+        ? ' What you see is the last result; Reset starts the engine again.'
+        : '';
+    this.#banner.show(title, failure.message + hint);
+    this.#status.say('');
+    this.#state.value = 'error';
+  }
+
+  #dismiss(): void {
+    this.#banner.hide();
+    if (this.#state.value === 'error' && this.#volume) this.#state.value = this.#calm;
+  }
+
+  async #export(format: MeshFormat, type: string): Promise<void> {
+    try {
+      const bytes = await this.#client.request('export', { format });
+      const stem = this.#volume?.name.replace(/\.(nii|nrrd|nhdr|mha|mhd|gz)\b.*$/i, '') ?? 'surface';
+      download(`${stem}.${format}`, bytes, type);
+      this.#status.say(`Saved ${stem}.${format}.`);
+    } catch (error) {
+      this.#fail('The surface could not be saved.', error);
+    }
+  }
+}
+
+function toFailure(error: unknown): Failure {
+  if (error instanceof RequestError) return { code: error.code, message: error.message };
+  return { code: 'page', message: error instanceof Error ? error.message : String(error) };
+}
+
+function transferable(source: VolumeSource): Transferable[] {
+  return 'files' in source ? source.files.map(({ bytes }) => bytes.buffer as ArrayBuffer) : [];
+}
+
+async function fetchBytes(url: string): Promise<Uint8Array> {
+  const response = await fetch(url);
+  if (!response.ok) throw new Error(`The server answered ${response.status} for ${url}.`);
+  return new Uint8Array(await response.arrayBuffer());
+}
+
+function describe(state: 'running' | 'paused' | 'done', last: StepReport | undefined): string {
+  if (!last) return state === 'running' ? 'Running.' : 'Ready to start.';
+  const where = `${count(last.vertices)} vertices in ${plural(last.components, 'component')}`;
+  if (state === 'done') return `Settled after ${count(last.iteration)} iterations: ${where}.`;
+  return state === 'running' ? 'Running.' : `Paused at iteration ${count(last.iteration)}: ${where}.`;
+}

@@ -1,0 +1,147 @@
+/**
+ * The messages between page and worker. Both sides import this file and nothing else of each other.
+ *
+ * The page sends requests and gets exactly one reply each; the worker also sends events on its own.
+ * Stopping a run is an ordinary request with an ordinary reply: a cancellation is not an error.
+ */
+import type { MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, Vec3 } from 'vesicle';
+
+import type { Shape } from './shapes';
+
+export type { MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, Vec3 };
+
+export type ParamValues = Record<string, unknown>;
+
+export interface NamedBytes {
+  name: string;
+  bytes: Uint8Array;
+}
+
+/** Where the surface starts. Points are world coordinates, packed xyz. */
+export type StartShape =
+  | { kind: 'enclosing' }
+  | { kind: 'bubbles'; count: number }
+  | { kind: 'sphere'; center: Vec3; radius: number }
+  | { kind: 'isosurface' };
+
+/** Where a volume comes from: one file, or a header and its data; or a computed shape. */
+export type VolumeSource = { files: NamedBytes[] } | { shape: Shape };
+
+export interface Setup {
+  start: StartShape;
+  /** Pyramid levels above the volume itself. */
+  levels: number;
+  /** What differs from the defaults; without `iso` the worker chooses one from the histogram. */
+  params: ParamValues;
+}
+
+/** What the page needs to know of a volume, with its voxels reduced to 8 bits for display. */
+export interface VolumeView {
+  name: string;
+  dims: Vec3;
+  frames: number;
+  spacing: Vec3;
+  /** Voxel index to world, column-major, 16 numbers. */
+  affine: Float64Array;
+  space: 'RAS' | 'LPS';
+  /** Smallest and largest intensity. */
+  range: [number, number];
+  histogram: Uint32Array;
+  /** The intensities shown as black and as white. */
+  window: [number, number];
+  /** x fastest, 0 = black, 255 = white. */
+  voxels: Uint8Array;
+}
+
+export interface Plane {
+  origin: Vec3;
+  normal: Vec3;
+}
+
+/** Buffers that travel to the page and back, so that none is allocated per frame. They may be longer than what is used. */
+export interface SurfaceBuffers {
+  positions: Float32Array;
+  normals: Float32Array;
+  indices: Uint32Array;
+}
+
+export interface Surface extends SurfaceBuffers {
+  /** How many vertices and triangles of the buffers are in use. */
+  vertices: number;
+  triangles: number;
+}
+
+/** `report` is there when the surface was checked, which costs time and is done only when it stands still. */
+export interface Measures {
+  info: MeshInfo;
+  report?: MeshReport;
+}
+
+/** A model that was just built, before its first step. */
+export interface Ready {
+  params: ParamValues;
+  /** Edge length the model starts with, world units. */
+  delta: number;
+}
+
+export interface Loaded extends Ready {
+  volume: VolumeView;
+}
+
+/** Every request: what is sent, and what comes back. */
+export interface Requests {
+  hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
+  /** When it fails, the former volume and model stay. */
+  load: { body: { name: string; source: VolumeSource; setup: Setup }; reply: Loaded };
+  /** A new model on the same volume. When it fails, the former model stays. */
+  rebuild: { body: Setup; reply: Ready };
+  play: { body: undefined; reply: undefined };
+  pause: { body: undefined; reply: undefined };
+  step: { body: { count: number }; reply: undefined };
+  /** Replies with all the parameters as they are now. */
+  setParams: { body: ParamValues; reply: ParamValues };
+  /** The planes whose cuts with the surface are to be sent. */
+  planes: { body: Plane[]; reply: undefined };
+  export: { body: { format: MeshFormat }; reply: Uint8Array };
+}
+
+export type RequestKind = keyof Requests;
+export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
+/** Buffers the page is done with; has no reply. */
+export interface ReturnMessage {
+  kind: 'return';
+  buffers: SurfaceBuffers;
+}
+export type ToWorker = RequestMessage | ReturnMessage;
+
+export interface Failure {
+  /** A VesicleError's code, or 'internal' when the engine itself broke and has to be started again. */
+  code: string;
+  message: string;
+}
+export type ReplyMessage = { id: number; ok: true; body: unknown } | { id: number; ok: false; failure: Failure };
+
+export interface SnapshotEvent {
+  event: 'snapshot';
+  surface: Surface;
+  /** Cuts with the planes, pairs of world points. */
+  sections: Float32Array[];
+  /** One per step since the last snapshot. */
+  reports: StepReport[];
+  measures?: Measures;
+}
+export interface SectionsEvent {
+  event: 'sections';
+  sections: Float32Array[];
+}
+/** Sent when a run has ended by itself or was stopped, after its last snapshot. */
+export interface StateEvent {
+  event: 'state';
+  state: 'running' | 'paused' | 'done';
+}
+export interface FailureEvent {
+  event: 'failure';
+  failure: Failure;
+}
+export type WorkerEvent = SnapshotEvent | SectionsEvent | StateEvent | FailureEvent;
+export type FromWorker = ReplyMessage | WorkerEvent;

@@ -1,0 +1,62 @@
+/** Volumes that are computed instead of loaded: shapes whose topology is known. Intensities 0..255, x fastest, cubes as voxels. */
+export type Shape = 'linked rings' | 'sponge';
+
+export interface ShapeVoxels {
+  data: Uint8Array;
+  dims: [number, number, number];
+}
+
+const RINGS_SIZE = 64;
+/** Of the linked rings, in voxels: from the middle of a ring to the middle of its tube, and the tube's radius. */
+const RING_RADIUS = 15;
+const TUBE_RADIUS = 5.5;
+/** Empty voxels around the sponge. */
+const SPONGE_MARGIN = 4;
+
+export function shapeVoxels(shape: Shape): ShapeVoxels {
+  return shape === 'sponge' ? spongeVoxels(2) : linkedRings();
+}
+
+/** Two rings that go through each other: two components of genus 1. */
+function linkedRings(): ShapeVoxels {
+  const middle = (RINGS_SIZE - 1) / 2;
+  const shift = RING_RADIUS / 2;
+  return sample(RINGS_SIZE, (i, j, k) => {
+    const [x, y, z] = [i - middle, j - middle, k - middle];
+    const flat = Math.hypot(Math.hypot(x + shift, y) - RING_RADIUS, z);
+    const upright = Math.hypot(Math.hypot(x - shift, z) - RING_RADIUS, y);
+    // Half grey at the surface, one voxel and a half of transition to each side.
+    return 127.5 + 85 * (TUBE_RADIUS - Math.min(flat, upright));
+  });
+}
+
+/** A Menger sponge of the given depth on 81³ voxels: a cube pierced by square tunnels on every scale. */
+function spongeVoxels(depth: number): ShapeVoxels {
+  const side = 81;
+  return sample(side + 2 * SPONGE_MARGIN, (i, j, k) => {
+    const at = [i - SPONGE_MARGIN, j - SPONGE_MARGIN, k - SPONGE_MARGIN];
+    if (at.some((x) => x < 0 || x >= side)) return 0;
+    return isPierced(at, side, depth) ? 0 : 255;
+  });
+}
+
+/** Whether a voxel lies in a tunnel: on some scale, in the middle third along two axes or more. */
+function isPierced(at: number[], side: number, depth: number): boolean {
+  for (let level = 1; level <= depth; level++) {
+    const third = side / 3 ** level;
+    const inMiddle = at.filter((x) => Math.floor(x / third) % 3 === 1);
+    if (inMiddle.length >= 2) return true;
+  }
+  return false;
+}
+
+function sample(size: number, value: (i: number, j: number, k: number) => number): ShapeVoxels {
+  const data = new Uint8Array(size ** 3);
+  let voxel = 0;
+  for (let k = 0; k < size; k++) {
+    for (let j = 0; j < size; j++) {
+      for (let i = 0; i < size; i++) data[voxel++] = Math.min(255, Math.max(0, value(i, j, k)));
+    }
+  }
+  return { data, dims: [size, size, size] };
+}

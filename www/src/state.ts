@@ -1,0 +1,29 @@
+/** The states a lab can be in; the lab's element carries it as `data-state`. */
+export type LabState = 'loading' | 'running' | 'paused' | 'done' | 'error';
+
+/** A value that others can follow. Setting an equal value tells nobody. */
+export class Observable<T> {
+  #value: T;
+  readonly #followers = new Set<(value: T) => void>();
+
+  constructor(value: T) {
+    this.#value = value;
+  }
+
+  get value(): T {
+    return this.#value;
+  }
+
+  set value(value: T) {
+    if (Object.is(value, this.#value)) return;
+    this.#value = value;
+    for (const follower of this.#followers) follower(value);
+  }
+
+  /** Calls `follower` now and at every change; returns how to stop. */
+  follow(follower: (value: T) => void): () => void {
+    this.#followers.add(follower);
+    follower(this.#value);
+    return () => this.#followers.delete(follower);
+  }
+}

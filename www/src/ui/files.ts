@@ -1,0 +1,51 @@
+import type { NamedBytes } from '../protocol';
+import { h, uniqueId } from './dom';
+
+const ACCEPT = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw';
+
+/** A file chooser: one file, or a header and its data. */
+export function fileChooser(onFiles: (files: File[]) => void): HTMLElement {
+  const id = uniqueId('file');
+  const input = h('input', { type: 'file', id, multiple: true, accept: ACCEPT, class: 'visually-hidden' });
+  input.addEventListener('change', () => {
+    const files = [...(input.files ?? [])];
+    // So that choosing the same file again is a change.
+    input.value = '';
+    if (files.length > 0) onFiles(files);
+  });
+  return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, 'Open file…'));
+}
+
+/** Lets files be dropped anywhere on the page, and shows that they can be. */
+export function acceptDrops(overlay: HTMLElement, onFiles: (files: File[]) => void): void {
+  const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false;
+  window.addEventListener('dragover', (event) => {
+    if (!hasFiles(event)) return;
+    event.preventDefault();
+    overlay.hidden = false;
+  });
+  window.addEventListener('dragleave', (event) => {
+    if (!event.relatedTarget) overlay.hidden = true;
+  });
+  window.addEventListener('drop', (event) => {
+    overlay.hidden = true;
+    if (!hasFiles(event)) return;
+    event.preventDefault();
+    onFiles([...(event.dataTransfer?.files ?? [])]);
+  });
+}
+
+export async function readFiles(files: File[]): Promise<NamedBytes[]> {
+  return Promise.all(files.map(async (file) => ({ name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) })));
+}
+
+/** Offers bytes as a download. */
+export function download(name: string, bytes: Uint8Array, type: string): void {
+  const url = URL.createObjectURL(new Blob([bytes as Uint8Array<ArrayBuffer>], { type }));
+  const link = h('a', { href: url, download: name });
+  document.body.append(link);
+  link.click();
+  link.remove();
+  // The browser has taken the blob over once the click is handled; a moment later nothing else needs the address.
+  setTimeout(() => URL.revokeObjectURL(url), 10_000);
+}

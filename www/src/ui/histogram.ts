@@ -1,0 +1,103 @@
+import type { VolumeView } from '../protocol';
+import { h, onSchemeChange, token, uniqueId } from './dom';
+import { figure } from './format';
+
+/**
+ * The intensities' histogram, counts on a logarithmic scale, with the iso value on it. The line is the thumb of a range
+ * input that covers the picture, so dragging and the arrow keys come with it.
+ */
+export class Histogram {
+  readonly element: HTMLElement;
+  readonly #canvas = h('canvas', { role: 'img' });
+  readonly #slider: HTMLInputElement;
+  readonly #number: HTMLInputElement;
+  readonly #ends = [h('span'), h('span')] as const;
+  readonly #error = h('p', { class: 'field-error', role: 'alert' });
+  readonly #observer = new ResizeObserver(() => this.#draw());
+  #volume: Pick<VolumeView, 'histogram' | 'range'> | undefined;
+
+  constructor(onIso: (iso: number) => void) {
+    const id = uniqueId('iso');
+    this.#slider = h('input', { type: 'range', 'aria-label': 'Iso value on the histogram', disabled: true });
+    this.#number = h('input', { type: 'number', id, step: 'any', disabled: true, 'aria-describedby': `${id}-help` });
+    this.#slider.addEventListener('input', () => this.#changed(this.#slider.valueAsNumber, onIso));
+    this.#number.addEventListener('change', () => this.#changed(this.#number.valueAsNumber, onIso));
+    const label = h('label', { for: id }, 'Iso value ', h('span', { class: 'symbol' }, 'πI'));
+    const help = 'The intensity the surface settles at. Drag the line, or type.';
+    this.element = h(
+      'div',
+      { class: 'histogram', 'data-param': 'iso' },
+      h('div', { class: 'row' }, label, h('span', { class: 'value' }, this.#number)),
+      h('div', { class: 'bars' }, this.#canvas, this.#slider),
+      h('div', { class: 'ends', 'aria-hidden': 'true' }, ...this.#ends),
+      h('p', { class: 'help', id: `${id}-help` }, help),
+      this.#error,
+    );
+    this.#observer.observe(this.#canvas);
+    onSchemeChange(() => this.#draw());
+  }
+
+  setVolume(volume: Pick<VolumeView, 'histogram' | 'range'>): void {
+    this.#volume = volume;
+    const [low, high] = volume.range;
+    Object.assign(this.#slider, {
+      min: String(low),
+      max: String(high),
+      step: String(stepOf(low, high)),
+      disabled: false,
+    });
+    this.#number.disabled = false;
+    this.#ends[0].textContent = figure(low);
+    this.#ends[1].textContent = figure(high);
+    this.#draw();
+  }
+
+  setIso(iso: number): void {
+    this.#slider.valueAsNumber = iso;
+    this.#slider.setAttribute('aria-valuetext', figure(iso));
+    this.#number.value = String(Number(iso.toPrecision(6)));
+    this.#error.textContent = '';
+    this.#draw();
+  }
+
+  complain(message: string): void {
+    this.#error.textContent = message;
+  }
+
+  #changed(iso: number, onIso: (iso: number) => void): void {
+    if (Number.isFinite(iso)) this.setIso(iso);
+    onIso(iso);
+  }
+
+  #draw(): void {
+    const { clientWidth, clientHeight } = this.#canvas;
+    const context = this.#canvas.getContext('2d');
+    if (!this.#volume || !context || clientWidth === 0) return;
+    const ratio = Math.min(devicePixelRatio, 2);
+    this.#canvas.width = Math.round(clientWidth * ratio);
+    this.#canvas.height = Math.round(clientHeight * ratio);
+    context.scale(ratio, ratio);
+    const { histogram, range } = this.#volume;
+    const peak = Math.log1p(histogram.reduce((most, n) => Math.max(most, n), 1));
+    const isoBin = ((this.#slider.valueAsNumber - range[0]) / (range[1] - range[0])) * histogram.length;
+    const width = clientWidth / histogram.length;
+    histogram.forEach((n, bin) => {
+      context.fillStyle = token(bin >= isoBin ? '--bar-above' : '--bar-below');
+      const height = (Math.log1p(n) / peak) * clientHeight;
+      context.fillRect(bin * width, clientHeight - height, Math.ceil(width), height);
+    });
+    this.#describe();
+  }
+
+  #describe(): void {
+    const [low, high] = this.#volume?.range ?? [0, 0];
+    const text = `Histogram of intensities from ${figure(low)} to ${figure(high)}, counts on a logarithmic scale`;
+    this.#canvas.setAttribute('aria-label', text);
+  }
+}
+
+/** A slider step that whole-number intensities fall on, and fine enough for any other range. */
+function stepOf(low: number, high: number): number {
+  const span = high - low;
+  return Number.isInteger(low) && Number.isInteger(high) && span >= 50 ? 1 : span / 1000;
+}

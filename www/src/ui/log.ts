@@ -1,0 +1,78 @@
+import { h } from './dom';
+import { count, plural } from './format';
+import type { Change, History } from './history';
+
+/** How many entries are kept on the page; the totals above them count all. */
+const MOST_ENTRIES = 300;
+
+/** What happened, newest first: level changes, joins, cuts, parts that vanished. */
+export class EventLog {
+  readonly element: HTMLElement;
+  readonly #summary = h('p', { class: 'help' });
+  readonly #list = h('ol', { class: 'log', tabindex: 0, 'aria-label': 'Events, newest first' });
+  #phases = 0;
+  #changes = 0;
+
+  constructor() {
+    this.element = h('div', {}, this.#summary, this.#list);
+    this.clear();
+  }
+
+  clear(): void {
+    this.#phases = 0;
+    this.#changes = 0;
+    this.#list.replaceChildren();
+    this.#summary.textContent = 'Nothing has happened yet.';
+  }
+
+  /** Adds what is new in the history. */
+  update(history: History): void {
+    const fresh = [
+      ...history.phases.slice(this.#phases).map(({ iteration, phase }) => entry(iteration, 'level', `begins ${phase}`)),
+      ...history.changes
+        .slice(this.#changes)
+        .map((change) => entry(change.iteration, kindOf(change), describe(change))),
+    ];
+    if (fresh.length === 0) return;
+    this.#phases = history.phases.length;
+    this.#changes = history.changes.length;
+    fresh.sort((a, b) => b.iteration - a.iteration);
+    this.#list.prepend(...fresh.slice(0, MOST_ENTRIES).map(({ element }) => element));
+    while (this.#list.children.length > MOST_ENTRIES) this.#list.lastElementChild?.remove();
+    this.#summary.textContent = totals(history.changes);
+  }
+}
+
+function entry(iteration: number, kind: string, text: string): { iteration: number; element: HTMLElement } {
+  const mark = h('span', { class: `mark ${kind}`, 'aria-hidden': 'true' });
+  return { iteration, element: h('li', {}, h('span', { class: 'when' }, count(iteration)), mark, text) };
+}
+
+function kindOf(change: Change): string {
+  return change.axial > 0 ? 'axial' : change.annular > 0 ? 'annular' : 'vanished';
+}
+
+function describe({ axial, annular, vanished }: Change): string {
+  const parts: string[] = [];
+  if (axial > 0) parts.push(plural(axial, 'join'));
+  if (annular > 0) parts.push(plural(annular, 'cut'));
+  if (vanished > 0) parts.push(`${plural(vanished, 'part')} vanished`);
+  return parts.join(', ');
+}
+
+function totals(changes: Change[]): string {
+  const sum = (of: (change: Change) => number) => changes.reduce((total, change) => total + of(change), 0);
+  const joins = plural(
+    sum((change) => change.axial),
+    'join',
+  );
+  const cuts = plural(
+    sum((change) => change.annular),
+    'cut',
+  );
+  const vanished = plural(
+    sum((change) => change.vanished),
+    'part',
+  );
+  return `${joins}, ${cuts}, ${vanished} vanished.`;
+}

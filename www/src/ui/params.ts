@@ -1,0 +1,151 @@
+import type { ParamSpec, ParamValues } from '../protocol';
+import { h, uniqueId } from './dom';
+
+/** Slider positions of a parameter with a logarithmic scale. */
+const LOG_STEPS = 200;
+
+interface Control {
+  element: HTMLElement;
+  show(value: unknown): void;
+  complain(message: string | undefined): void;
+}
+
+/** Controls for all parameters, generated from their specifications. */
+export class ParamControls {
+  readonly element: HTMLElement;
+  readonly #controls = new Map<string, Control>();
+
+  /** `skip` are parameters that are set elsewhere. */
+  constructor(specs: ParamSpec[], skip: string[], onChange: (name: string, value: unknown) => void) {
+    for (const spec of specs) {
+      if (!skip.includes(spec.name))
+        this.#controls.set(
+          spec.name,
+          controlFor(spec, (value) => onChange(spec.name, value)),
+        );
+    }
+    this.element = h('div', { class: 'params' }, ...[...this.#controls.values()].map((control) => control.element));
+  }
+
+  /** Shows the values in force, and takes complaints back. */
+  show(values: ParamValues): void {
+    for (const [name, control] of this.#controls) {
+      if (name in values) control.show(values[name]);
+      control.complain(undefined);
+    }
+  }
+
+  /** Says beside a control why its value was refused. */
+  complain(name: string, message: string): void {
+    this.#controls.get(name)?.complain(message);
+  }
+}
+
+function controlFor(spec: ParamSpec, onChange: (value: unknown) => void): Control {
+  const id = uniqueId(`param-${spec.name}`);
+  const input = inputFor(spec, id, onChange);
+  const error = h('p', { class: 'field-error', id: `${id}-error`, role: 'alert' });
+  const help = h('p', { class: 'help', id: `${id}-help` }, spec.help);
+  const symbol = spec.symbol ? [h('span', { class: 'symbol' }, spec.symbol)] : [];
+  const label = h('label', { for: id }, spec.label, ' ', ...symbol);
+  const unit = spec.unit ? [h('span', { class: 'unit' }, spec.unit)] : [];
+  const value = h('span', { class: 'value' }, input.main, ...unit);
+  const element = h('div', { class: 'param', 'data-param': spec.name }, label, value, ...input.extra, help, error);
+  const complain = (message: string | undefined) => {
+    error.textContent = message ?? '';
+    input.main.toggleAttribute('aria-invalid', message !== undefined);
+  };
+  return { element, show: input.show, complain };
+}
+
+interface Input {
+  main: HTMLInputElement | HTMLSelectElement;
+  extra: HTMLElement[];
+  show(value: unknown): void;
+}
+
+function inputFor(spec: ParamSpec, id: string, onChange: (value: unknown) => void): Input {
+  switch (spec.type) {
+    case 'boolean':
+      return checkbox(id, onChange);
+    case 'choice':
+      return choice(spec, id, onChange);
+    default:
+      return numberInput(spec, id, onChange);
+  }
+}
+
+function describedBy(id: string): Record<string, string> {
+  return { id, 'aria-describedby': `${id}-help ${id}-error` };
+}
+
+function checkbox(id: string, onChange: (value: unknown) => void): Input {
+  const main = h('input', { type: 'checkbox', ...describedBy(id) });
+  main.addEventListener('change', () => onChange(main.checked));
+  const show = (value: unknown) => {
+    main.checked = value === true;
+  };
+  return { main, extra: [], show };
+}
+
+function choice(spec: ParamSpec, id: string, onChange: (value: unknown) => void): Input {
+  const options = (spec.choices ?? []).map((name) => h('option', { value: name }, name));
+  const main = h('select', describedBy(id), ...options);
+  main.addEventListener('change', () => onChange(main.value));
+  const show = (value: unknown) => {
+    main.value = String(value);
+  };
+  return { main, extra: [], show };
+}
+
+/** A number to type, and a slider beside it where the range is known. */
+function numberInput(spec: ParamSpec, id: string, onChange: (value: unknown) => void): Input {
+  const { min, max } = spec;
+  const main = h('input', { type: 'number', ...describedBy(id), min, max, step: 'any', inputmode: 'decimal' });
+  const slider = min !== undefined && max !== undefined ? new Slider(spec, min, max) : undefined;
+  const show = (value: unknown) => {
+    main.value = typeof value === 'number' ? typed(value) : String(value);
+    if (typeof value === 'number') slider?.show(value);
+  };
+  // Empty or unreadable goes on as NaN, so that the library itself says what is accepted.
+  main.addEventListener('change', () => onChange(main.valueAsNumber));
+  slider?.element.addEventListener('input', () => {
+    main.value = typed(slider.value);
+    onChange(slider.value);
+  });
+  return { main, extra: slider ? [slider.element] : [], show };
+}
+
+/** A number as one would type it: 1e-6 rather than 0.000001. */
+function typed(value: number): string {
+  const short = Number(value.toPrecision(6));
+  return short !== 0 && Math.abs(short) < 1e-3 ? short.toExponential() : String(short);
+}
+
+/** A range input that can be logarithmic. The number input beside it carries the label. */
+class Slider {
+  readonly element: HTMLInputElement;
+  readonly #log: boolean;
+  readonly #min: number;
+  readonly #max: number;
+
+  constructor(spec: ParamSpec, min: number, max: number) {
+    this.#log = spec.scale === 'log' && min > 0;
+    this.#min = min;
+    this.#max = max;
+    const step = spec.step ?? (spec.type === 'integer' ? 1 : (max - min) / LOG_STEPS);
+    const range = this.#log ? { min: 0, max: LOG_STEPS, step: 1 } : { min, max, step };
+    this.element = h('input', { type: 'range', 'aria-label': `${spec.label}, slider`, ...range });
+  }
+
+  get value(): number {
+    const position = this.element.valueAsNumber;
+    const value = this.#log ? this.#min * (this.#max / this.#min) ** (position / LOG_STEPS) : position;
+    return Number(value.toPrecision(4));
+  }
+
+  show(value: number): void {
+    const position = this.#log ? (LOG_STEPS * Math.log(value / this.#min)) / Math.log(this.#max / this.#min) : value;
+    this.element.value = String(position);
+  }
+}

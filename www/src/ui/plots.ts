@@ -1,0 +1,224 @@
+import uPlot from 'uplot';
+import 'uplot/dist/uPlot.min.css';
+import type { StepReport } from '../protocol';
+import { h, onSchemeChange, token } from './dom';
+import { count, figure } from './format';
+import type { History } from './history';
+
+const PLOT_HEIGHT = 132;
+
+interface Curve {
+  label: string;
+  color: string;
+  dash?: number[];
+  of: (report: StepReport) => number;
+}
+
+interface PlotKind {
+  title: string;
+  log: boolean;
+  curves: Curve[];
+  /** What the plot says, for those who do not see it. */
+  tell: (history: History) => string;
+}
+
+const PLOTS: PlotKind[] = [
+  {
+    title: 'Kinetic energy',
+    log: true,
+    curves: [
+      { label: 'energy', color: '--curve', of: (report) => report.residual },
+      { label: 'tolerance ε', color: '--muted', dash: [4, 4], of: (report) => report.tolerance },
+    ],
+    tell: tellEnergy,
+  },
+  {
+    title: 'Vertices',
+    log: false,
+    curves: [{ label: 'vertices', color: '--curve', of: (report) => report.vertices }],
+    tell: (history) => tellChange(history, 'vertices', (report) => report.vertices),
+  },
+  {
+    title: 'Euler characteristic χ',
+    log: false,
+    curves: [{ label: 'χ', color: '--curve', of: (report) => report.euler }],
+    tell: (history) => tellChange(history, 'Euler characteristic', (report) => report.euler),
+  },
+];
+
+/** The live plots over the iterations, with level changes and topology events marked. */
+export class Plots {
+  readonly element: HTMLElement;
+  readonly #plots: Plot[];
+  readonly #history: History;
+  #pending = 0;
+
+  constructor(history: History) {
+    this.#history = history;
+    this.#plots = PLOTS.map((kind) => new Plot(kind, history));
+    const key = (name: string, text: string) =>
+      h('span', {}, h('span', { class: `mark ${name}`, 'aria-hidden': 'true' }), text);
+    const legend = h(
+      'p',
+      { class: 'legend' },
+      key('level', 'level change'),
+      key('axial', 'join'),
+      key('annular', 'cut'),
+    );
+    this.element = h('div', { class: 'plots' }, ...this.#plots.map((plot) => plot.element), legend);
+    onSchemeChange(() => this.update());
+  }
+
+  /** Redraws at the next animation frame. */
+  update(): void {
+    this.#pending ||= requestAnimationFrame(() => {
+      this.#pending = 0;
+      for (const plot of this.#plots) plot.update(this.#history);
+    });
+  }
+}
+
+class Plot {
+  readonly element: HTMLElement;
+  readonly #kind: PlotKind;
+  readonly #plot: uPlot;
+  readonly #caption = h('figcaption');
+
+  constructor(kind: PlotKind, history: History) {
+    this.#kind = kind;
+    const holder = h('div', { class: 'plot', 'aria-hidden': 'true' });
+    this.element = h('figure', {}, h('h3', {}, kind.title), holder, this.#caption);
+    const mark = (plot: uPlot) => drawMarks(plot, history);
+    this.#plot = new uPlot(optionsFor(kind, mark), emptyData(kind), holder);
+    new ResizeObserver(() => {
+      if (holder.clientWidth > 0) this.#plot.setSize({ width: holder.clientWidth, height: PLOT_HEIGHT });
+    }).observe(holder);
+  }
+
+  update(history: History): void {
+    const { reports } = history;
+    const values = (of: Curve['of']) => reports.map((report) => plottable(of(report), this.#kind.log));
+    const data = [reports.map((report) => report.iteration), ...this.#kind.curves.map((curve) => values(curve.of))];
+    this.#plot.setData(reports.length > 0 ? (data as uPlot.AlignedData) : emptyData(this.#kind));
+    this.#caption.textContent = reports.length > 0 ? this.#kind.tell(history) : 'No step yet.';
+  }
+}
+
+function emptyData(kind: PlotKind): uPlot.AlignedData {
+  return [[], ...kind.curves.map(() => [])] as uPlot.AlignedData;
+}
+
+/** A logarithmic axis has no place for zero and below. */
+function plottable(value: number, log: boolean): number | null {
+  return Number.isFinite(value) && (!log || value > 0) ? value : null;
+}
+
+function optionsFor(kind: PlotKind, mark: (plot: uPlot) => void): uPlot.Options {
+  const axis: uPlot.Axis = {
+    stroke: () => token('--muted'),
+    grid: { stroke: () => token('--line'), width: 1 },
+    ticks: { show: false },
+    font: '11px system-ui, sans-serif',
+  };
+  return {
+    width: 280,
+    height: PLOT_HEIGHT,
+    legend: { show: false },
+    cursor: { y: false, drag: { x: false, y: false } },
+    padding: [8, 8, 0, 0],
+    scales: {
+      x: { time: false, range: iterationRange },
+      y: kind.log ? { distr: 3, range: logRange } : { range: valueRange },
+    },
+    axes: [
+      { ...axis, size: 24 },
+      {
+        ...axis,
+        size: 52,
+        values: (_, ticks) => ticks.map((tick) => tickLabel(tick, kind.log)),
+        ...(kind.log && { splits: decades }),
+      },
+    ],
+    series: [{}, ...kind.curves.map(seriesFor)],
+    hooks: { drawClear: [mark] },
+  };
+}
+
+function seriesFor({ label, color, dash }: Curve): uPlot.Series {
+  return { label, stroke: () => token(color), width: 1.5, points: { show: false }, ...(dash && { dash }) };
+}
+
+function iterationRange(_: uPlot, __: number | null, last: number | null): uPlot.Range.MinMax {
+  return [0, Math.max(10, last ?? 0)];
+}
+
+function valueRange(_: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax {
+  if (low === null || high === null) return [0, 1];
+  const room = Math.max(1, 0.08 * (high - low));
+  return [low - room, high + room];
+}
+
+/** Whole powers of ten. */
+function logRange(_: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax {
+  if (!low || !high) return [1e-7, 1];
+  return [10 ** Math.floor(Math.log10(low)), 10 ** Math.ceil(Math.log10(high) + 1e-9)];
+}
+
+/** Ticks at every power of ten, or at every other one where there are many. */
+function decades(_: uPlot, __: number, low: number, high: number): number[] {
+  const [first, last] = [Math.round(Math.log10(low)), Math.round(Math.log10(high))];
+  const step = Math.max(1, Math.ceil((last - first) / 4));
+  return Array.from({ length: Math.floor((last - first) / step) + 1 }, (_, i) => 10 ** (first + i * step));
+}
+
+function tickLabel(tick: number | null, log: boolean): string {
+  if (tick === null) return '';
+  if (log) return `1e${Math.round(Math.log10(tick))}`;
+  return Math.abs(tick) >= 10_000 ? `${count(tick / 1000)}k` : Number.isInteger(tick) ? count(tick) : '';
+}
+
+/** Level changes as upright lines with their names; joins and cuts as ticks at the foot. */
+function drawMarks(plot: uPlot, history: History): void {
+  const { ctx, bbox } = plot;
+  ctx.save();
+  ctx.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
+  ctx.textAlign = 'left';
+  ctx.textBaseline = 'alphabetic';
+  for (const { iteration, phase } of history.phases) {
+    const x = Math.round(plot.valToPos(iteration, 'x', true));
+    upright(ctx, x, bbox.top, bbox.top + bbox.height, token('--line-strong'));
+    ctx.fillStyle = token('--muted');
+    ctx.fillText(phase, x + 3 * devicePixelRatio, bbox.top + 9 * devicePixelRatio);
+  }
+  const foot = bbox.top + bbox.height;
+  for (const { iteration, axial, annular } of history.changes) {
+    const x = plot.valToPos(iteration, 'x', true);
+    if (axial > 0) upright(ctx, x, foot - 6 * devicePixelRatio, foot, token('--join'));
+    if (annular > 0) upright(ctx, x, foot - 12 * devicePixelRatio, foot - 6 * devicePixelRatio, token('--cut'));
+  }
+  ctx.restore();
+}
+
+function upright(ctx: CanvasRenderingContext2D, x: number, top: number, bottom: number, color: string): void {
+  ctx.beginPath();
+  ctx.moveTo(x, top);
+  ctx.lineTo(x, bottom);
+  ctx.strokeStyle = color;
+  ctx.lineWidth = devicePixelRatio;
+  ctx.stroke();
+}
+
+function tellEnergy({ reports }: History): string {
+  const last = reports.at(-1);
+  if (!last) return '';
+  const relation = last.residual < last.tolerance ? 'below' : 'above';
+  return `After ${count(last.iteration)} iterations the energy is ${figure(last.residual)}, ${relation} the tolerance of ${figure(last.tolerance)}.`;
+}
+
+function tellChange({ reports }: History, name: string, of: (report: StepReport) => number): string {
+  const [first, last] = [reports[0], reports.at(-1)];
+  if (!first || !last) return '';
+  const values = reports.map(of);
+  const span = `${count(values.reduce((a, b) => Math.min(a, b)))} to ${count(values.reduce((a, b) => Math.max(a, b)))}`;
+  return `${name[0]?.toUpperCase()}${name.slice(1)}: now ${count(of(last))}; between ${span} so far.`;
+}

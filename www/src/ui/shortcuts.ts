@@ -1,0 +1,57 @@
+import { h } from './dom';
+
+export interface Shortcut {
+  key: string;
+  shown: string;
+  text: string;
+  act: () => void;
+}
+
+const VIEW_KEYS: [string, string][] = [
+  ['← → ↑ ↓', 'turn the 3D view (when it has the focus)'],
+  ['+ −', 'zoom the 3D view'],
+  ['Home', 'the 3D view as it was at first'],
+  ['Tab', 'to the next control; arrow keys move sliders'],
+];
+
+/** Acts on keys anywhere on the page, except where the key already means something. */
+export function listenForShortcuts(shortcuts: Shortcut[]): () => void {
+  const onKey = (event: KeyboardEvent) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
+    const shortcut = shortcuts.find(({ key }) => key === event.key);
+    if (!shortcut || isTakenBy(event)) return;
+    event.preventDefault();
+    shortcut.act();
+  };
+  window.addEventListener('keydown', onKey);
+  return () => window.removeEventListener('keydown', onKey);
+}
+
+/** Whether the focused element uses the key itself: space presses buttons, letters go into fields and choose in lists. */
+function isTakenBy({ target, key }: KeyboardEvent): boolean {
+  if (!(target instanceof HTMLElement)) return false;
+  if (target.closest('dialog, select, textarea, [contenteditable]')) return true;
+  if (target instanceof HTMLInputElement)
+    return !['range', 'checkbox'].includes(target.type) || (key === ' ' && target.type === 'checkbox');
+  return key === ' ' && target.closest('button, summary, a, label.button') !== null;
+}
+
+/** The list of shortcuts, opened by a button or by `?`. */
+export function shortcutDialog(shortcuts: Shortcut[], opener: HTMLElement): HTMLDialogElement {
+  const rows = [...shortcuts.map(({ shown, text }) => [shown, text]), ...VIEW_KEYS];
+  const list = h(
+    'dl',
+    { class: 'keys' },
+    ...rows.map(([key = '', text = '']) => h('div', {}, h('dt', {}, h('kbd', {}, key)), h('dd', {}, text))),
+  );
+  const form = h('form', { method: 'dialog' }, h('button', { class: 'primary' }, 'Close'));
+  const dialog = h(
+    'dialog',
+    { 'aria-labelledby': 'keys-title' },
+    h('h2', { id: 'keys-title' }, 'Keyboard'),
+    list,
+    form,
+  );
+  opener.addEventListener('click', () => dialog.showModal());
+  return dialog;
+}

@@ -1,0 +1,78 @@
+import type { StepReport } from '../protocol';
+import type { LabState } from '../state';
+import { h, icon } from './dom';
+import { count } from './format';
+
+const PLAY = 'M7 4.5v15l12-7.5z';
+const PAUSE = 'M6 5h4.5v14H6zM13.5 5H18v14h-4.5z';
+const STEP = 'M6 5v14l9-7zM16 5h2.5v14H16z';
+const STEPS = 'M3 5v14l7.5-7zM10.5 5v14L18 12zM18.5 5H21v14h-2.5z';
+const RESET = 'M12 5V1L6 6.5 12 12V8a5 5 0 1 1-5 5H4a8 8 0 1 0 8-8z';
+
+export interface TransportEvents {
+  onToggle: () => void;
+  onStep: (count: number) => void;
+  onReset: () => void;
+}
+
+/** Play, pause, step and reset, and how far the model has come. */
+export class Transport {
+  readonly element: HTMLElement;
+  readonly #play: HTMLButtonElement;
+  readonly #playIcon = h('span', { class: 'icon-holder' });
+  readonly #playText = h('span');
+  readonly #step: HTMLButtonElement;
+  readonly #steps: HTMLButtonElement;
+  readonly #reset: HTMLButtonElement;
+  readonly #iteration = h('span', { class: 'iteration' });
+  readonly #phase = h('span', { class: 'phase' });
+  readonly #progress = h('progress', { max: 1, 'aria-label': 'Progress' });
+
+  constructor({ onToggle, onStep, onReset }: TransportEvents) {
+    this.#play = h(
+      'button',
+      { type: 'button', class: 'primary play', onclick: onToggle },
+      this.#playIcon,
+      this.#playText,
+    );
+    this.#step = labelled(STEP, 'Step', () => onStep(1));
+    this.#steps = labelled(STEPS, 'Step ×10', () => onStep(10));
+    this.#reset = labelled(RESET, 'Reset', onReset);
+    const buttons = h('div', { class: 'buttons' }, this.#play, this.#step, this.#steps, this.#reset);
+    const where = h('div', { class: 'where' }, this.#iteration, this.#phase);
+    this.element = h('div', { class: 'transport', role: 'group', 'aria-label': 'Run' }, buttons, where, this.#progress);
+    this.showReport(undefined);
+    this.showState('loading', false);
+  }
+
+  /** `ready`: there is a model to run. */
+  showState(state: LabState, ready: boolean): void {
+    const running = state === 'running';
+    this.#playIcon.replaceChildren(icon(running ? PAUSE : PLAY));
+    this.#playText.textContent = running ? 'Pause' : 'Play';
+    const idle = ready && state !== 'loading';
+    this.#play.disabled = !idle || state === 'done';
+    this.#step.disabled = !idle || running || state === 'done';
+    this.#steps.disabled = this.#step.disabled;
+    this.#reset.disabled = !idle;
+    this.#showBusy(state);
+  }
+
+  showReport(report: StepReport | undefined): void {
+    this.#iteration.textContent = `Iteration ${count(report?.iteration ?? 0)}`;
+    this.#phase.textContent = report?.phase ?? '';
+    if (report && Number.isFinite(report.progress)) this.#progress.value = report.progress;
+    else this.#progress.value = 0;
+  }
+
+  #showBusy(state: LabState): void {
+    // A bar without a value moves by itself: something is going on, and nobody knows how long.
+    if (state === 'loading') this.#progress.removeAttribute('value');
+    else if (!this.#progress.hasAttribute('value')) this.#progress.value = 0;
+    if (state === 'done') this.#progress.value = 1;
+  }
+}
+
+function labelled(path: string, text: string, onclick: () => void): HTMLButtonElement {
+  return h('button', { type: 'button', onclick }, icon(path), h('span', {}, text));
+}

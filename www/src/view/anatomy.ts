@@ -1,0 +1,113 @@
+import type { Plane, Vec3, VolumeView } from '../protocol';
+
+export type Axis = 0 | 1 | 2;
+export type Grid = Pick<VolumeView, 'dims' | 'spacing' | 'affine' | 'space'>;
+
+/** One side of a slice picture: the voxel axis that runs along it, and whether its index falls instead of rising. */
+export interface Side {
+  axis: Axis;
+  flip: boolean;
+}
+
+/** How slices across one voxel axis are shown: as radiologists do, the patient's right on the left, head or face up. */
+export interface SliceFrame {
+  axis: Axis;
+  name: 'Sagittal' | 'Coronal' | 'Axial';
+  /** Left to right. */
+  horizontal: Side;
+  /** Top to bottom. */
+  vertical: Side;
+  labels: { left: string; right: string; top: string; bottom: string };
+}
+
+/** The two ends of each anatomical axis of RAS space, positive end first. */
+const ENDS = [
+  ['R', 'L'],
+  ['A', 'P'],
+  ['S', 'I'],
+] as const;
+const NAMES = ['Sagittal', 'Coronal', 'Axial'] as const;
+const ORDERS: [Axis, Axis, Axis][] = [
+  [0, 1, 2],
+  [0, 2, 1],
+  [1, 0, 2],
+  [1, 2, 0],
+  [2, 0, 1],
+  [2, 1, 0],
+];
+
+/** +1 where a world axis points to the positive anatomical end (R, A, S), -1 where it points away, as x and y of LPS do. */
+export function anatomicalSigns(space: 'RAS' | 'LPS'): Vec3 {
+  return space === 'LPS' ? [-1, -1, 1] : [1, 1, 1];
+}
+
+/** For each voxel axis: the anatomical axis it runs along most, and in which direction. */
+export function anatomyOf(grid: Grid): { anatomical: Axis; positive: boolean }[] {
+  const signs = anatomicalSigns(grid.space);
+  const along = (voxel: number, world: number) =>
+    ((grid.affine[4 * voxel + world] ?? 0) * (signs[world] ?? 1)) / (grid.spacing[voxel] || 1);
+  const score = (order: Axis[]) => order.reduce<number>((sum, world, voxel) => sum + Math.abs(along(voxel, world)), 0);
+  // The margin settles ties, in a volume turned by 45 degrees, for the first order.
+  const best = ORDERS.reduce((a, b) => (score(b) > score(a) + 1e-9 ? b : a));
+  return best.map((anatomical, voxel) => ({ anatomical, positive: along(voxel, anatomical) >= 0 }));
+}
+
+/** The three slice directions of a volume, one per voxel axis. */
+export function sliceFrames(grid: Grid): SliceFrame[] {
+  const anatomy = anatomyOf(grid);
+  const at = (axis: Axis) => anatomy[axis] ?? { anatomical: axis, positive: true };
+  return ([0, 1, 2] as Axis[]).map((axis) => {
+    const sides = ([0, 1, 2] as Axis[]).filter((other) => other !== axis);
+    const [across, up] = sides.sort((a, b) => at(a).anatomical - at(b).anatomical) as [Axis, Axis];
+    const [left, right] = ENDS[at(across).anatomical];
+    const [top, bottom] = ENDS[at(up).anatomical];
+    return {
+      axis,
+      name: NAMES[at(axis).anatomical],
+      horizontal: { axis: across, flip: at(across).positive },
+      vertical: { axis: up, flip: at(up).positive },
+      labels: { left, right, top, bottom },
+    };
+  });
+}
+
+/** Voxel index (centres at integers) to world. */
+export function toWorld(affine: ArrayLike<number>, index: Vec3): Vec3 {
+  const row = (r: number) =>
+    (affine[r] ?? 0) * index[0] +
+    (affine[4 + r] ?? 0) * index[1] +
+    (affine[8 + r] ?? 0) * index[2] +
+    (affine[12 + r] ?? 0);
+  return [row(0), row(1), row(2)];
+}
+
+/** The inverse of an affine map, column-major like the map itself. */
+export function invert(affine: ArrayLike<number>): Float64Array {
+  const a = (column: number, row: number) => affine[4 * column + row] ?? 0;
+  const cofactor = (c: number, r: number) => {
+    const [c1, c2, r1, r2] = [(c + 1) % 3, (c + 2) % 3, (r + 1) % 3, (r + 2) % 3];
+    return a(c1, r1) * a(c2, r2) - a(c1, r2) * a(c2, r1);
+  };
+  const determinant = a(0, 0) * cofactor(0, 0) + a(0, 1) * cofactor(0, 1) + a(0, 2) * cofactor(0, 2);
+  const inverse = new Float64Array(16);
+  for (let c = 0; c < 3; c++) for (let r = 0; r < 3; r++) inverse[4 * c + r] = cofactor(r, c) / determinant;
+  for (let r = 0; r < 3; r++) {
+    inverse[12 + r] = -(
+      (inverse[r] ?? 0) * a(3, 0) +
+      (inverse[4 + r] ?? 0) * a(3, 1) +
+      (inverse[8 + r] ?? 0) * a(3, 2)
+    );
+  }
+  inverse[15] = 1;
+  return inverse;
+}
+
+/** The world plane of the slice with the given index across a voxel axis. */
+export function slicePlane(affine: ArrayLike<number>, inverse: ArrayLike<number>, axis: Axis, index: number): Plane {
+  const at: Vec3 = [0, 0, 0];
+  at[axis] = index;
+  // The row of the inverse is the gradient of the index, hence normal to its level planes, also in a sheared grid.
+  const normal: Vec3 = [inverse[axis] ?? 0, inverse[4 + axis] ?? 0, inverse[8 + axis] ?? 0];
+  const length = Math.hypot(...normal);
+  return { origin: toWorld(affine, at), normal: normal.map((x) => x / length) as Vec3 };
+}

@@ -1,0 +1,39 @@
+import { BufferAttribute, BufferGeometry, type ColorRepresentation, LineBasicMaterial, LineSegments } from 'three';
+
+/** Line segments that change every frame, in a GPU buffer with room to spare. */
+export class Lines {
+  readonly object: LineSegments<BufferGeometry, LineBasicMaterial>;
+
+  constructor(color: ColorRepresentation) {
+    this.object = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color }));
+    this.object.frustumCulled = false;
+    this.object.visible = false;
+  }
+
+  /** Copies pairs of points, packed xyz. */
+  show(points: Float32Array): void {
+    const count = points.length / 3;
+    const position = this.#reserve(count);
+    (position.array as Float32Array).set(points);
+    position.clearUpdateRanges();
+    position.addUpdateRange(0, points.length);
+    position.needsUpdate = true;
+    this.object.geometry.setDrawRange(0, count);
+    this.object.visible = count > 0;
+  }
+
+  dispose(): void {
+    this.object.geometry.dispose();
+    this.object.material.dispose();
+  }
+
+  #reserve(count: number): BufferAttribute {
+    const present = this.object.geometry.getAttribute('position') as BufferAttribute | undefined;
+    if (present && present.count >= count) return present;
+    this.object.geometry.dispose();
+    this.object.geometry = new BufferGeometry();
+    const grown = new BufferAttribute(new Float32Array(3 * Math.ceil(1.5 * count)), 3);
+    this.object.geometry.setAttribute('position', grown);
+    return grown;
+  }
+}

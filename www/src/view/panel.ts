@@ -1,0 +1,188 @@
+import type { Vec3, VolumeView } from '../protocol';
+import { h, token, uniqueId } from '../ui/dom';
+import type { SliceFrame } from './anatomy';
+import { paintSlice, pictureSize, projectSegments } from './slicing';
+
+/** Colours of the three slice directions, by voxel axis, as style tokens. */
+export const AXIS_TOKENS = ['--axis-x', '--axis-y', '--axis-z'] as const;
+
+export interface PanelEvents {
+  /** The slider moved to another slice. */
+  onIndex: (index: number) => void;
+  /** The picture was clicked or dragged on: a voxel index, not rounded. */
+  onPoint: (index: Vec3) => void;
+}
+
+/** One slice as a picture with the surface's outline over it, its crosshair, and a slider. */
+export class SlicePanel {
+  readonly element: HTMLElement;
+  /** The bare slice in voxels, also the texture of the plane in the 3D view. */
+  readonly picture = document.createElement('canvas');
+  readonly frame: SliceFrame;
+  readonly #volume: VolumeView;
+  readonly #inverse: Float64Array;
+  readonly #canvas: HTMLCanvasElement;
+  readonly #slider: HTMLInputElement;
+  readonly #output: HTMLOutputElement;
+  readonly #pixels: ImageData;
+  readonly #observer = new ResizeObserver(() => this.draw());
+  #outline: Float32Array = new Float32Array(0);
+  #crosshair: Vec3 = [0, 0, 0];
+  #color = '#f80';
+
+  constructor(volume: VolumeView, frame: SliceFrame, inverse: Float64Array, events: PanelEvents) {
+    this.#volume = volume;
+    this.frame = frame;
+    this.#inverse = inverse;
+    const { width, height } = pictureSize(volume, frame);
+    this.picture.width = width;
+    this.picture.height = height;
+    this.#pixels = new ImageData(width, height);
+    const id = uniqueId('slice');
+    const last = volume.dims[frame.axis] - 1;
+    this.#canvas = h('canvas', { role: 'img', 'aria-label': `${frame.name} slice with the outline of the surface` });
+    this.#slider = h('input', { type: 'range', id, min: 0, max: last, step: 1, value: last >> 1 });
+    this.#slider.addEventListener('input', () => events.onIndex(this.#slider.valueAsNumber));
+    this.#output = h('output', { for: id });
+    this.element = this.#build(id);
+    this.#followPointer(events.onPoint);
+    this.#observer.observe(this.#canvas);
+  }
+
+  /** Repaints for the slice the crosshair is in, whatever its other two coordinates. */
+  setCrosshair(index: Vec3): void {
+    const { axis } = this.frame;
+    const moved = this.#crosshair[axis] !== index[axis] || this.#output.value === '';
+    this.#crosshair = [...index];
+    if (moved) this.#paint(index[axis]);
+    this.draw();
+  }
+
+  /** The surface's cut with this slice, as pairs of world points. */
+  setOutline(segments: Float32Array): void {
+    this.#outline = projectSegments(segments, this.#inverse, this.#volume, this.frame);
+    this.draw();
+  }
+
+  /** Brings everything together on the visible canvas, in its own resolution. */
+  draw(): void {
+    const { clientWidth, clientHeight } = this.#canvas;
+    const context = this.#canvas.getContext('2d');
+    if (!context || clientWidth === 0) return;
+    const ratio = Math.min(devicePixelRatio, 2);
+    this.#canvas.width = Math.round(clientWidth * ratio);
+    this.#canvas.height = Math.round(clientHeight * ratio);
+    const { x, y, scaleX, scaleY } = this.#placement();
+    context.scale(ratio, ratio);
+    context.translate(x, y);
+    context.save();
+    context.scale(scaleX, scaleY);
+    context.imageSmoothingQuality = 'high';
+    context.drawImage(this.picture, 0, 0);
+    context.restore();
+    this.#drawCrosshair(context, scaleX, scaleY);
+    this.#drawOutline(context, scaleX, scaleY);
+  }
+
+  dispose(): void {
+    this.#observer.disconnect();
+    this.element.remove();
+  }
+
+  #build(id: string): HTMLElement {
+    const { labels, name, axis } = this.frame;
+    const letters = Object.entries(labels).map(([side, letter]) =>
+      h('span', { class: `direction ${side}`, 'aria-hidden': 'true' }, letter),
+    );
+    const swatch = h('span', { class: `swatch axis-${axis}`, 'aria-hidden': 'true' });
+    const label = h('label', { for: id }, swatch, name);
+    return h(
+      'div',
+      { class: 'slice' },
+      h('div', { class: 'picture' }, this.#canvas, ...letters),
+      h('div', { class: 'slice-control' }, label, this.#slider, this.#output),
+    );
+  }
+
+  #paint(index: number): void {
+    paintSlice(this.#volume, this.frame, index, this.#pixels.data);
+    this.picture.getContext('2d')?.putImageData(this.#pixels, 0, 0);
+    this.#slider.valueAsNumber = index;
+    this.#output.value = String(index);
+    this.#color = token('--outline');
+  }
+
+  /** The picture fitted into the canvas, voxels in their true proportions. */
+  #placement(): { x: number; y: number; scaleX: number; scaleY: number } {
+    const { width, height } = this.picture;
+    const { spacing } = this.#volume;
+    const across = spacing[this.frame.horizontal.axis];
+    const down = spacing[this.frame.vertical.axis];
+    const { clientWidth, clientHeight } = this.#canvas;
+    const fit = Math.min(clientWidth / (width * across), clientHeight / (height * down));
+    const [scaleX, scaleY] = [fit * across, fit * down];
+    return { x: (clientWidth - width * scaleX) / 2, y: (clientHeight - height * scaleY) / 2, scaleX, scaleY };
+  }
+
+  #drawCrosshair(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
+    const { horizontal, vertical } = this.frame;
+    const { width, height } = this.picture;
+    const at = ({ axis, flip }: SliceFrame['horizontal']) => {
+      const index = this.#crosshair[axis];
+      return (flip ? this.#volume.dims[axis] - 1 - index : index) + 0.5;
+    };
+    const x = at(horizontal) * scaleX;
+    const y = at(vertical) * scaleY;
+    context.globalAlpha = 0.7;
+    line(context, token(AXIS_TOKENS[horizontal.axis]), x, 0, x, height * scaleY);
+    line(context, token(AXIS_TOKENS[vertical.axis]), 0, y, width * scaleX, y);
+    context.globalAlpha = 1;
+  }
+
+  #drawOutline(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
+    const points = this.#outline;
+    context.beginPath();
+    for (let i = 0; i + 3 < points.length; i += 4) {
+      context.moveTo((points[i] ?? 0) * scaleX, (points[i + 1] ?? 0) * scaleY);
+      context.lineTo((points[i + 2] ?? 0) * scaleX, (points[i + 3] ?? 0) * scaleY);
+    }
+    context.lineCap = 'round';
+    context.lineWidth = 1.4;
+    context.strokeStyle = this.#color;
+    context.stroke();
+  }
+
+  #followPointer(onPoint: (index: Vec3) => void): void {
+    const report = (event: PointerEvent) => onPoint(this.#indexAt(event.offsetX, event.offsetY));
+    this.#canvas.addEventListener('pointerdown', (event) => {
+      this.#canvas.setPointerCapture(event.pointerId);
+      report(event);
+    });
+    this.#canvas.addEventListener('pointermove', (event) => {
+      if (event.buttons & 1) report(event);
+    });
+  }
+
+  #indexAt(canvasX: number, canvasY: number): Vec3 {
+    const { x, y, scaleX, scaleY } = this.#placement();
+    const index: Vec3 = [...this.#crosshair];
+    for (const [{ axis, flip }, position] of [
+      [this.frame.horizontal, (canvasX - x) / scaleX],
+      [this.frame.vertical, (canvasY - y) / scaleY],
+    ] as const) {
+      const last = this.#volume.dims[axis] - 1;
+      const raw = Math.min(last, Math.max(0, Math.floor(position)));
+      index[axis] = flip ? last - raw : raw;
+    }
+    return index;
+  }
+}
+
+function line(context: CanvasRenderingContext2D, color: string, x1: number, y1: number, x2: number, y2: number): void {
+  context.beginPath();
+  context.moveTo(x1, y1);
+  context.lineTo(x2, y2);
+  context.lineWidth = 1;
+  context.strokeStyle = color;
+  context.stroke();
+}

@@ -1,0 +1,120 @@
+import {
+  BufferAttribute,
+  BufferGeometry,
+  CanvasTexture,
+  type ColorRepresentation,
+  DoubleSide,
+  Group,
+  LinearFilter,
+  LineBasicMaterial,
+  LineLoop,
+  Mesh,
+  MeshBasicMaterial,
+  SRGBColorSpace,
+  Vector3,
+} from 'three';
+import type { Vec3 } from '../protocol';
+import { type Grid, type SliceFrame, toWorld } from './anatomy';
+import { Lines } from './lines';
+
+export interface PlaneColors {
+  frame: ColorRepresentation;
+  section: ColorRepresentation;
+}
+
+/** A slice as a textured rectangle with a coloured frame and the surface's outline: where it lies, or on a wall behind. */
+export class SlicePlane {
+  readonly object = new Group();
+  readonly #grid: Grid;
+  readonly #frame: SliceFrame;
+  readonly #texture: CanvasTexture;
+  readonly #geometry = new BufferGeometry();
+  readonly #outline = new BufferGeometry();
+  readonly #material: MeshBasicMaterial;
+  readonly #line: LineBasicMaterial;
+  readonly #section: Lines;
+  #index = 0;
+
+  /** `picture` shows the slice in reading order, turned as `frame` says. */
+  constructor(grid: Grid, frame: SliceFrame, picture: HTMLCanvasElement, colors: PlaneColors) {
+    this.#grid = grid;
+    this.#frame = frame;
+    this.#texture = new CanvasTexture(picture);
+    this.#texture.colorSpace = SRGBColorSpace;
+    this.#texture.minFilter = LinearFilter;
+    this.#texture.generateMipmaps = false;
+    this.#material = new MeshBasicMaterial({
+      map: this.#texture,
+      side: DoubleSide,
+      // The outline lies in the same plane and has to win.
+      polygonOffset: true,
+      polygonOffsetFactor: 1,
+      polygonOffsetUnits: 1,
+    });
+    this.#line = new LineBasicMaterial({ color: colors.frame });
+    this.#section = new Lines(colors.section);
+    this.#geometry.setAttribute('position', new BufferAttribute(new Float32Array(12), 3));
+    this.#geometry.setAttribute('uv', new BufferAttribute(new Float32Array([0, 1, 1, 1, 1, 0, 0, 0]), 2));
+    this.#geometry.setIndex([0, 3, 2, 0, 2, 1]);
+    this.#outline.setAttribute('position', this.#geometry.getAttribute('position'));
+    const rectangle = new Mesh(this.#geometry, this.#material);
+    this.object.add(rectangle, new LineLoop(this.#outline, this.#line), this.#section.object);
+  }
+
+  /** Moves to the slice with the given index; the picture has been repainted. */
+  moveTo(index: number): void {
+    this.#index = index;
+    const position = this.#geometry.getAttribute('position') as BufferAttribute;
+    const corners = [
+      [0, 0],
+      [1, 0],
+      [1, 1],
+      [0, 1],
+    ] as const;
+    for (const [i, [u, v]] of corners.entries()) position.setXYZ(i, ...this.#corner(index, u, v));
+    position.needsUpdate = true;
+    this.#geometry.computeBoundingSphere();
+    this.#outline.boundingSphere = this.#geometry.boundingSphere;
+    this.#texture.needsUpdate = true;
+  }
+
+  /** The surface's cut with this slice, pairs of world points. */
+  showSection(segments: Float32Array): void {
+    this.#section.show(segments);
+  }
+
+  /** Stands where the slice lies, or on the side of the volume that is farther from the viewer. */
+  stand(place: 'in place' | 'walls', viewer: Vector3): void {
+    this.object.position.set(0, 0, 0);
+    if (place === 'in place') return;
+    const { axis } = this.#frame;
+    const across = new Vector3().fromArray(this.#grid.affine, 4 * axis);
+    const middle = new Vector3(...toWorld(this.#grid.affine, this.#grid.dims.map((n) => (n - 1) / 2) as Vec3));
+    const viewerIsHigh = viewer.clone().sub(middle).dot(across) > 0;
+    const wall = viewerIsHigh ? -0.5 : this.#grid.dims[axis] - 0.5;
+    this.object.position.copy(across).multiplyScalar(wall - this.#index);
+  }
+
+  dispose(): void {
+    this.#section.dispose();
+    this.#texture.dispose();
+    this.#geometry.dispose();
+    this.#outline.dispose();
+    this.#material.dispose();
+    this.#line.dispose();
+  }
+
+  /** World position of a corner of the picture: u, v = 0 or 1 from its left and top. */
+  #corner(index: number, u: 0 | 1, v: 0 | 1): Vec3 {
+    const at: Vec3 = [0, 0, 0];
+    at[this.#frame.axis] = index;
+    for (const [side, end] of [
+      [this.#frame.horizontal, u],
+      [this.#frame.vertical, v],
+    ] as const) {
+      const last = end === 1 ? !side.flip : side.flip;
+      at[side.axis] = last ? this.#grid.dims[side.axis] - 0.5 : -0.5;
+    }
+    return toWorld(this.#grid.affine, at);
+  }
+}

@@ -1,0 +1,173 @@
+import {
+  BufferAttribute,
+  BufferGeometry,
+  type ColorRepresentation,
+  Group,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshStandardMaterial,
+  Sphere,
+  Vector3,
+} from 'three';
+import type { Surface } from '../protocol';
+import { componentColors } from './components';
+
+/** Room beyond what is needed now, so that a growing surface gets new GPU buffers only now and then. */
+const SPARE = 1.5;
+const BONE: ColorRepresentation = '#e9dcc3';
+
+/** A surface whose vertices and triangles change every frame: over-allocated GPU buffers, drawn as far as they are filled. */
+export class SurfaceObject {
+  readonly object = new Group();
+  readonly #material = new MeshStandardMaterial({
+    color: BONE,
+    roughness: 0.62,
+    metalness: 0,
+    polygonOffset: true,
+    polygonOffsetFactor: 1,
+    polygonOffsetUnits: 1,
+  });
+  readonly #edgeMaterial = new LineBasicMaterial({ transparent: true, opacity: 0.4 });
+  readonly #mesh = new Mesh(new BufferGeometry(), this.#material);
+  readonly #edges = new LineSegments(new BufferGeometry(), this.#edgeMaterial);
+  /** How much of the buffers is in use: vertices, and corners of triangles. */
+  #vertices = 0;
+  #corners = 0;
+  #byComponent = false;
+
+  constructor() {
+    // The bounding sphere is kept by hand; the surface nearly always fills the view.
+    this.#mesh.frustumCulled = false;
+    this.#edges.frustumCulled = false;
+    this.#edges.visible = false;
+    this.object.add(this.#mesh, this.#edges);
+  }
+
+  /** Copies the surface; its arrays may be given away as soon as this returns. */
+  show(surface: Surface): void {
+    this.#vertices = surface.vertices;
+    this.#corners = 3 * surface.triangles;
+    this.#reserve();
+    const { geometry } = this.#mesh;
+    fill(geometry, 'position', surface.positions, 3 * this.#vertices);
+    fill(geometry, 'normal', surface.normals, 3 * this.#vertices);
+    fillIndex(geometry, surface.indices, this.#corners);
+    if (this.#edges.visible) this.#fillEdges();
+    if (this.#byComponent) this.#fillColors();
+  }
+
+  set edges(visible: boolean) {
+    this.#edges.visible = visible;
+    if (visible) this.#fillEdges();
+  }
+
+  set edgeColor(color: ColorRepresentation) {
+    this.#edgeMaterial.color.set(color);
+  }
+
+  set solid(visible: boolean) {
+    this.#mesh.visible = visible;
+  }
+
+  set byComponent(on: boolean) {
+    this.#byComponent = on;
+    this.#material.vertexColors = on;
+    this.#material.color.set(on ? '#ffffff' : BONE);
+    this.#material.needsUpdate = true;
+    if (on) this.#fillColors();
+  }
+
+  dispose(): void {
+    this.#mesh.geometry.dispose();
+    this.#edges.geometry.dispose();
+    this.#material.dispose();
+    this.#edgeMaterial.dispose();
+  }
+
+  #reserve(): void {
+    const { geometry } = this.#mesh;
+    const hasVertices = (geometry.getAttribute('position')?.count ?? 0) >= this.#vertices;
+    const hasTriangles = (geometry.index?.count ?? 0) >= this.#corners;
+    if (hasVertices && hasTriangles && geometry.index) return;
+    // GPU buffers cannot grow: a new geometry replaces the old one.
+    geometry.dispose();
+    this.#edges.geometry.dispose();
+    const grown = allocate(Math.ceil(SPARE * this.#vertices), Math.ceil((SPARE * this.#corners) / 3));
+    this.#mesh.geometry = grown;
+    this.#edges.geometry = edgeGeometry(grown);
+  }
+
+  #fillEdges(): void {
+    const corners = this.#mesh.geometry.index;
+    const { geometry } = this.#edges;
+    if (!corners || !geometry.index) return;
+    const count = listEdges(corners.array as Uint32Array, this.#corners, geometry.index.array as Uint32Array);
+    upload(geometry.index, count);
+    geometry.setDrawRange(0, count);
+  }
+
+  #fillColors(): void {
+    const { geometry } = this.#mesh;
+    if (!geometry.index) return;
+    const colors = geometry.getAttribute('color') as BufferAttribute;
+    const corners = geometry.index.array as Uint32Array;
+    componentColors(corners, this.#corners, this.#vertices, colors.array as Float32Array);
+    upload(colors, 3 * this.#vertices);
+  }
+}
+
+function allocate(vertices: number, triangles: number): BufferGeometry {
+  const geometry = new BufferGeometry();
+  for (const name of ['position', 'normal', 'color']) {
+    geometry.setAttribute(name, new BufferAttribute(new Float32Array(3 * vertices), 3));
+  }
+  geometry.setIndex(new BufferAttribute(new Uint32Array(3 * triangles), 1));
+  geometry.boundingSphere = new Sphere(new Vector3(), Number.POSITIVE_INFINITY);
+  return geometry;
+}
+
+/** The same vertices, drawn as lines. A closed surface has as many edges as half its triangles' corners. */
+function edgeGeometry(surface: BufferGeometry): BufferGeometry {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute('position', surface.getAttribute('position'));
+  geometry.setIndex(new BufferAttribute(new Uint32Array(surface.index?.count ?? 0), 1));
+  geometry.boundingSphere = surface.boundingSphere;
+  return geometry;
+}
+
+/** Each edge of a closed surface once: of the two triangles on it, the one that runs along it upwards lists it. */
+function listEdges(indices: Uint32Array, length: number, out: Uint32Array): number {
+  let count = 0;
+  for (let i = 0; i < length; i += 3) {
+    for (let side = 0; side < 3; side++) {
+      const from = indices[i + side] ?? 0;
+      const to = indices[i + ((side + 1) % 3)] ?? 0;
+      if (from > to) continue;
+      out[count++] = from;
+      out[count++] = to;
+    }
+  }
+  return count;
+}
+
+function fill(geometry: BufferGeometry, name: string, values: Float32Array, length: number): void {
+  const attribute = geometry.getAttribute(name) as BufferAttribute;
+  (attribute.array as Float32Array).set(values.subarray(0, length));
+  upload(attribute, length);
+}
+
+function fillIndex(geometry: BufferGeometry, indices: Uint32Array, length: number): void {
+  const { index } = geometry;
+  if (!index) return;
+  (index.array as Uint32Array).set(indices.subarray(0, length));
+  upload(index, length);
+  geometry.setDrawRange(0, length);
+}
+
+/** Only the part in use goes up. */
+function upload(attribute: BufferAttribute, length: number): void {
+  attribute.clearUpdateRanges();
+  attribute.addUpdateRange(0, length);
+  attribute.needsUpdate = true;
+}
