@@ -17,9 +17,10 @@ export function say(what, detail = '') {
   process.stdout.write(`${what.padEnd(12)} ${detail}\n`);
 }
 
-/** The same environment with colours and progress bars off, plus `extra`. */
+/** The same environment without progress bars, and without colours where nobody sees them, plus `extra`. */
 function environment(extra) {
-  return { ...process.env, CARGO_TERM_PROGRESS_WHEN: 'never', ...extra };
+  const plain = process.stdout.isTTY ? {} : { NO_COLOR: '1' };
+  return { ...process.env, CARGO_TERM_PROGRESS_WHEN: 'never', ...plain, ...extra };
 }
 
 /**

@@ -1,4 +1,5 @@
 // Every check there is, one after the other. Goes on after a failure; the last line is the sum.
+// `npm test -- build package` runs the stages of these names only.
 import { existsSync } from 'node:fs';
 import { readFile, rm } from 'node:fs/promises';
 import { buildApp } from './app.mjs';
@@ -97,9 +98,15 @@ async function attempt([name, work]) {
   return { name, seconds, ...counts };
 }
 
-async function all() {
+function chosen(names) {
+  const unknown = names.filter((name) => !STAGES.some(([stage]) => stage === name));
+  if (unknown.length > 0) throw new Error(`no stage is called ${unknown}; there are ${STAGES.map(([stage]) => stage)}`);
+  return STAGES.filter(([stage]) => names.length === 0 || names.includes(stage));
+}
+
+async function all(names) {
   const results = [];
-  for (const stage of [['set-up', works(setup)], ...STAGES]) {
+  for (const stage of [['set-up', works(setup)], ...chosen(names)]) {
     results.push(await attempt(stage));
     // Without tools and packages nothing else can tell anything.
     if (results.length === 1 && results[0].failed) break;
@@ -107,7 +114,7 @@ async function all() {
   return results;
 }
 
-const results = await all();
+const results = await all(process.argv.slice(2));
 process.stdout.write('\n');
 for (const { name, seconds, passed, failed } of results) {
   say(name, `${String(passed).padStart(5)} passed ${String(failed).padStart(4)} failed ${seconds.padStart(7)} s`);
