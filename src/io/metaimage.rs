@@ -212,8 +212,7 @@ fn scalar(field: &Field<'_>) -> Result<Scalar, FormatError> {
 
 fn skip(fields: &Fields) -> Result<Option<usize>, FormatError> {
     let Some(field) = fields.get("HeaderSize") else { return Ok(Some(0)) };
-    let value = field.integer(-1)?;
-    Ok(usize::try_from(value).ok())
+    if field.integer(-1)? == -1 { Ok(None) } else { Ok(Some(field.offset()?)) }
 }
 
 fn affine(fields: &Fields, rank: usize) -> Result<DAffine3, FormatError> {

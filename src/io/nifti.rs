@@ -225,6 +225,7 @@ impl Fields {
                 Ok(n) if n > 1 => {
                     return Err(FormatError::unsupported(FORMAT, field, n.to_string(), "1 (no vector data)"));
                 }
+                Err(_) if n > 0 => return Err(FormatError::too_large(FORMAT, field, n as u64)),
                 _ => return Err(FormatError::invalid(FORMAT, field, format!("{n}; at least 1 is needed"))),
             }
         }

@@ -179,7 +179,7 @@ impl Header {
             dims: axes.dims,
             encoding,
             big: big_endian(fields, scalar, encoding)?,
-            line_skip: fields.get("lineskip").map_or(Ok(0), |f| f.integer(0))? as usize,
+            line_skip: fields.get("lineskip").map_or(Ok(0), |f| f.offset())?,
             byte_skip: byte_skip(fields, encoding)?,
             affine,
             space,
@@ -304,7 +304,7 @@ fn byte_skip(fields: &Fields, encoding: Encoding) -> Result<Option<usize>, Forma
     match field.integer(-1)? {
         -1 if encoding == Encoding::Raw => Ok(None),
         -1 => Err(field.invalid("-1 goes with encoding raw only")),
-        n => Ok(Some(n as usize)),
+        _ => Ok(Some(field.offset()?)),
     }
 }
 

@@ -74,14 +74,16 @@ impl Field<'_> {
     /// Whole numbers of at least 1.
     ///
     /// # Errors
-    /// Another count than `count`, a 0, or something else than digits.
+    /// Another count than `count`, a 0, something else than digits, or more than can be addressed.
     pub(super) fn sizes(&self, count: usize) -> Result<Vec<usize>, FormatError> {
-        let words: Result<Vec<usize>, _> = self.text.split_whitespace().map(str::parse).collect();
-        let fits = |v: &Vec<usize>| v.len() == count && !v.contains(&0);
-        words
-            .ok()
-            .filter(fits)
-            .ok_or_else(|| self.invalid(&format!("{count} whole numbers of at least 1 are needed")))
+        let words: Result<Vec<u64>, _> = self.text.split_whitespace().map(str::parse).collect();
+        let fits = |v: &Vec<u64>| v.len() == count && !v.contains(&0);
+        let sizes = words.ok().filter(fits);
+        let sizes =
+            sizes.ok_or_else(|| self.invalid(&format!("{count} whole numbers of at least 1 are needed")))?;
+        let needed = sizes.iter().fold(1u64, |product, &n| product.saturating_mul(n));
+        let counted: Result<Vec<usize>, _> = sizes.into_iter().map(usize::try_from).collect();
+        counted.map_err(|_| FormatError::too_large(self.format, self.name, needed))
     }
 
     /// One whole number of at least `least`.
@@ -91,5 +93,14 @@ impl Field<'_> {
     pub(super) fn integer(&self, least: i64) -> Result<i64, FormatError> {
         let value = self.text.trim().parse().ok().filter(|&v| v >= least);
         value.ok_or_else(|| self.invalid(&format!("a whole number of at least {least} is needed")))
+    }
+
+    /// One whole number of at least 0, as an offset; one that cannot be addressed becomes the largest that can, past
+    /// the end of any file.
+    ///
+    /// # Errors
+    /// Anything else.
+    pub(super) fn offset(&self) -> Result<usize, FormatError> {
+        Ok(usize::try_from(self.integer(0)?).unwrap_or(usize::MAX))
     }
 }

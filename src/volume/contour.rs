@@ -233,7 +233,8 @@ fn filled<T: Clone>(value: T, count: usize) -> Result<Vec<T>, VolumeError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::DVec3;
+    use crate::math::{DMat3, DVec3};
+    use crate::mesh::count_crossings;
     use crate::volume::{Space, VolumeInit, Voxels};
     use std::collections::BTreeMap;
     #[cfg(target_arch = "wasm32")]
@@ -352,6 +353,22 @@ mod tests {
                 let chi = euler(&mesh);
                 assert!(chi % 2 == 0 && enclosed(&mesh) > 0.0, "seed {seed}, iso {iso}: chi {chi}");
             }
+        }
+    }
+
+    #[test]
+    fn noise_crosses_itself_neither_in_index_nor_in_world_coordinates() {
+        for seed in 0..12 {
+            let grid = noise([14, 12, 13], seed, 7);
+            let mut mesh = marching_cubes(&grid, 2.0 + (seed % 3) as f32 * 0.75).unwrap();
+            assert_eq!(count_crossings(&mesh), 0, "seed {seed}, in index coordinates");
+            let axes = DMat3::from_cols(
+                DVec3::new(0.54, 0.72, 1.2),
+                DVec3::new(-1.6, 1.2, 0.0),
+                DVec3::new(-1.44, -1.92, 1.8),
+            );
+            place(&mut mesh, &DAffine3::from_mat3_translation(axes, DVec3::new(-120.0, 90.0, 300.0)));
+            assert_eq!(count_crossings(&mesh), 0, "seed {seed}, in world coordinates");
         }
     }
 
