@@ -3,8 +3,8 @@ import init, { DeformableModel, Mesh, Volume, version } from '../pkg/index.js';
 
 /** Bone, in the scan's intensities. */
 const ISO = 95;
-const LEVELS = 3;
-const PARAMS = { iso: ISO, isoForce: -1, rigidity: 0.4 };
+const LEVELS = 2;
+const PARAMS = { iso: ISO, isoForce: -1, rigidity: 0.2 };
 /** A model that has not come to rest by then is reported as such. */
 const MOST_ITERATIONS = 3000;
 
