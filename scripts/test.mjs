@@ -75,7 +75,8 @@ const STAGES = [
     'rust docs',
     check('cargo', ['doc', '--locked', '-p', 'vesicle', '--no-deps'], { env: { RUSTDOCFLAGS: '-D warnings' } }),
   ],
-  ['native', cargoTests()],
+  // With the counts of crossing triangles that the scenes print.
+  ['native', cargoTests('--', '--show-output')],
   ['wasm', cargoTests('--lib', '--tests', ...WASM)],
   ['build', works(build)],
   ['biome', check(tool('biome'), ['ci', '--colors=off'])],

@@ -1,5 +1,6 @@
 //! Every edit and every refusal, and long seeded runs of random edits with all invariants checked after each.
 
+#![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
 mod common;
 
 use common::Random;
@@ -19,7 +20,8 @@ fn torus(n: u32, m: u32) -> Mesh {
     let mut mesh = TriangleMesh::default();
     for i in 0..n {
         for j in 0..m {
-            let (a, b) = (i as f32 / n as f32 * 6.283, j as f32 / m as f32 * 6.283);
+            let (a, b) =
+                (i as f32 / n as f32 * std::f32::consts::TAU, j as f32 / m as f32 * std::f32::consts::TAU);
             let r = 3.0 + libm::cosf(b);
             mesh.positions.push(Vec3::new(r * libm::cosf(a), r * libm::sinf(a), libm::sinf(b)));
             let at = |i: u32, j: u32| (i % n) * m + j % m;

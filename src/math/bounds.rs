@@ -37,6 +37,12 @@ impl Bounds {
         Self { min, max }
     }
 
+    /// Whether `p` is inside or on the border; false for NaN.
+    #[inline]
+    pub fn contains(&self, p: Vec3) -> bool {
+        self.meets(&Self { min: p, max: p })
+    }
+
     /// Whether the boxes share a point.
     #[inline]
     pub fn meets(&self, other: &Self) -> bool {

@@ -80,6 +80,11 @@ impl Attributes {
         [self.vectors.len(), self.scalars.len()]
     }
 
+    pub(super) fn is_finite(&self, v: VertexId) -> bool {
+        let i = v.index();
+        self.vectors.iter().all(|of| of[i].is_finite()) && self.scalars.iter().all(|of| of[i].is_finite())
+    }
+
     pub(super) fn fits(&self, slots: usize) -> bool {
         self.vectors.iter().all(|v| v.len() == slots) && self.scalars.iter().all(|s| s.len() == slots)
     }

@@ -28,8 +28,8 @@ pub enum Flaw {
     /// Per-vertex arrays, the free list and the rings are out of step.
     #[error("the arrays of the mesh are out of step")]
     OutOfStep,
-    /// A coordinate is NaN or infinite.
-    #[error("{0:?} has no finite position")]
+    /// A coordinate or an attribute is NaN or infinite.
+    #[error("{0:?} has a position or attribute that is not finite")]
     NotFinite(VertexId),
 }
 
@@ -44,7 +44,7 @@ impl Mesh {
             self.check_valence(v)?;
             self.check_neighbours(v)?;
             self.check_triangles(v)?;
-            if !self.position(v).is_finite() {
+            if !self.position(v).is_finite() || !self.attributes.is_finite(v) {
                 return Err(Flaw::NotFinite(v));
             }
         }

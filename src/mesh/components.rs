@@ -19,8 +19,13 @@ impl Mesh {
     /// The vertices of each component, components in the order of their lowest slot.
     pub fn component_members(&self) -> Vec<Vec<VertexId>> {
         let mut seen = vec![false; self.slots()];
-        let starts = self.vertices();
-        starts.filter_map(|v| (!seen[v.index()]).then(|| self.flood(v, &mut seen))).collect()
+        let mut components = Vec::new();
+        for v in self.vertices() {
+            if !seen[v.index()] {
+                components.push(self.flood(v, &mut seen));
+            }
+        }
+        components
     }
 
     /// Everything connected with `v`, breadth first.

@@ -20,6 +20,14 @@ pub enum MethodError {
     /// The volume cannot be used.
     #[error(transparent)]
     Volume(#[from] VolumeError),
+    /// The surface has grown beyond what this image and sampling can need.
+    #[error(
+        "the surface would have more than {most} vertices: take longer edges, or forces that do not inflate it"
+    )]
+    TooManyVertices {
+        /// The number accepted.
+        most: usize,
+    },
     /// Bytes that are not a saved state of this model.
     #[error("saved state, {field}: {problem}")]
     BadState {

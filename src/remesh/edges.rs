@@ -4,10 +4,6 @@ use super::{Resolver, Sampling};
 use crate::math::Vec3;
 use crate::mesh::{Cut, EditError, Mesh, Opposite, VertexId};
 
-/// Edits a settling may take for each vertex of the mesh before the rest is left for later. Ordinary iterations take
-/// below one; a cycle of edits that undo each other would take any number.
-const EDITS_PER_VERTEX: usize = 20;
-
 /// How far the two sides of a cut neck are moved apart, in δ. Left in place they cross as soon as they are smoothed.
 const CUT_PUSH: f32 = 0.75;
 
@@ -17,14 +13,10 @@ const CUT_PUSH_LIMIT: f32 = 0.6;
 impl Resolver {
     /// Works through the queue until every edge around its vertices is within bounds.
     pub(super) fn settle_edges(&mut self, mesh: &mut Mesh, sampling: Sampling) {
-        let mut left = EDITS_PER_VERTEX * mesh.vertex_count() + 1000;
-        while let Some(u) = self.pop() {
-            if left == 0 {
-                self.touch(u);
-                return;
-            }
+        while self.edits_left > 0 {
+            let Some(u) = self.pop() else { return };
             if mesh.is_live(u) && self.settle_vertex(mesh, sampling, u) {
-                left -= 1;
+                self.edits_left -= 1;
             }
         }
     }
@@ -65,6 +57,8 @@ impl Resolver {
         let flat = a.distance_squared(b) < mesh.position(u).distance_squared(mesh.position(v));
         if crowded && flat && mesh.flip(u, v).is_ok() {
             self.changes.inversions += 1;
+        } else if !self.has_room(mesh) {
+            return Ok(false);
         } else {
             let w = mesh.split(u, v, middle)?;
             self.changes.creations += 1;

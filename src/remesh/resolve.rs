@@ -10,9 +10,18 @@ use std::collections::VecDeque;
 /// never needed more than five, and what is left waits for the next call.
 const PASSES: usize = 8;
 
+/// Edges a call may mend for each vertex of the mesh before the rest is left for the next call. Ordinary iterations
+/// take below one; a cycle of edits that undo each other, as on a needle that was pulled out of the surface, would take
+/// any number.
+const EDITS_PER_VERTEX: usize = 6;
+
 /// Keeps the bounds of a [`Sampling`] on a mesh that moves.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Resolver {
+    most_vertices: usize,
+    full: bool,
+    /// Edges that may still be mended in this call.
+    pub(super) edits_left: usize,
     queue: VecDeque<VertexId>,
     queued: Vec<bool>,
     /// Vertices that were moved or made since contact was last looked for.
@@ -42,18 +51,53 @@ impl Waiting {
 }
 
 impl Resolver {
+    /// A resolver that splits no edge of a mesh with so many vertices.
+    pub fn with_room_for(most_vertices: usize) -> Self {
+        Self {
+            most_vertices,
+            full: false,
+            edits_left: 0,
+            queue: VecDeque::new(),
+            queued: Vec::new(),
+            stirred: Vec::new(),
+            is_stirred: Vec::new(),
+            edited: Vec::new(),
+            grid: PointGrid::default(),
+            changes: Changes::default(),
+        }
+    }
+
+    /// The number of vertices from which on no edge is split.
+    pub fn most_vertices(&self) -> usize {
+        self.most_vertices
+    }
+
+    /// That number, where the last call left an edge too long because of it.
+    pub fn overflow(&self) -> Option<usize> {
+        self.full.then_some(self.most_vertices)
+    }
+
+    /// Whether a vertex may be added; if not, [`Self::overflow`] will tell.
+    pub(super) fn has_room(&mut self, mesh: &Mesh) -> bool {
+        self.full |= mesh.vertex_count() >= self.most_vertices;
+        !self.full
+    }
+
     /// Restores the bounds around the `active` vertices and returns what was done.
     ///
     /// Vertices that are not named are looked at only where an edit or a contact reaches them.
     pub fn resolve(&mut self, mesh: &mut Mesh, sampling: Sampling, active: &[VertexId]) -> Changes {
         self.changes = Changes::default();
+        self.full = false;
+        self.edits_left = EDITS_PER_VERTEX * mesh.vertex_count() + 1000;
         self.edited.clear();
         for &v in active {
             self.touch(v);
         }
         for _ in 0..PASSES {
             self.settle_edges(mesh, sampling);
-            if !self.join_contacts(mesh, sampling) {
+            // Between edges out of bounds nearly every pair of vertices is in contact, and joins make it worse.
+            if self.is_waiting() || !self.join_contacts(mesh, sampling) {
                 break;
             }
         }
@@ -63,6 +107,11 @@ impl Resolver {
     /// The vertices that edits of the last call made or displaced; some may be gone again.
     pub fn edited(&self) -> &[VertexId] {
         &self.edited
+    }
+
+    /// Whether something waits for the next call.
+    pub fn is_waiting(&self) -> bool {
+        !self.queue.is_empty()
     }
 
     /// What waits for the next call.

@@ -104,6 +104,8 @@ impl Forces {
         let rest = rest_length(rings, positions, scale);
         for (v, ring) in rings.iter().enumerate() {
             if ring.is_empty() {
+                // Free slots hold what anybody would compute, so that a run that was restored has the same bits.
+                self.force[v] = Vec3::ZERO;
                 continue;
             }
             let x = positions[v];

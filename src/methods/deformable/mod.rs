@@ -41,6 +41,7 @@
 //! # }
 //! ```
 
+mod domain;
 mod forces;
 mod image;
 mod motion;
@@ -57,11 +58,13 @@ use crate::math::{DAffine3, DVec3};
 use crate::mesh::{Mesh, ScalarKey, TriangleMesh, VectorKey, VertexId};
 use crate::remesh::{Changes, Resolver, Sampling};
 use crate::volume::Volume;
+use domain::Domain;
 use forces::{ForceScale, Forces, Pull};
 use image::Pyramid;
 use motion::{Movement, World, advance};
 use schedule::Rest;
 use start::Frame;
+use std::ops::RangeInclusive;
 
 /// How a [`DeformableModel`] is set up.
 #[derive(Clone, Debug)]
@@ -96,14 +99,14 @@ pub struct Attractor {
 }
 
 /// Mean edge of a resolved mesh in δ, measured on converged spheres and skulls.
-const MEAN_EDGE: f64 = 1.55;
+const MEAN_EDGE: f64 = 1.7;
 
 /// δ at the finest level in voxels, where no edge is asked for: inside 0.693 ≤ δ/U ≤ 1 (14), near its upper end,
 /// because vertices grow as 1/δ².
 const DEFAULT_DELTA: f64 = 0.9;
 
 /// δ in voxels that is accepted: below, a mesh of the whole image no longer fits memory; above, it misses it.
-const DELTA_RANGE: [f64; 2] = [0.2, 20.0];
+const DELTA_RANGE: RangeInclusive<f64> = 0.2..=20.0;
 
 /// A vertex is looked at again when it has gone this far since the last time, in δ…
 const CHECK_TRAVEL: f32 = 0.1;
@@ -130,6 +133,7 @@ struct Keys {
 #[derive(Clone, Debug)]
 pub struct DeformableModel {
     pyramid: Pyramid,
+    domain: Domain,
     to_world: DAffine3,
     voxel: f64,
     fingerprint: u64,
@@ -160,9 +164,11 @@ impl DeformableModel {
         let finest_delta = finest_delta(options.edge, voxel)?;
         let pyramid = Pyramid::new(volume, options.frame, options.levels)?;
         let delta = delta_at(finest_delta, options.levels);
+        let domain = Domain::new(volume.dims(), delta);
         let frame = Frame {
             image: &pyramid.levels[options.levels],
             dims: volume.dims(),
+            domain,
             from_world: volume.inverse_affine(),
             voxel,
             sampling: Sampling::new(delta),
@@ -178,6 +184,7 @@ impl DeformableModel {
             to_world: volume.affine(),
             fingerprint: state::fingerprint(volume, options.frame, options.levels),
             pyramid,
+            domain,
             voxel,
             params,
             attractors: Vec::new(),
@@ -185,7 +192,7 @@ impl DeformableModel {
             level: options.levels,
             mesh,
             keys,
-            resolver: Resolver::default(),
+            resolver: Resolver::with_room_for(domain.most_vertices(delta_at(finest_delta, 0))),
             forces: Forces::default(),
             iteration: 0,
             rest: Rest::default(),
@@ -203,7 +210,8 @@ impl DeformableModel {
     /// After the end the model stays as it is and reports `done`.
     ///
     /// # Errors
-    /// [`MethodError::Mesh`] where refinement would need more memory than there is; the model is then as it was.
+    /// [`MethodError::TooManyVertices`] where the surface grows beyond all bounds. It is sound then, but edges that
+    /// should have been split are too long; other parameters may bring it back.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
         let mut changes = Changes::default();
@@ -216,6 +224,9 @@ impl DeformableModel {
             self.iteration += 1;
             changes += self.come_to_rest(&mut times)?;
             self.count_components(changes);
+            if let Some(most) = self.resolver.overflow() {
+                return Err(MethodError::TooManyVertices { most });
+            }
         }
         Ok(self.report(changes, times))
     }
@@ -231,6 +242,7 @@ impl DeformableModel {
             image: &self.pyramid.levels[self.level],
             scale: ForceScale::new(&self.params, iso, self.voxel, delta),
             pulls: &pulls,
+            domain: self.domain,
         };
         self.movement = advance(&mut self.mesh, self.keys, &mut self.forces, &world, &self.params, delta);
         times.add("normals", normals - begin);
@@ -403,10 +415,10 @@ impl DeformableModel {
 fn finest_delta(edge: Option<f64>, voxel: f64) -> Result<f64, MethodError> {
     let Some(edge) = edge else { return Ok(DEFAULT_DELTA) };
     let delta = edge / voxel / MEAN_EDGE;
-    if delta >= DELTA_RANGE[0] && delta <= DELTA_RANGE[1] {
+    if DELTA_RANGE.contains(&delta) {
         return Ok(delta);
     }
-    let [low, high] = DELTA_RANGE.map(|d| d * MEAN_EDGE * voxel);
+    let [low, high] = [DELTA_RANGE.start(), DELTA_RANGE.end()].map(|d| d * MEAN_EDGE * voxel);
     Err(MethodError::invalid(
         "edge",
         format!("{edge} given, {low:.4} to {high:.4} accepted for these voxels"),

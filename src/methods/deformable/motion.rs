@@ -1,6 +1,7 @@
 //! The law of motion m ẍ + γ ẋ = f (4), integrated over one iteration.
 
 use super::Keys;
+use super::domain::Domain;
 use super::forces::{ForceScale, Forces, Pull};
 use super::image::LevelImage;
 use super::params::{DeformableParams, Integrator};
@@ -25,6 +26,8 @@ pub(super) struct World<'a> {
     pub(super) image: &'a LevelImage,
     pub(super) scale: ForceScale,
     pub(super) pulls: &'a [Pull],
+    /// Where vertices are held back.
+    pub(super) domain: Domain,
 }
 
 impl World<'_> {
@@ -47,7 +50,7 @@ pub(super) fn advance(
         Integrator::Euler => euler(mesh, keys, forces, world, params),
         Integrator::RungeKutta => runge_kutta(mesh, keys, forces, world, params),
     };
-    apply(mesh, keys, forces, moves, params, delta)
+    apply(mesh, keys, forces, moves, params, delta, world.domain)
 }
 
 /// Semi-implicit Euler: the new velocity moves the vertex. The velocity attribute holds it; no moves are returned.
@@ -107,6 +110,7 @@ fn apply(
     moves: Option<Vec<Vec3>>,
     params: &DeformableParams,
     delta: f32,
+    domain: Domain,
 ) -> Movement {
     let (step, limit) = (params.time_step as f32, params.max_move as f32 * delta);
     let live: Vec<bool> = mesh.rings().iter().map(|ring| !ring.is_empty()).collect();
@@ -121,6 +125,11 @@ fn apply(
         if length > limit {
             way *= limit / length;
             velocities[i] *= limit / length;
+        }
+        let to = positions[i] + way;
+        if !domain.bounds.contains(to) {
+            way = domain.hold(to) - positions[i];
+            velocities[i] = way * (1.0 / step);
         }
         positions[i] += way;
         let along = (way.dot(forces.normal[i]) / delta).abs();

@@ -65,6 +65,10 @@ impl DeformableModel {
     /// Refines the mesh and takes the next finer image (figure 13).
     fn descend(&mut self) -> Result<(), MethodError> {
         if self.params.topology == Topology::Adaptive {
+            let most = self.resolver.most_vertices();
+            if self.mesh.vertex_count() + self.mesh.triangle_count() > most {
+                return Err(MethodError::TooManyVertices { most });
+            }
             self.mesh.refine()?;
         }
         self.level -= 1;

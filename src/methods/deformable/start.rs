@@ -1,5 +1,6 @@
 //! The surface a run starts from (section 3.6), made in the space of the model and resolved before the first step.
 
+use super::domain::Domain;
 use super::image::LevelImage;
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings};
@@ -32,6 +33,7 @@ pub(super) struct Frame<'a> {
     pub(super) image: &'a LevelImage,
     /// Voxels of the finest level.
     pub(super) dims: [usize; 3],
+    pub(super) domain: Domain,
     pub(super) from_world: DAffine3,
     /// World length of a unit of the model.
     pub(super) voxel: f64,
@@ -52,6 +54,9 @@ const SPHERE_EDGE: f32 = 2.2;
 const MOST_BUBBLES: u32 = 100;
 const MOST_SEEDS: usize = 100_000;
 
+/// Calls until the edges of a start mesh are within bounds; each refines a coarse mesh several times.
+const MOST_CALLS: usize = 20;
+
 impl Start {
     /// The start mesh with its edges within bounds, and no two parts in contact.
     ///
@@ -66,15 +71,25 @@ impl Start {
             Self::MarchingCubes(value) => iso_surface(frame, iso(*value))?,
             Self::Mesh(mesh) => given(frame, mesh)?,
         };
-        resolve_all(&mut mesh, frame.sampling);
+        resolve_all(&mut mesh, frame, frame.sampling)?;
         Ok(mesh)
     }
 }
 
-fn resolve_all(mesh: &mut Mesh, sampling: Sampling) {
-    let mut resolver = Resolver::default();
+fn resolve_all(mesh: &mut Mesh, frame: &Frame, sampling: Sampling) -> Result<(), MethodError> {
+    let mut resolver = Resolver::with_room_for(frame.domain.most_vertices(sampling.shortest()));
     resolver.resolve(mesh, sampling, &mesh.vertices().collect::<Vec<_>>());
+    for _ in 0..MOST_CALLS {
+        if !resolver.is_waiting() {
+            break;
+        }
+        resolver.resolve(mesh, sampling, &[]);
+    }
+    if let Some(most) = resolver.overflow() {
+        return Err(MethodError::TooManyVertices { most });
+    }
     resolver.sweep(mesh, sampling);
+    Ok(())
 }
 
 /// A rounded box around the image: |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1 through the image's corners.
@@ -82,12 +97,8 @@ fn resolve_all(mesh: &mut Mesh, sampling: Sampling) {
 /// It is refined from an icosahedron, each level pulled onto the shape and resolved: a fine icosahedron squashed onto
 /// a flat box would have triangles that no edit can mend.
 fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
-    // 3^(1/4): the rounded box through the corners of a box is this much longer than the box along each axis.
-    const THROUGH_CORNERS: f32 = 1.316_074;
     let delta = frame.sampling.shortest();
-    let centre = Vec3::from(frame.dims.map(|n| 0.5 * (n as f32 - 1.0)));
-    let axes = Vec3::from(frame.dims.map(|n| THROUGH_CORNERS * 0.5 * (n as f32 + 1.0)))
-        .max(Vec3::splat(4.0 * delta));
+    let Domain { centre, axes, .. } = frame.domain;
     let onto_box = |p: Vec3| {
         let unit = (p - centre) / axes;
         let fourth = unit * unit * unit * unit;
@@ -104,10 +115,10 @@ fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
         let slots: Vec<_> = mesh.vertices().collect();
         slots.into_iter().for_each(|v| mesh.set_position(v, onto_box(mesh.position(v))));
         if 3.0 * delta < axes.min_element() {
-            resolve_all(&mut mesh, Sampling::new(delta));
+            resolve_all(&mut mesh, frame, Sampling::new(delta))?;
         }
     }
-    resolve_all(&mut mesh, frame.sampling);
+    resolve_all(&mut mesh, frame, frame.sampling)?;
     Ok(mesh)
 }
 
@@ -151,8 +162,11 @@ fn seeds(frame: &Frame, points: &[DVec3], radius: f64) -> Result<Mesh, MethodErr
         return Err(MethodError::invalid("start.radius", problem));
     }
     let centres: Vec<Vec3> = points.iter().map(|p| frame.from_world.transform_point3(*p).as_vec3()).collect();
-    if let Some(bad) = centres.iter().position(|p| !p.is_finite()) {
-        return Err(MethodError::invalid("start.seeds", format!("point {bad} is not finite")));
+    let room = frame.domain.bounds;
+    let fits = |&p: &Vec3| room.contains(p - Vec3::splat(local)) && room.contains(p + Vec3::splat(local));
+    if let Some(bad) = centres.iter().position(|p| !fits(p)) {
+        let problem = format!("the sphere at point {bad}, {}, is not in or near the image", points[bad]);
+        return Err(MethodError::invalid("start.seeds", problem));
     }
     let apart = 2.0 * local + frame.sampling.contact();
     let mut mesh = Mesh::default();
@@ -181,6 +195,10 @@ fn iso_surface(frame: &Frame, iso: f32) -> Result<Mesh, MethodError> {
 
 fn given(frame: &Frame, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
     let local = mesh.transformed(&frame.from_world);
+    if let Some(far) = local.positions.iter().position(|&p| !frame.domain.bounds.contains(p)) {
+        let problem = format!("vertex {far} at {} is not in or near the image", mesh.positions[far]);
+        return Err(MethodError::invalid("start.mesh", problem));
+    }
     let surface = Mesh::from_triangles(&local)?;
     let pairs = count_crossings(&surface.to_triangles());
     if pairs > 0 {

@@ -3,7 +3,7 @@
 use super::motion::Movement;
 use super::schedule::Rest;
 use super::{Attractor, DeformableModel, DeformableParams};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, VertexId};
 use crate::methods::MethodError;
 use crate::remesh::Waiting;
 use crate::volume::Volume;
@@ -81,20 +81,22 @@ impl DeformableModel {
         if state.mesh.attribute_counts() != self.mesh.attribute_counts() {
             return bad("mesh", "the vertices do not carry the data of this method".into());
         }
+        let lost = |v: &VertexId| !self.domain.bounds.contains(state.mesh.position(*v));
+        if let Some(v) = state.mesh.vertices().find(lost) {
+            return bad("mesh", format!("{v:?} is not in or near the image"));
+        }
         let named = state.waiting.queue.iter().chain(&state.waiting.stirred);
         if let Some(v) = named.into_iter().find(|v| v.index() >= state.mesh.slots()) {
             return bad("queue", format!("{v:?} does not exist"));
         }
-        let delta_fits =
-            state.finest_delta >= super::DELTA_RANGE[0] && state.finest_delta <= super::DELTA_RANGE[1];
-        if state.level >= self.pyramid.levels.len() || !delta_fits {
+        if state.level >= self.pyramid.levels.len() || !super::DELTA_RANGE.contains(&state.finest_delta) {
             return bad("level", "level or edge is out of range".into());
         }
         Ok(())
     }
 
     fn take_state(&mut self, state: State) -> Result<(), MethodError> {
-        let mut next = self.clone_without_mesh();
+        let mut next = self.clone();
         next.set_attractors(state.attractors)?;
         next.params = state.params;
         next.finest_delta = state.finest_delta;
@@ -108,10 +110,6 @@ impl DeformableModel {
         next.prepare_gradient()?;
         *self = next;
         Ok(())
-    }
-
-    fn clone_without_mesh(&self) -> Self {
-        self.clone()
     }
 }
 

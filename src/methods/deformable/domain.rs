@@ -1,0 +1,42 @@
+//! The part of space a surface may be in. Without it a force that points outwards would grow it for ever.
+
+use crate::math::{Bounds, Vec3};
+
+/// How much longer than the enclosing start shape the domain is.
+const ROOM: f32 = 1.5;
+
+/// 3^(1/4): the rounded box |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1 through the corners of a box is this much longer than it.
+const THROUGH_CORNERS: f32 = 1.316_074;
+
+/// The most vertices of any surface: about 200 bytes each, and wasm32 has 4 GiB.
+const MOST_VERTICES: f64 = 1e7;
+
+/// A box around the image, in the space of the model.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Domain {
+    pub(super) centre: Vec3,
+    /// Half axes of the rounded box that the enclosing start shape is.
+    pub(super) axes: Vec3,
+    pub(super) bounds: Bounds,
+}
+
+impl Domain {
+    /// For an image of `dims` voxels and a surface that starts with the invariant `delta`.
+    pub(super) fn new(dims: [usize; 3], delta: f32) -> Self {
+        let centre = Vec3::from(dims.map(|n| 0.5 * (n as f32 - 1.0)));
+        let around = Vec3::from(dims.map(|n| THROUGH_CORNERS * 0.5 * (n as f32 + 1.0)));
+        let axes = around.max(Vec3::splat(4.0 * delta));
+        Self { centre, axes, bounds: Bounds { min: centre - axes * ROOM, max: centre + axes * ROOM } }
+    }
+
+    /// The nearest point of the domain.
+    pub(super) fn hold(&self, p: Vec3) -> Vec3 {
+        p.clamp(self.bounds.min, self.bounds.max)
+    }
+
+    /// The most vertices that a surface with no contact unresolved can have here: one in each cube of side δ.
+    pub(super) fn most_vertices(&self, delta: f32) -> usize {
+        let cubes = ((self.bounds.max - self.bounds.min) / delta).as_dvec3().element_product();
+        if cubes < MOST_VERTICES { cubes as usize } else { MOST_VERTICES as usize }
+    }
+}
