@@ -2,6 +2,7 @@
 //!
 //! Reads the sources, so it runs natively only.
 #![cfg(not(target_arch = "wasm32"))]
+#![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
 
 use std::fs;
 use std::path::{Path, PathBuf};

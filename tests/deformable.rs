@@ -382,9 +382,9 @@ fn refusals_name_the_option_and_what_is_accepted() {
 
 #[test]
 fn flat_and_tiny_volumes_have_an_enclosing_start() {
-    for dims in [[64, 64, 6], [5, 5, 5], [2, 2, 2], [1, 1, 1], [100, 3, 3]] {
+    for dims in [[64, 64, 6], [5, 5, 5], [2, 2, 2], [1, 1, 1], [100, 3, 3], [90, 40, 1], [3, 30, 70]] {
         let volume = scenes::volume(dims, |p| p.x);
-        for edge in [0.8, 1.5, 3.0] {
+        for edge in [0.5, 0.8, 1.1, 1.5, 2.2, 3.0, 5.0] {
             let options = DeformableOptions { edge: Some(edge), ..Default::default() };
             let model = DeformableModel::new(&volume, options).unwrap();
             assert_eq!((model.mesh().check(), model.mesh().euler()), (Ok(()), 2), "{dims:?} {edge}");

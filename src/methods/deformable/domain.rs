@@ -8,6 +8,10 @@ const ROOM: f32 = 1.5;
 /// 3^(1/4): the rounded box |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1 through the corners of a box is this much longer than it.
 const THROUGH_CORNERS: f32 = 1.316_074;
 
+/// The longest axis of the enclosing start shape in its shortest. Around flatter images it leaves more room: the flatter
+/// it is, the more its triangles are squashed before they can be resolved, and from 15 on some of them cross.
+const MOST_ELONGATED: f32 = 6.0;
+
 /// The most vertices of any surface: about 200 bytes each, and wasm32 has 4 GiB.
 const MOST_VERTICES: f64 = 1e7;
 
@@ -25,7 +29,8 @@ impl Domain {
     pub(super) fn new(dims: [usize; 3], delta: f32) -> Self {
         let centre = Vec3::from(dims.map(|n| 0.5 * (n as f32 - 1.0)));
         let around = Vec3::from(dims.map(|n| THROUGH_CORNERS * 0.5 * (n as f32 + 1.0)));
-        let axes = around.max(Vec3::splat(4.0 * delta));
+        let least = (4.0 * delta).max(around.max_element() / MOST_ELONGATED);
+        let axes = around.max(Vec3::splat(least));
         Self { centre, axes, bounds: Bounds { min: centre - axes * ROOM, max: centre + axes * ROOM } }
     }
 
