@@ -236,7 +236,7 @@ mod tests {
     }
 
     fn text(n: usize) -> Vec<u8> {
-        (0..n).map(|i| (i * i / 7) as u8).collect()
+        (0..n as u64).map(|i| (i * i / 7) as u8).collect()
     }
 
     #[test]

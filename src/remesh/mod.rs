@@ -3,7 +3,7 @@
 //!
 //! [`Resolver::resolve`] is the whole of it: edges out of bounds are split, flipped, collapsed or cut through
 //! (`edges`), vertices in contact are joined (`contact`), and again until all bounds hold; what is left after
-//! [`PASSES`](resolve) stays queued for the next call. Small parts without volume are removed (`specks`).
+//! eight rounds stays queued for the next call. Small parts without volume are removed (`specks`).
 
 mod changes;
 mod contact;

@@ -16,7 +16,7 @@ use crate::math::{DAffine3, DMat3, DVec3};
 const KERNEL: [f64; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
 
 impl Volume {
-    /// `levels` volumes in all: [0] is this one, each next is coarser by `factor` (ρ) along every axis.
+    /// `levels` volumes in all: the first is this one, each next is coarser by `factor` (ρ) along every axis.
     ///
     /// All frames are kept; levels after the first are `f32` intensities.
     ///
