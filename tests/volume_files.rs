@@ -699,4 +699,60 @@ mod elsewhere {
             ([128, 128, 32], [0.0, 918.0], LengthUnit::Micrometre)
         );
     }
+
+    /// Every file below a folder, in the order of their names.
+    fn files_below(folder: &std::path::Path) -> Vec<PathBuf> {
+        let mut paths: Vec<PathBuf> =
+            std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+        paths.sort();
+        paths
+            .into_iter()
+            .flat_map(|path| if path.is_dir() { files_below(&path) } else { vec![path] })
+            .collect()
+    }
+
+    /// The file cut short, with its sizes and its numbers spoiled, emptied, and replaced by text.
+    fn broken(bytes: &[u8]) -> Vec<Vec<u8>> {
+        let mut variants: Vec<Vec<u8>> = (0..40).map(|k| bytes[..bytes.len() * k / 40].to_vec()).collect();
+        variants.push(bytes[..bytes.len() - 1].to_vec());
+        variants.push(b"once upon a time there was a volume".to_vec());
+        for at in (0..400).step_by(4).filter(|at| at + 4 <= bytes.len()) {
+            for pattern in [[0xFF; 4], [0xFF, 0xFF, 0xFF, 0x7F], f32::NAN.to_le_bytes(), [b'9'; 4], [0; 4]] {
+                let mut damaged = bytes.to_vec();
+                damaged[at..at + 4].copy_from_slice(&pattern);
+                variants.push(damaged);
+            }
+        }
+        variants
+    }
+
+    /// An error says `format: field: problem`, with a format that this crate knows.
+    fn names_format_and_field(message: &str) -> bool {
+        const FORMATS: [&str; 4] = ["NIfTI", "NRRD", "MetaImage", "volume file"];
+        let parts: Vec<&str> = message.splitn(3, ": ").collect();
+        parts.len() == 3 && FORMATS.iter().any(|f| parts[0].starts_with(f)) && !parts[1].is_empty()
+    }
+
+    #[test]
+    fn every_file_and_every_broken_variant_gives_a_volume_or_names_format_and_field() {
+        let Some(folder) = folder() else { return };
+        let (mut volumes, mut errors) = (0, 0);
+        for path in files_below(&folder.join("volumes/formats")) {
+            let bytes = std::fs::read(&path).unwrap();
+            for variant in std::iter::once(bytes.clone()).chain(broken(&bytes)) {
+                match parse_volume(&variant, None) {
+                    Ok(volume) => {
+                        volumes += 1;
+                        assert!(volume.range().iter().all(|v| v.is_finite()), "{path:?}");
+                    }
+                    Err(error) => {
+                        errors += 1;
+                        assert!(names_format_and_field(&error.to_string()), "{path:?}: {error}");
+                    }
+                }
+            }
+        }
+        eprintln!("{volumes} volumes, {errors} errors");
+        assert!(volumes > 100 && errors > 1000);
+    }
 }

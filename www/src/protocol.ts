@@ -31,6 +31,8 @@ export interface Setup {
   start: StartShape;
   /** Pyramid levels above the volume itself. */
   levels: number;
+  /** Mean edge at the end in world units; chosen by the model where undefined. */
+  edge: number | undefined;
   /** What differs from the defaults; without `iso` the worker chooses one from the histogram. */
   params: ParamValues;
 }

@@ -104,6 +104,7 @@ function buildModel(volume: Volume, setup: Setup): DeformableModel {
     volume,
     start: startOf(setup, iso),
     levels: setup.levels,
+    ...(setup.edge === undefined ? {} : { edge: setup.edge }),
     params: { ...setup.params, iso },
   });
 }

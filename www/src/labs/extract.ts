@@ -178,7 +178,8 @@ export class ExtractLab {
       const body = { name: source.name, source: await source.volume(), setup: this.#setupFor(source) };
       const loaded = await this.#client.request('load', body, transferable(body.source));
       this.#source = source;
-      if (source.example) this.#start.show({ kind: 'enclosing', levels: source.example.levels });
+      if (source.example)
+        this.#start.show({ kind: 'enclosing', levels: source.example.levels, edge: source.example.edge });
       this.#adoptVolume(loaded.volume, source.example);
       this.#adoptModel(loaded);
       await this.#play();
@@ -219,13 +220,14 @@ export class ExtractLab {
   }
 
   #setup(): Setup {
-    const { levels } = this.#start.value;
-    return { start: this.#startShape(), levels, params: this.#params };
+    const { levels, edge } = this.#start.value;
+    return { start: this.#startShape(), levels, edge, params: this.#params };
   }
 
   /** What suits an example; for a file, the settings as they are, except the iso value, which no other volume shares. */
   #setupFor({ example }: Source): Setup {
-    if (example) return { start: { kind: 'enclosing' }, levels: example.levels, params: example.params };
+    if (example)
+      return { start: { kind: 'enclosing' }, levels: example.levels, edge: example.edge, params: example.params };
     const { iso: _, ...params } = this.#params;
     return { ...this.#setup(), params };
   }

@@ -21,10 +21,14 @@ const DEFAULT_LEVELS = 1;
 const MOST_LEVELS = 6;
 const DEFAULT_BUBBLES = 5;
 
+type Ids = [string, string, string, string];
+
 export interface StartChoice {
   kind: Kind;
   bubbles: number;
   levels: number;
+  /** Mean edge in world units; chosen by the model where undefined. */
+  edge: number | undefined;
 }
 
 /** What the model starts from. A change starts it over. */
@@ -33,17 +37,26 @@ export class StartControls {
   readonly #shape: HTMLSelectElement;
   readonly #bubbles: HTMLInputElement;
   readonly #levels: HTMLInputElement;
+  readonly #edge: HTMLInputElement;
   readonly #bubbleRow: HTMLElement;
   readonly #help: HTMLElement;
 
   constructor(onChange: () => void) {
-    const [shapeId, bubblesId, levelsId] = [uniqueId('shape'), uniqueId('bubbles'), uniqueId('levels')];
+    const [shapeId, bubblesId, levelsId, edgeId] = ['shape', 'bubbles', 'levels', 'edge'].map(uniqueId) as Ids;
     const options = SHAPES.map(({ kind, label }) => h('option', { value: kind }, label));
     const changed = () => this.#changed(onChange);
     this.#help = h('p', { class: 'help', id: `${shapeId}-help` });
     this.#shape = h('select', { id: shapeId, 'aria-describedby': `${shapeId}-help`, onchange: changed }, ...options);
     this.#bubbles = integer(bubblesId, 2, 32, DEFAULT_BUBBLES, changed);
     this.#levels = integer(levelsId, 0, MOST_LEVELS, DEFAULT_LEVELS, changed);
+    this.#edge = h('input', {
+      type: 'number',
+      id: edgeId,
+      min: 0,
+      step: 'any',
+      placeholder: 'auto',
+      onchange: changed,
+    });
     this.#bubbleRow = row(bubblesId, 'Bubbles along each side', this.#bubbles);
     const levelHelp = h(
       'p',
@@ -58,6 +71,12 @@ export class StartControls {
       this.#bubbleRow,
       row(levelsId, 'Pyramid levels', this.#levels),
       levelHelp,
+      row(edgeId, 'Mean edge', this.#edge),
+      h(
+        'p',
+        { class: 'help' },
+        'Of the triangles at the end, in the units of the volume; left empty, it follows the voxels.',
+      ),
     );
     this.#explain();
   }
@@ -67,19 +86,21 @@ export class StartControls {
       kind: this.#shape.value as Kind,
       bubbles: this.#bubbles.valueAsNumber,
       levels: this.#levels.valueAsNumber,
+      edge: this.#edge.value === '' ? undefined : this.#edge.valueAsNumber,
     };
   }
 
   /** Sets what suits an example; no change is reported. */
-  show({ kind, levels }: Pick<StartChoice, 'kind' | 'levels'>): void {
+  show({ kind, levels, edge }: Omit<StartChoice, 'bubbles'>): void {
     this.#shape.value = kind;
     this.#levels.valueAsNumber = levels;
+    this.#edge.value = edge === undefined ? '' : String(edge);
     this.#explain();
   }
 
   #changed(onChange: () => void): void {
     this.#explain();
-    if (this.#bubbles.checkValidity() && this.#levels.checkValidity()) onChange();
+    if ([this.#bubbles, this.#levels, this.#edge].every((input) => input.checkValidity())) onChange();
     else this.element.querySelector<HTMLInputElement>('input:invalid')?.reportValidity();
   }
 
