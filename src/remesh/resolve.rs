@@ -6,8 +6,8 @@ use crate::spatial::PointGrid;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// Rounds of edges and contact in one call. A round mends what the round before it broke; the study of hard scenes
-/// never needed more than five, and what is left waits for the next call.
+/// Rounds of edges and contact in one call. A round mends what the round before it broke; hard scenes never
+/// needed more than five, and what is left waits for the next call.
 const PASSES: usize = 8;
 
 /// Edges a call may mend for each vertex of the mesh before the rest is left for the next call. Ordinary iterations

@@ -243,8 +243,10 @@ impl DeformableModel {
             scale: ForceScale::new(&self.params, iso, self.voxel, delta),
             pulls: &pulls,
             domain: self.domain,
+            params: &self.params,
+            delta,
         };
-        self.movement = advance(&mut self.mesh, self.keys, &mut self.forces, &world, &self.params, delta);
+        self.movement = advance(&mut self.mesh, self.keys, &mut self.forces, &world);
         times.add("normals", normals - begin);
         times.add("motion", (self.clock)() - normals);
     }

@@ -21,13 +21,15 @@ pub(super) struct Movement {
 /// Iterations after which a vertex has come back from an edit.
 const CALM: f32 = 6.0;
 
-/// What pushes the vertices.
+/// What pushes and what holds the vertices.
 pub(super) struct World<'a> {
     pub(super) image: &'a LevelImage,
     pub(super) scale: ForceScale,
     pub(super) pulls: &'a [Pull],
     /// Where vertices are held back.
     pub(super) domain: Domain,
+    pub(super) params: &'a DeformableParams,
+    pub(super) delta: f32,
 }
 
 impl World<'_> {
@@ -38,31 +40,19 @@ impl World<'_> {
 }
 
 /// Moves every vertex by one time step. `forces` holds normals and L of the mesh as it is.
-pub(super) fn advance(
-    mesh: &mut Mesh,
-    keys: Keys,
-    forces: &mut Forces,
-    world: &World,
-    params: &DeformableParams,
-    delta: f32,
-) -> Movement {
-    let moves = match params.integrator {
-        Integrator::Euler => euler(mesh, keys, forces, world, params),
-        Integrator::RungeKutta => runge_kutta(mesh, keys, forces, world, params),
+pub(super) fn advance(mesh: &mut Mesh, keys: Keys, forces: &mut Forces, world: &World) -> Movement {
+    let moves = match world.params.integrator {
+        Integrator::Euler => euler(mesh, keys, forces, world),
+        Integrator::RungeKutta => runge_kutta(mesh, keys, forces, world),
     };
-    apply(mesh, keys, forces, moves, params, delta, world.domain)
+    apply(mesh, keys, forces, world, moves)
 }
 
 /// Semi-implicit Euler: the new velocity moves the vertex. The velocity attribute holds it; no moves are returned.
-fn euler(
-    mesh: &mut Mesh,
-    keys: Keys,
-    forces: &mut Forces,
-    world: &World,
-    params: &DeformableParams,
-) -> Option<Vec<Vec3>> {
+fn euler(mesh: &mut Mesh, keys: Keys, forces: &mut Forces, world: &World) -> Option<Vec<Vec3>> {
     world.act(forces, mesh, mesh.positions(), mesh.vector(keys.velocity));
-    let (step, damping) = (params.time_step as f32 / params.mass as f32, params.damping as f32);
+    let &DeformableParams { time_step, mass, damping, .. } = world.params;
+    let (step, damping) = (time_step as f32 / mass as f32, damping as f32);
     for (v, force) in mesh.vector_mut(keys.velocity).iter_mut().zip(&forces.force) {
         *v += (*force - *v * damping) * step;
     }
@@ -70,14 +60,9 @@ fn euler(
 }
 
 /// The classical fourth-order method on positions and velocities; returns the way of each vertex.
-fn runge_kutta(
-    mesh: &mut Mesh,
-    keys: Keys,
-    forces: &mut Forces,
-    world: &World,
-    params: &DeformableParams,
-) -> Option<Vec<Vec3>> {
-    let (step, mass, damping) = (params.time_step as f32, params.mass as f32, params.damping as f32);
+fn runge_kutta(mesh: &mut Mesh, keys: Keys, forces: &mut Forces, world: &World) -> Option<Vec<Vec3>> {
+    let &DeformableParams { time_step, mass, damping, .. } = world.params;
+    let (step, mass, damping) = (time_step as f32, mass as f32, damping as f32);
     let (x0, v0) = (mesh.positions().to_vec(), mesh.vector(keys.velocity).to_vec());
     let normals = forces.normal.clone();
     let (mut x, mut v) = (x0.clone(), v0.clone());
@@ -103,15 +88,8 @@ fn runge_kutta(
 }
 
 /// Bounds each move, scales the velocity with it, and moves the vertices.
-fn apply(
-    mesh: &mut Mesh,
-    keys: Keys,
-    forces: &Forces,
-    moves: Option<Vec<Vec3>>,
-    params: &DeformableParams,
-    delta: f32,
-    domain: Domain,
-) -> Movement {
+fn apply(mesh: &mut Mesh, keys: Keys, forces: &Forces, world: &World, moves: Option<Vec<Vec3>>) -> Movement {
+    let &World { domain, params, delta, .. } = world;
     let (step, limit) = (params.time_step as f32, params.max_move as f32 * delta);
     let live: Vec<bool> = mesh.rings().iter().map(|ring| !ring.is_empty()).collect();
     let count = mesh.vertex_count();
