@@ -204,6 +204,18 @@ fn open_and_broken_triangle_lists_are_refused_with_words() {
     assert!(refusal(&bad, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]).contains("finite"));
 }
 
+/// Removed twice, the slots of a component were free twice, and two vertices later shared one.
+#[test]
+fn a_component_is_removed_once() {
+    let mut mesh = tetrahedron();
+    mesh.append(&sphere()).unwrap();
+    let v = mesh.vertices().next().unwrap();
+    assert_eq!(mesh.remove_component(v), 4);
+    let without = mesh.clone();
+    assert_eq!((mesh.component_of(v, usize::MAX), mesh.remove_component(v)), (vec![], 0));
+    assert!(mesh == without && mesh.check() == Ok(()));
+}
+
 /// One random edit on a random place, refused or done.
 fn random_edit(mesh: &mut Mesh, random: &mut Random, live: &[VertexId]) -> Result<i64, EditError> {
     let u = live[random.below(live.len())];

@@ -6,8 +6,11 @@ use super::{Mesh, VertexId};
 const SMALL: usize = 64;
 
 impl Mesh {
-    /// The vertices connected with `v` in breadth-first order, at most `limit` of them.
+    /// The vertices connected with `v` in breadth-first order, at most `limit` of them; none where `v` is not live.
     pub fn component_of(&self, v: VertexId, limit: usize) -> Vec<VertexId> {
+        if !self.is_live(v) {
+            return Vec::new();
+        }
         if limit <= SMALL {
             return self.small_component_of(v, limit);
         }

@@ -144,9 +144,13 @@ impl Mesh {
         Ok(())
     }
 
-    /// Deletes the whole component of `v`, whatever its genus, and returns how many vertices it had.
+    /// Deletes the whole component of `v`, whatever its genus, and returns how many vertices it had; none where `v` is not
+    /// live.
     pub fn remove_component(&mut self, v: VertexId) -> usize {
         let members = self.component_of(v, usize::MAX);
+        if members.is_empty() {
+            return 0;
+        }
         let half_edges: usize = members.iter().map(|&w| self.ring(w).valence()).sum();
         self.euler -= members.len() as i64 + half_edges as i64 / 3 - half_edges as i64 / 2;
         self.half_edges -= half_edges;

@@ -7,10 +7,15 @@ use crate::mesh::{Mesh, VertexId};
 const LARGEST_SPECK: usize = 32;
 
 impl Resolver {
-    /// Removes the component of `v` where it is a speck, and says whether it did.
+    /// Removes the component of `v` where it is a speck, and says whether it is gone.
+    ///
+    /// It may be gone already: the two sides of a cut handle are one component.
     ///
     /// A speck has at most 32 vertices and less than δ³ of volume. Those of negative volume would grow in empty space.
     pub(super) fn remove_speck(&mut self, mesh: &mut Mesh, sampling: Sampling, v: VertexId) -> bool {
+        if !mesh.is_live(v) {
+            return true;
+        }
         let members = mesh.component_of(v, LARGEST_SPECK + 1);
         if members.len() > LARGEST_SPECK || volume(mesh, &members) >= sampling.smallest_volume() {
             return false;

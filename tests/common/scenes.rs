@@ -1,4 +1,5 @@
 //! Synthetic volumes with a known answer.
+#![allow(dead_code, reason = "each test file uses a part of it")]
 
 use vesicle::math::{DAffine3, Vec3};
 use vesicle::volume::{Space, Volume, VolumeInit, Voxels};

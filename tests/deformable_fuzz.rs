@@ -1,0 +1,142 @@
+//! The deformable model under random images, starts and parameters: sound after every step, whatever they are.
+//!
+//! A seed that fails prints itself. `FUZZ_SEEDS=<first>..<last>` runs others than the usual ones.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "the lints spare tests, but not their helpers"
+)]
+
+mod common;
+#[path = "common/scenes.rs"]
+mod scenes;
+
+use common::Random;
+use std::ops::Range;
+use vesicle::math::{DVec3, Vec3};
+use vesicle::methods::deformable::{
+    Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, Start,
+};
+use vesicle::volume::Volume;
+#[cfg(target_arch = "wasm32")]
+use wasm_bindgen_test::wasm_bindgen_test as test;
+
+const STEPS: usize = 40;
+
+/// Where the usual seeds end; in wasm, which is slower to report, fewer do.
+const SEEDS: u64 = if cfg!(target_arch = "wasm32") { 100 } else { 400 };
+
+fn number(random: &mut Random, low: f64, high: f64) -> f64 {
+    low + (high - low) * f64::from(random.unit())
+}
+
+fn dims(random: &mut Random) -> [usize; 3] {
+    [8 + random.below(30), 8 + random.below(30), 4 + random.below(30)]
+}
+
+/// Noise, a noisy lattice of holes, or a ball.
+fn image(random: &mut Random, dims: [usize; 3]) -> Volume {
+    let noise: Vec<f32> = (0..dims[0] * dims[1] * dims[2]).map(|_| random.unit()).collect();
+    let (kind, frequency) = (random.below(3), 0.2 + random.unit());
+    let middle = Vec3::from(dims.map(|n| n as f32)) * 0.5;
+    scenes::volume(dims, |p| {
+        let noise = noise[p.x as usize + dims[0] * (p.y as usize + dims[1] * p.z as usize)];
+        let wave = |x: f32| 0.2 * libm::sinf(x * frequency);
+        match kind {
+            0 => noise,
+            1 => 0.5 + wave(p.x) + wave(p.y) + wave(p.z) + 0.2 * noise,
+            _ => scenes::potential(p.distance(middle), 3.0 + 4.0 * frequency),
+        }
+    })
+}
+
+fn start(random: &mut Random, dims: [usize; 3]) -> Start {
+    match random.below(5) {
+        0 => Start::Bubbles(1 + random.below(4) as u32),
+        1 => Start::MarchingCubes(number(random, 0.3, 0.7)),
+        2 => {
+            let middle = DVec3::from(dims.map(|n| n as f64)) * 0.5;
+            Start::Seeds { points: vec![middle], radius: number(random, 1.0, 7.0) }
+        }
+        _ => Start::Enclosing,
+    }
+}
+
+fn params(random: &mut Random, volume: &Volume) -> DeformableParams {
+    DeformableParams {
+        iso: number(random, 0.2, 0.8),
+        iso_force: if random.below(3) == 0 { number(random, -4.0, 4.0) } else { -1.0 },
+        rigidity: number(random, 0.0, 0.4),
+        stiffness: if random.below(2) == 0 { 0.0 } else { number(random, 0.0, 0.2) },
+        gradient_normal: if random.below(3) == 0 { number(random, 0.0, 1.0) } else { 0.0 },
+        damping: number(random, 0.2, 0.8),
+        max_move: number(random, 0.1, 0.5),
+        integrator: if random.below(4) == 0 { Integrator::RungeKutta } else { Integrator::Euler },
+        ..DeformableParams::for_volume(volume)
+    }
+}
+
+/// One run, with parameters changed and attractors set on the way. A start that does not fit is refused.
+fn run(seed: u64) {
+    let mut random = Random(seed);
+    let dims = dims(&mut random);
+    let volume = image(&mut random, dims);
+    let options = DeformableOptions {
+        start: start(&mut random, dims),
+        levels: random.below(3),
+        edge: Some(number(&mut random, 1.0, 3.0)),
+        params: Some(params(&mut random, &volume)),
+        ..Default::default()
+    };
+    let Ok(mut model) = DeformableModel::new(&volume, options) else { return };
+    for step in 0..STEPS {
+        let report = model.step().unwrap_or_else(|error| panic!("seed {seed}, step {step}: {error}"));
+        assert_eq!(model.mesh().check(), Ok(()), "seed {seed}, step {step}");
+        assert_eq!(i64::from(report.euler), model.mesh().euler(), "seed {seed}, step {step}");
+        match random.below(40) {
+            0 => model.set_params(params(&mut random, &volume)).unwrap(),
+            1 => {
+                let point = DVec3::from(dims.map(|n| number(&mut random, 0.0, n as f64)));
+                let pull = Attractor { point, strength: number(&mut random, -0.5, 0.5), radius: 8.0 };
+                model.set_attractors(vec![pull]).unwrap();
+            }
+            _ => {}
+        }
+    }
+}
+
+fn seeds() -> Range<u64> {
+    let named = std::env::var("FUZZ_SEEDS").unwrap_or_default();
+    let range =
+        named.split_once("..").and_then(|(first, last)| Some(first.parse().ok()?..last.parse().ok()?));
+    range.unwrap_or(0..SEEDS)
+}
+
+/// Names the seed of a run that panics. In wasm a panic ends the program, so each seed is said before.
+struct Named(u64);
+
+impl Named {
+    fn new(seed: u64) -> Self {
+        #[cfg(target_arch = "wasm32")]
+        wasm_bindgen_test::console_log!("seed {seed}");
+        Self(seed)
+    }
+}
+
+impl Drop for Named {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            println!("failing seed: {}", self.0);
+        }
+    }
+}
+
+#[test]
+fn any_run_is_sound_after_every_step() {
+    for seed in seeds() {
+        let named = Named::new(seed);
+        run(named.0);
+    }
+}
