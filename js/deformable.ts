@@ -100,7 +100,8 @@ export class DeformableModel implements Stepper {
    *   `self-intersecting` for a start mesh that is; `too-large`.
    */
   constructor(given: DeformableOptions) {
-    const { volume, frame = 0, start = 'enclosing', levels = 0, edge, params = {} } = checked(given);
+    const { volume, frame = 0, start = 'enclosing', levels = 0, edge, params: some = {} } = checked(given);
+    const params = plain('params', some);
     const image = volumeHandle('volume', volume as Volume);
     this.#handle = new Handle('DeformableModel', () =>
       image.use((raw) => new RawDeformable(raw, frame, rawStart(start), levels, edge, params)),
@@ -119,7 +120,10 @@ export class DeformableModel implements Stepper {
     return this.#handle.use((raw) => raw.level());
   }
 
-  /** The sampling distance δ now, world units: edges are between δ and 2.5 δ. */
+  /**
+   * The sampling distance δ now, world units: edges are between δ and 2.5 δ. Where voxels are not cubes, both hold in the
+   * mean of all directions.
+   */
   get delta(): number {
     return this.#handle.use((raw) => raw.delta());
   }
@@ -173,8 +177,8 @@ export class DeformableModel implements Stepper {
    *   of range; nothing has changed then.
    */
   setParams(params: DeformableParams): void {
-    object('params', params);
-    this.#handle.use((raw) => raw.setParams(params));
+    const values = plain('params', params);
+    this.#handle.use((raw) => raw.setParams(values));
   }
 
   /** The whole state, for {@link DeformableModel.restore} of a model made with the same volume and options. */
@@ -212,12 +216,15 @@ function checked(given: DeformableOptions): Partial<DeformableOptions> {
   if (frame !== undefined) whole('frame', frame);
   if (levels !== undefined) whole('levels', levels);
   if (edge !== undefined) positive('edge', edge);
-  if (params !== undefined) object('params', params);
+  if (params !== undefined) plain('params', params);
   return known;
 }
 
-function object(parameter: string, value: unknown): void {
-  if (value === null || typeof value !== 'object') throw invalid(parameter, 'an object is needed');
+// A copy, so that getters and proxies run their own code here and not in the middle of a call into the module.
+function plain<T extends object>(parameter: string, value: T): T {
+  if (value === null || typeof value !== 'object' || Array.isArray(value))
+    throw invalid(parameter, 'an object is needed');
+  return { ...value };
 }
 
 // Made last, when nothing else can fail: whoever takes it frees it.
@@ -225,9 +232,18 @@ function rawStart(start: DeformableStart): RawStart {
   if (start === 'enclosing') return RawStart.enclosing();
   if (start instanceof Mesh) return meshHandle('start', start).use((raw) => RawStart.mesh(raw));
   if (start === null || typeof start !== 'object') throw unknownStart();
-  if ('bubbles' in start) return RawStart.bubbles(whole('bubbles', start.bubbles, { min: 1 }));
-  if ('marchingCubes' in start) return RawStart.marchingCubes(number('marchingCubes', start.marchingCubes));
-  if ('seeds' in start) return RawStart.seeds(finite('seeds', start.seeds, 3), positive('radius', start.radius));
+  if ('bubbles' in start) {
+    const { bubbles } = options('start', start, ['bubbles']);
+    return RawStart.bubbles(whole('bubbles', bubbles, { min: 1 }));
+  }
+  if ('marchingCubes' in start) {
+    const { marchingCubes } = options('start', start, ['marchingCubes']);
+    return RawStart.marchingCubes(number('marchingCubes', marchingCubes));
+  }
+  if ('seeds' in start) {
+    const { seeds, radius } = options('start', start, ['seeds', 'radius']);
+    return RawStart.seeds(finite('seeds', seeds, 3), positive('radius', radius));
+  }
   throw unknownStart();
 }
 

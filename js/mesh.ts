@@ -1,5 +1,5 @@
 import { choice, finite, invalid, number, options, positive, typed, vec3, whole } from './check.js';
-import { Handle } from './runtime.js';
+import { call, Handle } from './runtime.js';
 import { type RawArrays, RawMesh } from './vesicle.js';
 import { type Vec3, type Volume, volumeHandle } from './volume.js';
 
@@ -193,11 +193,14 @@ export class Mesh {
   /**
    * Into the caller's buffers, which are replaced only when too small; returns the counts written. `uvs` and `colors`
    * are set where the mesh has them, and deleted where it has none.
+   *
+   * @throws {@link VesicleError} `invalid-argument` where `out` is no such object.
    */
   copyTo(out: MeshArrays): { vertices: number; triangles: number } {
+    options('out', out, ['positions', 'normals', 'indices', 'uvs', 'colors']);
     const arrays = this.#handle.use((raw) => raw.arrays());
     try {
-      return copyArrays(arrays, out);
+      return call(() => copyArrays(arrays, out));
     } finally {
       arrays.free();
     }

@@ -87,7 +87,7 @@ function translate(error: unknown): unknown {
 
 // A trap, or a stack that ran out: either leaves the instance's memory in the middle of something.
 function isFatal(error: Error): boolean {
-  return error instanceof WebAssembly.RuntimeError || error instanceof RangeError;
+  return error instanceof WebAssembly.RuntimeError || /call stack|recursion/i.test(error.message);
 }
 
 function crashed(what: string, cause: unknown): VesicleCrash {

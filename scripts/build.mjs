@@ -10,6 +10,9 @@ const COMPILED = 'target/wasm32-unknown-unknown/release/vesicle.wasm';
 // Glue and optimised module are kept here between builds: both depend on the compiled module alone.
 const GLUE = 'target/glue';
 
+// What the README links to comes along.
+const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md', 'CHANGELOG.md', 'docs/extract.png'];
+
 async function compile() {
   await must('cargo', [
     ...['rustc', '--locked', '--release', '--lib', '--crate-type', 'cdylib'],
@@ -51,9 +54,7 @@ async function assemble() {
   await mkdir(at('pkg'));
   for (const file of ['vesicle.js', 'vesicle.d.ts', 'vesicle_bg.wasm']) await copyFile(at(GLUE, file), at('pkg', file));
   await must(tool('tsc'), ['-p', at('js')]);
-  for (const file of ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md']) {
-    if (existsSync(at(file))) await cp(at(file), at('pkg', file));
-  }
+  for (const file of PAPERS) await cp(at(file), at('pkg', file));
   await writeFile(at('pkg/package.json'), `${JSON.stringify(await manifest(), null, 2)}\n`);
 }
 

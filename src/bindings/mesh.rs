@@ -147,14 +147,14 @@ impl RawMesh {
     /// The nearest triangle a ray meets, or nothing.
     pub fn pick(&self, origin: &[f64], direction: &[f64]) -> Result<JsValue, JsValue> {
         let tree = TriangleTree::new(&self.triangles()).map_err(Failure::from)?;
-        let hit = tree.ray_hit(point(origin)?.as_vec3(), point(direction)?.as_vec3());
+        let hit = tree.ray_hit(point(origin)?.as_vec3(), direction_of(direction)?);
         Ok(to_js(&hit.map(Hit::from))?)
     }
 
     /// Pairs of points where a plane cuts.
     #[wasm_bindgen(js_name = crossSection)]
     pub fn cross_section(&self, origin: &[f64], normal: &[f64]) -> Result<Vec<f32>, JsValue> {
-        let (origin, normal) = (point(origin)?.as_vec3(), point(normal)?.as_vec3());
+        let (origin, normal) = (point(origin)?.as_vec3(), direction_of(normal)?);
         let segments = cross_section(&self.triangles(), origin, normal);
         Ok(packed(segments.as_flattened()))
     }
@@ -335,4 +335,12 @@ impl From<Measures> for Info {
             bounds: Bounds { min, max },
         }
     }
+}
+
+/// A direction of any length but 0, as one of length 1.
+fn direction_of(values: &[f64]) -> Result<crate::math::Vec3, Failure> {
+    let given = point(values)?;
+    let largest = given.abs().max_element();
+    // Scaled first: squares of very long and very short ones leave the range of numbers.
+    Ok((given / largest).normalize_or_zero().as_vec3())
 }

@@ -6,4 +6,4 @@ pub mod symmetric;
 pub mod triangle;
 
 pub use bounds::{Bounds, BoxTree};
-pub use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+pub use glam::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3};

@@ -82,13 +82,6 @@ impl Mesh {
         self.edges().map(square).fold(0.0, |longest, d| if d > longest { d } else { longest }).sqrt()
     }
 
-    /// The lowest and the highest corner of the box around all vertices; none for the empty mesh.
-    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        let mut points = self.vertices().map(|v| self.position(v));
-        let first = points.next()?;
-        Some(points.fold((first, first), |(low, high), p| (low.min(p), high.max(p))))
-    }
-
     /// The mesh as compact arrays with area-weighted unit normals, vertices in the order of their slots.
     pub fn to_triangles(&self) -> TriangleMesh {
         let mut names = vec![u32::MAX; self.slots()];

@@ -57,7 +57,9 @@ pub struct Mesh {
     free: Vec<VertexId>,
     half_edges: usize,
     euler: i64,
+    #[serde(skip)]
     topology_version: u32,
+    #[serde(skip)]
     geometry_version: u32,
 }
 
@@ -102,6 +104,12 @@ impl Mesh {
     #[inline]
     pub fn geometry_version(&self) -> u32 {
         self.geometry_version
+    }
+
+    /// Takes versions above those of a mesh that this one replaces, so that nobody takes it for the old one.
+    pub fn count_on_from(&mut self, replaced: &Self) {
+        self.topology_version = replaced.topology_version.wrapping_add(1);
+        self.geometry_version = replaced.geometry_version.wrapping_add(1);
     }
 
     /// Whether `v` names a vertex now.

@@ -72,12 +72,12 @@ impl Resolver {
         self.most_vertices
     }
 
-    /// That number, where the last call left an edge too long because of it.
-    pub fn overflow(&self) -> Option<usize> {
-        self.full.then_some(self.most_vertices)
+    /// That number, where the last call left an edge too long because of it; told once.
+    pub fn take_overflow(&mut self) -> Option<usize> {
+        std::mem::take(&mut self.full).then_some(self.most_vertices)
     }
 
-    /// Whether a vertex may be added; if not, [`Self::overflow`] will tell.
+    /// Whether a vertex may be added; if not, [`Self::take_overflow`] will tell.
     pub(super) fn has_room(&mut self, mesh: &Mesh) -> bool {
         self.full |= mesh.vertex_count() >= self.most_vertices;
         !self.full

@@ -215,6 +215,26 @@ impl Volume {
         Ok(Grid { dims: self.dims(), values: self.intensities(frame)? })
     }
 
+    /// One frame as a grid of intensities on a scale where 0 and 1 are the ends of [`Self::range`].
+    ///
+    /// Scaled before it is rounded to `f32`, so that small differences of large numbers stay.
+    ///
+    /// # Errors
+    /// `frame` out of range; [`VolumeError::TooLarge`].
+    pub fn normalised_grid(&self, frame: usize) -> Result<Grid, VolumeError> {
+        let start = self.frame_start(frame)?;
+        let end = start + self.frame_len();
+        let [low, high] = self.range();
+        let factor = if high > low { 1.0 / (high - low) } else { 1.0 };
+        let (slope, intercept) = (self.slope * factor, (self.intercept - low) * factor);
+        let values = each!(self.voxels.as_ref(), values => converted(&values[start..end], |v| {
+            let value = v * slope + intercept;
+            // Voxels that are not a number count as the lowest.
+            if value > 0.0 { if value < 1.0 { value } else { 1.0 } } else { 0.0 }
+        }))?;
+        Ok(Grid { dims: self.dims(), values })
+    }
+
     /// Trilinear intensity at a world point; outside the volume the border is replicated.
     ///
     /// # Errors
@@ -265,11 +285,17 @@ impl Volume {
     }
 
     fn convert<T: Copy + Into<f64>>(&self, stored: &[T]) -> Result<Vec<f32>, VolumeError> {
-        let mut out = reserve(stored.len())?;
-        let (slope, intercept) = (self.slope, self.intercept);
-        out.extend(stored.iter().map(|&v| self.finite(v.into() * slope + intercept) as f32));
-        Ok(out)
+        converted(stored, |v| self.finite(v * self.slope + self.intercept))
     }
+}
+
+fn converted<T: Copy + Into<f64>>(
+    stored: &[T],
+    intensity: impl Fn(f64) -> f64,
+) -> Result<Vec<f32>, VolumeError> {
+    let mut out = reserve(stored.len())?;
+    out.extend(stored.iter().map(|&v| intensity(v.into()) as f32));
+    Ok(out)
 }
 
 fn check_dims(dims: [usize; 4], len: usize) -> Result<(), VolumeError> {

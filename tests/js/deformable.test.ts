@@ -320,3 +320,30 @@ test('the volume may go, the model stays; a freed model is gone', () => {
   }
   expect(failure(() => model({ volume: own })).code).toBe('freed');
 });
+
+test('parameters may be getters that ask the model', () => {
+  const fitted = model();
+  fitted.setParams({
+    get iso() {
+      return (fitted.params.iso ?? 0) + 1;
+    },
+  });
+  expect(fitted.params.iso).toBe(101);
+});
+
+test('names that every object has are no parameters, and an array holds none', () => {
+  const fitted = model();
+  expect(failure(() => fitted.setParams({ toString: 1 } as unknown as DeformableParams)).message).toContain('toString');
+  expect(failure(() => fitted.setParams([] as unknown as DeformableParams)).code).toBe('invalid-argument');
+  expect(failure(() => model({ start: { bubbles: 1, seeds: 1 } as never })).message).toContain('seeds');
+});
+
+test('a restored mesh is never mistaken for the one before', () => {
+  const fitted = model();
+  const state = fitted.save();
+  fitted.step(5);
+  const { topologyVersion, geometryVersion } = fitted.mesh;
+  fitted.restore(state);
+  expect(fitted.mesh.topologyVersion).toBeGreaterThan(topologyVersion);
+  expect(fitted.mesh.geometryVersion).toBeGreaterThan(geometryVersion);
+});

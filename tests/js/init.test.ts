@@ -11,7 +11,7 @@ function node(script: string): string {
   return execFileSync(process.execPath, ['--input-type=module', '--eval', script], {
     cwd: root,
     encoding: 'utf8',
-    timeout: 30_000,
+    timeout: 60_000,
   }).trim();
 }
 
@@ -86,4 +86,15 @@ const CRASH = `
 test('after a crash everything says so, until init starts a fresh instance', () => {
   const crash = 'VesicleCrash undefined';
   expect(JSON.parse(node(CRASH))).toEqual([crash, crash, crash, 'VesicleError freed', null, 0]);
+});
+
+test('the example of the README runs', () => {
+  const [, example = ''] = /```js\n([\s\S]*?)```/.exec(readFileSync(`${root}/README.md`, 'utf8')) ?? [];
+  const script = `
+    import { readFileSync } from 'node:fs';
+    globalThis.fetch = async () => new Response(readFileSync('www/public/data/visible-human-head.nii.gz'));
+    ${example.replace("from 'vesicle'", "from './pkg/index.js'")}
+    console.log(report.done, positions.length / 3 === report.vertices, indices.length / 3 === report.triangles);
+    console.log(new TextDecoder().decode(glb.subarray(0, 4)));`;
+  expect(node(script).split('\n').slice(-2)).toEqual(['true true true', 'glTF']);
 });

@@ -222,3 +222,16 @@ test('use after free', () => {
     expect(failure(use).code).toBe('freed');
   }
 });
+
+test('directions of any length', () => {
+  const sphere = Mesh.icosphere([0, 0, 0], 1, 0.3);
+  for (const length of [1e-60, 1, 1e60, 1e300]) {
+    expect(sphere.pick([0, 0, 3], [0, 0, -length])?.distance).toBeCloseTo(2, 1);
+    expect(sphere.crossSection([0, 0, 0.05], [0, 0, length]).length).toBeGreaterThan(50);
+  }
+});
+
+test('arrays are copied into an object of arrays only', () => {
+  const sphere = Mesh.icosphere([0, 0, 0], 1, 0.5);
+  expect(failure(() => sphere.copyTo(null as never)).code).toBe('invalid-argument');
+});

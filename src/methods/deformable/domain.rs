@@ -9,11 +9,11 @@ const ROOM: f32 = 1.5;
 const THROUGH_CORNERS: f32 = 1.316_074;
 
 /// The longest axis of the enclosing start shape in its shortest. Around flatter images it leaves more room: the flatter
-/// it is, the more its triangles are squashed before they can be resolved, and from 15 on some of them cross.
+/// it is, the more its triangles are squashed before they can be resolved; at 33 some of them crossed.
 const MOST_ELONGATED: f32 = 6.0;
 
-/// The most vertices of any surface: about 200 bytes each, and wasm32 has 4 GiB.
-const MOST_VERTICES: f64 = 1e7;
+/// The most vertices of any surface: about 200 bytes each, several copies on the way, and wasm32 has 4 GiB.
+const MOST_VERTICES: f64 = 4e6;
 
 /// A box around the image, in the space of the model.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +32,12 @@ impl Domain {
         let least = (4.0 * delta).max(around.max_element() / MOST_ELONGATED);
         let axes = around.max(Vec3::splat(least));
         Self { centre, axes, bounds: Bounds { min: centre - axes * ROOM, max: centre + axes * ROOM } }
+    }
+
+    /// About the number of vertices of the enclosing start shape: one for 2 δ² of a box of its axes.
+    pub(super) fn enclosing_vertices(&self, delta: f32) -> usize {
+        let [a, b, c] = (self.axes / delta).as_dvec3().to_array();
+        (4.0 * (a * b + b * c + c * a)) as usize
     }
 
     /// The nearest point of the domain.

@@ -2,7 +2,7 @@
 
 use super::image::LevelImage;
 use super::params::{DeformableParams, RestLength};
-use crate::math::Vec3;
+use crate::math::{Mat3, Vec3};
 use crate::mesh::Ring;
 
 /// Speed along the normal, in δ per unit of time, from which on rigidity evens out the sampling with its full force.
@@ -13,12 +13,13 @@ use crate::mesh::Ring;
 /// of slow fronts suffers; from 0.3 on the slide does not die out everywhere.
 const SLIDE_SPEED: f32 = 0.1;
 
-/// A point that pulls the surface within `radius`, in the space of the model.
+/// A point that pulls the surface, in the space of the model.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pull {
     pub(super) point: Vec3,
     pub(super) strength: f32,
-    pub(super) radius: f32,
+    /// From ways in the model to ways in the world, in radii of the attractor.
+    pub(super) in_radii: Mat3,
 }
 
 /// The parameters of the forces in the units of the model: lengths in voxels, intensities in 0..1.
@@ -181,6 +182,6 @@ fn springs(ring: &Ring, positions: &[Vec3], x: Vec3, rest: f32) -> Vec3 {
 /// A spring to the point that fades out smoothly at its radius.
 fn attraction(pull: &Pull, x: Vec3) -> Vec3 {
     let way = pull.point - x;
-    let far = way.length_squared() / (pull.radius * pull.radius);
+    let far = (pull.in_radii * way).length_squared();
     if far >= 1.0 { Vec3::ZERO } else { way * (pull.strength * (1.0 - far) * (1.0 - far)) }
 }

@@ -10,6 +10,9 @@ use crate::volume::{Grid, VectorGrid, Volume};
 /// Reduction factor ρ of the pyramid: the one that belongs to √3 refinement (15).
 pub(super) const REDUCTION: f64 = 1.732_050_807_568_877_2;
 
+/// Normalised intensities that are told apart; no force overflows with them.
+const FURTHEST: f64 = 100.0;
+
 /// One level of the pyramid.
 #[derive(Clone, Debug)]
 pub(super) struct LevelImage {
@@ -79,8 +82,7 @@ impl Pyramid {
         }
         let [low, high] = volume.range();
         let range = if high > low { high - low } else { 1.0 };
-        let mut grid = volume.grid(frame)?;
-        normalise(&mut grid, low, range);
+        let mut grid = volume.normalised_grid(frame)?;
         let mut spacing = volume.spacing();
         let mut unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
         let mut levels = Vec::with_capacity(above + 1);
@@ -94,17 +96,13 @@ impl Pyramid {
         Ok(Self { levels, low, range })
     }
 
-    /// An intensity of the volume on the scale 0..1.
+    /// An intensity of the volume on the scale 0..1, and a little beyond: what is further out pushes with all force.
     pub(super) fn normalised(&self, intensity: f64) -> f32 {
-        ((intensity - self.low) / self.range) as f32
+        ((intensity - self.low) / self.range).clamp(-FURTHEST, FURTHEST) as f32
     }
-}
 
-/// Scales intensities to 0..1; voxels that are not a number count as the lowest.
-fn normalise(grid: &mut Grid, low: f64, range: f64) {
-    let (low, factor) = (low as f32, (1.0 / range) as f32);
-    for value in &mut grid.values {
-        let scaled = (*value - low) * factor;
-        *value = if scaled > 0.0 { scaled } else { 0.0 };
+    /// Voxels of the finest level.
+    pub(super) fn dims(&self) -> [usize; 3] {
+        self.levels[0].grid.dims
     }
 }

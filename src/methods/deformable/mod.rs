@@ -75,7 +75,8 @@ pub struct DeformableOptions {
     pub start: Start,
     /// Pyramid levels above the volume itself; 0 is direct.
     pub levels: usize,
-    /// Mean edge at the finest level in world units; else from the voxel size.
+    /// Mean edge at the finest level in world units, in the mean of all directions where voxels are not cubes; else from
+    /// the voxel size.
     pub edge: Option<f64>,
     /// Parameters; else [`DeformableParams::for_volume`].
     pub params: Option<DeformableParams>,
@@ -107,6 +108,10 @@ const DEFAULT_DELTA: f64 = 0.9;
 
 /// δ in voxels that is accepted: below, a mesh of the whole image no longer fits memory; above, it misses it.
 const DELTA_RANGE: RangeInclusive<f64> = 0.2..=20.0;
+
+/// The strongest attractor, and how far away in voxels one may be: beyond, forces overflow.
+const STRONGEST: f64 = 1e3;
+const FURTHEST: f64 = 1e6;
 
 /// A vertex is looked at again when it has gone this far since the last time, in δ…
 const CHECK_TRAVEL: f32 = 0.1;
@@ -170,7 +175,7 @@ impl DeformableModel {
             dims: volume.dims(),
             domain,
             from_world: volume.inverse_affine(),
-            voxel,
+            spacing: volume.spacing(),
             sampling: Sampling::new(delta),
         };
         let mut mesh = options.start.make(&frame, |value| pyramid.normalised(value))?;
@@ -224,7 +229,7 @@ impl DeformableModel {
             self.iteration += 1;
             changes += self.come_to_rest(&mut times)?;
             self.count_components(changes);
-            if let Some(most) = self.resolver.overflow() {
+            if let Some(most) = self.resolver.take_overflow() {
                 return Err(MethodError::TooManyVertices { most });
             }
         }
@@ -352,12 +357,17 @@ impl DeformableModel {
     /// Takes the attachment points, from the next step on.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] where a number is not finite or a radius is not positive.
+    /// [`MethodError::InvalidArgument`] where a number is not finite or too large, or a radius is not positive.
     pub fn set_attractors(&mut self, attractors: Vec<Attractor>) -> Result<(), MethodError> {
         for (i, a) in attractors.iter().enumerate() {
-            if !(a.point.is_finite() && a.strength.is_finite() && a.radius.is_finite() && a.radius > 0.0) {
-                let problem =
-                    format!("attractor {i} needs a finite point and strength and a positive radius");
+            let local = self.to_world.inverse().transform_point3(a.point) / FURTHEST;
+            let radius = a.radius / (FURTHEST * self.voxel);
+            let fits = local.abs().max_element() <= 1.0 && a.strength.abs() <= STRONGEST;
+            if !(fits && local.is_finite() && radius > 0.0 && radius <= 1.0) {
+                let problem = format!(
+                    "attractor {i} needs a strength of {STRONGEST} at most, a positive radius, and both radius and \
+                     point within {FURTHEST} voxels"
+                );
                 return Err(MethodError::invalid("attractors", problem));
             }
         }
@@ -371,7 +381,7 @@ impl DeformableModel {
         let local = |a: &Attractor| Pull {
             point: from_world.transform_point3(a.point).as_vec3(),
             strength: a.strength as f32,
-            radius: (a.radius / self.voxel) as f32,
+            in_radii: (self.to_world.matrix3 * (1.0 / a.radius)).as_mat3(),
         };
         self.attractors.iter().map(local).collect()
     }
@@ -388,7 +398,7 @@ impl DeformableModel {
         self.level
     }
 
-    /// δ now, in world units.
+    /// δ now, in world units; where voxels are not cubes, in the mean of all directions.
     pub fn delta(&self) -> f64 {
         f64::from(self.model_delta()) * self.voxel
     }

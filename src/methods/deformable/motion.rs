@@ -13,7 +13,7 @@ use crate::mesh::Mesh;
 pub(super) struct Movement {
     /// Mean of ½ m (v·n)² / δ², the criterion of section 5.1.
     pub(super) energy: f64,
-    /// Largest move along a normal, in δ, of a vertex that no edit displaced lately. Edits of a surface at rest throw
+    /// Largest speed along a normal, in δ per unit of time, of a vertex that no edit displaced lately. Edits of a surface at rest throw
     /// single vertices off it; they come back in a few iterations and are no sign that the surface still travels.
     pub(super) fastest: f32,
 }
@@ -110,7 +110,7 @@ fn apply(mesh: &mut Mesh, keys: Keys, forces: &Forces, world: &World, moves: Opt
             velocities[i] = way * (1.0 / step);
         }
         positions[i] += way;
-        let along = (way.dot(forces.normal[i]) / delta).abs();
+        let along = (way.dot(forces.normal[i]) / (step * delta)).abs();
         movement.energy += f64::from(along) * f64::from(along);
         if along > movement.fastest && calm[i] >= CALM {
             movement.fastest = along;

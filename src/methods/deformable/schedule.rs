@@ -1,15 +1,18 @@
 //! When a level is finished, and the way down to the next (section 5.1, figures 12 and 13).
 
-use super::{DeformableModel, Topology};
+use super::{DeformableModel, DeformableParams, Topology};
 use crate::mesh::VertexId;
 use crate::methods::{MethodError, Times};
 use crate::remesh::{Changes, Sampling};
 use serde::{Deserialize, Serialize};
 
 /// Iterations running that must be quiet: one alone may be a turning point of a swing.
-const QUIET_ITERATIONS: u32 = 3;
+const QUIET_ITERATIONS: f64 = 3.0;
 
-/// The fastest vertex of a surface at rest, in δ an iteration. The mean energy hides a few vertices that still travel,
+/// They need never be more, however small time step and damping are.
+const MOST_QUIET_ITERATIONS: f64 = 500.0;
+
+/// The fastest vertex of a surface at rest, in δ per unit of time. The mean energy hides a few vertices that still travel,
 /// such as a front in a hole; with no bound the model stops before it has passed.
 const REST_SPEED: f32 = 0.03;
 
@@ -36,7 +39,7 @@ impl DeformableModel {
     pub(super) fn come_to_rest(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let quiet = self.movement.energy < self.params.energy_tolerance && self.movement.fastest < REST_SPEED;
         self.rest.quiet = if quiet { self.rest.quiet + 1 } else { 0 };
-        if self.rest.quiet < QUIET_ITERATIONS {
+        if self.rest.quiet < self.quiet_iterations() {
             return Ok(Changes::default());
         }
         let mut changes = self.check_everything(times);
@@ -47,6 +50,12 @@ impl DeformableModel {
             changes += self.check_everything(times);
         }
         Ok(changes)
+    }
+
+    /// Iterations a surface takes to follow a force, m/γ: one that has just begun to move is slow too, and not at rest.
+    fn quiet_iterations(&self) -> u32 {
+        let DeformableParams { mass, damping, time_step, .. } = self.params;
+        libm::ceil(mass / (damping * time_step)).clamp(QUIET_ITERATIONS, MOST_QUIET_ITERATIONS) as u32
     }
 
     /// Looks at every vertex whether it has moved or not, and removes specks.

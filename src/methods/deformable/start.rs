@@ -3,7 +3,7 @@
 use super::domain::Domain;
 use super::image::LevelImage;
 use crate::math::{DAffine3, DVec3, Vec3};
-use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings};
+use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure};
 use crate::methods::MethodError;
 use crate::remesh::{Resolver, Sampling};
 use crate::volume::marching_cubes;
@@ -35,8 +35,8 @@ pub(super) struct Frame<'a> {
     pub(super) dims: [usize; 3],
     pub(super) domain: Domain,
     pub(super) from_world: DAffine3,
-    /// World length of a unit of the model.
-    pub(super) voxel: f64,
+    /// World lengths of the voxel edges.
+    pub(super) spacing: [f64; 3],
     pub(super) sampling: Sampling,
 }
 
@@ -52,7 +52,7 @@ const SPHERE_EDGE: f32 = 2.2;
 
 /// The most bubbles along an axis and the most seeds: beyond them memory, not the method, is the limit.
 const MOST_BUBBLES: u32 = 100;
-const MOST_SEEDS: usize = 100_000;
+const MOST_SEEDS: usize = 10_000;
 
 /// Calls until the edges of a start mesh are within bounds; each refines a coarse mesh several times.
 const MOST_CALLS: usize = 20;
@@ -85,7 +85,7 @@ fn resolve_all(mesh: &mut Mesh, frame: &Frame, sampling: Sampling) -> Result<(),
         }
         resolver.resolve(mesh, sampling, &[]);
     }
-    if let Some(most) = resolver.overflow() {
+    if let Some(most) = resolver.take_overflow() {
         return Err(MethodError::TooManyVertices { most });
     }
     resolver.sweep(mesh, sampling);
@@ -98,6 +98,10 @@ fn resolve_all(mesh: &mut Mesh, frame: &Frame, sampling: Sampling) -> Result<(),
 /// a flat box would have triangles that no edit can mend.
 fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
     let delta = frame.sampling.shortest();
+    let most = frame.domain.most_vertices(delta);
+    if frame.domain.enclosing_vertices(delta) > most {
+        return Err(MethodError::TooManyVertices { most });
+    }
     let Domain { centre, axes, .. } = frame.domain;
     let onto_box = |p: Vec3| {
         let unit = (p - centre) / axes;
@@ -149,35 +153,62 @@ fn bubbles(frame: &Frame, n: u32) -> Result<Mesh, MethodError> {
 }
 
 fn seeds(frame: &Frame, points: &[DVec3], radius: f64) -> Result<Mesh, MethodError> {
-    let smallest = SMALLEST_RADIUS * frame.sampling.shortest();
-    let local = (radius / frame.voxel) as f32;
     if points.is_empty() || points.len() > MOST_SEEDS {
         let problem = format!("{} points given, 1 to {MOST_SEEDS} accepted", points.len());
         return Err(MethodError::invalid("start.seeds", problem));
     }
-    if !(local >= smallest && local.is_finite()) {
-        let least = f64::from(smallest) * frame.voxel;
-        let problem =
-            format!("{radius} given, at least {least:.3} accepted (or fewer pyramid levels, shorter edges)");
-        return Err(MethodError::invalid("start.radius", problem));
+    let ball = world_ball(frame, radius)?;
+    for (i, point) in points.iter().enumerate() {
+        let inside = ball.positions.iter().all(|&p| frame.domain.bounds.contains(moved(frame, p, *point)));
+        if !inside {
+            let problem = format!("the sphere at point {i}, {point}, is not in or near the image");
+            return Err(MethodError::invalid("start.seeds", problem));
+        }
     }
-    let centres: Vec<Vec3> = points.iter().map(|p| frame.from_world.transform_point3(*p).as_vec3()).collect();
-    let room = frame.domain.bounds;
-    let fits = |&p: &Vec3| room.contains(p - Vec3::splat(local)) && room.contains(p + Vec3::splat(local));
-    if let Some(bad) = centres.iter().position(|p| !fits(p)) {
-        let problem = format!("the sphere at point {bad}, {}, is not in or near the image", points[bad]);
-        return Err(MethodError::invalid("start.seeds", problem));
-    }
-    let apart = 2.0 * local + frame.sampling.contact();
+    let apart = 2.0 * radius + f64::from(frame.sampling.contact()) * largest(frame.spacing);
     let mut mesh = Mesh::default();
-    for (i, &centre) in centres.iter().enumerate() {
-        if let Some(j) = centres[..i].iter().position(|other| other.distance(centre) < apart) {
+    for (i, point) in points.iter().enumerate() {
+        if let Some(j) = points[..i].iter().position(|other| other.distance(*point) < apart) {
             let problem = format!("points {j} and {i} are too near: spheres of radius {radius} would touch");
             return Err(MethodError::invalid("start.seeds", problem));
         }
-        mesh.append(&sphere(frame, centre, local)?)?;
+        let mut there = ball.clone();
+        there.positions.iter_mut().for_each(|p| *p = moved(frame, *p, *point));
+        mesh.append(&Mesh::from_triangles(&there)?)?;
     }
     Ok(mesh)
+}
+
+/// A sphere around the origin of the world, in the space of the model without its translation: an ellipsoid where
+/// voxels are not cubes.
+fn world_ball(frame: &Frame, radius: f64) -> Result<TriangleMesh, MethodError> {
+    let least = f64::from(SMALLEST_RADIUS * frame.sampling.shortest()) * largest(frame.spacing);
+    let most =
+        f64::from((frame.domain.bounds.max - frame.domain.bounds.min).max_element()) * largest(frame.spacing);
+    if !(radius >= least && radius <= most) {
+        let problem = format!(
+            "{radius} given, {least:.3} to {most:.3} accepted (smaller ones with fewer pyramid levels or shorter edges)"
+        );
+        return Err(MethodError::invalid("start.radius", problem));
+    }
+    let shortest = frame.spacing.into_iter().fold(f64::INFINITY, f64::min);
+    let edge = f64::from(SPHERE_EDGE * frame.sampling.shortest()) * shortest / radius;
+    let mut ball = Mesh::icosphere(Vec3::ZERO, 1.0, edge as f32)?.to_triangles();
+    let turned = |p: Vec3| frame.from_world.transform_vector3(p.as_dvec3() * radius).as_vec3();
+    ball.positions.iter_mut().for_each(|p| *p = turned(*p));
+    if frame.from_world.matrix3.determinant() < 0.0 {
+        ball.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
+    Ok(ball)
+}
+
+/// A point of a ball around the origin, moved with it to a point of the world.
+fn moved(frame: &Frame, p: Vec3, to: DVec3) -> Vec3 {
+    p + frame.from_world.transform_point3(to).as_vec3()
+}
+
+fn largest(spacing: [f64; 3]) -> f64 {
+    spacing.into_iter().fold(0.0, f64::max)
 }
 
 fn iso_surface(frame: &Frame, iso: f32) -> Result<Mesh, MethodError> {
@@ -200,6 +231,10 @@ fn given(frame: &Frame, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
         return Err(MethodError::invalid("start.mesh", problem));
     }
     let surface = Mesh::from_triangles(&local)?;
+    if measure(&surface.to_triangles()).volume <= 0.0 {
+        let problem = "the triangles face inwards; counter-clockwise seen from outside is needed";
+        return Err(MethodError::invalid("start.mesh", problem));
+    }
     let pairs = count_crossings(&surface.to_triangles());
     if pairs > 0 {
         return Err(MeshError::SelfIntersecting { pairs }.into());

@@ -1,16 +1,20 @@
 //! Saving a run and going on with it, bit for bit.
 
+use super::domain::Domain;
 use super::motion::Movement;
 use super::schedule::Rest;
-use super::{Attractor, DeformableModel, DeformableParams};
+use super::{Attractor, DeformableModel, DeformableParams, delta_at};
 use crate::mesh::{Mesh, VertexId};
 use crate::methods::MethodError;
-use crate::remesh::Waiting;
+use crate::remesh::{Resolver, Waiting};
 use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
 
-/// Begins every saved state; the last byte counts versions of the layout.
+/// Begins every saved state; the last byte counts versions of the layout. A checksum of the rest follows.
 const MAGIC: [u8; 8] = *b"VSCLDEF\x01";
+
+/// More neighbours than any edit leaves a vertex, and few enough to check.
+const MOST_NEIGHBOURS: usize = 4096;
 
 /// Everything a run has beside its volume.
 #[derive(Serialize, Deserialize)]
@@ -44,10 +48,9 @@ impl DeformableModel {
             energy: self.movement.energy,
             fastest: self.movement.fastest,
         };
-        let mut bytes = MAGIC.to_vec();
         // Serialising plain data into memory has no way to fail.
-        bytes.extend(postcard::to_allocvec(&state).unwrap_or_default());
-        bytes
+        let body = postcard::to_allocvec(&state).unwrap_or_default();
+        [&MAGIC[..], &checksum(&body).to_le_bytes(), &body].concat()
     }
 
     /// Goes on from bytes that [`Self::save`] gave, for a model of the same volume, frame and levels.
@@ -56,9 +59,13 @@ impl DeformableModel {
     /// [`MethodError::BadState`] where the bytes are none of those; the model is then as it was.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
         let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
-        let Some(body) = bytes.strip_prefix(&MAGIC) else {
+        let after = bytes.strip_prefix(&MAGIC).and_then(|rest| rest.split_first_chunk::<8>());
+        let Some((sum, body)) = after else {
             return bad("header", "these bytes are no saved state of this version");
         };
+        if u64::from_le_bytes(*sum) != checksum(body) {
+            return bad("contents", "the bytes are cut off or damaged");
+        }
         let Ok((state, rest)) = postcard::take_from_bytes::<State>(body) else {
             return bad("contents", "the bytes are cut off or damaged");
         };
@@ -75,13 +82,20 @@ impl DeformableModel {
     fn check_state(&self, state: &State) -> Result<(), MethodError> {
         let bad = |field, problem: String| Err(MethodError::BadState { field, problem });
         state.params.validate()?;
+        if state.mesh.rings().iter().any(|ring| ring.valence() > MOST_NEIGHBOURS) {
+            return bad("mesh", format!("a vertex has more than {MOST_NEIGHBOURS} neighbours"));
+        }
         if let Err(flaw) = state.mesh.check() {
             return bad("mesh", flaw.to_string());
         }
         if state.mesh.attribute_counts() != self.mesh.attribute_counts() {
             return bad("mesh", "the vertices do not carry the data of this method".into());
         }
-        let lost = |v: &VertexId| !self.domain.bounds.contains(state.mesh.position(*v));
+        if state.level >= self.pyramid.levels.len() || !super::DELTA_RANGE.contains(&state.finest_delta) {
+            return bad("level", "level or edge is out of range".into());
+        }
+        let domain = self.domain_for(state.finest_delta);
+        let lost = |v: &VertexId| !domain.bounds.contains(state.mesh.position(*v));
         if let Some(v) = state.mesh.vertices().find(lost) {
             return bad("mesh", format!("{v:?} is not in or near the image"));
         }
@@ -89,10 +103,12 @@ impl DeformableModel {
         if let Some(v) = named.into_iter().find(|v| v.index() >= state.mesh.slots()) {
             return bad("queue", format!("{v:?} does not exist"));
         }
-        if state.level >= self.pyramid.levels.len() || !super::DELTA_RANGE.contains(&state.finest_delta) {
-            return bad("level", "level or edge is out of range".into());
-        }
         Ok(())
+    }
+
+    fn domain_for(&self, finest_delta: f64) -> Domain {
+        let coarsest = delta_at(finest_delta, self.pyramid.levels.len() - 1);
+        Domain::new(self.pyramid.dims(), coarsest)
     }
 
     fn take_state(&mut self, state: State) -> Result<(), MethodError> {
@@ -101,7 +117,10 @@ impl DeformableModel {
         next.params = state.params;
         next.finest_delta = state.finest_delta;
         next.level = state.level;
+        next.domain = self.domain_for(state.finest_delta);
         next.mesh = state.mesh;
+        next.mesh.count_on_from(&self.mesh);
+        next.resolver = Resolver::with_room_for(next.domain.most_vertices(delta_at(state.finest_delta, 0)));
         next.resolver.set_waiting(state.waiting);
         next.iteration = state.iteration;
         next.rest = state.rest;
@@ -115,8 +134,8 @@ impl DeformableModel {
 
 /// A number that tells volumes, frames and pyramids apart (FNV-1a over shape, place and intensities).
 pub(super) fn fingerprint(volume: &Volume, frame: usize, levels: usize) -> u64 {
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    let mut mix = |word: u64| hash = (hash ^ word).wrapping_mul(0x100_0000_01b3);
+    let mut hash = HASH_START;
+    let mut mix = |word: u64| hash = mixed(hash, word);
     volume.dims().into_iter().chain([frame, levels]).for_each(|n| mix(n as u64));
     volume.affine().to_cols_array().into_iter().for_each(|x| mix(x.to_bits()));
     volume.range().into_iter().for_each(|x| mix(x.to_bits()));
@@ -124,4 +143,14 @@ pub(super) fn fingerprint(volume: &Volume, frame: usize, levels: usize) -> u64 {
         values.into_iter().for_each(|x| mix(u64::from(x.to_bits())));
     }
     hash
+}
+
+fn checksum(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(HASH_START, |hash, &byte| mixed(hash, u64::from(byte)))
+}
+
+const HASH_START: u64 = 0xcbf2_9ce4_8422_2325;
+
+fn mixed(hash: u64, word: u64) -> u64 {
+    (hash ^ word).wrapping_mul(0x100_0000_01b3)
 }
