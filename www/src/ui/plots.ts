@@ -187,11 +187,15 @@ function drawMarks(plot: uPlot, history: History): void {
   ctx.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
   ctx.textAlign = 'left';
   ctx.textBaseline = 'alphabetic';
-  for (const { iteration, phase } of history.phases) {
+  // Backwards: where names would lie on each other the later one is told.
+  let free = Number.POSITIVE_INFINITY;
+  for (const { iteration, phase } of [...history.phases].reverse()) {
     const x = Math.round(plot.valToPos(iteration, 'x', true));
     upright(ctx, x, bbox.top, bbox.top + bbox.height, token('--line-strong'));
     ctx.fillStyle = token('--muted');
+    if (x + ctx.measureText(phase).width > free) continue;
     ctx.fillText(phase, x, bbox.top - 4 * devicePixelRatio);
+    free = x - 4 * devicePixelRatio;
   }
   const foot = bbox.top + bbox.height;
   for (const { iteration, axial, annular } of history.changes) {
