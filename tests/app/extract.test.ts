@@ -162,3 +162,51 @@ describe('files', () => {
     expect(await measures(app.page)).toMatchObject({ components: 1, genus: 1, closed: true });
   });
 });
+
+describe('the mean edge', () => {
+  const edge = () => app.page.getByLabel('Mean edge');
+  const complaint = () => app.page.locator('.start .field-error:not(:empty)');
+
+  test('shorter edges make more vertices, also after a reset', async () => {
+    const before = await measures(app.page);
+    const states = await recordStates(app.page);
+    await edge().fill('1');
+    await edge().press('Enter');
+    await expect.poll(states).toEqual(['loading', 'paused', 'running', 'done']);
+    const shorter = await measures(app.page);
+    expect(shorter).toMatchObject({ components: 1, genus: 1, closed: true });
+    expect(shorter.vertices).toBeGreaterThan(1.3 * before.vertices);
+    await app.page.click('text=Reset');
+    await reach(app.page, 'paused');
+    expect(await edge().inputValue()).toBe('1');
+    await app.page.click('text=Play');
+    await reach(app.page, 'done');
+    expect((await measures(app.page)).vertices).toBe(shorter.vertices);
+  });
+
+  test.each(['0.001', '-2', '1e9'])('%s is refused beside the field, and the former one comes back', async (value) => {
+    const before = await measures(app.page);
+    await edge().fill(value);
+    await edge().press('Enter');
+    await expect.poll(() => edge().inputValue()).toBe('1');
+    expect(await complaint().allTextContents()).toEqual([expect.stringMatching(/accepted|needed/)]);
+    await reach(app.page, 'done');
+    expect(await measures(app.page)).toEqual(before);
+  });
+
+  test('an example brings its own, and a file starts without one and without a place in another volume', async () => {
+    await app.page.selectOption('.data select', 'linked-rings');
+    await expect.poll(() => edge().inputValue()).toBe('');
+    expect(await complaint().count()).toBe(0);
+    await app.page.selectOption('.data select', 'head-bone');
+    await expect.poll(() => edge().inputValue()).toBe('2.2');
+    await reach(app.page, 'running');
+    await app.page.selectOption('.start select', 'sphere');
+    await reach(app.page, 'running');
+    await drop(app.page, [{ name: 'ball.nii', bytes: niftiOf(ball()) }]);
+    await expect.poll(() => edge().inputValue()).toBe('');
+    expect(await app.page.inputValue('.start select')).toBe('enclosing');
+    await reach(app.page, 'done');
+    expect(await measures(app.page)).toMatchObject({ components: 1, genus: 0, closed: true });
+  });
+});

@@ -13,6 +13,7 @@ test.each([
   [390, 844],
   [1024, 768],
   [1440, 900],
+  [390, 844],
 ])('nothing is wider than a page of %i by %i', async (width, height) => {
   await app.page.setViewportSize({ width, height });
   const overflow = await app.page.evaluate(() => document.documentElement.scrollWidth - innerWidth);

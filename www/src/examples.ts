@@ -19,7 +19,7 @@ export interface Example {
 }
 
 const HEAD_CREDIT =
-  'Head CT: Visible Human Project, U.S. National Library of Medicine, public domain; volume from ipyvolume (MIT) Walls thinner than a voxel, as before the frontal sinus, come out with gaps.';
+  'Head CT: Visible Human Project, U.S. National Library of Medicine, public domain; volume from ipyvolume (MIT). Walls thinner than a voxel, as before the frontal sinus, come out with gaps.';
 const BONE = { iso: 95, isoForce: -1, rigidity: 0.1 };
 
 /** The first is shown when the page opens. */
@@ -60,7 +60,8 @@ export const EXAMPLES: Example[] = [
     source: { file: 'tooth.nrrd' },
     unit: '',
     levels: 2,
-    params: { iso: 400, isoForce: -1, rigidity: 0.2 },
+    // Half way between what the tooth stands in and dentine.
+    params: { iso: 600, isoForce: -1, rigidity: 0.2 },
     credit: 'Tooth CT: Scientific Computing and Imaging Institute, University of Utah, Seg3D data (MIT).',
   },
   {

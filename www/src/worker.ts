@@ -56,12 +56,25 @@ function emptyBuffers(): SurfaceBuffers {
   return { positions: new Float32Array(0), normals: new Float32Array(0), indices: new Uint32Array(0) };
 }
 
+function isHeader({ name }: NamedBytes): boolean {
+  return /\.(nhdr|mhd)$/i.test(name);
+}
+
+/** A volume from one file; a header whose data is missing asks for it. */
+function parseFile(file: NamedBytes): Volume {
+  try {
+    return Volume.parse(file.bytes);
+  } catch (error) {
+    if (!(error instanceof VesicleError) || !isHeader(file)) throw error;
+    throw new Refusal(error.code, `${error.message}. Choose or drop a header together with the file of its voxels.`);
+  }
+}
+
 /** A volume from one file, or from a header and its data in either order. */
 function parseFiles(files: NamedBytes[]): Volume {
   const [first, second] = files;
   if (!first) throw new Refusal('bad-file', 'no file was given');
-  if (!second) return Volume.parse(first.bytes);
-  const isHeader = (file: NamedBytes) => /\.(nhdr|mhd)$/i.test(file.name);
+  if (!second) return parseFile(first);
   const [header, data] = isHeader(second) && !isHeader(first) ? [second, first] : [first, second];
   return Volume.parse(header.bytes, { data: data.bytes });
 }

@@ -92,9 +92,14 @@ export class DataPanel {
     );
   }
 
-  show(volume: VolumeView, example: Example | undefined): void {
+  /** Shows in the list which example is open, or that a file is. */
+  choose(example: Example | undefined): void {
     this.#own.hidden = example !== undefined;
     this.#examples.value = example?.id ?? '';
+  }
+
+  show(volume: VolumeView, example: Example | undefined): void {
+    this.choose(example);
     const spacing = volume.spacing.map(figure).join(' × ');
     const facts: [string, string][] = [
       ['File', volume.name],

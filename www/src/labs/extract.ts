@@ -26,7 +26,7 @@ import { MeasurePanel } from '../ui/measures';
 import { ParamControls } from '../ui/params';
 import { Plots } from '../ui/plots';
 import { listenForShortcuts, type Shortcut, shortcutDialog } from '../ui/shortcuts';
-import { StartControls } from '../ui/start';
+import { type StartChoice, StartControls } from '../ui/start';
 import { ErrorBanner, StatusLine } from '../ui/status';
 import { TimeTable } from '../ui/times';
 import { Transport } from '../ui/transport';
@@ -40,6 +40,8 @@ const SPHERE_PART = 0.1;
 
 const VANISHED =
   'It found nothing to hold it: try fewer pyramid levels (thin parts blur away on coarse ones), another iso value or start shape, or less rigidity.';
+
+const BROKEN = 'The engine has stopped; Reset starts it again.';
 
 /** What the present volume was made of, to open it again after a failure of the engine. */
 interface Source {
@@ -65,7 +67,7 @@ export class ExtractLab {
   readonly #drop = h('div', { class: 'drop', hidden: true }, 'Drop a volume to open it');
   readonly #stage = new Stage(this.#canvas, this.#slices, INITIAL_VIEW, (planes) => this.#setPlanes(planes));
   readonly #histogram = new Histogram((iso) => this.#setParam('iso', iso));
-  readonly #start = new StartControls(() => void this.#rebuild(true));
+  readonly #start = new StartControls(() => void this.#restart());
   readonly #paramsHolder = h('div');
   readonly #measures = new MeasurePanel();
   readonly #exports = new ExportButtons((format, type) => void this.#export(format, type));
@@ -75,22 +77,24 @@ export class ExtractLab {
   readonly #transport = new Transport({
     onToggle: () => this.#toggle(),
     onStep: (steps) => this.#step(steps),
-    onReset: () => void this.#rebuild(false),
+    onReset: () => void this.#reset(),
   });
   readonly #data: DataPanel;
   readonly #shortcuts: Shortcut[] = [
     { key: ' ', shown: 'Space', text: 'play or pause', act: () => this.#toggle() },
     { key: 's', shown: 's', text: 'one step', act: () => this.#step(1) },
     { key: 'd', shown: 'd', text: 'ten steps', act: () => this.#step(10) },
-    { key: 'r', shown: 'r', text: 'reset', act: () => void this.#rebuild(false) },
+    { key: 'r', shown: 'r', text: 'reset', act: () => void this.#reset() },
   ];
   #paramControls: ParamControls | undefined;
   /** The parameters in force; they outlive a reset. */
   #params: ParamValues = {};
   #volume: VolumeView | undefined;
   #source: Source | undefined;
+  /** Counts what was asked to be opened, so that a slow download does not replace what came after it. */
+  #turn = 0;
   /** The state to return to when an error has been read. */
-  #calm: LabState = 'loading';
+  #calm: 'loading' | 'paused' | 'done' = 'loading';
   #engineBroken = false;
   #snapshot: SnapshotEvent | undefined;
   #framePending = 0;
@@ -169,21 +173,25 @@ export class ExtractLab {
     return this.#open({ name, volume: async () => ({ files: await readFiles(files) }) });
   }
 
-  /** Opens a volume and runs the model on it. When that fails, everything stays as it was. */
+  /** Opens a volume and runs the model on it. What is asked for last counts. When it fails, everything stays as it was. */
   async #open(source: Source): Promise<void> {
-    if (this.#state.value === 'loading' && this.#volume) return;
+    const turn = ++this.#turn;
     this.#enterLoading(`Opening ${source.name}.`);
     try {
       if (this.#engineBroken) await this.#restartEngine();
-      const body = { name: source.name, source: await source.volume(), setup: this.#setupFor(source) };
+      const choice = this.#startFor(source);
+      const volume = await source.volume();
+      if (turn !== this.#turn) return;
+      const body = { name: source.name, source: volume, setup: this.#setupFor(source, choice) };
       const loaded = await this.#client.request('load', body, transferable(body.source));
       this.#source = source;
-      if (source.example)
-        this.#start.show({ kind: 'enclosing', levels: source.example.levels, edge: source.example.edge });
+      this.#start.show(choice);
       this.#adoptVolume(loaded.volume, source.example);
       this.#adoptModel(loaded);
       await this.#play();
     } catch (error) {
+      if (turn !== this.#turn) return;
+      this.#data.choose(this.#source?.example);
       this.#fail(`${source.name} could not be opened.`, error);
     }
   }
@@ -205,35 +213,59 @@ export class ExtractLab {
     this.#state.value = 'paused';
   }
 
-  /** Starts the model over, with the parameters as they are; plays on when asked to or when it was running. */
-  async #rebuild(play: boolean): Promise<void> {
+  /** Starts the model over, with the parameters as they are. */
+  async #reset(): Promise<void> {
     if (!this.#volume || this.#state.value === 'loading') return;
     if (this.#engineBroken && this.#source) return this.#open(this.#source);
     this.#enterLoading('Starting over.');
     try {
-      this.#adoptModel(await this.#client.request('rebuild', this.#setup()));
-      if (play) await this.#play();
-      else this.#status.say('Ready to start.');
+      this.#adoptModel(await this.#client.request('rebuild', this.#setup(this.#start.value, this.#params)));
+      this.#status.say('Ready to start.');
     } catch (error) {
       this.#fail('The model could not be built.', error);
     }
   }
 
-  #setup(): Setup {
-    const { levels, edge } = this.#start.value;
-    return { start: this.#startShape(), levels, edge, params: this.#params };
+  /** Starts over from another start and plays. When that start is refused, the model that was there goes on. */
+  async #restart(): Promise<void> {
+    if (!this.#volume || this.#state.value === 'loading') return this.#start.refuse('Not while a volume is opened.');
+    if (this.#engineBroken) return this.#start.refuse(BROKEN);
+    const running = this.#state.value === 'running';
+    const choice = this.#start.value;
+    this.#enterLoading('Starting over.');
+    try {
+      const ready = await this.#client.request('rebuild', this.#setup(choice, this.#params));
+      this.#start.show(choice);
+      this.#adoptModel(ready);
+      await this.#play();
+    } catch (error) {
+      const failure = toFailure(error);
+      this.#start.refuse(failure.message);
+      if (failure.code === 'internal') return this.#fail('The model could not be built.', error);
+      this.#calmDown();
+      if (running) this.#ask(this.#play());
+    }
+  }
+
+  #setup(choice: StartChoice, params: ParamValues): Setup {
+    const { levels, edge } = choice;
+    return { start: this.#startShape(choice), levels, edge, params };
   }
 
   /** What suits an example; for a file, the settings as they are, except the iso value, which no other volume shares. */
-  #setupFor({ example }: Source): Setup {
-    if (example)
-      return { start: { kind: 'enclosing' }, levels: example.levels, edge: example.edge, params: example.params };
+  #setupFor({ example }: Source, choice: StartChoice): Setup {
     const { iso: _, ...params } = this.#params;
-    return { ...this.#setup(), params };
+    return this.#setup(choice, example?.params ?? params);
   }
 
-  #startShape(): StartShape {
-    const { kind, bubbles } = this.#start.value;
+  /** What suits an example; for a file, the start as it is, except lengths and places of another volume's world. */
+  #startFor({ example }: Source): StartChoice {
+    const choice = this.#start.value;
+    if (example) return { ...choice, kind: 'enclosing', levels: example.levels, edge: example.edge };
+    return { ...choice, kind: choice.kind === 'sphere' ? 'enclosing' : choice.kind, edge: undefined };
+  }
+
+  #startShape({ kind, bubbles }: StartChoice): StartShape {
     switch (kind) {
       case 'bubbles':
         return { kind, count: bubbles };
@@ -304,7 +336,9 @@ export class ExtractLab {
   }
 
   #refuseParam(name: string, error: unknown): void {
-    const { message } = toFailure(error);
+    const { code, message: reason } = toFailure(error);
+    if (code === 'internal' && !this.#engineBroken) this.#fail('That did not work.', error);
+    const message = this.#engineBroken ? BROKEN : reason;
     this.#showParams(this.#params);
     if (name === 'iso') this.#histogram.complain(message);
     else this.#paramControls?.complain(name, message);
@@ -399,16 +433,22 @@ export class ExtractLab {
     if (failure.code === 'internal') this.#engineBroken = true;
     const hint =
       failure.code === 'internal' && this.#volume
-        ? ' What you see is the last result; Reset starts the engine again.'
+        ? 'What you see is the last result; Reset starts the engine again. It said: '
         : '';
-    this.#banner.show(title, failure.message + hint);
+    this.#banner.show(title, hint + failure.message);
     this.#status.say('');
     this.#state.value = 'error';
   }
 
   #dismiss(): void {
     this.#banner.hide();
-    if (this.#state.value === 'error' && this.#volume) this.#state.value = this.#calm;
+    if (this.#state.value === 'error' && this.#volume) this.#calmDown();
+  }
+
+  /** Back to what the model was before an error or a refusal, in words too. */
+  #calmDown(): void {
+    this.#state.value = this.#calm;
+    if (this.#calm !== 'loading') this.#status.say(describe(this.#calm, this.#history.reports.at(-1)));
   }
 
   async #export(format: MeshFormat, type: string): Promise<void> {
@@ -440,6 +480,7 @@ async function fetchBytes(url: string): Promise<Uint8Array> {
 
 function describe(state: 'running' | 'paused' | 'done', last: StepReport | undefined): string {
   if (!last) return state === 'running' ? 'Running.' : 'Ready to start.';
+  if (last.vertices === 0) return `The surface vanished at iteration ${count(last.iteration)}.`;
   const where = `${count(last.vertices)} vertices in ${plural(last.components, 'component')}`;
   if (state === 'done') return `Settled after ${count(last.iteration)} iterations: ${where}.`;
   return state === 'running' ? 'Running.' : `Paused at iteration ${count(last.iteration)}: ${where}.`;

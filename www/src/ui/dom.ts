@@ -24,6 +24,12 @@ export function section(title: string, ...children: (Node | string)[]): HTMLElem
   return h('section', { class: 'panel' }, h('h2', {}, title), ...children);
 }
 
+/** A letter of a formula; a Latin letter after a Greek one is its index. */
+export function symbol(text: string): HTMLElement {
+  const [, base = text, index = ''] = /^([α-ω])([A-Za-z])$/.exec(text) ?? [];
+  return h('span', { class: 'symbol' }, base, ...(index ? [h('sub', {}, index)] : []));
+}
+
 /** A picture from a 24 by 24 path; decoration only, the text beside it says the same. */
 export function icon(path: string): SVGSVGElement {
   const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');

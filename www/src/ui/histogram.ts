@@ -1,5 +1,5 @@
 import type { VolumeView } from '../protocol';
-import { h, onSchemeChange, token, uniqueId } from './dom';
+import { h, onSchemeChange, symbol, token, uniqueId } from './dom';
 import { figure } from './format';
 
 /**
@@ -22,7 +22,7 @@ export class Histogram {
     this.#number = h('input', { type: 'number', id, step: 'any', disabled: true, 'aria-describedby': `${id}-help` });
     this.#slider.addEventListener('input', () => this.#changed(this.#slider.valueAsNumber, onIso));
     this.#number.addEventListener('change', () => this.#changed(this.#number.valueAsNumber, onIso));
-    const label = h('label', { for: id }, 'Iso value ', h('span', { class: 'symbol' }, 'πI'));
+    const label = h('label', { for: id }, 'Iso value ', symbol('πI'));
     const help = 'The intensity the surface settles at. Drag the line, or type.';
     this.element = h(
       'div',

@@ -1,8 +1,11 @@
 import type { ParamSpec, ParamValues } from '../protocol';
-import { h, uniqueId } from './dom';
+import { h, symbol, uniqueId } from './dom';
+import { figure } from './format';
 
 /** Slider positions of a parameter with a logarithmic scale. */
 const LOG_STEPS = 200;
+/** What is chosen in the list of a parameter that takes a number as well as its named choices. */
+const NUMBER = 'number';
 
 interface Control {
   element: HTMLElement;
@@ -46,9 +49,8 @@ function controlFor(spec: ParamSpec, onChange: (value: unknown) => void): Contro
   const input = inputFor(spec, id, onChange);
   const error = h('p', { class: 'field-error', id: `${id}-error`, role: 'alert' });
   const help = h('p', { class: 'help', id: `${id}-help` }, spec.help);
-  const symbol = spec.symbol ? [h('span', { class: 'symbol' }, spec.symbol)] : [];
-  const label = h('label', { for: id }, spec.label, ' ', ...symbol);
-  const unit = spec.unit ? [h('span', { class: 'unit' }, spec.unit)] : [];
+  const label = h('label', { for: id }, spec.label, ' ', ...(spec.symbol ? [symbol(spec.symbol)] : []));
+  const unit = spec.type === 'choice' ? [] : unitOf(spec);
   const value = h('span', { class: 'value' }, input.main, ...unit);
   const element = h('div', { class: 'param', 'data-param': spec.name }, label, value, ...input.extra, help, error);
   const complain = (message: string | undefined) => {
@@ -56,6 +58,10 @@ function controlFor(spec: ParamSpec, onChange: (value: unknown) => void): Contro
     input.main.toggleAttribute('aria-invalid', message !== undefined);
   };
   return { element, show: input.show, complain };
+}
+
+function unitOf({ unit }: ParamSpec): HTMLElement[] {
+  return unit ? [h('span', { class: 'unit' }, unit)] : [];
 }
 
 interface Input {
@@ -91,11 +97,34 @@ function checkbox(id: string, onChange: (value: unknown) => void): Input {
 function choice(spec: ParamSpec, id: string, onChange: (value: unknown) => void): Input {
   const options = (spec.choices ?? []).map((name) => h('option', { value: name }, name));
   const main = h('select', describedBy(id), ...options);
-  main.addEventListener('change', () => onChange(main.value));
+  main.addEventListener('change', () => {
+    if (main.value !== NUMBER) onChange(main.value);
+  });
   const show = (value: unknown) => {
     main.value = String(value);
   };
-  return { main, extra: [], show };
+  return spec.min === undefined ? { main, extra: [], show } : withNumber({ main, extra: [], show }, spec, onChange);
+}
+
+/** Adds a number to a list of choices: one more choice, and a field that is there when it is chosen. */
+function withNumber({ main, show }: Input, spec: ParamSpec, onChange: (value: unknown) => void): Input {
+  const { label, min, max, unit } = spec;
+  const name = [label, unit].filter(Boolean).join(', ');
+  const field = h('input', { type: 'number', min, max, step: 'any', inputmode: 'decimal', 'aria-label': name });
+  const row = h('span', { class: 'value own', hidden: true }, field, ...unitOf(spec));
+  main.append(h('option', { value: NUMBER }, 'a number'));
+  main.addEventListener('change', () => {
+    row.hidden = main.value !== NUMBER;
+    if (!row.hidden) field.focus();
+  });
+  field.addEventListener('change', () => onChange(field.valueAsNumber));
+  const showEither = (value: unknown) => {
+    const given = typeof value === 'number';
+    show(given ? NUMBER : value);
+    row.hidden = !given;
+    field.value = given ? typed(value) : '';
+  };
+  return { main, extra: [row], show: showEither };
 }
 
 /** A number to type, and a slider beside it where the range is known. */
@@ -147,5 +176,7 @@ class Slider {
   show(value: number): void {
     const position = this.#log ? (LOG_STEPS * Math.log(value / this.#min)) / Math.log(this.#max / this.#min) : value;
     this.element.value = String(position);
+    // Where the position is a logarithm it says nothing.
+    this.element.setAttribute('aria-valuetext', figure(value));
   }
 }

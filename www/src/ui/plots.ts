@@ -5,7 +5,9 @@ import { h, onSchemeChange, token } from './dom';
 import { count, figure } from './format';
 import type { History } from './history';
 
-const PLOT_HEIGHT = 132;
+const PLOT_HEIGHT = 144;
+/** Above a plot, for the names of the levels. */
+const MARK_ROOM = 16;
 
 interface Curve {
   label: string;
@@ -125,7 +127,7 @@ function optionsFor(kind: PlotKind, mark: (plot: uPlot) => void): uPlot.Options 
     height: PLOT_HEIGHT,
     legend: { show: false },
     cursor: { y: false, drag: { x: false, y: false } },
-    padding: [8, 8, 0, 0],
+    padding: [MARK_ROOM, 8, 0, 0],
     scales: {
       x: { time: false, range: iterationRange },
       y: kind.log ? { distr: 3, range: logRange } : { range: valueRange },
@@ -136,7 +138,8 @@ function optionsFor(kind: PlotKind, mark: (plot: uPlot) => void): uPlot.Options 
         ...axis,
         size: 52,
         values: (_, ticks) => ticks.map((tick) => tickLabel(tick, kind.log)),
-        ...(kind.log && { splits: decades }),
+        // uPlot would leave some powers of ten without their number.
+        ...(kind.log && { splits: decades, filter: (_: uPlot, ticks: number[]) => ticks }),
       },
     ],
     series: [{}, ...kind.curves.map(seriesFor)],
@@ -184,11 +187,15 @@ function drawMarks(plot: uPlot, history: History): void {
   ctx.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
   ctx.textAlign = 'left';
   ctx.textBaseline = 'alphabetic';
-  for (const { iteration, phase } of history.phases) {
+  // Backwards: where names would lie on each other the later one is told.
+  let free = Number.POSITIVE_INFINITY;
+  for (const { iteration, phase } of [...history.phases].reverse()) {
     const x = Math.round(plot.valToPos(iteration, 'x', true));
     upright(ctx, x, bbox.top, bbox.top + bbox.height, token('--line-strong'));
     ctx.fillStyle = token('--muted');
-    ctx.fillText(phase, x + 3 * devicePixelRatio, bbox.top + 9 * devicePixelRatio);
+    if (x + ctx.measureText(phase).width > free) continue;
+    ctx.fillText(phase, x, bbox.top - 4 * devicePixelRatio);
+    free = x - 4 * devicePixelRatio;
   }
   const foot = bbox.top + bbox.height;
   for (const { iteration, axial, annular } of history.changes) {

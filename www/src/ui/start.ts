@@ -20,8 +20,7 @@ const SHAPES: { kind: Kind; label: string; help: string }[] = [
 const DEFAULT_LEVELS = 1;
 const MOST_LEVELS = 6;
 const DEFAULT_BUBBLES = 5;
-
-type Ids = [string, string, string, string];
+const MOST_BUBBLES = 32;
 
 export interface StartChoice {
   kind: Kind;
@@ -31,90 +30,117 @@ export interface StartChoice {
   edge: number | undefined;
 }
 
-/** What the model starts from. A change starts it over. */
+/** What the model starts from. A change starts it over; when that is refused, what was in force comes back. */
 export class StartControls {
   readonly element: HTMLElement;
-  readonly #shape: HTMLSelectElement;
-  readonly #bubbles: HTMLInputElement;
-  readonly #levels: HTMLInputElement;
-  readonly #edge: HTMLInputElement;
-  readonly #bubbleRow: HTMLElement;
-  readonly #help: HTMLElement;
+  readonly #shape = new Field('Shape', h('select', {}, ...SHAPES.map(optionFor)), '', '');
+  readonly #bubbles = new Field(
+    'Bubbles along each side',
+    integer(2, MOST_BUBBLES, DEFAULT_BUBBLES),
+    'More of them find smaller parts.',
+    `A whole number from 2 to ${MOST_BUBBLES} is needed.`,
+  );
+  readonly #levels = new Field(
+    'Pyramid levels',
+    integer(0, MOST_LEVELS, DEFAULT_LEVELS),
+    'Coarser copies of the volume to pass through first; 0 works on the volume itself at once.',
+    `A whole number from 0 to ${MOST_LEVELS} is needed.`,
+  );
+  readonly #edge = new Field(
+    'Mean edge',
+    h('input', { type: 'number', min: 0, step: 'any', inputmode: 'decimal', placeholder: 'auto' }),
+    'Of the triangles at the end, in the units of the volume; left empty, it follows the voxels.',
+    'A number above 0 is needed, or nothing.',
+  );
+  readonly #fields = [this.#shape, this.#bubbles, this.#levels, this.#edge];
+  /** The field changed last: it is to blame when the model cannot be built. */
+  #changed: Field = this.#shape;
+  #inForce: StartChoice;
 
   constructor(onChange: () => void) {
-    const [shapeId, bubblesId, levelsId, edgeId] = ['shape', 'bubbles', 'levels', 'edge'].map(uniqueId) as Ids;
-    const options = SHAPES.map(({ kind, label }) => h('option', { value: kind }, label));
-    const changed = () => this.#changed(onChange);
-    this.#help = h('p', { class: 'help', id: `${shapeId}-help` });
-    this.#shape = h('select', { id: shapeId, 'aria-describedby': `${shapeId}-help`, onchange: changed }, ...options);
-    this.#bubbles = integer(bubblesId, 2, 32, DEFAULT_BUBBLES, changed);
-    this.#levels = integer(levelsId, 0, MOST_LEVELS, DEFAULT_LEVELS, changed);
-    this.#edge = h('input', {
-      type: 'number',
-      id: edgeId,
-      min: 0,
-      step: 'any',
-      placeholder: 'auto',
-      onchange: changed,
-    });
-    this.#bubbleRow = row(bubblesId, 'Bubbles along each side', this.#bubbles);
-    const levelHelp = h(
-      'p',
-      { class: 'help' },
-      'Coarser copies of the volume to pass through first; 0 works on the volume itself at once.',
-    );
-    this.element = h(
-      'div',
-      { class: 'start' },
-      row(shapeId, 'Shape', this.#shape),
-      this.#help,
-      this.#bubbleRow,
-      row(levelsId, 'Pyramid levels', this.#levels),
-      levelHelp,
-      row(edgeId, 'Mean edge', this.#edge),
-      h(
-        'p',
-        { class: 'help' },
-        'Of the triangles at the end, in the units of the volume; left empty, it follows the voxels.',
-      ),
-    );
+    for (const field of this.#fields) field.control.addEventListener('change', () => this.#onChange(field, onChange));
+    this.element = h('div', { class: 'start' }, ...this.#fields.map((field) => field.element));
     this.#explain();
+    this.#inForce = this.value;
   }
 
   get value(): StartChoice {
+    const edge = this.#edge.control;
     return {
-      kind: this.#shape.value as Kind,
-      bubbles: this.#bubbles.valueAsNumber,
-      levels: this.#levels.valueAsNumber,
-      edge: this.#edge.value === '' ? undefined : this.#edge.valueAsNumber,
+      kind: this.#shape.control.value as Kind,
+      bubbles: this.#bubbles.control.valueAsNumber,
+      levels: this.#levels.control.valueAsNumber,
+      edge: edge.value === '' ? undefined : edge.valueAsNumber,
     };
   }
 
-  /** Sets what suits an example; no change is reported. */
-  show({ kind, levels, edge }: Omit<StartChoice, 'bubbles'>): void {
-    this.#shape.value = kind;
-    this.#levels.valueAsNumber = levels;
-    this.#edge.value = edge === undefined ? '' : String(edge);
+  /** Shows what is now in force, and takes complaints back; no change is reported. */
+  show(choice: StartChoice): void {
+    this.#inForce = choice;
+    this.#shape.control.value = choice.kind;
+    this.#bubbles.control.valueAsNumber = choice.bubbles;
+    this.#levels.control.valueAsNumber = choice.levels;
+    this.#edge.control.value = choice.edge === undefined ? '' : String(choice.edge);
+    for (const field of this.#fields) field.complain(undefined);
     this.#explain();
   }
 
-  #changed(onChange: () => void): void {
+  /** Says beside the field changed last why that cannot be, and shows again what is in force. */
+  refuse(message: string): void {
+    this.show(this.#inForce);
+    this.#changed.complain(message);
+  }
+
+  #onChange(field: Field, onChange: () => void): void {
+    this.#changed = field;
+    for (const each of this.#fields) each.complain(undefined);
     this.#explain();
-    if ([this.#bubbles, this.#levels, this.#edge].every((input) => input.checkValidity())) onChange();
-    else this.element.querySelector<HTMLInputElement>('input:invalid')?.reportValidity();
+    if (field.control.checkValidity()) onChange();
+    else this.refuse(field.need);
   }
 
   #explain(): void {
-    const kind = this.#shape.value;
-    this.#bubbleRow.hidden = kind !== 'bubbles';
-    this.#help.textContent = SHAPES.find((shape) => shape.kind === kind)?.help ?? '';
+    const kind = this.#shape.control.value;
+    this.#bubbles.element.hidden = kind !== 'bubbles';
+    this.#shape.help = SHAPES.find((shape) => shape.kind === kind)?.help ?? '';
   }
 }
 
-function integer(id: string, min: number, max: number, value: number, onchange: () => void): HTMLInputElement {
-  return h('input', { type: 'number', id, min, max, step: 1, value, required: true, onchange });
+/** A control with its label, what it means, and what was wrong with its last value. */
+class Field<Control extends HTMLInputElement | HTMLSelectElement = HTMLInputElement | HTMLSelectElement> {
+  readonly element: HTMLElement;
+  readonly control: Control;
+  /** What to say of a value that is none. */
+  readonly need: string;
+  readonly #help: HTMLElement;
+  readonly #error: HTMLElement;
+
+  constructor(label: string, control: Control, help: string, need: string) {
+    const id = uniqueId('start');
+    this.control = control;
+    this.need = need;
+    this.#help = h('p', { class: 'help', id: `${id}-help` }, help);
+    this.#error = h('p', { class: 'field-error', id: `${id}-error`, role: 'alert' });
+    control.id = id;
+    control.setAttribute('aria-describedby', `${id}-help ${id}-error`);
+    const row = h('div', { class: 'row' }, h('label', { for: id }, label), h('span', { class: 'value' }, control));
+    this.element = h('div', {}, row, this.#help, this.#error);
+  }
+
+  set help(text: string) {
+    this.#help.textContent = text;
+  }
+
+  complain(message: string | undefined): void {
+    this.#error.textContent = message ?? '';
+    this.control.toggleAttribute('aria-invalid', message !== undefined);
+  }
 }
 
-function row(id: string, label: string, control: HTMLElement): HTMLElement {
-  return h('div', { class: 'row' }, h('label', { for: id }, label), h('span', { class: 'value' }, control));
+function optionFor({ kind, label }: (typeof SHAPES)[number]): HTMLOptionElement {
+  return h('option', { value: kind }, label);
+}
+
+function integer(min: number, max: number, value: number): HTMLInputElement {
+  return h('input', { type: 'number', min, max, step: 1, value, required: true });
 }

@@ -43,7 +43,8 @@ export class SlicePanel {
     this.#canvas = h('canvas', { role: 'img', 'aria-label': `${frame.name} slice with the outline of the surface` });
     this.#slider = h('input', { type: 'range', id, min: 0, max: last, step: 1, value: last >> 1 });
     this.#slider.addEventListener('input', () => events.onIndex(this.#slider.valueAsNumber));
-    this.#output = h('output', { for: id });
+    // The slider speaks the number already.
+    this.#output = h('output', { for: id, 'aria-live': 'off' });
     this.element = this.#build(id);
     this.#followPointer(events.onPoint);
     this.#observer.observe(this.#canvas);

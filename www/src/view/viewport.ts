@@ -31,6 +31,8 @@ export class Viewport {
   onDraw: (viewer: Vector3) => void = () => undefined;
   #pending = 0;
   #home = { position: new Vector3(), target: new Vector3() };
+  /** Width by height of the view, at most 1: in a narrow view the camera stands farther off. */
+  #narrowness = 1;
 
   constructor(canvas: HTMLCanvasElement) {
     this.canvas = canvas;
@@ -66,8 +68,7 @@ export class Viewport {
     const radius = box.getSize(new Vector3()).length() / 2;
     const [x, y, z] = anatomicalSigns(grid.space);
     const direction = new Vector3(-0.55 * x, 1 * y, 0.32 * z).normalize();
-    const narrow = Math.min(1, this.#camera.aspect);
-    const distance = (0.97 * radius) / Math.sin((FIELD_OF_VIEW * Math.PI) / 360) / narrow;
+    const distance = (0.97 * radius) / Math.sin((FIELD_OF_VIEW * Math.PI) / 360) / this.#narrowness;
     this.#home = { position: target.clone().addScaledVector(direction, distance), target };
     this.#camera.near = radius / 50;
     this.#camera.far = radius * 50;
@@ -106,9 +107,20 @@ export class Viewport {
     this.#renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.#renderer.setSize(width, height, false);
     this.#camera.aspect = width / height;
+    this.#standOff(Math.min(1, this.#camera.aspect));
     this.#camera.updateProjectionMatrix();
     // Setting the size clears the canvas: draw at once, or it flashes.
     this.#draw();
+  }
+
+  /** Keeps in sight what was in sight, when a window or a phone is turned. */
+  #standOff(narrowness: number): void {
+    const factor = this.#narrowness / narrowness;
+    this.#narrowness = narrowness;
+    if (factor === 1) return;
+    const { position, target } = this.#home;
+    position.sub(target).multiplyScalar(factor).add(target);
+    this.#zoom(factor);
   }
 
   #draw(): void {
