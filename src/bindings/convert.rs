@@ -87,7 +87,7 @@ pub fn merged<T: Serialize + DeserializeOwned>(current: &T, given: &JsValue) -> 
             continue;
         }
         let parameter = name.as_string().unwrap_or_default();
-        if !js_sys::Object::has_own(all.unchecked_ref(), &name) {
+        if !js_sys::Object::has_own(all.unchecked_ref::<js_sys::Object>(), &name) {
             return Err(unknown(&parameter, &all));
         }
         // One at a time, so that a value of the wrong type is blamed on its own name.
