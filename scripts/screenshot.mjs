@@ -1,17 +1,10 @@
 // Takes docs/extract.png, the README's picture, from the running app: the built-in example when it is done.
 import { mkdir } from 'node:fs/promises';
-import { chromium } from 'playwright-core';
+import { launchChromium } from './chromium.mjs';
 import { serve } from './serve.mjs';
-import { findChromium } from './setup.mjs';
 import { at, say, script } from './shell.mjs';
 
 const SIZE = { width: 1440, height: 900 };
-const FLAGS = [
-  '--use-angle=swiftshader',
-  '--enable-unsafe-swiftshader',
-  '--no-sandbox',
-  '--disable-background-networking',
-];
 
 /** Waits for the example to be done, then for the frame that shows it. */
 async function shoot(page, address, file) {
@@ -25,7 +18,7 @@ await script(async () => {
   const file = at('docs/extract.png');
   await mkdir(at('docs'), { recursive: true });
   const server = await serve(at('dist'), 0);
-  const browser = await chromium.launch({ executablePath: findChromium(), args: FLAGS });
+  const browser = await launchChromium();
   try {
     await shoot(await browser.newPage({ viewport: SIZE }), server.address, file);
     say('picture', file);

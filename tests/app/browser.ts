@@ -1,16 +1,9 @@
 import { existsSync } from 'node:fs';
-import { type Browser, chromium, type Page } from 'playwright-core';
+import type { Browser, Page } from 'playwright-core';
 import { buildApp } from '../../scripts/app.mjs';
+import { launchChromium } from '../../scripts/chromium.mjs';
 import { serve } from '../../scripts/serve.mjs';
-import { findChromium } from '../../scripts/setup.mjs';
 import { at } from '../../scripts/shell.mjs';
-
-const FLAGS = [
-  '--use-angle=swiftshader',
-  '--enable-unsafe-swiftshader',
-  '--no-sandbox',
-  '--disable-background-networking',
-];
 
 export interface App {
   page: Page;
@@ -23,10 +16,8 @@ export interface App {
 /** The built app in a browser of its own. */
 export async function openApp(viewport = { width: 1280, height: 800 }): Promise<App> {
   if (!existsSync(at('dist/index.html'))) await buildApp();
-  const executablePath = findChromium();
-  if (!executablePath) throw new Error('no Chromium or Chrome found: install one, or set CHROMIUM_PATH');
   const server = await serve(at('dist'), 0);
-  const browser = await chromium.launch({ executablePath, args: FLAGS });
+  const browser = await launchChromium();
   const page = await browser.newPage({ viewport });
   const complaints = listen(page, server.address);
   await page.goto(server.address);

@@ -76,8 +76,9 @@ impl Pyramid {
     pub(super) fn new(volume: &Volume, frame: usize, above: usize) -> Result<Self, MethodError> {
         let possible = volume.max_pyramid_levels(REDUCTION)? - 1;
         if above > possible {
+            let [nx, ny, nz] = volume.dims();
             let problem =
-                format!("{above} given, 0 to {possible} are possible for {:?} voxels", volume.dims());
+                format!("{above} given, 0 to {possible} are possible for {nx} × {ny} × {nz} voxels");
             return Err(MethodError::invalid("levels", problem));
         }
         let [low, high] = volume.range();

@@ -433,7 +433,7 @@ fn finest_delta(edge: Option<f64>, voxel: f64) -> Result<f64, MethodError> {
     let [low, high] = [DELTA_RANGE.start(), DELTA_RANGE.end()].map(|d| d * MEAN_EDGE * voxel);
     Err(MethodError::invalid(
         "edge",
-        format!("{edge} given, {low:.4} to {high:.4} accepted for these voxels"),
+        format!("{edge} given, {low:.3} to {high:.3} accepted for these voxels"),
     ))
 }
 
