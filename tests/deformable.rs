@@ -528,8 +528,8 @@ fn seeds_and_attractors_are_round_in_the_world() {
     let mut model = DeformableModel::new(&volume, options).unwrap();
     let before = model.surface();
     let size = measure(&before).bounds;
-    for axis in 0..3 {
-        close("diameter", f64::from(size[1][axis] - size[0][axis]), 18.0, 0.06);
+    for diameter in (size[1] - size[0]).to_array() {
+        close("diameter", diameter, 18.0, 0.06);
     }
     let top = middle + DVec3::Z * 9.0;
     model
