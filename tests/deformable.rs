@@ -36,6 +36,7 @@ fn run(model: &mut DeformableModel, most: u32) -> Run {
         let report = model.step().unwrap();
         assert_eq!(model.mesh().check(), Ok(()), "iteration {}", report.iteration);
         assert_eq!(report.euler as i64, model.mesh().euler());
+        assert!((0.0..=1.0).contains(&report.progress) && (report.progress == 1.0 || !report.done));
         let pairs = count_crossings(&model.mesh().to_triangles());
         run.crossing = (run.crossing.0 + u32::from(pairs > 0), run.crossing.1.max(pairs));
         if (report.components, report.euler) != (run.last.components, run.last.euler) {

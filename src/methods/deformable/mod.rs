@@ -315,13 +315,12 @@ impl DeformableModel {
     }
 
     fn report(&self, events: Changes, times: Times) -> StepReport {
-        let levels = self.pyramid.levels.len();
         let done = self.is_done();
         StepReport {
             iteration: self.iteration,
             done,
             phase: if done { "done".into() } else { format!("level {}", self.level) },
-            progress: if done { 1.0 } else { (levels - 1 - self.level) as f64 / levels as f64 },
+            progress: self.progress(),
             residual: self.movement.energy,
             tolerance: self.params.energy_tolerance,
             vertices: self.mesh.vertex_count() as u32,

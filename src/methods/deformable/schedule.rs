@@ -21,6 +21,8 @@ const REST_SPEED: f32 = 0.03;
 pub(super) struct Rest {
     quiet: u32,
     done: bool,
+    /// The iteration at whose end this level began.
+    began: u32,
 }
 
 impl Rest {
@@ -33,6 +35,22 @@ impl Rest {
 impl DeformableModel {
     pub(super) fn is_done(&self) -> bool {
         self.rest.done
+    }
+
+    /// Levels done, and the way of this one from the energy of a surface at full speed to that of one at rest, as its
+    /// logarithm falls. It can go back where the surface finds a way on.
+    pub(super) fn progress(&self) -> f64 {
+        if self.rest.done {
+            return 1.0;
+        }
+        let DeformableParams { mass, max_move, time_step, energy_tolerance, .. } = self.params;
+        let speed = max_move / time_step;
+        let full = (0.5 * mass * speed * speed).max(2.0 * energy_tolerance);
+        // Where a level begins, the energy is still that of the level before.
+        let energy = if self.iteration == self.rest.began { full } else { self.movement.energy };
+        let way = libm::log(full / energy.max(energy_tolerance)) / libm::log(full / energy_tolerance);
+        let levels = self.pyramid.levels.len();
+        ((levels - 1 - self.level) as f64 + way.clamp(0.0, 1.0)) / levels as f64
     }
 
     /// Counts quiet iterations; after enough of them checks the whole mesh and goes one level down, or ends.
@@ -81,7 +99,7 @@ impl DeformableModel {
             self.mesh.refine()?;
         }
         self.level -= 1;
-        self.rest.quiet = 0;
+        self.rest = Rest { began: self.iteration, ..Rest::default() };
         self.settle_in();
         self.prepare_gradient()
     }
