@@ -168,3 +168,31 @@ fn mark(flags: &mut Vec<bool>, v: VertexId) -> bool {
     }
     !std::mem::replace(&mut flags[v.index()], true)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// A vertex pulled far out of a sphere: edits on its needle undo each other, and contact is everywhere along it. Once
+    /// a single call never came back.
+    #[test]
+    fn a_needle_is_resolved_in_calls_of_bounded_work() {
+        let mut mesh = Mesh::icosphere(Vec3::ZERO, 5.0, 1.5).unwrap();
+        let tip = mesh.vertices().next().unwrap();
+        mesh.set_position(tip, Vec3::new(-40.0, 3.0, 1.0));
+        let mut resolver = Resolver::with_room_for(20_000);
+        let mut active: Vec<VertexId> = mesh.vertices().collect();
+        for _ in 0..40 {
+            let most = EDITS_PER_VERTEX * mesh.vertex_count() + 1000;
+            let changes = resolver.resolve(&mut mesh, Sampling::new(0.9), &active);
+            assert_eq!(mesh.check(), Ok(()));
+            let edits = changes.creations + changes.deletions + changes.annular;
+            assert!(edits as usize <= most, "{edits} edits, {most} allowed");
+            active.clear();
+        }
+        assert!(!resolver.is_waiting());
+    }
+}
