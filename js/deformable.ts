@@ -212,11 +212,10 @@ export class DeformableModel implements Stepper {
 
 function checked(given: DeformableOptions): Partial<DeformableOptions> {
   const known = options('options', given, OPTIONS);
-  const { frame, levels, edge, params } = known;
+  const { frame, levels, edge } = known;
   if (frame !== undefined) whole('frame', frame);
   if (levels !== undefined) whole('levels', levels);
   if (edge !== undefined) positive('edge', edge);
-  if (params !== undefined) plain('params', params);
   return known;
 }
 

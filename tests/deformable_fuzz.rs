@@ -108,10 +108,11 @@ fn run(seed: u64) {
 }
 
 fn seeds() -> Range<u64> {
-    let named = std::env::var("FUZZ_SEEDS").unwrap_or_default();
-    let range =
-        named.split_once("..").and_then(|(first, last)| Some(first.parse().ok()?..last.parse().ok()?));
-    range.unwrap_or(0..SEEDS)
+    let Ok(named) = std::env::var("FUZZ_SEEDS") else { return 0..SEEDS };
+    let ends =
+        named.split_once("..").and_then(|(first, last)| Some((first.parse().ok()?, last.parse().ok()?)));
+    let Some((first, last)) = ends else { panic!("FUZZ_SEEDS is {named}; <first>..<last> is needed") };
+    first..last
 }
 
 /// Names the seed of a run that panics. In wasm a panic ends the program, so each seed is said before.

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
 mod common;
 
-use common::Random;
+use common::{Random, torus_around};
 use vesicle::math::Vec3;
 use vesicle::mesh::{EditError, Mesh, TriangleMesh, VectorKey, VertexId};
 #[cfg(target_arch = "wasm32")]
@@ -17,19 +17,7 @@ fn tetrahedron() -> Mesh {
 
 /// A torus of `n` × `m` vertices; `n` = 3 gives rings of three edges to cut.
 fn torus(n: u32, m: u32) -> Mesh {
-    let mut mesh = TriangleMesh::default();
-    for i in 0..n {
-        for j in 0..m {
-            let (a, b) =
-                (i as f32 / n as f32 * std::f32::consts::TAU, j as f32 / m as f32 * std::f32::consts::TAU);
-            let r = 3.0 + libm::cosf(b);
-            mesh.positions.push(Vec3::new(r * libm::cosf(a), r * libm::sinf(a), libm::sinf(b)));
-            let at = |i: u32, j: u32| (i % n) * m + j % m;
-            mesh.triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
-            mesh.triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
-        }
-    }
-    Mesh::from_triangles(&mesh).unwrap()
+    Mesh::from_triangles(&torus_around(Vec3::ZERO, [n, m], [3.0, 1.0])).unwrap()
 }
 
 fn sphere() -> Mesh {

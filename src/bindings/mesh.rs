@@ -11,7 +11,7 @@ use super::convert::{bytes, coordinates, packed, point, points, to_js, triangles
 use super::error::Failure;
 use super::volume::RawVolume;
 use crate::io::{MeshFormat, parse_mesh, write_mesh};
-use crate::math::DVec3;
+use crate::math::{DVec3, Vec3};
 use crate::mesh::{Measures, Mesh, MeshReport, TriangleMesh, measure, report};
 use crate::methods::deformable::DeformableModel;
 use crate::spatial::{SurfacePoint, TriangleTree, cross_section};
@@ -338,7 +338,7 @@ impl From<Measures> for Info {
 }
 
 /// A direction of any length but 0, as one of length 1.
-fn direction_of(values: &[f64]) -> Result<crate::math::Vec3, Failure> {
+fn direction_of(values: &[f64]) -> Result<Vec3, Failure> {
     let given = point(values)?;
     let largest = given.abs().max_element();
     // Scaled first: squares of very long and very short ones leave the range of numbers.

@@ -197,6 +197,12 @@ impl Volume {
         self.range
     }
 
+    /// From the lowest to the highest intensity; 1 where all are the same, so that one can divide by it.
+    pub fn span(&self) -> f64 {
+        let [low, high] = self.range;
+        if high > low { high - low } else { 1.0 }
+    }
+
     /// All intensities of one frame, x fastest, then y, z.
     ///
     /// # Errors
@@ -224,9 +230,8 @@ impl Volume {
     pub fn normalised_grid(&self, frame: usize) -> Result<Grid, VolumeError> {
         let start = self.frame_start(frame)?;
         let end = start + self.frame_len();
-        let [low, high] = self.range();
-        let factor = if high > low { 1.0 / (high - low) } else { 1.0 };
-        let (slope, intercept) = (self.slope * factor, (self.intercept - low) * factor);
+        let factor = 1.0 / self.span();
+        let (slope, intercept) = (self.slope * factor, (self.intercept - self.range[0]) * factor);
         let values = each!(self.voxels.as_ref(), values => converted(&values[start..end], |v| {
             let value = v * slope + intercept;
             // Voxels that are not a number count as the lowest.

@@ -9,11 +9,15 @@ pub fn volume(dims: [usize; 3], value: impl Fn(Vec3) -> f32) -> Volume {
     let at = |i: usize| {
         value(Vec3::new((i % dims[0]) as f32, (i / dims[0] % dims[1]) as f32, (i / dims[0] / dims[1]) as f32))
     };
-    let voxels = Voxels::F32((0..dims[0] * dims[1] * dims[2]).map(at).collect());
+    placed(Voxels::F32((0..dims[0] * dims[1] * dims[2]).map(at).collect()), dims, DAffine3::IDENTITY)
+}
+
+/// Voxels as they are, placed in the world by `affine`.
+pub fn placed(voxels: Voxels, [nx, ny, nz]: [usize; 3], affine: DAffine3) -> Volume {
     Volume::new(VolumeInit {
         voxels,
-        dims: [dims[0], dims[1], dims[2], 1],
-        affine: DAffine3::IDENTITY,
+        dims: [nx, ny, nz, 1],
+        affine,
         slope: 1.0,
         intercept: 0.0,
         frame_seconds: 0.0,

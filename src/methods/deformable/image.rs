@@ -81,8 +81,6 @@ impl Pyramid {
                 format!("{above} given, 0 to {possible} are possible for {nx} × {ny} × {nz} voxels");
             return Err(MethodError::invalid("levels", problem));
         }
-        let [low, high] = volume.range();
-        let range = if high > low { high - low } else { 1.0 };
         let mut grid = volume.normalised_grid(frame)?;
         let mut spacing = volume.spacing();
         let mut unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
@@ -94,7 +92,7 @@ impl Pyramid {
             unit *= REDUCTION;
         }
         levels.push(LevelImage::new(grid, volume.dims()));
-        Ok(Self { levels, low, range })
+        Ok(Self { levels, low: volume.range()[0], range: volume.span() })
     }
 
     /// An intensity of the volume on the scale 0..1, and a little beyond: what is further out pushes with all force.

@@ -358,8 +358,9 @@ impl DeformableModel {
     /// # Errors
     /// [`MethodError::InvalidArgument`] where a number is not finite or too large, or a radius is not positive.
     pub fn set_attractors(&mut self, attractors: Vec<Attractor>) -> Result<(), MethodError> {
+        let from_world = self.to_world.inverse();
         for (i, a) in attractors.iter().enumerate() {
-            let local = self.to_world.inverse().transform_point3(a.point) / FURTHEST;
+            let local = from_world.transform_point3(a.point) / FURTHEST;
             let radius = a.radius / (FURTHEST * self.voxel);
             let fits = local.abs().max_element() <= 1.0 && a.strength.abs() <= STRONGEST;
             if !(fits && local.is_finite() && radius > 0.0 && radius <= 1.0) {

@@ -13,8 +13,9 @@ use crate::mesh::Mesh;
 pub(super) struct Movement {
     /// Mean of ½ m (v·n)² / δ², the criterion of section 5.1.
     pub(super) energy: f64,
-    /// Largest speed along a normal, in δ per unit of time, of a vertex that no edit displaced lately. Edits of a surface at rest throw
-    /// single vertices off it; they come back in a few iterations and are no sign that the surface still travels.
+    /// Largest speed along a normal, in δ per unit of time, of a vertex that no edit displaced lately. Edits of a
+    /// surface at rest throw single vertices off it; they come back in a few iterations and are no sign that the surface
+    /// still travels.
     pub(super) fastest: f32,
 }
 

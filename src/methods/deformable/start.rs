@@ -2,7 +2,7 @@
 
 use super::domain::Domain;
 use super::image::LevelImage;
-use crate::math::{DAffine3, DVec3, Vec3};
+use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure};
 use crate::methods::MethodError;
 use crate::remesh::{Resolver, Sampling};
@@ -158,12 +158,13 @@ fn seeds(frame: &Frame, points: &[DVec3], radius: f64) -> Result<Mesh, MethodErr
         return Err(MethodError::invalid("start.seeds", problem));
     }
     let ball = world_ball(frame, radius)?;
-    for (i, point) in points.iter().enumerate() {
-        let inside = ball.positions.iter().all(|&p| frame.domain.bounds.contains(moved(frame, p, *point)));
-        if !inside {
-            let problem = format!("the sphere at point {i}, {point}, is not in or near the image");
-            return Err(MethodError::invalid("start.seeds", problem));
-        }
+    let reach = Bounds::of(ball.positions());
+    let room = frame.domain.bounds;
+    let centres: Vec<Vec3> = points.iter().map(|p| frame.from_world.transform_point3(*p).as_vec3()).collect();
+    let fits = |&c: &Vec3| room.contains(reach.min + c) && room.contains(reach.max + c);
+    if let Some(i) = centres.iter().position(|c| !fits(c)) {
+        let problem = format!("the sphere at point {i}, {}, is not in or near the image", points[i]);
+        return Err(MethodError::invalid("start.seeds", problem));
     }
     let apart = 2.0 * radius + f64::from(frame.sampling.contact()) * largest(frame.spacing);
     let mut mesh = Mesh::default();
@@ -173,15 +174,15 @@ fn seeds(frame: &Frame, points: &[DVec3], radius: f64) -> Result<Mesh, MethodErr
             return Err(MethodError::invalid("start.seeds", problem));
         }
         let mut there = ball.clone();
-        there.positions.iter_mut().for_each(|p| *p = moved(frame, *p, *point));
-        mesh.append(&Mesh::from_triangles(&there)?)?;
+        there.positions_mut().iter_mut().for_each(|p| *p += centres[i]);
+        mesh.append(&there)?;
     }
     Ok(mesh)
 }
 
 /// A sphere around the origin of the world, in the space of the model without its translation: an ellipsoid where
 /// voxels are not cubes.
-fn world_ball(frame: &Frame, radius: f64) -> Result<TriangleMesh, MethodError> {
+fn world_ball(frame: &Frame, radius: f64) -> Result<Mesh, MethodError> {
     let least = f64::from(SMALLEST_RADIUS * frame.sampling.shortest()) * largest(frame.spacing);
     let most =
         f64::from((frame.domain.bounds.max - frame.domain.bounds.min).max_element()) * largest(frame.spacing);
@@ -199,12 +200,7 @@ fn world_ball(frame: &Frame, radius: f64) -> Result<TriangleMesh, MethodError> {
     if frame.from_world.matrix3.determinant() < 0.0 {
         ball.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     }
-    Ok(ball)
-}
-
-/// A point of a ball around the origin, moved with it to a point of the world.
-fn moved(frame: &Frame, p: Vec3, to: DVec3) -> Vec3 {
-    p + frame.from_world.transform_point3(to).as_vec3()
+    Ok(Mesh::from_triangles(&ball)?)
 }
 
 fn largest(spacing: [f64; 3]) -> f64 {
@@ -231,11 +227,12 @@ fn given(frame: &Frame, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
         return Err(MethodError::invalid("start.mesh", problem));
     }
     let surface = Mesh::from_triangles(&local)?;
-    if measure(&surface.to_triangles()).volume <= 0.0 {
+    let triangles = surface.to_triangles();
+    if measure(&triangles).volume <= 0.0 {
         let problem = "the triangles face inwards; counter-clockwise seen from outside is needed";
         return Err(MethodError::invalid("start.mesh", problem));
     }
-    let pairs = count_crossings(&surface.to_triangles());
+    let pairs = count_crossings(&triangles);
     if pairs > 0 {
         return Err(MeshError::SelfIntersecting { pairs }.into());
     }

@@ -132,6 +132,9 @@ impl DeformableModel {
     }
 }
 
+/// Where FNV-1a begins.
+const HASH_START: u64 = 0xcbf2_9ce4_8422_2325;
+
 /// A number that tells volumes, frames and pyramids apart (FNV-1a over shape, place and intensities).
 pub(super) fn fingerprint(volume: &Volume, frame: usize, levels: usize) -> u64 {
     let mut hash = HASH_START;
@@ -148,8 +151,6 @@ pub(super) fn fingerprint(volume: &Volume, frame: usize, levels: usize) -> u64 {
 fn checksum(bytes: &[u8]) -> u64 {
     bytes.iter().fold(HASH_START, |hash, &byte| mixed(hash, u64::from(byte)))
 }
-
-const HASH_START: u64 = 0xcbf2_9ce4_8422_2325;
 
 fn mixed(hash: u64, word: u64) -> u64 {
     (hash ^ word).wrapping_mul(0x100_0000_01b3)
