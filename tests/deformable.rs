@@ -460,10 +460,12 @@ fn numbers_beyond_all_measure_push_or_are_refused() {
 #[test]
 fn small_time_steps_are_no_rest() {
     let volume = ball([24, 24, 24], 7.0);
-    let params = DeformableParams { time_step: 0.02, ..params(&volume, 0.5, 0.1, 0.0) };
-    let options = DeformableOptions { params: Some(params), ..Default::default() };
-    let mut model = DeformableModel::new(&volume, options).unwrap();
-    assert!((0..200).all(|_| !model.step().unwrap().done));
+    for (time_step, mass, iso) in [(0.02, 1.0, 0.5), (0.01, 100.0, 0.2)] {
+        let params = DeformableParams { time_step, mass, ..params(&volume, iso, 0.1, 0.0) };
+        let options = DeformableOptions { params: Some(params), ..Default::default() };
+        let mut model = DeformableModel::new(&volume, options).unwrap();
+        assert!((0..600).all(|_| !model.step().unwrap().done), "time step {time_step}, mass {mass}");
+    }
 }
 
 /// Small differences on top of a number that f32 cannot tell apart from its neighbours.
@@ -491,14 +493,15 @@ fn seeds_and_attractors_are_round_in_the_world() {
     for diameter in (size[1] - size[0]).to_array() {
         close("diameter", diameter, 18.0, 0.06);
     }
-    let top = middle + DVec3::Z * 9.0;
-    model
-        .set_attractors(vec![Attractor { point: top + DVec3::Z * 2.0, strength: 0.5, radius: 4.0 }])
-        .unwrap();
-    model.step().unwrap();
-    let after = measure(&model.surface()).bounds;
-    assert!(after[1].z > size[1].z + 0.1, "the attractor is felt at a distance of 2");
-    assert!((after[1].x - size[1].x).abs() < 1e-3, "and not at one of 10");
+    let mut moved_by = |point: DVec3| {
+        let before = measure(&model.surface()).bounds[1];
+        model.set_attractors(vec![Attractor { point, strength: 0.5, radius: 4.0 }]).unwrap();
+        model.step().unwrap();
+        measure(&model.surface()).bounds[1] - before
+    };
+    assert!(moved_by(middle + DVec3::Z * 14.0).length() < 1e-3, "not felt 5 above the top");
+    assert!(moved_by(middle + DVec3::X * 12.0).x > 0.05, "felt 3 beside it");
+    assert!(moved_by(middle + DVec3::Z * 11.0).z > 0.1, "felt 2 above the top");
 }
 
 /// A saved state brings its edge length along, and the bounds that follow from it.
