@@ -16,6 +16,7 @@ mod scenes;
 use common::Random;
 use std::ops::Range;
 use vesicle::math::{DVec3, Vec3};
+use vesicle::mesh::count_crossings;
 use vesicle::methods::deformable::{
     Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, Start,
 };
@@ -95,6 +96,8 @@ fn run(seed: u64) {
         let report = model.step().unwrap_or_else(|error| panic!("seed {seed}, step {step}: {error}"));
         assert_eq!(model.mesh().check(), Ok(()), "seed {seed}, step {step}");
         assert_eq!(i64::from(report.euler), model.mesh().euler(), "seed {seed}, step {step}");
+        let crossings = count_crossings(&model.mesh().to_triangles());
+        assert_eq!(crossings, 0, "seed {seed}, step {step}: {report:?}");
         match random.below(40) {
             0 => model.set_params(params(&mut random, &volume)).unwrap(),
             1 => {

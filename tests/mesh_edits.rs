@@ -4,6 +4,7 @@
 mod common;
 
 use common::{Random, torus_around};
+use std::collections::BTreeSet;
 use vesicle::math::Vec3;
 use vesicle::mesh::{EditError, Mesh, TriangleMesh, VectorKey, VertexId};
 #[cfg(target_arch = "wasm32")]
@@ -271,4 +272,71 @@ fn random_edits_keep_every_invariant() {
     let refused: usize =
         (0..20).map(|seed| run_random_edits(starts[seed % starts.len()], seed as u64, 5_000)).sum();
     assert!(refused > 1_000, "only {refused} edits were refused: refusals are not tested");
+}
+
+/// What a mesh is, without its versions.
+fn contents(mesh: &Mesh) -> Vec<u8> {
+    postcard::to_allocvec(mesh).unwrap()
+}
+
+type Placed = [(VertexId, [u32; 3]); 3];
+
+/// The triangles of a mesh: names and places of their corners.
+fn placed_triangles(mesh: &Mesh) -> BTreeSet<Placed> {
+    let corner = |v: VertexId| (v, mesh.position(v).to_array().map(f32::to_bits));
+    mesh.triangles().map(|names| names.map(corner)).collect()
+}
+
+/// Several random edits and moves, recorded. Returns whether they are then taken back.
+fn run_recorded_edits(mesh: &mut Mesh, random: &mut Random, what: &str) -> bool {
+    let before = mesh.clone();
+    mesh.begin();
+    for _ in 0..1 + random.below(4) {
+        let live: Vec<_> = mesh.vertices().collect();
+        if live.is_empty() {
+            break;
+        }
+        let moved = live[random.below(live.len())];
+        mesh.set_position(moved, mesh.position(moved) + Vec3::splat(random.unit()));
+        _ = random_edit(mesh, random, &live);
+    }
+    let (old, new) = (placed_triangles(&before), placed_triangles(mesh));
+    let changed: BTreeSet<[VertexId; 3]> = mesh.changed_triangles().into_iter().collect();
+    let expected = new.difference(&old).map(|corners| corners.map(|(v, _)| v)).collect();
+    assert_eq!(changed, expected, "{what}");
+    let touched: BTreeSet<VertexId> = mesh.touched().collect();
+    let is_known = |v: VertexId| v.index() < before.slots() && before.is_live(v);
+    let same = |v: VertexId| before.ring(v) == mesh.ring(v) && before.position(v) == mesh.position(v);
+    let untouched = mesh.vertices().filter(|v| !touched.contains(v));
+    assert!(untouched.into_iter().all(|v| is_known(v) && same(v)), "{what}");
+
+    let back = random.below(2) == 0;
+    if back {
+        mesh.roll_back();
+        assert!(contents(mesh) == contents(&before), "{what}: taken back, and not as it was");
+        assert_ne!(mesh.geometry_version(), before.geometry_version(), "{what}");
+    } else {
+        mesh.commit();
+    }
+    back
+}
+
+#[test]
+fn recorded_edits_are_known_and_can_be_taken_back() {
+    let starts: [fn() -> Mesh; 4] = [tetrahedron, sphere, || torus(3, 7), || torus(9, 3)];
+    for seed in 0..8 {
+        let mut random = Random(seed);
+        let start = starts[seed as usize % starts.len()];
+        let (mut mesh, _) = followed(start());
+        let mut taken_back = 0;
+        for round in 0..500 {
+            if mesh.vertex_count() == 0 || mesh.vertex_count() > 200 {
+                (mesh, _) = followed(start());
+            }
+            let what = format!("seed {seed}, round {round}");
+            taken_back += usize::from(run_recorded_edits(&mut mesh, &mut random, &what));
+            assert_eq!(mesh.check(), Ok(()), "{what}");
+        }
+        assert!(taken_back > 100, "only {taken_back} were taken back");
+    }
 }

@@ -65,6 +65,28 @@ impl Attributes {
         }
     }
 
+    /// Appends all data of one slot to `out`.
+    pub(super) fn get(&self, slot: usize, out: &mut Vec<f32>) {
+        self.vectors.iter().for_each(|v| out.extend(v[slot].to_array()));
+        out.extend(self.scalars.iter().map(|s| s[slot]));
+    }
+
+    /// Takes back what [`Self::get`] gave.
+    pub(super) fn set(&mut self, slot: usize, data: &[f32]) {
+        let (vectors, scalars) = data.split_at(3 * self.vectors.len());
+        for (to, from) in self.vectors.iter_mut().zip(vectors.chunks_exact(3)) {
+            to[slot] = Vec3::from_slice(from);
+        }
+        for (to, &from) in self.scalars.iter_mut().zip(scalars) {
+            to[slot] = from;
+        }
+    }
+
+    pub(super) fn truncate(&mut self, slots: usize) {
+        self.vectors.iter_mut().for_each(|v| v.truncate(slots));
+        self.scalars.iter_mut().for_each(|s| s.truncate(slots));
+    }
+
     /// Keeps slot `order[i]` as the new slot `i`.
     pub(super) fn reorder(&mut self, order: &[VertexId]) {
         for v in &mut self.vectors {

@@ -47,29 +47,38 @@ fn sound_corners(mesh: &TriangleMesh, &[a, b, c]: &[u32; 3]) -> Option<[Vec3; 3]
 
 fn cross(mesh: &TriangleMesh, s: [u32; 3], t: [u32; 3]) -> bool {
     let at = |v: u32| mesh.positions[v as usize];
-    match s.iter().filter(|v| t.contains(v)).count() {
-        0 => triangles_cross(s.map(at), t.map(at)),
+    triangles_meet((s, s.map(at)), (t, t.map(at)))
+}
+
+/// Whether two triangles, each by the names and the places of its corners, share more than their common corners and
+/// edges. Exact, as [`crossing_pairs`].
+pub fn triangles_meet<Name: Copy + PartialEq>(s: ([Name; 3], [Vec3; 3]), t: ([Name; 3], [Vec3; 3])) -> bool {
+    match s.0.iter().filter(|v| t.0.contains(v)).count() {
+        0 => triangles_cross(s.1, t.1),
         1 => {
-            let [shared, a, b] = rotated(s, |v| t.contains(&v)).map(at);
-            let [_, c, d] = rotated(t, |v| s.contains(&v)).map(at);
+            let [shared, a, b] = rotated(s, |v| t.0.contains(&v));
+            let [_, c, d] = rotated(t, |v| s.0.contains(&v));
             triangles_cross_sharing_vertex(shared, [a, b], [c, d])
         }
         2 => {
-            let [tip, u, v] = rotated(s, |v| !t.contains(&v)).map(at);
-            let [other_tip, ..] = rotated(t, |v| !s.contains(&v)).map(at);
+            let [tip, u, v] = rotated(s, |v| !t.0.contains(&v));
+            let [other_tip, ..] = rotated(t, |v| !s.0.contains(&v));
             triangles_fold_sharing_edge(u, v, tip, other_tip)
         }
-        _ => !collinear(s.map(at)),
+        _ => !collinear(s.1),
     }
 }
 
-/// The same triangle from the corner that is asked for.
-fn rotated([a, b, c]: [u32; 3], is_first: impl Fn(u32) -> bool) -> [u32; 3] {
+/// The places of the same triangle's corners from the one that is asked for.
+fn rotated<Name: Copy>(
+    ([a, b, _], [p, q, r]): ([Name; 3], [Vec3; 3]),
+    is_first: impl Fn(Name) -> bool,
+) -> [Vec3; 3] {
     if is_first(a) {
-        [a, b, c]
+        [p, q, r]
     } else if is_first(b) {
-        [b, c, a]
+        [q, r, p]
     } else {
-        [c, a, b]
+        [r, p, q]
     }
 }

@@ -44,11 +44,11 @@ impl Mesh {
         }
         let w = self.allocate(position);
         self.attributes.blend(w, u, v, 0.5);
-        self.rings[w.index()] = Ring::new([v, a, u, b]);
-        self.rings[u.index()].replace(v, w);
-        self.rings[v.index()].replace(u, w);
-        self.rings[a.index()].insert_after(u, w);
-        self.rings[b.index()].insert_after(v, w);
+        *self.ring_mut(w) = Ring::new([v, a, u, b]);
+        self.ring_mut(u).replace(v, w);
+        self.ring_mut(v).replace(u, w);
+        self.ring_mut(a).insert_after(u, w);
+        self.ring_mut(b).insert_after(v, w);
         self.half_edges += 6;
         self.topology_changed();
         Ok(w)
@@ -77,10 +77,10 @@ impl Mesh {
                 return Err(EditError::ValenceTooLow(end));
             }
         }
-        self.rings[u.index()].remove(v);
-        self.rings[v.index()].remove(u);
-        self.rings[a.index()].insert_after(u, b);
-        self.rings[b.index()].insert_after(v, a);
+        self.ring_mut(u).remove(v);
+        self.ring_mut(v).remove(u);
+        self.ring_mut(a).insert_after(u, b);
+        self.ring_mut(b).insert_after(v, a);
         self.topology_changed();
         Ok(())
     }
@@ -110,16 +110,17 @@ impl Mesh {
     /// common; [`EditError::ValenceTooLow`] at a vertex opposite, as on a tetrahedron.
     pub fn collapse(&mut self, u: VertexId, v: VertexId, position: Vec3) -> Result<(), EditError> {
         let Opposite { left: a, right: b } = self.can_collapse(u, v)?;
+        self.touch(u);
         self.attributes.blend(u, u, v, 0.5);
         self.positions[u.index()] = position;
         // Seen from v the order is u, b, outer neighbours, a; they take the place of v between b and a around u.
         let outer = self.ring(v).between(b, a);
         for &w in &outer {
-            self.rings[w.index()].replace(v, u);
+            self.ring_mut(w).replace(v, u);
         }
-        self.rings[u.index()].splice(v, &outer);
-        self.rings[a.index()].remove(v);
-        self.rings[b.index()].remove(v);
+        self.ring_mut(u).splice(v, &outer);
+        self.ring_mut(a).remove(v);
+        self.ring_mut(b).remove(v);
         self.release(v);
         self.half_edges -= 6;
         self.topology_changed();

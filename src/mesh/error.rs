@@ -54,6 +54,9 @@ pub enum EditError {
     /// The four vertices are not a component of their own.
     #[error("{0:?} is not a corner of a lone tetrahedron")]
     NotATetrahedron(VertexId),
+    /// Triangles would cross.
+    #[error("triangles would cross")]
+    WouldCross,
     /// No ids are left.
     #[error("the mesh holds as many vertices as it can name")]
     Full,

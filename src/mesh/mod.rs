@@ -21,6 +21,7 @@ mod edits;
 mod error;
 mod groups;
 mod ids;
+mod journal;
 mod measure;
 mod refine;
 mod report;
@@ -34,10 +35,11 @@ mod weld;
 
 pub use attributes::{ScalarKey, VectorKey};
 pub use check::Flaw;
-pub use crossing::{count_crossings, crossing_pairs};
+pub use crossing::{count_crossings, crossing_pairs, triangles_meet};
 pub use edits::Opposite;
 pub use error::{EditError, MeshError};
 pub use ids::VertexId;
+pub use journal::Triangles;
 pub use measure::{Measures, measure};
 pub use report::{MeshReport, report};
 pub use ring::Ring;
@@ -46,6 +48,7 @@ pub use triangles::TriangleMesh;
 
 use crate::math::Vec3;
 use attributes::Attributes;
+use journal::Journal;
 use serde::{Deserialize, Serialize};
 
 /// A closed oriented triangle mesh with dynamic connectivity.
@@ -57,6 +60,8 @@ pub struct Mesh {
     free: Vec<VertexId>,
     half_edges: usize,
     euler: i64,
+    #[serde(skip)]
+    journal: Journal,
     #[serde(skip)]
     topology_version: u32,
     #[serde(skip)]
@@ -171,6 +176,7 @@ impl Mesh {
     /// Puts `v` at `position`.
     #[inline]
     pub fn set_position(&mut self, v: VertexId, position: Vec3) {
+        self.touch(v);
         self.geometry_version = self.geometry_version.wrapping_add(1);
         self.positions[v.index()] = position;
     }
@@ -246,6 +252,7 @@ impl Mesh {
     fn allocate(&mut self, position: Vec3) -> VertexId {
         self.geometry_version = self.geometry_version.wrapping_add(1);
         if let Some(v) = self.free.pop() {
+            self.slot_taken(v);
             self.positions[v.index()] = position;
             return v;
         }
@@ -260,8 +267,9 @@ impl Mesh {
     }
 
     fn release(&mut self, v: VertexId) {
-        self.rings[v.index()] = Ring::default();
+        *self.ring_mut(v) = Ring::default();
         self.free.push(v);
+        self.slot_freed();
     }
 
     fn topology_changed(&mut self) {

@@ -62,13 +62,13 @@ impl Mesh {
         let left = ring.between(kept[next], kept[previous]);
         let right = ring.between(kept[previous], kept[next]);
         for &w in &right {
-            self.rings[w.index()].replace(kept[k], copies[k]);
+            self.ring_mut(w).replace(kept[k], copies[k]);
         }
         let close = |from, inner: &[VertexId], to| {
             Ring::new(std::iter::once(from).chain(inner.iter().copied()).chain([to]))
         };
-        self.rings[kept[k].index()] = close(kept[next], &left, kept[previous]);
-        self.rings[copies[k].index()] = close(copies[previous], &right, copies[next]);
+        *self.ring_mut(kept[k]) = close(kept[next], &left, kept[previous]);
+        *self.ring_mut(copies[k]) = close(copies[previous], &right, copies[next]);
     }
 
     /// Replaces the discs around `u` and `v` by a tube between them (axial change, section 3.3, figure 4). χ falls
@@ -116,8 +116,8 @@ impl Mesh {
         let n = rim.len();
         for i in 0..n {
             let (next, previous) = ((i + 1) % n, (i + n - 1) % n);
-            self.rings[spokes[i].index()].splice(centre, &[rim[i], rim[previous]]);
-            self.rings[rim[i].index()] = Ring::new([spokes[i], spokes[next], rim[next], rim[previous]]);
+            self.ring_mut(spokes[i]).splice(centre, &[rim[i], rim[previous]]);
+            *self.ring_mut(rim[i]) = Ring::new([spokes[i], spokes[next], rim[next], rim[previous]]);
         }
         self.release(centre);
         rim
@@ -138,14 +138,14 @@ impl Mesh {
             let met: Vec<VertexId> = tube.met_by_first(i).map(|j| second[j]).collect();
             for &s in &met {
                 let next = first[(i + 1) % first.len()];
-                self.rings[first[i].index()].insert_after(next, s);
+                self.ring_mut(first[i]).insert_after(next, s);
             }
         }
         for j in 0..second.len() {
             let met: Vec<VertexId> = tube.met_by_second(j).map(|i| first[i]).collect();
             for &r in met.iter().rev() {
                 let next = second[(j + 1) % second.len()];
-                self.rings[second[j].index()].insert_after(next, r);
+                self.ring_mut(second[j]).insert_after(next, r);
             }
         }
     }

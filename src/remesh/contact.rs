@@ -4,10 +4,11 @@ use super::{Resolver, Sampling};
 use crate::mesh::{Mesh, VertexId};
 
 /// Where the intermediary points of a joint lie on the spokes, from the centre. Nearer to the centre the tube is thin
-/// and is cut again at once; further out the strip around it is thinner than δ and collapses.
-const JOINT_REACH: f32 = 0.7;
+/// and is cut again at once; further out the strip around it is thinner than δ and collapses. The others are for where
+/// the first would cross something.
+const JOINT_REACHES: [f32; 4] = [0.7, 0.5, 0.35, 0.85];
 
-/// Two vertices in contact, nearest first.
+/// Two vertices in contact, the lower one first.
 struct Contact {
     square: f32,
     u: VertexId,
@@ -54,16 +55,14 @@ impl Resolver {
         if stirred.is_empty() {
             return contacts;
         }
-        let points = mesh.vertices().map(|v| (v, mesh.position(v)));
-        self.grid.rebuild(points, mesh.vertex_count(), sampling.contact());
+        self.embedding.follow(mesh);
         let mut is_stirred = vec![false; mesh.slots()];
         stirred.iter().for_each(|v| is_stirred[v.index()] = true);
         for &u in &stirred {
-            let ring = mesh.ring(u);
-            self.grid.near(mesh.position(u), |v, square| {
-                let counted_from_v = is_stirred[v.index()] && v < u;
-                if v != u && !counted_from_v && !ring.contains(v) {
-                    contacts.push(Contact { square, u, v });
+            self.embedding.company(mesh, u, sampling.contact(), |v, square| {
+                let counted_from_v = v < u && is_stirred[v.index()] && self.embedding.may_have_company(v);
+                if !counted_from_v {
+                    contacts.push(Contact { square, u: u.min(v), v: u.max(v) });
                 }
             });
         }
@@ -76,13 +75,14 @@ impl Resolver {
         if let Some(across) = longest_edge_between(mesh, u, v) {
             let (a, b, length) = across;
             // The fold at a short edge is no contact: its two wings cannot meet before one of them is collapsed.
-            if length <= square || mesh.flip(a, b).is_err() {
+            if length <= square || self.embedding.attempt(mesh, |mesh| mesh.flip(a, b)).is_err() {
                 return None;
             }
             self.changes.inversions += 1;
             return Some(true);
         }
-        let joint = mesh.join(u, v, JOINT_REACH).ok()?;
+        let mut join = |reach: f32| self.embedding.attempt(mesh, |mesh| mesh.join(u, v, reach)).ok();
+        let joint = JOINT_REACHES.into_iter().find_map(&mut join)?;
         self.changes.axial += 1;
         joint.first.iter().chain(&joint.second).for_each(|&w| self.touch_edited(w));
         Some(true)

@@ -4,8 +4,9 @@ use super::{Resolver, Sampling};
 use crate::math::Vec3;
 use crate::mesh::{Cut, EditError, Mesh, Opposite, VertexId};
 
-/// How far the two sides of a cut neck are moved apart, in δ. Left in place they cross as soon as they are smoothed.
-const CUT_PUSH: f32 = 0.75;
+/// How far the two sides of a cut neck are moved apart, in δ: the first that makes nothing cross. With less they are soon
+/// in contact again.
+const CUT_PUSHES: [f32; 4] = [0.75, 0.4, 0.2, 0.05];
 
 /// The share of the way to its own side's neighbours that a side is pushed at most, so that no triangle turns over.
 const CUT_PUSH_LIMIT: f32 = 0.6;
@@ -55,12 +56,12 @@ impl Resolver {
         let (a, b) = (mesh.position(left), mesh.position(right));
         let crowded = [a, b].iter().any(|p| p.distance_squared(middle) < square(sampling.shortest()));
         let flat = a.distance_squared(b) < mesh.position(u).distance_squared(mesh.position(v));
-        if crowded && flat && mesh.flip(u, v).is_ok() {
+        if crowded && flat && self.embedding.attempt(mesh, |mesh| mesh.flip(u, v)).is_ok() {
             self.changes.inversions += 1;
         } else if !self.has_room(mesh) {
             return Ok(false);
         } else {
-            let w = mesh.split(u, v, middle)?;
+            let w = self.embedding.attempt(mesh, |mesh| mesh.split(u, v, middle))?;
             self.changes.creations += 1;
             self.touch_edited(w);
         }
@@ -77,14 +78,7 @@ impl Resolver {
         v: VertexId,
     ) -> Result<bool, EditError> {
         match mesh.can_collapse(u, v) {
-            Ok(_) => {
-                let position = collapse_point(mesh, u, v);
-                mesh.collapse(u, v, position)?;
-                self.changes.deletions += 1;
-                // At the end of the queue: trying the survivor again at once piles up valence.
-                self.touch_edited(u);
-                Ok(true)
-            }
+            Ok(_) => self.collapse(mesh, u, v),
             Err(EditError::NeckInTheWay(_)) => self.cut_neck(mesh, sampling, u, v),
             Err(EditError::ValenceTooLow(_)) if mesh.is_tetrahedron(u) => {
                 mesh.remove_tetrahedron(u)?;
@@ -93,6 +87,23 @@ impl Resolver {
             }
             Err(refusal) => Err(refusal),
         }
+    }
+
+    /// Draws the edge together at the best of the places where nothing crosses.
+    fn collapse(&mut self, mesh: &mut Mesh, u: VertexId, v: VertexId) -> Result<bool, EditError> {
+        for place in collapse_places(mesh, u, v) {
+            match self.embedding.attempt(mesh, |mesh| mesh.collapse(u, v, place)) {
+                Ok(()) => {
+                    self.changes.deletions += 1;
+                    // At the end of the queue: trying the survivor again at once piles up valence.
+                    self.touch_edited(u);
+                    return Ok(true);
+                }
+                Err(EditError::WouldCross) => {}
+                Err(refusal) => return Err(refusal),
+            }
+        }
+        Err(EditError::WouldCross)
     }
 
     /// Annular change through the edge `uv` and the common neighbour that makes the shortest ring.
@@ -113,9 +124,17 @@ impl Resolver {
         let Some(o) = third.min_by(|a, b| around(a).total_cmp(&around(b))) else {
             return Ok(false);
         };
-        let cut = mesh.cut(u, v, o)?;
+        let mut apart = |push: f32| {
+            self.embedding.attempt(mesh, |mesh| {
+                let cut = mesh.cut(u, v, o)?;
+                part(mesh, cut, push * sampling.shortest());
+                Ok(cut)
+            })
+        };
+        let Some(cut) = CUT_PUSHES.into_iter().find_map(|push| apart(push).ok()) else {
+            return Err(EditError::WouldCross);
+        };
         self.changes.annular += 1;
-        part(mesh, cut, CUT_PUSH * sampling.shortest());
         for side in [cut.kept, cut.copies] {
             if !self.remove_speck(mesh, sampling, side[0]) {
                 side.into_iter().for_each(|w| self.touch_edited(w));
@@ -125,12 +144,12 @@ impl Resolver {
     }
 }
 
-/// The middle of the edge, or that end of it at which no triangle turns over; the middle where all three turn one.
-fn collapse_point(mesh: &Mesh, u: VertexId, v: VertexId) -> Vec3 {
+/// The middle of the edge and its ends, in this order, those first at which no triangle turns over.
+fn collapse_places(mesh: &Mesh, u: VertexId, v: VertexId) -> [Vec3; 3] {
     let (p, q) = (mesh.position(u), mesh.position(v));
-    let middle = (p + q) * 0.5;
-    let keeps = |&at: &Vec3| !turns_over(mesh, u, v, at) && !turns_over(mesh, v, u, at);
-    [middle, p, q].into_iter().find(keeps).unwrap_or(middle)
+    let mut places = [(p + q) * 0.5, p, q];
+    places.sort_by_cached_key(|&at| turns_over(mesh, u, v, at) || turns_over(mesh, v, u, at));
+    places
 }
 
 /// Whether moving `u` to `to` turns over a triangle around it that does not have `v` as a corner.

@@ -8,10 +8,12 @@
 mod changes;
 mod contact;
 mod edges;
+mod embedding;
 mod resolve;
 mod sampling;
 mod specks;
 
 pub use changes::Changes;
+pub use embedding::Embedding;
 pub use resolve::{Resolver, Waiting};
 pub use sampling::Sampling;

@@ -1,8 +1,8 @@
 //! The loop of figure 9: edges, then contact, until every bound holds.
 
-use super::{Changes, Sampling};
+use super::{Changes, Embedding, Sampling};
+use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
-use crate::spatial::PointGrid;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -15,7 +15,7 @@ const PASSES: usize = 8;
 /// any number.
 const EDITS_PER_VERTEX: usize = 6;
 
-/// Keeps the bounds of a [`Sampling`] on a mesh that moves.
+/// Keeps the bounds of a [`Sampling`] on a mesh that moves, and keeps it from crossing itself.
 #[derive(Clone, Debug)]
 pub struct Resolver {
     most_vertices: usize,
@@ -29,7 +29,7 @@ pub struct Resolver {
     is_stirred: Vec<bool>,
     /// Vertices made or displaced by the last call.
     edited: Vec<VertexId>,
-    pub(super) grid: PointGrid,
+    pub(super) embedding: Embedding,
     pub(super) changes: Changes,
 }
 
@@ -62,7 +62,7 @@ impl Resolver {
             stirred: Vec::new(),
             is_stirred: Vec::new(),
             edited: Vec::new(),
-            grid: PointGrid::default(),
+            embedding: Embedding::default(),
             changes: Changes::default(),
         }
     }
@@ -87,6 +87,7 @@ impl Resolver {
     ///
     /// Vertices that are not named are looked at only where an edit or a contact reaches them.
     pub fn resolve(&mut self, mesh: &mut Mesh, sampling: Sampling, active: &[VertexId]) -> Changes {
+        self.embedding.follow_with(mesh, sampling.longest());
         self.changes = Changes::default();
         self.full = false;
         self.edits_left = EDITS_PER_VERTEX * mesh.vertex_count() + 1000;
@@ -102,6 +103,12 @@ impl Resolver {
             }
         }
         self.changes
+    }
+
+    /// Moves the vertices as [`Embedding::carry`] does.
+    pub fn carry(&mut self, mesh: &mut Mesh, sampling: Sampling, ways: &mut [Vec3]) -> Vec<(VertexId, f32)> {
+        self.embedding.follow_with(mesh, sampling.longest());
+        self.embedding.carry(mesh, ways)
     }
 
     /// The vertices that edits of the last call made or displaced; some may be gone again.
@@ -172,7 +179,6 @@ fn mark(flags: &mut Vec<bool>, v: VertexId) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Vec3;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 

@@ -20,7 +20,7 @@ impl Resolver {
         if members.len() > LARGEST_SPECK || volume(mesh, &members) >= sampling.smallest_volume() {
             return false;
         }
-        mesh.remove_component(v);
+        self.embedding.remove_component(mesh, v);
         self.changes.vanished += 1;
         true
     }

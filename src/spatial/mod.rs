@@ -1,9 +1,9 @@
 //! Finding what is near: points by points, triangles by points, rays and planes.
 
-mod grid;
 mod section;
+mod stars;
 mod tree;
 
-pub use grid::PointGrid;
 pub use section::cross_section;
+pub use stars::{Nearness, Star, StarGrid};
 pub use tree::{SurfacePoint, TriangleTree};

@@ -54,7 +54,7 @@ pub use params::{DeformableParams, Integrator, RestLength, Topology, param_specs
 pub use start::Start;
 
 use super::{MethodError, StepReport, Times};
-use crate::math::{DAffine3, DVec3};
+use crate::math::{DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, ScalarKey, TriangleMesh, VectorKey, VertexId};
 use crate::remesh::{Changes, Resolver, Sampling};
 use crate::volume::Volume;
@@ -251,7 +251,9 @@ impl DeformableModel {
             params: &self.params,
             delta,
         };
-        self.movement = advance(&mut self.mesh, self.keys, &mut self.forces, &world);
+        let carry =
+            |mesh: &mut Mesh, ways: &mut [Vec3]| self.resolver.carry(mesh, Sampling::new(delta), ways);
+        self.movement = advance(&mut self.mesh, self.keys, &mut self.forces, &world, carry);
         times.add("normals", normals - begin);
         times.add("motion", (self.clock)() - normals);
     }

@@ -6,7 +6,7 @@ use super::forces::{ForceScale, Forces, Pull};
 use super::image::LevelImage;
 use super::params::{DeformableParams, Integrator};
 use crate::math::Vec3;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, VertexId};
 
 /// How much the mesh moved in one iteration.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,28 +40,41 @@ impl World<'_> {
     }
 }
 
-/// Moves every vertex by one time step. `forces` holds normals and L of the mesh as it is.
-pub(super) fn advance(mesh: &mut Mesh, keys: Keys, forces: &mut Forces, world: &World) -> Movement {
-    let moves = match world.params.integrator {
+/// Moves every vertex by one time step, as far as `carry` can. `forces` holds normals and L of the mesh as it is.
+///
+/// `carry` moves vertices by ways, by slot; it leaves there what they went, and tells which share of its way each of the
+/// vertices went that it held back.
+pub(super) fn advance(
+    mesh: &mut Mesh,
+    keys: Keys,
+    forces: &mut Forces,
+    world: &World,
+    carry: impl FnOnce(&mut Mesh, &mut [Vec3]) -> Vec<(VertexId, f32)>,
+) -> Movement {
+    let mut ways = match world.params.integrator {
         Integrator::Euler => euler(mesh, keys, forces, world),
         Integrator::RungeKutta => runge_kutta(mesh, keys, forces, world),
     };
-    apply(mesh, keys, forces, world, moves)
+    bound(mesh, keys, world, &mut ways);
+    let held = carry(mesh, &mut ways);
+    let velocities = mesh.vector_mut(keys.velocity);
+    held.into_iter().for_each(|(v, share)| velocities[v.index()] *= share);
+    measure(mesh, keys, forces, world, &ways)
 }
 
-/// Semi-implicit Euler: the new velocity moves the vertex. The velocity attribute holds it; no moves are returned.
-fn euler(mesh: &mut Mesh, keys: Keys, forces: &mut Forces, world: &World) -> Option<Vec<Vec3>> {
+/// Semi-implicit Euler: the new velocity moves the vertex. Returns the way of each vertex.
+fn euler(mesh: &mut Mesh, keys: Keys, forces: &mut Forces, world: &World) -> Vec<Vec3> {
     world.act(forces, mesh, mesh.positions(), mesh.vector(keys.velocity));
     let &DeformableParams { time_step, mass, damping, .. } = world.params;
     let (step, damping) = (time_step as f32 / mass as f32, damping as f32);
     for (v, force) in mesh.vector_mut(keys.velocity).iter_mut().zip(&forces.force) {
         *v += (*force - *v * damping) * step;
     }
-    None
+    mesh.vector(keys.velocity).iter().map(|v| *v * time_step as f32).collect()
 }
 
 /// The classical fourth-order method on positions and velocities; returns the way of each vertex.
-fn runge_kutta(mesh: &mut Mesh, keys: Keys, forces: &mut Forces, world: &World) -> Option<Vec<Vec3>> {
+fn runge_kutta(mesh: &mut Mesh, keys: Keys, forces: &mut Forces, world: &World) -> Vec<Vec3> {
     let &DeformableParams { time_step, mass, damping, .. } = world.params;
     let (step, mass, damping) = (time_step as f32, mass as f32, damping as f32);
     let (x0, v0) = (mesh.positions().to_vec(), mesh.vector(keys.velocity).to_vec());
@@ -85,38 +98,45 @@ fn runge_kutta(mesh: &mut Mesh, keys: Keys, forces: &mut Forces, world: &World) 
     for (v, gain) in mesh.vector_mut(keys.velocity).iter_mut().zip(gain) {
         *v += gain;
     }
-    Some(way)
+    way
 }
 
-/// Bounds each move, scales the velocity with it, and moves the vertices.
-fn apply(mesh: &mut Mesh, keys: Keys, forces: &Forces, world: &World, moves: Option<Vec<Vec3>>) -> Movement {
+/// Shortens ways that are too long or lead out of the domain, and the velocities with them. Free slots stay where they
+/// are.
+fn bound(mesh: &mut Mesh, keys: Keys, world: &World, ways: &mut [Vec3]) {
     let &World { domain, params, delta, .. } = world;
-    let (step, limit) = (params.time_step as f32, params.max_move as f32 * delta);
-    let live: Vec<bool> = mesh.rings().iter().map(|ring| !ring.is_empty()).collect();
-    let count = mesh.vertex_count();
-    let calm = mesh.scalar(keys.calm).to_vec();
-    mesh.scalar_mut(keys.calm).iter_mut().for_each(|calm| *calm += 1.0);
-    let (positions, velocities) = mesh.positions_and_vector_mut(keys.velocity);
-    let mut movement = Movement::default();
-    for i in (0..live.len()).filter(|&i| live[i]) {
-        let mut way = moves.as_ref().map_or(velocities[i] * step, |moves| moves[i]);
+    let limit = params.max_move as f32 * delta;
+    for (i, way) in ways.iter_mut().enumerate() {
+        if mesh.rings()[i].is_empty() {
+            *way = Vec3::ZERO;
+            continue;
+        }
         let length = way.length();
         if length > limit {
-            way *= limit / length;
-            velocities[i] *= limit / length;
+            *way *= limit / length;
+            mesh.vector_mut(keys.velocity)[i] *= limit / length;
         }
-        let to = positions[i] + way;
-        if !domain.bounds.contains(to) {
-            way = domain.hold(to) - positions[i];
-            velocities[i] = way * (1.0 / step);
-        }
-        positions[i] += way;
-        let along = (way.dot(forces.normal[i]) / (step * delta)).abs();
-        movement.energy += f64::from(along) * f64::from(along);
-        if along > movement.fastest && calm[i] >= CALM {
-            movement.fastest = along;
+        let from = mesh.positions()[i];
+        if !domain.bounds.contains(from + *way) {
+            *way = domain.hold(from + *way) - from;
+            mesh.vector_mut(keys.velocity)[i] = *way * (1.0 / params.time_step as f32);
         }
     }
-    movement.energy *= 0.5 * params.mass / count.max(1) as f64;
+}
+
+/// How much the mesh moved by `ways`.
+fn measure(mesh: &mut Mesh, keys: Keys, forces: &Forces, world: &World, ways: &[Vec3]) -> Movement {
+    let per_time = 1.0 / (world.params.time_step as f32 * world.delta);
+    let mut movement = Movement::default();
+    for (i, calm) in mesh.scalar_mut(keys.calm).iter_mut().enumerate() {
+        // Free slots have no way.
+        let along = (ways[i].dot(forces.normal[i]) * per_time).abs();
+        movement.energy += f64::from(along) * f64::from(along);
+        if along > movement.fastest && *calm >= CALM {
+            movement.fastest = along;
+        }
+        *calm += 1.0;
+    }
+    movement.energy *= 0.5 * world.params.mass / mesh.vertex_count().max(1) as f64;
     movement
 }

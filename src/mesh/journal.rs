@@ -1,0 +1,160 @@
+//! Edits that can be taken back.
+
+use super::{Mesh, Ring, VertexId};
+use crate::math::Vec3;
+use smallvec::SmallVec;
+
+/// What edits have changed since [`Mesh::begin`]: each slot as it was before it was first touched.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Journal {
+    touched: Vec<Touched>,
+    /// Attributes of the touched slots, one slot after the other.
+    attributes: Vec<f32>,
+    /// What became of the list of free slots, in order.
+    slots_taken_and_freed: Vec<SlotChange>,
+    slots: usize,
+    half_edges: usize,
+    euler: i64,
+    /// Storage kept from one journal to the next; `false` while nothing is recorded.
+    open: bool,
+}
+
+/// A vertex as it was.
+#[derive(Clone, Debug, PartialEq)]
+struct Touched {
+    vertex: VertexId,
+    ring: Ring,
+    position: Vec3,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum SlotChange {
+    Taken(VertexId),
+    Freed,
+}
+
+/// Triangles by their corners, each from its lowest id on.
+pub type Triangles = SmallVec<[[VertexId; 3]; 16]>;
+
+impl Mesh {
+    /// Records edits from now on, until [`Mesh::commit`] keeps them or [`Mesh::roll_back`] takes them back.
+    ///
+    /// Edits that touch much of the mesh are slow while they are recorded. Recording begins anew where it was on already.
+    pub fn begin(&mut self) {
+        let journal = &mut self.journal;
+        journal.touched.clear();
+        journal.attributes.clear();
+        journal.slots_taken_and_freed.clear();
+        journal.slots = self.rings.len();
+        journal.half_edges = self.half_edges;
+        journal.euler = self.euler;
+        journal.open = true;
+    }
+
+    /// Keeps the edits since [`Mesh::begin`].
+    pub fn commit(&mut self) {
+        self.journal.open = false;
+    }
+
+    /// Takes back the edits since [`Mesh::begin`]; versions count on.
+    pub fn roll_back(&mut self) {
+        let journal = std::mem::take(&mut self.journal);
+        if !journal.open {
+            self.journal = journal;
+            return;
+        }
+        let [vectors, scalars] = self.attributes.counts();
+        let width = 3 * vectors + scalars;
+        for (k, was) in journal.touched.iter().enumerate() {
+            let slot = was.vertex.index();
+            self.rings[slot] = was.ring.clone();
+            self.positions[slot] = was.position;
+            self.attributes.set(slot, &journal.attributes[k * width..(k + 1) * width]);
+        }
+        for change in journal.slots_taken_and_freed.iter().rev() {
+            match *change {
+                SlotChange::Taken(v) => self.free.push(v),
+                SlotChange::Freed => _ = self.free.pop(),
+            }
+        }
+        self.rings.truncate(journal.slots);
+        self.positions.truncate(journal.slots);
+        self.attributes.truncate(journal.slots);
+        self.half_edges = journal.half_edges;
+        self.euler = journal.euler;
+        self.topology_changed();
+        self.journal = Journal { open: false, ..journal };
+    }
+
+    /// The vertices that edits since [`Mesh::begin`] touched, those that are gone included: moved, made, deleted or
+    /// given other neighbours.
+    pub fn touched(&self) -> impl Iterator<Item = VertexId> + '_ {
+        let made = (self.journal.slots..self.slots()).map(VertexId::from_index);
+        self.journal.touched.iter().map(|was| was.vertex).chain(made)
+    }
+
+    /// The triangles that edits since [`Mesh::begin`] made or moved, each once.
+    pub fn changed_triangles(&self) -> Triangles {
+        let mut found = Triangles::new();
+        for was in &self.journal.touched {
+            let ring = self.ring(was.vertex);
+            let all = was.ring.is_empty() || was.position != self.position(was.vertex);
+            let pairs = ring.pairs().filter(|&(a, b)| all || was.ring.after(a) != Some(b));
+            found.extend(pairs.map(|(a, b)| from_lowest([was.vertex, a, b])));
+        }
+        for v in (self.journal.slots..self.slots()).map(VertexId::from_index) {
+            found.extend(self.ring(v).pairs().map(|(a, b)| from_lowest([v, a, b])));
+        }
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
+    /// To be called before the slot of `v` is changed in any way.
+    #[inline]
+    pub(super) fn touch(&mut self, v: VertexId) {
+        if self.journal.open {
+            self.record(v);
+        }
+    }
+
+    fn record(&mut self, v: VertexId) {
+        let journal = &mut self.journal;
+        if v.index() >= journal.slots || journal.touched.iter().any(|was| was.vertex == v) {
+            return;
+        }
+        let (ring, position) = (self.rings[v.index()].clone(), self.positions[v.index()]);
+        journal.touched.push(Touched { vertex: v, ring, position });
+        self.attributes.get(v.index(), &mut journal.attributes);
+    }
+
+    pub(super) fn slot_taken(&mut self, v: VertexId) {
+        if self.journal.open {
+            self.journal.slots_taken_and_freed.push(SlotChange::Taken(v));
+            self.record(v);
+        }
+    }
+
+    pub(super) fn slot_freed(&mut self) {
+        if self.journal.open {
+            self.journal.slots_taken_and_freed.push(SlotChange::Freed);
+        }
+    }
+
+    /// The ring of `v`, to be changed.
+    #[inline]
+    pub(super) fn ring_mut(&mut self, v: VertexId) -> &mut Ring {
+        self.touch(v);
+        &mut self.rings[v.index()]
+    }
+}
+
+fn from_lowest([a, b, c]: [VertexId; 3]) -> [VertexId; 3] {
+    if a < b && a < c {
+        [a, b, c]
+    } else if b < c {
+        [b, c, a]
+    } else {
+        [c, a, b]
+    }
+}

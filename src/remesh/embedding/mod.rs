@@ -1,0 +1,153 @@
+//! Keeps a mesh from crossing itself: moves are held back, edits taken back, before anything crosses.
+//!
+//! The mesh did not cross itself before; so there is always a way back to a mesh that does not. What is near is found
+//! through a grid that follows the mesh ([`StarGrid`]); whether it crosses is decided exactly.
+//!
+//! Two triangles cross in one of three ways, each looked for where it can be:
+//! - they have a corner in common: around each vertex (`star`);
+//! - a corner of one is a neighbour of a corner of the other: around each edge (`star`);
+//! - else two corners that are no neighbours are near each other: the end P of an edge of length `a` that meets a
+//!   triangle with edges up to `b` and that corner A of the triangle which is nearest to the meeting point have
+//!   |PA|² ≤ a²/4 + b²/3 for one of the two ends (`motion`).
+
+mod motion;
+mod patch;
+mod star;
+
+use crate::mesh::{EditError, Mesh, VertexId};
+use crate::spatial::StarGrid;
+use motion::UNKNOWN;
+use star::longest_edge;
+
+/// 1/√3, rounded up: the distance of a point of a triangle from its nearest corner, in the triangle's longest edge.
+const NEAREST_CORNER: f32 = 0.577_351;
+
+/// √(1/4 + 1/3), rounded up: the distance between corners of two triangles that cross, in the longest edge of both.
+const PIERCING: f32 = 0.763_763;
+
+/// How far a vertex may move from where it was looked at before it is looked at again, in the ordinary edge. With more,
+/// fewer vertices have the room for it; with less, they are looked at more often.
+const FREEDOM: f32 = 0.008;
+
+/// Keeps one mesh embedded.
+///
+/// A vertex that was looked at and found to have room around it is free: it is not looked at again before it has moved by
+/// its freedom. Which vertices are free has no influence on what is found.
+#[derive(Clone, Debug, Default)]
+pub struct Embedding {
+    grid: StarGrid,
+    /// An edge that is longer than most of the mesh.
+    edge: f32,
+    /// By vertex, the pairs of triangles it has no room for to move freely, and must be looked at for after every move.
+    tight: Vec<u8>,
+    /// By vertex, the pairs it is to be looked at for now, and the vertices that have any.
+    doubts: Vec<u8>,
+    doubtful: Vec<VertexId>,
+    /// The version of the mesh's geometry that is known here.
+    version: Option<u32>,
+    /// A vertex is marked where its entry is the newest mark.
+    marks: Vec<u32>,
+    newest: u32,
+    found: Vec<VertexId>,
+}
+
+impl Embedding {
+    /// As [`Self::follow`]. `edge` is longer than most of its edges; it makes a
+    /// difference to speed only.
+    pub fn follow_with(&mut self, mesh: &Mesh, edge: f32) {
+        if self.edge != edge {
+            self.edge = edge;
+            self.version = None;
+        }
+        self.follow(mesh);
+    }
+
+    /// Follows `mesh`, whatever was done to it since the last time.
+    pub fn follow(&mut self, mesh: &Mesh) {
+        if self.version == Some(mesh.geometry_version()) {
+            return;
+        }
+        self.grid = StarGrid::new(self.edge, FREEDOM * self.edge, mesh.slots());
+        self.tight = vec![UNKNOWN; mesh.slots()];
+        for v in mesh.vertices() {
+            self.grid.set(v, mesh.position(v), longest_edge(mesh, v));
+        }
+        self.version = Some(mesh.geometry_version());
+    }
+
+    /// Makes an edit, or several as one, and takes it back where triangles would cross.
+    ///
+    /// # Errors
+    /// That of the edit; [`EditError::WouldCross`]. The mesh is then as it was.
+    pub fn attempt<T>(
+        &mut self,
+        mesh: &mut Mesh,
+        edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
+    ) -> Result<T, EditError> {
+        self.follow(mesh);
+        mesh.begin();
+        let mut done = edit(mesh);
+        if done.is_ok() && self.changes_cross(mesh) {
+            done = Err(EditError::WouldCross);
+        }
+        if done.is_ok() {
+            self.follow_changes(mesh);
+            mesh.commit();
+        } else {
+            mesh.roll_back();
+        }
+        self.version = Some(mesh.geometry_version());
+        done
+    }
+
+    /// Deletes the component of `v` and returns how many vertices it had.
+    pub fn remove_component(&mut self, mesh: &mut Mesh, v: VertexId) -> usize {
+        self.follow(mesh);
+        let members = mesh.component_of(v, usize::MAX);
+        members.iter().for_each(|&w| self.grid.remove(w));
+        let count = mesh.remove_component(v);
+        self.version = Some(mesh.geometry_version());
+        count
+    }
+
+    /// Takes the changes since [`Mesh::begin`] into the grid.
+    fn follow_changes(&mut self, mesh: &Mesh) {
+        self.tight.resize(mesh.slots(), UNKNOWN);
+        for v in mesh.touched() {
+            self.tight[v.index()] = UNKNOWN;
+            if mesh.is_live(v) {
+                self.grid.set(v, mesh.position(v), longest_edge(mesh, v));
+            } else {
+                self.grid.remove(v);
+            }
+        }
+        // Neighbours of what moved have longer edges, too.
+        for names in mesh.changed_triangles() {
+            let [a, b, c] = names.map(|v| mesh.position(v));
+            let square = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
+            for v in names {
+                self.tight[v.index()] = UNKNOWN;
+                self.grid.stretch(v, square.sqrt());
+            }
+        }
+    }
+
+    /// Takes all marks away.
+    fn new_marks(&mut self, mesh: &Mesh) {
+        self.marks.resize(mesh.slots(), 0);
+        self.newest = self.newest.wrapping_add(1);
+        if self.newest == 0 {
+            self.marks.fill(0);
+            self.newest = 1;
+        }
+    }
+
+    /// Marks `v` and says whether it was not.
+    fn mark(&mut self, v: VertexId) -> bool {
+        std::mem::replace(&mut self.marks[v.index()], self.newest) != self.newest
+    }
+
+    fn is_marked(&self, v: VertexId) -> bool {
+        self.marks[v.index()] == self.newest
+    }
+}

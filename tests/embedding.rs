@@ -1,0 +1,162 @@
+//! A mesh that is moved and edited at random never crosses itself.
+
+#![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
+
+mod common;
+
+use common::{Random, torus_around};
+use vesicle::math::Vec3;
+use vesicle::mesh::{EditError, Mesh, TriangleMesh, VertexId, count_crossings};
+use vesicle::remesh::{Embedding, Resolver, Sampling};
+#[cfg(target_arch = "wasm32")]
+use wasm_bindgen_test::wasm_bindgen_test as test;
+
+/// Longer than most edges of the meshes below.
+const EDGE: f32 = 2.5;
+
+fn embedded(mesh: &Mesh) -> bool {
+    count_crossings(&mesh.to_triangles()) == 0
+}
+
+/// Two spheres and two tori, side by side with little between them.
+fn crowd() -> Mesh {
+    let mut mesh = Mesh::icosphere(Vec3::ZERO, 4.0, 1.8).unwrap();
+    mesh.append(&Mesh::icosphere(Vec3::X * 8.5, 4.0, 2.4).unwrap()).unwrap();
+    for (x, size) in [(4.0, [24, 8]), (20.5, [40, 12])] {
+        let torus: TriangleMesh = torus_around(Vec3::new(x, 12.5, 0.0), size, [6.0, 1.8]);
+        mesh.append(&Mesh::from_triangles(&torus).unwrap()).unwrap();
+    }
+    mesh
+}
+
+/// A way for every vertex: a common drift of each region, and something of its own.
+fn random_ways(mesh: &Mesh, random: &mut Random, size: f32) -> Vec<Vec3> {
+    let mut any = || Vec3::new(random.unit(), random.unit(), random.unit()) * 2.0 - 1.0;
+    let (drift, place) = (any(), any());
+    let regional = |p: Vec3| drift * libm::sinf(p.dot(place));
+    mesh.positions().iter().map(|&p| (regional(p) + any() * 0.3) * size).collect()
+}
+
+/// Which vertices are looked at must not matter: one that has followed from the beginning and one that knows nothing
+/// carry the same mesh to the same place.
+#[test]
+fn a_mesh_carried_at_random_never_crosses_itself() {
+    for seed in 0..12 {
+        let mut random = Random(seed);
+        let mut mesh = crowd();
+        let mut follower = Embedding::default();
+        let mut held = 0;
+        for step in 0..60 {
+            let what = format!("seed {seed}, step {step}");
+            let size = [0.5, 0.1, 0.02, 0.004][random.below(4)];
+            let mut ways = random_ways(&mesh, &mut random, size);
+            let (mut other, mut other_ways) = (mesh.clone(), ways.clone());
+            let before = mesh.positions().to_vec();
+
+            follower.follow_with(&mesh, EDGE);
+            let shares = follower.carry(&mut mesh, &mut ways);
+            let mut stranger = Embedding::default();
+            stranger.follow_with(&other, EDGE);
+            assert_eq!(stranger.carry(&mut other, &mut other_ways), shares, "{what}");
+
+            assert!(mesh.positions() == other.positions(), "{what}");
+            assert!(embedded(&mesh), "{what}");
+            for (i, &p) in mesh.positions().iter().enumerate() {
+                assert_eq!(p, before[i] + ways[i], "{what}");
+            }
+            assert!(shares.iter().all(|&(_, share)| (0.0..1.0).contains(&share)), "{what}");
+            held += shares.len();
+        }
+        assert!(held > 0, "seed {seed}: nothing was ever held back");
+    }
+}
+
+/// Two spheres pushed into each other come to rest on each other; the rest of them goes on.
+#[test]
+fn spheres_pushed_together_flatten() {
+    let mut mesh = Mesh::icosphere(-Vec3::X * 4.5, 4.0, 1.5).unwrap();
+    mesh.append(&Mesh::icosphere(Vec3::X * 4.5, 4.0, 1.5).unwrap()).unwrap();
+    let far = |mesh: &Mesh| mesh.positions().iter().fold(0.0f32, |far, p| far.max(p.x));
+    let began = far(&mesh);
+    let mut embedding = Embedding::default();
+    for _ in 0..20 {
+        let mut ways: Vec<Vec3> = mesh.positions().iter().map(|p| Vec3::X * 0.1 * -p.x.signum()).collect();
+        embedding.follow_with(&mesh, EDGE);
+        embedding.carry(&mut mesh, &mut ways);
+        assert!(embedded(&mesh));
+    }
+    let gone = began - far(&mesh);
+    assert!((gone - 2.0).abs() < 1e-3, "the far side went {gone}");
+}
+
+/// A large triangle mesh beside small ones, all vertices moved far: found across all sizes.
+#[test]
+fn large_and_small_triangles_do_not_cross() {
+    let mut mesh = Mesh::icosahedron(Vec3::ZERO, 40.0);
+    for k in 0..6 {
+        let turn = std::f32::consts::TAU * k as f32 / 6.0;
+        let centre = Vec3::new(libm::cosf(turn), libm::sinf(turn), 0.0) * 25.0;
+        mesh.append(&Mesh::icosphere(centre, 2.0, 1.0).unwrap()).unwrap();
+    }
+    assert!(embedded(&mesh));
+    let mut embedding = Embedding::default();
+    for _ in 0..30 {
+        // The small spheres fly outwards, the large one shrinks.
+        let mut ways: Vec<Vec3> = mesh.positions().iter().map(|p| *p * 0.02).collect();
+        ways[..12].iter_mut().for_each(|way| *way *= -0.5);
+        embedding.follow_with(&mesh, EDGE);
+        embedding.carry(&mut mesh, &mut ways);
+        assert!(embedded(&mesh));
+    }
+}
+
+#[test]
+fn an_edit_that_would_cross_is_taken_back() {
+    // A plate with a sphere just above it: drawing an edge of the plate together at a place above the sphere's bottom
+    // would pierce it.
+    let mut mesh = Mesh::icosphere(Vec3::ZERO, 4.0, 1.5).unwrap();
+    mesh.append(&Mesh::icosphere(Vec3::X * 8.2, 4.0, 1.5).unwrap()).unwrap();
+    let nearest = |mesh: &Mesh| {
+        let distance = |v: &VertexId| mesh.position(*v).distance(Vec3::X * 4.0);
+        mesh.vertices().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
+    };
+    let u = nearest(&mesh);
+    let v = mesh.ring(u).as_slice()[0];
+    let before = mesh.to_triangles();
+    let mut embedding = Embedding::default();
+    embedding.follow_with(&mesh, EDGE);
+    let piercing = Vec3::X * 5.0;
+    let refused = embedding.attempt(&mut mesh, |mesh| mesh.collapse(u, v, piercing));
+    assert_eq!(refused, Err(EditError::WouldCross));
+    assert!(mesh.to_triangles() == before);
+    let beside = mesh.position(u);
+    assert_eq!(embedding.attempt(&mut mesh, |mesh| mesh.collapse(u, v, beside)), Ok(()));
+    assert!(embedded(&mesh) && mesh.check() == Ok(()));
+}
+
+/// Moves and passes in turn, with parts that meet and part; what is left of the mesh is sound after each.
+#[test]
+fn a_mesh_resolved_after_every_move_never_crosses_itself() {
+    let sampling = Sampling::new(1.0);
+    for seed in 0..10 {
+        let mut random = Random(seed);
+        let mut mesh = crowd();
+        let mut resolver = Resolver::with_room_for(100_000);
+        let everything: Vec<VertexId> = mesh.vertices().collect();
+        resolver.resolve(&mut mesh, sampling, &everything);
+        let mut changes = resolver.resolve(&mut mesh, sampling, &[]);
+        for step in 0..30 {
+            let size = [0.5, 0.3, 0.1][random.below(3)];
+            let mut ways = random_ways(&mesh, &mut random, size);
+            resolver.carry(&mut mesh, sampling, &mut ways);
+            let everything: Vec<VertexId> = mesh.vertices().collect();
+            changes += resolver.resolve(&mut mesh, sampling, &everything);
+            assert_eq!(mesh.check(), Ok(()), "seed {seed}, step {step}");
+            assert!(embedded(&mesh), "seed {seed}, step {step}");
+            if mesh.vertex_count() == 0 {
+                break;
+            }
+        }
+        assert!(changes.axial > 0 && changes.annular > 0, "seed {seed}: {changes:?}");
+    }
+}
