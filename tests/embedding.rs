@@ -160,3 +160,46 @@ fn a_mesh_resolved_after_every_move_never_crosses_itself() {
         assert!(changes.axial > 0 && changes.annular > 0, "seed {seed}: {changes:?}");
     }
 }
+
+/// The largest factor up to `most` by which `inner` can be scaled about the origin and still not touch `outer`.
+fn nearly_touching(outer: &Mesh, inner: &Mesh, most: f32) -> Mesh {
+    let within = |factor: f32| {
+        let mut both = inner.clone();
+        both.positions_mut().iter_mut().for_each(|p| *p *= factor);
+        both.append(outer).unwrap();
+        both
+    };
+    let (mut low, mut high) = (0.1, most);
+    for _ in 0..20 {
+        let middle = 0.5 * (low + high);
+        if embedded(&within(middle)) { low = middle } else { high = middle }
+    }
+    within(low)
+}
+
+#[test]
+fn refinement_of_facing_sheets_does_not_cross() {
+    let mut crossed = 0;
+    for seed in 0..6 {
+        let mut random = Random(seed);
+        let mut ball = |edge: f32| {
+            let mut ball = Mesh::icosphere(Vec3::ZERO, 4.0, edge).unwrap();
+            let shift = |random: &mut Random| Vec3::new(random.unit(), random.unit(), random.unit()) * 0.4;
+            ball.positions_mut().iter_mut().for_each(|p| *p += shift(&mut random));
+            ball
+        };
+        let mut mesh = nearly_touching(&ball(2.0), &ball(2.6), 1.2);
+        let mut unguarded = mesh.clone();
+        unguarded.refine().unwrap();
+        crossed += usize::from(!embedded(&unguarded));
+
+        let mut embedding = Embedding::default();
+        embedding.follow_with(&mesh, EDGE);
+        assert!(embedding.is_embedded(&mesh));
+        assert!(embedding.refine(&mut mesh).unwrap());
+        assert!(embedded(&mesh) && embedding.is_embedded(&mesh), "seed {seed}");
+        assert_eq!(mesh.check(), Ok(()), "seed {seed}");
+        assert_eq!(mesh.vertex_count(), unguarded.vertex_count(), "seed {seed}");
+    }
+    assert!(crossed > 2, "only {crossed} cross when refined without a guard");
+}

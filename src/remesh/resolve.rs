@@ -2,7 +2,7 @@
 
 use super::{Changes, Embedding, Sampling};
 use crate::math::Vec3;
-use crate::mesh::{Mesh, VertexId};
+use crate::mesh::{Mesh, MeshError, VertexId};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -109,6 +109,20 @@ impl Resolver {
     pub fn carry(&mut self, mesh: &mut Mesh, sampling: Sampling, ways: &mut [Vec3]) -> Vec<(VertexId, f32)> {
         self.embedding.follow_with(mesh, sampling.longest());
         self.embedding.carry(mesh, ways)
+    }
+
+    /// Whether no two triangles cross, exactly.
+    pub fn is_embedded(&mut self, mesh: &Mesh) -> bool {
+        self.embedding.is_embedded(mesh)
+    }
+
+    /// Refines the mesh as [`Embedding::refine`] does; `sampling` is that of the mesh as it is.
+    ///
+    /// # Errors
+    /// As [`Mesh::refine`].
+    pub fn refine(&mut self, mesh: &mut Mesh, sampling: Sampling) -> Result<bool, MeshError> {
+        self.embedding.follow_with(mesh, sampling.longest());
+        self.embedding.refine(mesh)
     }
 
     /// The vertices that edits of the last call made or displaced; some may be gone again.

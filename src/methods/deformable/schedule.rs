@@ -96,7 +96,9 @@ impl DeformableModel {
             if self.mesh.vertex_count() + self.mesh.triangle_count() > most {
                 return Err(MethodError::TooManyVertices { most });
             }
-            self.mesh.refine()?;
+            // Where it cannot be refined, edges that are now too long are split.
+            let sampling = Sampling::new(self.model_delta());
+            self.resolver.refine(&mut self.mesh, sampling)?;
         }
         self.level -= 1;
         self.rest = Rest { began: self.iteration, ..Rest::default() };

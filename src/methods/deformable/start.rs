@@ -65,18 +65,21 @@ impl Start {
     /// is empty; [`MethodError::Mesh`] where the caller's mesh is open, not manifold or crosses itself.
     pub(super) fn make(&self, frame: &Frame, iso: impl Fn(f64) -> f32) -> Result<Mesh, MethodError> {
         let mut mesh = match self {
-            Self::Enclosing => return enclosing(frame),
+            Self::Enclosing => enclosing(frame)?,
             Self::Bubbles(n) => bubbles(frame, *n)?,
             Self::Seeds { points, radius } => seeds(frame, points, *radius)?,
             Self::MarchingCubes(value) => iso_surface(frame, iso(*value))?,
             Self::Mesh(mesh) => given(frame, mesh)?,
         };
-        resolve_all(&mut mesh, frame, frame.sampling)?;
+        let mut resolver = resolve_all(&mut mesh, frame, frame.sampling)?;
+        if !resolver.is_embedded(&mesh) {
+            return Err(MeshError::SelfIntersecting { pairs: count_crossings(&mesh.to_triangles()) }.into());
+        }
         Ok(mesh)
     }
 }
 
-fn resolve_all(mesh: &mut Mesh, frame: &Frame, sampling: Sampling) -> Result<(), MethodError> {
+fn resolve_all(mesh: &mut Mesh, frame: &Frame, sampling: Sampling) -> Result<Resolver, MethodError> {
     let mut resolver = Resolver::with_room_for(frame.domain.most_vertices(sampling.shortest()));
     resolver.resolve(mesh, sampling, &mesh.vertices().collect::<Vec<_>>());
     for _ in 0..MOST_CALLS {
@@ -89,7 +92,7 @@ fn resolve_all(mesh: &mut Mesh, frame: &Frame, sampling: Sampling) -> Result<(),
         return Err(MethodError::TooManyVertices { most });
     }
     resolver.sweep(mesh, sampling);
-    Ok(())
+    Ok(resolver)
 }
 
 /// A rounded box around the image: |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1 through the image's corners.
@@ -119,10 +122,9 @@ fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
         let slots: Vec<_> = mesh.vertices().collect();
         slots.into_iter().for_each(|v| mesh.set_position(v, onto_box(mesh.position(v))));
         if 3.0 * delta < axes.min_element() {
-            resolve_all(&mut mesh, frame, Sampling::new(delta))?;
+            _ = resolve_all(&mut mesh, frame, Sampling::new(delta))?;
         }
     }
-    resolve_all(&mut mesh, frame, frame.sampling)?;
     Ok(mesh)
 }
 

@@ -12,6 +12,7 @@
 
 mod motion;
 mod patch;
+mod refine;
 mod star;
 
 use crate::mesh::{EditError, Mesh, VertexId};
@@ -98,6 +99,11 @@ impl Embedding {
         }
         self.version = Some(mesh.geometry_version());
         done
+    }
+
+    /// Whether no two triangles share more than their common corners and edges.
+    pub fn is_embedded(&mut self, mesh: &Mesh) -> bool {
+        self.look_everywhere(mesh).is_empty()
     }
 
     /// Deletes the component of `v` and returns how many vertices it had.

@@ -86,6 +86,14 @@ impl Embedding {
         *doubts |= pairs;
     }
 
+    /// Looks at every vertex; see [`Self::look`].
+    pub(super) fn look_everywhere(&mut self, mesh: &Mesh) -> Vec<VertexId> {
+        self.follow(mesh);
+        self.doubts.resize(mesh.slots(), 0);
+        mesh.vertices().for_each(|v| self.doubt(v, ALL));
+        self.look(mesh)
+    }
+
     /// Looks for crossings where there is doubt, and notes where there is room. Returns the corners of all triangles that
     /// cross another, in order.
     fn look(&mut self, mesh: &Mesh) -> Vec<VertexId> {
