@@ -2,8 +2,9 @@
 //! Heckbert, *Surface simplification using quadric error metrics*, 1997).
 //!
 //! Guarantees: closed, oriented and manifold stays so, with the same components and χ; no triangle turns over; where
-//! the surface did not cross itself, it never does. Each edge drawn together is first tested for all of this, exactly
-//! as far as crossing goes. Not guaranteed: a bound on the error.
+//! the surface did not cross itself, it never does, and no component comes to lie on the other side of another. Each
+//! edge is tested for all of this before it is drawn together, exactly as far as crossing goes. Not guaranteed: a bound
+//! on the error.
 
 use super::obstacles::{Obstacles, facet};
 use crate::math::predicates::collinear;
@@ -184,7 +185,7 @@ impl<'a> Decimation<'a> {
                 fresh.push(new);
             }
         }
-        !self.obstacles.crosses(self.mesh, &fresh, &[u, v])
+        !self.obstacles.block(self.mesh, &fresh, &[u, v])
     }
 }
 
@@ -208,4 +209,46 @@ fn quadrics(mesh: &Mesh, origin: DVec3) -> Vec<Quadric> {
         }
     }
     quadrics
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn triangles_do_not_turn_over_nor_lose_their_area() {
+        let with_tip = |tip: Vec3| Facet { corners: [0, 1, 2], points: [tip, Vec3::ZERO, Vec3::X] };
+        let old = with_tip(Vec3::Y);
+        for (tip, expected) in [
+            (Vec3::new(5.0, 0.1, 0.0), true),
+            (Vec3::new(0.0, 1.0, 3.0), true),
+            (Vec3::new(0.0, 0.1, 3.0), false),
+            (-Vec3::Y, false),
+            (Vec3::X * 2.0, false),
+        ] {
+            assert_eq!(may_become(&old, &with_tip(tip)), expected, "{tip}");
+        }
+        let flat = with_tip(Vec3::X * 2.0);
+        assert!(
+            may_become(&flat, &old) && may_become(&flat, &with_tip(-Vec3::Y)) && !may_become(&flat, &flat)
+        );
+    }
+
+    #[test]
+    fn the_best_place_comes_first() {
+        let mut mesh = Mesh::icosphere(Vec3::splat(100.0), 1.0, 0.3).unwrap();
+        let decimation = Decimation::new(&mut mesh, 4);
+        for (u, v) in decimation.mesh.edges() {
+            let places = decimation.places(u, v);
+            assert_eq!(places.len(), 4);
+            assert!(places.is_sorted_by(|a, b| a.0 <= b.0));
+            // The planes around an edge of a ball meet above it.
+            let ends = [u, v].map(|w| decimation.mesh.position(w));
+            let height = places[0].1.distance(Vec3::splat(100.0));
+            let sagitta = ends[0].distance_squared(ends[1]) / 8.0;
+            assert!(height > 1.0 - sagitta && height < 1.0 + 2.0 * sagitta, "{height}");
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! What new triangles may not touch: the rest of the surface, found through a tree of boxes that follows the edits.
 
-use crate::math::{Bounds, Vec3};
+use crate::math::{Bounds, Vec3, triangle};
 use crate::mesh::{Facet, Mesh, VertexId, facets_cross};
 
 /// The stars of all vertices by where they are: a balanced tree of boxes over the vertices in the order of a space-filling
@@ -15,6 +15,8 @@ pub(super) struct Obstacles {
     leaves: Vec<u32>,
     /// The vertex of each leaf.
     vertices: Vec<VertexId>,
+    /// The component of each vertex slot.
+    components: Vec<u32>,
     /// Pairs of a box and a triangle that may still be compared; see [`Self::is_exhausted`].
     work_left: u64,
     stack: Vec<u32>,
@@ -34,58 +36,62 @@ impl Obstacles {
         for i in (1..first_leaf).rev() {
             nodes[i] = nodes[2 * i].joined(&nodes[2 * i + 1]);
         }
-        Self { nodes, leaves, vertices, work_left: work, stack: Vec::new() }
+        let components = components(mesh);
+        Self { nodes, leaves, vertices, components, work_left: work, stack: Vec::new() }
     }
 
-    /// Whether the triangles `fresh` share more than common corners and edges with each other, or with those triangles
-    /// of `mesh` that have no corner in `replaced`; exact, touching included.
+    /// Whether putting the triangles `fresh` in the place of the stars of `replaced` would do harm: they share more than
+    /// common corners and edges with each other or with other triangles of `mesh` (exact, touching included), or a whole
+    /// component changes sides without being touched.
     ///
-    /// `mesh` is still as it was before the edit, and the vertices in `replaced` are those whose stars `fresh` would stand
-    /// in for.
-    pub fn crosses(&mut self, mesh: &Mesh, fresh: &[Facet], replaced: &[VertexId]) -> bool {
+    /// `mesh` is as it was before the edit. The first of `replaced` names the component that is edited.
+    pub fn block(&mut self, mesh: &Mesh, fresh: &[Facet], replaced: &[VertexId]) -> bool {
         let boxes: Vec<Bounds> = fresh.iter().map(|facet| Bounds::of(&facet.points)).collect();
         if cross_each_other(fresh, &boxes) {
             return true;
         }
-        let around = boxes.iter().fold(Bounds::EMPTY, |all, one| all.joined(one));
+        let edit = Edit { fresh, boxes: &boxes, replaced, around: around(mesh, &boxes, replaced) };
         self.stack.clear();
         self.stack.push(1);
         while let Some(i) = self.stack.pop() {
             self.work_left = self.work_left.saturating_sub(1);
-            if !self.nodes[i as usize].meets(&around) {
+            if !self.nodes[i as usize].meets(&edit.around) {
                 continue;
             }
-            match (i as usize).checked_sub(self.nodes.len() / 2) {
-                None => self.stack.extend([2 * i, 2 * i + 1]),
-                Some(leaf) => {
-                    let v = self.vertices[leaf];
-                    if !replaced.contains(&v)
-                        && self.star_crosses(mesh, v, replaced, (fresh, &boxes, &around))
-                    {
-                        return true;
-                    }
+            let blocked = match (i as usize).checked_sub(self.nodes.len() / 2) {
+                None => {
+                    self.stack.extend([2 * i, 2 * i + 1]);
+                    false
                 }
+                Some(leaf) => self.star_blocks(mesh, self.vertices[leaf], &edit),
+            };
+            if blocked {
+                return true;
             }
         }
         false
     }
 
+    fn star_blocks(&mut self, mesh: &Mesh, v: VertexId, edit: &Edit) -> bool {
+        if edit.replaced.contains(&v) {
+            return false;
+        }
+        let component = |w: VertexId| self.components[w.index()];
+        let is_apart = edit.replaced.first().is_some_and(|&u| component(u) != component(v));
+        self.star_crosses(mesh, v, edit) || is_apart && changes_sides(mesh, mesh.position(v), edit)
+    }
+
     /// Whether one of the triangles of which `v` is the lowest corner, none of them in `replaced`, crosses a fresh one.
-    fn star_crosses(
-        &mut self,
-        mesh: &Mesh,
-        v: VertexId,
-        replaced: &[VertexId],
-        (fresh, boxes, around): (&[Facet], &[Bounds], &Bounds),
-    ) -> bool {
+    fn star_crosses(&mut self, mesh: &Mesh, v: VertexId, edit: &Edit) -> bool {
         for (a, b) in mesh.ring(v).pairs().filter(|&(a, b)| v < a && v < b) {
             let other = facet(mesh, [v, a, b]);
             let bounds = Bounds::of(&other.points);
-            if !bounds.meets(around) || replaced.contains(&a) || replaced.contains(&b) {
+            if !bounds.meets(&edit.around) || edit.replaced.contains(&a) || edit.replaced.contains(&b) {
                 continue;
             }
-            self.work_left = self.work_left.saturating_sub(fresh.len() as u64);
-            if fresh.iter().zip(boxes).any(|(f, near)| near.meets(&bounds) && facets_cross(f, &other)) {
+            self.work_left = self.work_left.saturating_sub(edit.fresh.len() as u64);
+            let mut near = edit.fresh.iter().zip(edit.boxes).filter(|(_, near)| near.meets(&bounds));
+            if near.any(|(fresh, _)| facets_cross(fresh, &other)) {
                 return true;
             }
         }
@@ -118,6 +124,47 @@ impl Obstacles {
             self.nodes[i] = joined;
         }
     }
+}
+
+/// Triangles that would stand in for others.
+struct Edit<'a> {
+    fresh: &'a [Facet],
+    boxes: &'a [Bounds],
+    replaced: &'a [VertexId],
+    /// A box around all of it, before and after.
+    around: Bounds,
+}
+
+fn around(mesh: &Mesh, boxes: &[Bounds], replaced: &[VertexId]) -> Bounds {
+    let before = replaced.iter().map(|&v| star(mesh, v));
+    boxes.iter().copied().chain(before).fold(Bounds::EMPTY, |all, one| all.joined(&one))
+}
+
+/// Whether `p` lies between the triangles that were and those that would be.
+fn changes_sides(mesh: &Mesh, p: Vec3, edit: &Edit) -> bool {
+    if !edit.around.contains(p) {
+        return false;
+    }
+    let fresh: f64 = edit.fresh.iter().map(|facet| triangle::solid_angle(facet.points, p)).sum();
+    let old = edit.replaced.iter().enumerate().flat_map(|(k, &v)| {
+        // A triangle at several of the vertices counts for the first of them.
+        let counted = move |&(a, b): &(VertexId, VertexId)| {
+            !edit.replaced[..k].contains(&a) && !edit.replaced[..k].contains(&b)
+        };
+        mesh.ring(v).pairs().filter(counted).map(move |(a, b)| [v, a, b])
+    });
+    let old: f64 = old.map(|corners| triangle::solid_angle(facet(mesh, corners).points, p)).sum();
+    // 4π between them, else 0.
+    (fresh - old).abs() > std::f64::consts::TAU
+}
+
+/// The number of the component of each slot.
+fn components(mesh: &Mesh) -> Vec<u32> {
+    let mut components = vec![0; mesh.slots()];
+    for (number, members) in (0..).zip(mesh.component_members()) {
+        members.into_iter().for_each(|v| components[v.index()] = number);
+    }
+    components
 }
 
 /// The triangle of `corners` as it is now.
@@ -173,6 +220,75 @@ mod tests {
     use super::*;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Two balls beside each other, and the triangles that would stand around `v` if it were at `place`.
+    fn moved(place: Vec3) -> (Mesh, VertexId, Vec<Facet>) {
+        let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
+        mesh.append(&Mesh::icosphere(Vec3::X * 2.2, 1.0, 0.3).unwrap()).unwrap();
+        let nearest = mesh.vertices().max_by(|&a, &b| f32::total_cmp(&first_x(&mesh, a), &first_x(&mesh, b)));
+        let v = nearest.unwrap();
+        let fan = mesh.ring(v).pairs().map(|(a, b)| {
+            let mut facet = facet(&mesh, [v, a, b]);
+            facet.points[0] = place;
+            facet
+        });
+        let fan = fan.collect();
+        (mesh, v, fan)
+    }
+
+    /// How far along x a vertex of the first ball is.
+    fn first_x(mesh: &Mesh, v: VertexId) -> f32 {
+        let x = mesh.position(v).x;
+        if x < 1.1 { x } else { f32::MIN }
+    }
+
+    #[test]
+    fn what_is_touched_blocks() {
+        for (x, expected) in
+            [(1.0, false), (1.05, false), (1.3, true), (5.0, true), (-0.5, false), (-1.3, true)]
+        {
+            let (mesh, v, fan) = moved(Vec3::X * x);
+            assert_eq!(Obstacles::new(&mesh, u64::MAX).block(&mesh, &fan, &[v]), expected, "{x}");
+        }
+    }
+
+    #[test]
+    fn what_would_change_sides_blocks() {
+        for (x, expected) in [(1.01, false), (1.5, true), (0.95, false), (3.0, true)] {
+            let (mut mesh, v, fan) = moved(Vec3::X * x);
+            let other = mesh.vertices().find(|&w| mesh.position(w).x > 1.1).unwrap();
+            mesh.remove_component(other);
+            mesh.append(&Mesh::icosahedron(Vec3::X * 1.1, 0.01)).unwrap();
+            assert_eq!(Obstacles::new(&mesh, u64::MAX).block(&mesh, &fan, &[v]), expected, "{x}");
+        }
+    }
+
+    #[test]
+    fn a_tree_that_followed_is_one_made_anew() {
+        let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.2).unwrap();
+        let mut followed = Obstacles::new(&mesh, u64::MAX);
+        for i in 0..300 {
+            let (u, v) = mesh.edges().nth(i * 7 % mesh.edge_count()).unwrap();
+            let place = mesh.position(v);
+            if mesh.collapse(u, v, place).is_ok() {
+                followed.follow(&mesh, u, v);
+            }
+        }
+        let leaf =
+            |v: VertexId| followed.nodes[followed.nodes.len() / 2 + followed.leaves[v.index()] as usize];
+        assert!(mesh.vertices().all(|v| leaf(v) == star(&mesh, v)));
+        let root = mesh.vertices().fold(Bounds::EMPTY, |all, v| all.joined(&star(&mesh, v)));
+        assert_eq!(followed.nodes[1], root);
+    }
+
+    #[test]
+    fn work_ends() {
+        let (mesh, v, fan) = moved(Vec3::X);
+        let mut obstacles = Obstacles::new(&mesh, 1000);
+        let looks =
+            (0..1000).take_while(|_| !obstacles.block(&mesh, &fan, &[v]) && !obstacles.is_exhausted());
+        assert!((2..50).contains(&looks.count()));
+    }
 
     #[test]
     fn bits_are_spread() {
