@@ -244,6 +244,23 @@ mod tests {
     }
 
     #[test]
+    fn an_obtuse_corner_has_half_the_area() {
+        let [o, x] = [DVec3::ZERO, DVec3::X];
+        let areas_of = |tip: DVec3| lone_areas([tip, o, x]);
+        assert_eq!(areas_of(DVec3::new(0.5, 0.125, 0.0)), [0.03125, 0.015625, 0.015625]);
+        // At a right angle both rules agree; of acute corners each has what is nearer to it.
+        assert_eq!(areas_of(DVec3::Y), [0.125, 0.25, 0.125]);
+        assert_eq!(areas_of(DVec3::new(0.5, 1.0, 0.0)), [0.15625, 0.171875, 0.171875]);
+    }
+
+    /// The areas of a lone triangle's corners.
+    fn lone_areas(points: [DVec3; 3]) -> [f64; 3] {
+        let mut sums = [Sums::default(); 3];
+        add(&mut sums, [0, 1, 2], points);
+        sums.map(|s| s.area)
+    }
+
+    #[test]
     fn angles_of_flat_triangles_sum_to_a_half_turn() {
         let [o, x] = [DVec3::ZERO, DVec3::X];
         for points in [[o, x, 3.0 * x], [o, o, x], [o, x, o], [x, o, o], [o, o, o]] {
@@ -264,6 +281,8 @@ mod tests {
                 assert!(found.areas.iter().all(|a| a.is_finite()), "{seed}");
             }
         }
+        let speck = curvature(&shapes::cuboid(Vec3::splat(1e-30)));
+        assert!(speck.gaussian.iter().all(|&k| k == f64::from(f32::MAX)));
         let flat = curvature(&shapes::cuboid(Vec3::new(1.0, 0.0, 0.0)));
         assert!(flat.mean.iter().chain(&flat.gaussian).all(|&x| x == 0.0));
     }

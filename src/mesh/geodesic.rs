@@ -120,8 +120,8 @@ fn through_edge([to_a, to_b]: [f64; 2], edge: DVec3, spoke: DVec3) -> Option<f64
     let base = edge.length();
     let source_x = 0.5 * (base + (to_a - to_b) * ((to_a + to_b) / base));
     let square = (to_a - source_x) * (to_a + source_x);
-    // Not so where a distance is infinite or the edge has no length, either.
-    if !(square >= 0.0) {
+    // NaN where a distance is infinite or the edge has no length.
+    if square.is_nan() || square < 0.0 {
         return None;
     }
     let (source_depth, x, height) =
