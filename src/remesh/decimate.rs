@@ -25,16 +25,19 @@ const MOST_NEIGHBOURS: usize = 24;
 /// The least cosine between the normals of a triangle before and after: it may turn by 78°.
 const LEAST_COSINE: f64 = 0.2;
 
-/// How often edges that were refused are tried again after the others are done. A refused edge may be free once its
-/// neighbours are gone; the third round hardly finds any.
+/// How often all edges are queued. An edge that was refused may be free once its neighbours are gone; without a bound,
+/// rounds that free one edge each would make the work quadratic.
 const ROUNDS: usize = 4;
 
-/// Pairs of a triangle and a box that are looked at for each triangle of the mesh. A few hundred are common; without a
-/// bound, triangles that are all in each other's boxes would take forever.
-const WORK_PER_TRIANGLE: u64 = 10_000;
+/// Boxes and triangles that may be looked at for each triangle of the mesh, and for any mesh. 200 to 600 for each are
+/// common. Without a bound, triangles that are all in each other's boxes would take for ever; with five times as much,
+/// 42,000 of them took 48 s.
+const WORK_PER_TRIANGLE: u64 = 2_000;
+const WORK_AT_LEAST: u64 = 10_000_000;
 
-/// Draws edges together until at most `target_triangles` are left, or no edge can be drawn together safely; returns how
-/// many were. Ids then mean nothing any more, as the vertices are numbered anew.
+/// Draws edges together until at most `target_triangles` are left, or no edge can be drawn together safely, or finding
+/// that out takes too long, as among thousands of needles in each other's way; returns how many were. Ids then mean
+/// nothing any more, as the vertices are numbered anew.
 ///
 /// Each takes two triangles. A component has four at least. What crosses already keeps its triangles, as far as drawing
 /// them together would leave it crossing. Attributes of the vertex that stays are the mean of both.
@@ -87,7 +90,7 @@ type Place = (f64, Vec3);
 impl<'a> Decimation<'a> {
     fn new(mesh: &'a mut Mesh, target: usize) -> Self {
         let origin = mesh.vertices().next().map_or(DVec3::ZERO, |v| mesh.position(v).as_dvec3());
-        let work = WORK_PER_TRIANGLE * mesh.triangle_count() as u64;
+        let work = WORK_AT_LEAST + WORK_PER_TRIANGLE * mesh.triangle_count() as u64;
         Self {
             target,
             quadrics: quadrics(mesh, origin),

@@ -84,6 +84,7 @@ impl Obstacles {
     /// Whether one of the triangles of which `v` is the lowest corner, none of them in `replaced`, crosses a fresh one.
     fn star_crosses(&mut self, mesh: &Mesh, v: VertexId, edit: &Edit) -> bool {
         for (a, b) in mesh.ring(v).pairs().filter(|&(a, b)| v < a && v < b) {
+            self.work_left = self.work_left.saturating_sub(1);
             let other = facet(mesh, [v, a, b]);
             let bounds = Bounds::of(&other.points);
             if !bounds.meets(&edit.around) || edit.replaced.contains(&a) || edit.replaced.contains(&b) {

@@ -24,7 +24,8 @@ pub struct SurfaceDistance {
     pub hausdorff: f64,
 }
 
-/// The distance of two surfaces from each other; O(n log n) as long as the surfaces are not far apart.
+/// The distance of two surfaces from each other; O(n log n), but for parts that are equally far from everything: of a
+/// speck in the very middle of a ball, each vertex looks at every triangle.
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] where either has no triangle (`mesh` is the first, `other` the second), names a vertex
