@@ -16,9 +16,11 @@ mod check;
 mod compact;
 mod components;
 mod crossing;
+mod curvature;
 mod edge_table;
 mod edits;
 mod error;
+mod geodesic;
 mod groups;
 mod ids;
 mod journal;
@@ -35,9 +37,11 @@ mod weld;
 
 pub use attributes::{ScalarKey, VectorKey};
 pub use check::Flaw;
-pub use crossing::{count_crossings, crossing_pairs, triangles_meet};
+pub use crossing::{Facet, count_crossings, crossing_pairs, facets_cross};
+pub use curvature::{Curvature, curvature};
 pub use edits::Opposite;
 pub use error::{EditError, MeshError};
+pub use geodesic::geodesic;
 pub use ids::VertexId;
 pub use journal::Triangles;
 pub use measure::{Measures, measure};
@@ -134,6 +138,12 @@ impl Mesh {
         self.vertices().flat_map(|u| {
             self.ring(u).pairs().filter(move |&(a, b)| u < a && u < b).map(move |(a, b)| [u, a, b])
         })
+    }
+
+    /// The triangle with these corners, as it is now.
+    #[inline]
+    pub fn facet(&self, corners: [VertexId; 3]) -> Facet {
+        Facet { corners: corners.map(|v| v.0), points: corners.map(|v| self.position(v)) }
     }
 
     /// Every edge once, from the lower id to the higher.

@@ -1,9 +1,11 @@
-//! Finding what is near: points by points, triangles by points, rays and planes.
+//! Finding what is near: points by points, triangles by points, rays and planes, surfaces by surfaces.
 
+mod distance;
 mod section;
 mod stars;
 mod tree;
 
+pub use distance::{SurfaceDistance, surface_distance};
 pub use section::cross_section;
 pub use stars::{Nearness, Star, StarGrid};
 pub use tree::{SurfacePoint, TriangleTree};

@@ -72,9 +72,14 @@ test('the live mesh is one object that follows the model', () => {
   const copy = mesh.clone();
   copy.refine();
   expect(copy.triangleCount).toBe(3 * mesh.triangleCount);
-  const error = failure(() => mesh.refine());
-  expect(error.code).toBe('invalid-argument');
-  expect(error.message).toContain('clone()');
+  for (const edit of [() => mesh.refine(), () => mesh.decimate(8)]) {
+    const error = failure(edit);
+    expect(error.code).toBe('invalid-argument');
+    expect(error.message).toContain('clone()');
+  }
+  for (const measured of [mesh.curvature('mean'), mesh.geodesic(0), mesh.distanceTo(copy).perVertex]) {
+    expect(measured).toHaveLength(mesh.vertexCount);
+  }
   mesh.free();
   expect(fitted.step().iteration).toBe(6);
 });

@@ -128,7 +128,7 @@ impl Embedding {
     fn look_around(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
         let room = flatness(mesh, v, self.grid.longest(v));
         if !self.settle(room, AROUND, [v, v]) {
-            crossings_around(mesh, v, |s, t| crossing.extend(s.into_iter().chain(t)));
+            crossings_around(mesh, v, crossing);
         }
     }
 
@@ -145,7 +145,7 @@ impl Embedding {
                     room = if other > room { other } else { room };
                 }
                 if !self.settle(room, ALONG, [v, w]) {
-                    crossings_between(mesh, [v, w], |s, t| crossing.extend(s.into_iter().chain(t)));
+                    crossings_between(mesh, [v, w], crossing);
                 }
             }
             right = w;
@@ -213,7 +213,7 @@ impl Embedding {
                 None => divided_between(mesh, [v, w], longest),
             };
             if !self.settle(room, ACROSS, [v, w]) {
-                crossings_between(mesh, [v, w], |s, t| crossing.extend(s.into_iter().chain(t)));
+                crossings_between(mesh, [v, w], crossing);
             }
         }
     }

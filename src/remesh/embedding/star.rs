@@ -4,7 +4,7 @@
 //! cannot settle is worked out exactly. The quick tests allow for rounding by a wide margin.
 
 use crate::math::{Bounds, Vec3};
-use crate::mesh::{Mesh, VertexId, triangles_meet};
+use crate::mesh::{Facet, Mesh, VertexId, facets_cross};
 
 /// Valence up to which quick tests of a star are tried.
 const MOST_SPOKES: usize = 16;
@@ -14,13 +14,6 @@ const ROUNDING: f32 = 1e-4;
 
 /// The bounds on movement below hold for movements of less than this share of the lengths they were derived from.
 const SMALL: f32 = 0.125;
-
-/// The corners of a triangle: names and places.
-pub(super) type Corners = ([VertexId; 3], [Vec3; 3]);
-
-pub(super) fn corners(mesh: &Mesh, names: [VertexId; 3]) -> Corners {
-    (names, names.map(|v| mesh.position(v)))
-}
 
 /// The longest edge at `v`.
 pub(super) fn longest_edge(mesh: &Mesh, v: VertexId) -> f32 {
@@ -190,40 +183,34 @@ fn lower(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
 }
 
-/// Calls `found` with each pair of crossing triangles around `v`; exact.
-pub(super) fn crossings_around(
-    mesh: &Mesh,
-    v: VertexId,
-    mut found: impl FnMut([VertexId; 3], [VertexId; 3]),
-) {
-    let triangles: Vec<Corners> = mesh.ring(v).pairs().map(|(a, b)| corners(mesh, [v, a, b])).collect();
-    for (k, &s) in triangles.iter().enumerate() {
-        for &t in &triangles[..k] {
-            if triangles_meet(s, t) {
-                found(s.0, t.0);
+/// Puts the corners of all triangles around `v` that cross each other into `crossing`; exact.
+pub(super) fn crossings_around(mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
+    let facets: Vec<Facet> = star(mesh, v).collect();
+    for (k, s) in facets.iter().enumerate() {
+        for t in facets[..k].iter().filter(|t| facets_cross(s, t)) {
+            crossing.extend(s.corners.into_iter().chain(t.corners).map(VertexId));
+        }
+    }
+}
+
+/// Puts the corners of all pairs of triangles that cross into `crossing`, one at `u` and one at `v`, with no corner in
+/// common; exact.
+pub(super) fn crossings_between(mesh: &Mesh, [u, v]: [VertexId; 2], crossing: &mut Vec<VertexId>) {
+    let around_v = star(mesh, v).fold(Bounds::EMPTY, |bounds, t| bounds.joined(&Bounds::of(&t.points)));
+    for s in star(mesh, u).filter(|s| !s.corners.contains(&v.0)) {
+        let bounds = Bounds::of(&s.points);
+        if !bounds.meets(&around_v) {
+            continue;
+        }
+        for t in star(mesh, v) {
+            let apart = t.corners.iter().all(|w| !s.corners.contains(w));
+            if apart && bounds.meets(&Bounds::of(&t.points)) && facets_cross(&s, &t) {
+                crossing.extend(s.corners.into_iter().chain(t.corners).map(VertexId));
             }
         }
     }
 }
 
-/// Calls `found` with each pair of crossing triangles, one at `u` and one at `v`, that have no corner in common; exact.
-pub(super) fn crossings_between(
-    mesh: &Mesh,
-    [u, v]: [VertexId; 2],
-    mut found: impl FnMut([VertexId; 3], [VertexId; 3]),
-) {
-    let star = |w: VertexId| mesh.ring(w).pairs().map(move |(a, b)| corners(mesh, [w, a, b]));
-    let around_v = star(v).fold(Bounds::EMPTY, |bounds, (_, at)| bounds.joined(&Bounds::of(&at)));
-    for s in star(u).filter(|s| !s.0.contains(&v)) {
-        let bounds = Bounds::of(&s.1);
-        if !bounds.meets(&around_v) {
-            continue;
-        }
-        for t in star(v) {
-            let apart = t.0.iter().all(|w| !s.0.contains(w));
-            if apart && bounds.meets(&Bounds::of(&t.1)) && triangles_meet(s, t) {
-                found(s.0, t.0);
-            }
-        }
-    }
+fn star(mesh: &Mesh, v: VertexId) -> impl Iterator<Item = Facet> + '_ {
+    mesh.ring(v).pairs().map(move |(a, b)| mesh.facet([v, a, b]))
 }
