@@ -14,16 +14,16 @@ const CUT_PUSH_LIMIT: f32 = 0.6;
 impl Resolver {
     /// Works through the queue until every edge around its vertices is within bounds.
     pub(super) fn settle_edges(&mut self, mesh: &mut Mesh, sampling: Sampling) {
-        while self.edits_left > 0 {
+        while self.embedding.effort() < self.most_effort {
             let Some(u) = self.pop() else { return };
-            if mesh.is_live(u) && self.settle_vertex(mesh, sampling, u) {
-                self.edits_left -= 1;
+            if mesh.is_live(u) {
+                self.settle_vertex(mesh, sampling, u);
             }
         }
     }
 
-    /// Mends the first edge around `u` that is out of bounds and can be mended; says whether one was.
-    fn settle_vertex(&mut self, mesh: &mut Mesh, sampling: Sampling, u: VertexId) -> bool {
+    /// Mends the first edge around `u` that is out of bounds and can be mended.
+    fn settle_vertex(&mut self, mesh: &mut Mesh, sampling: Sampling, u: VertexId) {
         let (shortest, longest) = (square(sampling.shortest()), square(sampling.longest()));
         let from = mesh.position(u);
         for k in 0..mesh.ring(u).valence() {
@@ -37,10 +37,9 @@ impl Resolver {
                 Ok(false)
             };
             if mended == Ok(true) {
-                return true;
+                return;
             }
         }
-        false
     }
 
     /// Flips an edge that is too long where a new vertex on it would come too near its opposite ones; else splits it.

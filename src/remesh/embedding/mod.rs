@@ -50,6 +50,7 @@ pub struct Embedding {
     marks: Vec<u32>,
     newest: u32,
     found: Vec<VertexId>,
+    effort: u64,
 }
 
 impl Embedding {
@@ -104,6 +105,11 @@ impl Embedding {
     /// Whether no two triangles share more than their common corners and edges.
     pub fn is_embedded(&mut self, mesh: &Mesh) -> bool {
         self.look_everywhere(mesh).is_empty()
+    }
+
+    /// The number of near vertices that were looked at for edits, over all time.
+    pub fn effort(&self) -> u64 {
+        self.effort
     }
 
     /// Deletes the component of `v` and returns how many vertices it had.

@@ -18,6 +18,8 @@ impl Embedding {
     pub(super) fn changes_cross(&mut self, mesh: &Mesh) -> bool {
         let names = mesh.changed_triangles();
         let fresh: Vec<Changed> = names.iter().map(|&names| changed(mesh.facet(names))).collect();
+        // Refusals for what is close at hand are cheap, but not free.
+        self.effort += 1;
         stars_cross(mesh, &names) || cross_each_other(&fresh) || self.cross_others(mesh, &fresh)
     }
 
@@ -27,6 +29,7 @@ impl Embedding {
         let mut near = std::mem::take(&mut self.found);
         near.clear();
         self.grid.near_box(&whole, NEAREST_CORNER, |v| near.push(v));
+        self.effort += near.len() as u64;
         self.new_marks(mesh);
         let crosses = near.iter().any(|&v| {
             self.mark(v);
