@@ -68,6 +68,8 @@ pub(super) struct Forces {
     pub(super) normal: Vec<Vec3>,
     /// The sum of all forces.
     pub(super) force: Vec<Vec3>,
+    /// Milliseconds of evaluating forces that no report has told of.
+    pub(super) spent: f64,
 }
 
 impl Forces {

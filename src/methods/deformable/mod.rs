@@ -54,7 +54,7 @@ pub use params::{DeformableParams, Integrator, RestLength, Topology, param_specs
 pub use start::Start;
 
 use super::{MethodError, StepReport, Times};
-use crate::math::{DAffine3, DVec3};
+use crate::math::{DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, ScalarKey, TriangleMesh, VectorKey, VertexId};
 use crate::remesh::{Changes, Resolver, Sampling};
 use crate::volume::Volume;
@@ -250,10 +250,13 @@ impl DeformableModel {
             domain: self.domain,
             params: &self.params,
             delta,
+            clock: self.clock,
         };
         self.movement = advance(&mut self.mesh, self.keys, &mut self.forces, &world);
+        let forces = std::mem::take(&mut self.forces.spent);
         times.add("normals", normals - begin);
-        times.add("motion", (self.clock)() - normals);
+        times.add("forces", forces);
+        times.add("motion", (self.clock)() - normals - forces);
     }
 
     /// Vertices that have travelled far enough since their bounds were last looked at, and those long not looked at.
@@ -415,6 +418,17 @@ impl DeformableModel {
     /// The surface in world space with normals, counter-clockwise seen from outside.
     pub fn surface(&self) -> TriangleMesh {
         self.mesh.to_triangles().transformed(&self.to_world)
+    }
+
+    /// Speed of each vertex of [`Self::surface`] along its outward normal, in world units per unit of time; negative
+    /// inwards. A vertex that an edit made has what its neighbourhood had.
+    pub fn speeds(&self) -> Vec<f32> {
+        let normals = self.surface().normals.unwrap_or_default();
+        let velocities = self.mesh.vector(self.keys.velocity);
+        let along = |(v, normal): (VertexId, Vec3)| {
+            (self.to_world.matrix3 * velocities[v.index()].as_dvec3()).dot(normal.as_dvec3()) as f32
+        };
+        self.mesh.vertices().zip(normals).map(along).collect()
     }
 
     /// Takes a clock in milliseconds, by which reports tell the time of each part.
