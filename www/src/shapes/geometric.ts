@@ -5,6 +5,8 @@ const RINGS_SIZE = 64;
 /** Of the linked rings, in voxels: from the middle of a ring to the middle of its tube, and the tube's radius. */
 const RING_RADIUS = 15;
 const TUBE_RADIUS = 5.5;
+/** Of the chain, in the same way. */
+const CHAIN = { size: [61, 45, 45] as [number, number, number], ring: 16, tube: 4.5 };
 /** Empty voxels around the sponge. */
 const SPONGE_MARGIN = 4;
 
@@ -18,6 +20,21 @@ export function linkedRings(): ShapeVoxels {
     const upright = Math.hypot(Math.hypot(x - shift, z) - RING_RADIUS, y);
     // Half grey at the surface, one voxel and a half of transition to each side.
     return 127.5 + 85 * (TUBE_RADIUS - Math.min(flat, upright));
+  });
+}
+
+/**
+ * Two linked rings as a potential that falls evenly with the distance from their middle lines: all of it up to half of
+ * the tube's radius, half of it at the radius, none from one radius and a half.
+ */
+export function chain(): ShapeVoxels {
+  const { size, ring, tube } = CHAIN;
+  const middle = size.map((n) => (n - 1) / 2) as [number, number, number];
+  return sample(size, (i, j, k) => {
+    const [x, y, z] = [i - middle[0], j - middle[1], k - middle[2]];
+    const flat = Math.hypot(Math.hypot(x + ring / 2, y) - ring, z);
+    const upright = Math.hypot(Math.hypot(x - ring / 2, z) - ring, y);
+    return 255 * (1.5 - Math.min(flat, upright) / tube);
   });
 }
 

@@ -6,7 +6,7 @@ const MIDDLE = (SIZE - 1) / 2;
 /** Half axes in voxels: of the skin, of the skull's outside, and its thickness. */
 const SKIN = [43, 50, 48] as const;
 const SKULL = [35, 42, 40] as const;
-const THICKNESS = 7;
+const THICKNESS = 9;
 const SOFT_TISSUE = 75;
 const BONE = 220;
 const NOISE = 6;

@@ -1,6 +1,6 @@
 /** Volumes that are computed instead of loaded. Intensities 0..255, x fastest, cubes as voxels; the same on every machine. */
 import { cell, markedNucleus } from './cells';
-import { linkedRings, spongeVoxels } from './geometric';
+import { chain, linkedRings, spongeVoxels } from './geometric';
 import { headPhantom } from './head';
 import type { ShapeVoxels } from './sampling';
 import { vesselTree } from './vessels';
@@ -9,6 +9,7 @@ export type { ShapeVoxels } from './sampling';
 
 const MAKERS = {
   'linked rings': linkedRings,
+  chain,
   sponge: () => spongeVoxels(2),
   'deep sponge': () => spongeVoxels(3),
   'head phantom': headPhantom,

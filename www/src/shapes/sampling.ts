@@ -7,16 +7,20 @@ export interface ShapeVoxels {
 
 type Point = readonly [number, number, number];
 
-/** Intensities of a function of voxel indices on a cube, held to 0..255. */
-export function sample(size: number, value: (i: number, j: number, k: number) => number): ShapeVoxels {
-  const data = new Uint8Array(size ** 3);
+/** Intensities of a function of voxel indices, held to 0..255; a single number makes a cube. */
+export function sample(
+  size: number | [number, number, number],
+  value: (i: number, j: number, k: number) => number,
+): ShapeVoxels {
+  const dims: [number, number, number] = typeof size === 'number' ? [size, size, size] : size;
+  const data = new Uint8Array(dims[0] * dims[1] * dims[2]);
   let voxel = 0;
-  for (let k = 0; k < size; k++) {
-    for (let j = 0; j < size; j++) {
-      for (let i = 0; i < size; i++) data[voxel++] = Math.min(255, Math.max(0, value(i, j, k)));
+  for (let k = 0; k < dims[2]; k++) {
+    for (let j = 0; j < dims[1]; j++) {
+      for (let i = 0; i < dims[0]; i++) data[voxel++] = Math.min(255, Math.max(0, value(i, j, k)));
     }
   }
-  return { data, dims: [size, size, size] };
+  return { data, dims };
 }
 
 /** A small seeded generator (mulberry32) of numbers in 0..1: the same volume on every machine. */

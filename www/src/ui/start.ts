@@ -3,6 +3,10 @@ import { h, uniqueId } from './dom';
 
 type Kind = StartShape['kind'];
 
+export function isStartKind(text: string | undefined): text is Kind {
+  return SHAPES.some(({ kind }) => kind === text);
+}
+
 const SHAPES: { kind: Kind; label: string; help: string }[] = [
   {
     kind: 'enclosing',
@@ -72,6 +76,11 @@ export class StartControls {
       levels: this.#levels.control.valueAsNumber,
       edge: edge.value === '' ? undefined : edge.valueAsNumber,
     };
+  }
+
+  /** What the model was started from; while another start is being tried, {@link value} is ahead of it. */
+  get inForce(): StartChoice {
+    return this.#inForce;
   }
 
   /** Shows what is now in force, and takes complaints back; no change is reported. */
