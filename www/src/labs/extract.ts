@@ -186,9 +186,7 @@ export class ExtractLab {
       return;
     }
     window.addEventListener('hashchange', () => void this.#openLink());
-    if (await this.#openLink()) return;
-    const [example] = EXAMPLES;
-    if (example) await this.#openExample(example);
+    await this.#openLink(EXAMPLES[0]);
   }
 
   #layOut(chooser: HTMLElement): void {
@@ -257,17 +255,18 @@ export class ExtractLab {
     if (example) void this.#openExample(example);
   }
 
-  /** Opens what the page's address asks for; false where it asks for nothing that can be opened now. */
-  async #openLink(): Promise<boolean> {
+  /** Opens what the page's address asks for; says why where that cannot be. `otherwise` is opened then. */
+  async #openLink(otherwise?: Example): Promise<void> {
     const linked = fromHash(location.hash);
-    if (!linked) return false;
-    const example = linked.example || linked.file ? exampleById(linked.example ?? '') : EXAMPLES[0];
-    this.#awaiting = example ? undefined : linked;
-    if (example) await this.#openExample(example, linked);
-    else if (linked.file)
+    const id = linked?.example ?? (linked && !linked.file ? EXAMPLES[0]?.id : '');
+    const example = exampleById(id ?? '');
+    if (linked && example) return this.#openExample(example, linked);
+    if (otherwise) await this.#openExample(otherwise);
+    if (!linked) return;
+    this.#awaiting = linked.file ? linked : undefined;
+    if (linked.file)
       this.#banner.show('This link needs a file.', `Open ${linked.file} from your disk: its settings will follow.`);
     else this.#banner.show('This link cannot be followed.', `There is no example “${linked.example ?? ''}”.`);
-    return example !== undefined;
   }
 
   /** Another picture of the figure that is open: other parameters, from the same start or from where the surface is. */
@@ -528,6 +527,7 @@ export class ExtractLab {
       this.#goOn();
     } catch (error) {
       forget();
+      this.#attractors.show(before);
       this.#showAttractors(before);
       this.#attractors.complain(toFailure(error).message);
     }

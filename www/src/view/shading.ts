@@ -58,8 +58,9 @@ function roundUp(value: number): number {
 /** Linear rgb of each vertex, three numbers each, into `out`. */
 export function shadeColors(values: Float32Array, range: number, out: Float32Array): void {
   for (let vertex = 0; vertex < values.length; vertex++) {
-    const t = Math.min(1, Math.max(-1, (values[vertex] ?? 0) / range));
-    const entry = 3 * Math.round(((t + 1) * TABLE) / 2) || 0;
+    // What is no number is drawn as zero.
+    const t = Math.min(1, Math.max(-1, (values[vertex] || 0) / range));
+    const entry = 3 * Math.round(((t + 1) * TABLE) / 2);
     out[3 * vertex] = LINEAR[entry] ?? 1;
     out[3 * vertex + 1] = LINEAR[entry + 1] ?? 1;
     out[3 * vertex + 2] = LINEAR[entry + 2] ?? 1;

@@ -31,7 +31,8 @@ export class SurfaceObject {
     polygonOffsetUnits: 1,
   });
   readonly #edgeMaterial = new LineBasicMaterial({ transparent: true, opacity: 0.4 });
-  readonly #mesh = new Mesh(new BufferGeometry(), this.#material);
+  /** With normals from the start: a shader that is made for a surface without them draws flat triangles for ever. */
+  readonly #mesh = new Mesh(allocate(1, 1), this.#material);
   readonly #edges = new LineSegments(new BufferGeometry(), this.#edgeMaterial);
   /** How much of the buffers is in use: vertices, and corners of triangles. */
   #vertices = 0;
@@ -151,6 +152,7 @@ function allocate(vertices: number, triangles: number): BufferGeometry {
   }
   geometry.setIndex(new BufferAttribute(new Uint32Array(3 * triangles), 1));
   geometry.boundingSphere = new Sphere(new Vector3(), Number.POSITIVE_INFINITY);
+  geometry.setDrawRange(0, 0);
   return geometry;
 }
 
