@@ -43,7 +43,7 @@ export class AttractorControls {
       PLACE,
     );
     const help =
-      'Points that pull the surface like springs, or push it where the strength is negative, and fade out at their radius. A tip that is pulled out never quite comes to rest: press Pause when you have seen enough.';
+      'Points that pull the surface like springs, or push it where the strength is negative, and fade out at their radius. A strong pull draws out a tip that never quite comes to rest: press Pause then.';
     this.element = h(
       'div',
       {},
