@@ -17,7 +17,16 @@ export {
   type DeformableStart,
 } from './deformable.js';
 export { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
-export { Mesh, type MeshArrays, type MeshFormat, type MeshHit, type MeshInfo, type MeshReport } from './mesh.js';
+export {
+  type CurvatureKind,
+  Mesh,
+  type MeshArrays,
+  type MeshFormat,
+  type MeshHit,
+  type MeshInfo,
+  type MeshReport,
+  type SurfaceDistance,
+} from './mesh.js';
 export { type ParamSpec, paramSpecs } from './params.js';
 export { type InitInput, init as default, initSync } from './runtime.js';
 export type { RunOptions, Stepper, StepReport } from './stepper.js';

@@ -72,6 +72,29 @@ export interface MeshHit {
   distance: number;
 }
 
+/** Which curvature: κ₁ and κ₂ are the principal ones. */
+export type CurvatureKind =
+  /** H = (κ₁ + κ₂) / 2. */
+  | 'mean'
+  /** K = κ₁ κ₂. */
+  | 'gaussian';
+
+/** How far two surfaces are from each other, world units. Summaries are of both ways, and the same both ways. */
+export interface SurfaceDistance {
+  /** From each vertex of the mesh to the nearest point of the other's surface; not negative. */
+  perVertex: Float32Array;
+  /** Mean of the two one-way means. */
+  mean: number;
+  /** Root of the mean of the two one-way mean squares. */
+  rms: number;
+  /** The larger of the two one-way 95th percentiles. */
+  p95: number;
+  /** The largest distance of all, both ways. */
+  hausdorff: number;
+}
+
+const CURVATURES: readonly CurvatureKind[] = ['mean', 'gaussian'];
+
 const FORMATS: readonly MeshFormat[] = ['glb', 'ply', 'stl', 'obj', 'vtp', 'mz3'];
 
 /** The handle of a mesh; for the library's own modules. */
@@ -229,6 +252,66 @@ export class Mesh {
    */
   refine(): void {
     this.#handle.use((raw) => raw.refine());
+  }
+
+  /**
+   * Draws edges together, those first whose loss is felt least (by quadric errors), until at most so many triangles
+   * are left. The mesh stays closed, keeps its components and their genus, no triangle turns over, and where it did
+   * not cross itself it does not afterwards.
+   *
+   * Stops early where no edge can be drawn together safely: a component keeps four triangles at least, a handle some
+   * more. Vertices are numbered anew. Texture coordinates and colours are not kept. A target of as many triangles as
+   * there are, or more, changes nothing.
+   *
+   * @param targetTriangles - At least 1; a fraction is cut off.
+   * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first.
+   */
+  decimate(targetTriangles: number): void {
+    number('targetTriangles', targetTriangles, { min: 1 });
+    this.#handle.use((raw) => raw.decimate(targetTriangles));
+  }
+
+  /**
+   * Curvature at each vertex, in the order of {@link Mesh.arrays}. `mean` is positive where the surface bulges outwards:
+   * 1/r on a ball of radius r, -1/r on a cavity. `gaussian` is 1/r² on both and negative on a saddle.
+   *
+   * Of the triangles around a vertex, so rough where they are: smooth the values for display if need be. Always finite;
+   * 0 on the rim of an open mesh and at vertices of no triangle.
+   *
+   * @throws {@link VesicleError} `invalid-argument`: neither of the two.
+   */
+  curvature(kind: CurvatureKind): Float32Array {
+    choice('kind', kind, CURVATURES);
+    return this.#handle.use((raw) => (kind === 'mean' ? raw.meanCurvature() : raw.gaussianCurvature()));
+  }
+
+  /**
+   * Distance along the surface from one vertex to each, in the order of {@link Mesh.arrays}, world units; `Infinity`
+   * where no triangles lead, as on other components.
+   *
+   * Exact on flat parts. On curved ones, and where ways from two sides meet, up to half an edge short; never shorter
+   * than the straight line.
+   *
+   * @param fromVertex - Index of the vertex.
+   * @throws {@link VesicleError} `invalid-argument`: there is no such vertex.
+   */
+  geodesic(fromVertex: number): Float32Array {
+    whole('fromVertex', fromVertex);
+    return this.#handle.use((raw) => raw.geodesic(fromVertex));
+  }
+
+  /**
+   * Unsigned distance from each of this mesh's vertices to the other's surface, and summaries of both ways: from this
+   * mesh's vertices to the other's surface, and from the other's vertices to this one's surface.
+   *
+   * In the summaries each vertex counts by the area around it. `a.distanceTo(b)` and `b.distanceTo(a)` give the same
+   * summaries.
+   *
+   * @throws {@link VesicleError} `invalid-argument`: `other` is no mesh, or one of the two has no triangle.
+   */
+  distanceTo(other: Mesh): SurfaceDistance {
+    const handle = meshHandle('other', other);
+    return this.#handle.use((raw) => handle.use((rawOther) => raw.distanceTo(rawOther) as SurfaceDistance));
   }
 
   /**

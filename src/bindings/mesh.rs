@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use js_sys::{Float32Array, Uint8Array, Uint32Array};
+use js_sys::{Float32Array, Reflect, Uint8Array, Uint32Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
@@ -12,9 +12,10 @@ use super::error::Failure;
 use super::volume::RawVolume;
 use crate::io::{MeshFormat, parse_mesh, write_mesh};
 use crate::math::{DVec3, Vec3};
-use crate::mesh::{Measures, Mesh, MeshReport, TriangleMesh, measure, report};
+use crate::mesh::{Measures, Mesh, MeshReport, TriangleMesh, curvature, geodesic, measure, report};
 use crate::methods::deformable::DeformableModel;
-use crate::spatial::{SurfacePoint, TriangleTree, cross_section};
+use crate::remesh::decimate;
+use crate::spatial::{SurfaceDistance, SurfacePoint, TriangleTree, cross_section, surface_distance};
 use crate::volume::marching_cubes_world;
 
 /// What stands behind a JavaScript `Mesh`.
@@ -144,6 +145,49 @@ impl RawMesh {
         Ok(())
     }
 
+    /// Quadric decimation; see [`decimate`].
+    pub fn decimate(&mut self, target_triangles: f64) -> Result<(), JsValue> {
+        // A fraction is cut off, and so is what no mesh can have.
+        let target = target_triangles as usize;
+        if let Body::Triangles(mesh) = &self.0
+            && mesh.triangles.len() <= target
+        {
+            // Nothing is left to do, and nothing changes; an open mesh is refused all the same.
+            Mesh::from_triangles(mesh).map_err(Failure::from)?;
+            return Ok(());
+        }
+        decimate(self.editable()?, target);
+        Ok(())
+    }
+
+    /// Mean curvature of each vertex.
+    #[wasm_bindgen(js_name = meanCurvature)]
+    pub fn mean_curvature(&self) -> Vec<f32> {
+        narrowed(&curvature(&self.triangles()).mean)
+    }
+
+    /// Gaussian curvature of each vertex.
+    #[wasm_bindgen(js_name = gaussianCurvature)]
+    pub fn gaussian_curvature(&self) -> Vec<f32> {
+        narrowed(&curvature(&self.triangles()).gaussian)
+    }
+
+    /// Distance along the surface of each vertex.
+    pub fn geodesic(&self, from_vertex: u32) -> Result<Vec<f32>, JsValue> {
+        Ok(narrowed(&geodesic(&self.triangles(), from_vertex).map_err(Failure::from)?))
+    }
+
+    /// Distances to another surface as the contract has them.
+    #[wasm_bindgen(js_name = distanceTo)]
+    pub fn distance_to(&self, other: &RawMesh) -> Result<JsValue, JsValue> {
+        let found = surface_distance(&self.triangles(), &other.triangles()).map_err(Failure::from)?;
+        let summaries = to_js(&Summaries::from(&found))?;
+        let per_vertex = Float32Array::from(narrowed(&found.per_vertex).as_slice());
+        // Setting a property of a fresh plain object cannot fail.
+        Reflect::set(&summaries, &"perVertex".into(), &per_vertex).ok();
+        Ok(summaries)
+    }
+
     /// The nearest triangle a ray meets, or nothing.
     pub fn pick(&self, origin: &[f64], direction: &[f64]) -> Result<JsValue, JsValue> {
         let tree = TriangleTree::new(&self.triangles()).map_err(Failure::from)?;
@@ -242,6 +286,24 @@ fn fill(out: &Float32Array, values: &[f32]) {
 
 fn loose(mesh: TriangleMesh) -> Body {
     Body::Triangles(Rc::new(mesh))
+}
+
+fn narrowed(values: &[f64]) -> Vec<f32> {
+    values.iter().map(|&value| value as f32).collect()
+}
+
+#[derive(Serialize)]
+struct Summaries {
+    mean: f64,
+    rms: f64,
+    p95: f64,
+    hausdorff: f64,
+}
+
+impl From<&SurfaceDistance> for Summaries {
+    fn from(found: &SurfaceDistance) -> Self {
+        Self { mean: found.mean, rms: found.rms, p95: found.p95, hausdorff: found.hausdorff }
+    }
 }
 
 #[derive(Serialize)]

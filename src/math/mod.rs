@@ -1,9 +1,11 @@
-//! Small geometry: the vector types every layer shares, and exact predicates on triangles.
+//! Small geometry: the vector types every layer shares, quadric errors, and exact predicates on triangles.
 
 mod bounds;
 pub mod predicates;
+mod quadric;
 pub mod symmetric;
 pub mod triangle;
 
 pub use bounds::{Bounds, BoxTree};
 pub use glam::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3};
+pub use quadric::Quadric;

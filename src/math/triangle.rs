@@ -15,6 +15,17 @@ pub fn area(triangle: [Vec3; 3]) -> f64 {
     0.5 * area_vector(triangle).length()
 }
 
+/// The solid angle of the triangle seen from `p`, positive from the side from which it looks clockwise, that is from
+/// behind; from −2π to 2π. Those of a closed surface sum to 4π from inside and to 0 from outside.
+///
+/// Van Oosterom & Strackee, *The solid angle of a plane triangle*, 1983.
+pub fn solid_angle(triangle: [Vec3; 3], p: Vec3) -> f64 {
+    let [a, b, c] = triangle.map(|q| q.as_dvec3() - p.as_dvec3());
+    let [x, y, z] = [a.length(), b.length(), c.length()];
+    let cosine = x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y;
+    2.0 * libm::atan2(a.dot(b.cross(c)), cosine)
+}
+
 /// The point with the given barycentric coordinates.
 #[inline]
 pub fn at([a, b, c]: [Vec3; 3], barycentric: DVec3) -> DVec3 {
@@ -97,6 +108,15 @@ mod tests {
     fn area_and_normal() {
         assert_eq!(area_vector(T), DVec3::new(0.0, 0.0, 12.0));
         assert_eq!(area(T), 6.0);
+    }
+
+    #[test]
+    fn solid_angles() {
+        let octant = [Vec3::X, Vec3::Y, Vec3::Z];
+        assert!((solid_angle(octant, Vec3::ZERO) - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+        assert!((solid_angle(T, Vec3::new(1.0, 1.0, -1e-6)) - std::f64::consts::TAU).abs() < 1e-5);
+        assert!((solid_angle(T, Vec3::new(1.0, 1.0, 1e-6)) + std::f64::consts::TAU).abs() < 1e-5);
+        assert_eq!(solid_angle(T, Vec3::new(9.0, 1.0, 0.0)), 0.0);
     }
 
     #[test]

@@ -33,7 +33,7 @@ fn for_each_crossing(mesh: &TriangleMesh, mut visit: impl FnMut(u32, u32)) {
         .unzip();
     BoxTree::new(&boxes).for_each_pair(|i, j| {
         let (s, t) = (sound[i as usize], sound[j as usize]);
-        if cross(mesh, mesh.triangles[s as usize], mesh.triangles[t as usize]) {
+        if facets_cross(&facet(mesh, s), &facet(mesh, t)) {
             visit(s, t);
         }
     });
@@ -45,31 +45,47 @@ fn sound_corners(mesh: &TriangleMesh, &[a, b, c]: &[u32; 3]) -> Option<[Vec3; 3]
     (a != b && b != c && c != a).then_some(corners)
 }
 
-fn cross(mesh: &TriangleMesh, s: [u32; 3], t: [u32; 3]) -> bool {
-    let at = |v: u32| mesh.positions[v as usize];
-    match s.iter().filter(|v| t.contains(v)).count() {
-        0 => triangles_cross(s.map(at), t.map(at)),
-        1 => {
-            let [shared, a, b] = rotated(s, |v| t.contains(&v)).map(at);
-            let [_, c, d] = rotated(t, |v| s.contains(&v)).map(at);
-            triangles_cross_sharing_vertex(shared, [a, b], [c, d])
+fn facet(mesh: &TriangleMesh, triangle: u32) -> Facet {
+    let corners = mesh.triangles[triangle as usize];
+    Facet { corners, points: corners.map(|v| mesh.positions[v as usize]) }
+}
+
+/// A triangle by the names of its corners and where they are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facet {
+    /// Which vertices the corners are: equal names are a common corner.
+    pub corners: [u32; 3],
+    /// Where they are.
+    pub points: [Vec3; 3],
+}
+
+impl Facet {
+    /// The same triangle from the corner that is asked for.
+    fn rotated(&self, is_first: impl Fn(u32) -> bool) -> [Vec3; 3] {
+        let [a, b, c] = self.points;
+        match self.corners.map(is_first) {
+            [true, _, _] => [a, b, c],
+            [_, true, _] => [b, c, a],
+            _ => [c, a, b],
         }
-        2 => {
-            let [tip, u, v] = rotated(s, |v| !t.contains(&v)).map(at);
-            let [other_tip, ..] = rotated(t, |v| !s.contains(&v)).map(at);
-            triangles_fold_sharing_edge(u, v, tip, other_tip)
-        }
-        _ => !collinear(s.map(at)),
     }
 }
 
-/// The same triangle from the corner that is asked for.
-fn rotated([a, b, c]: [u32; 3], is_first: impl Fn(u32) -> bool) -> [u32; 3] {
-    if is_first(a) {
-        [a, b, c]
-    } else if is_first(b) {
-        [b, c, a]
-    } else {
-        [c, a, b]
+/// Whether two triangles share more than their common corners and edges; exact, touching included. A coplanar fold over
+/// a common edge counts, and so do two triangles on the same three corners.
+pub fn facets_cross(s: &Facet, t: &Facet) -> bool {
+    let in_s = |v: u32| s.corners.contains(&v);
+    let in_t = |v: u32| t.corners.contains(&v);
+    match s.corners.iter().filter(|&&v| in_t(v)).count() {
+        0 => triangles_cross(s.points, t.points),
+        1 => {
+            let ([shared, a, b], [_, c, d]) = (s.rotated(in_t), t.rotated(in_s));
+            triangles_cross_sharing_vertex(shared, [a, b], [c, d])
+        }
+        2 => {
+            let ([tip, u, v], [other_tip, ..]) = (s.rotated(|v| !in_t(v)), t.rotated(|v| !in_s(v)));
+            triangles_fold_sharing_edge(u, v, tip, other_tip)
+        }
+        _ => !collinear(s.points),
     }
 }

@@ -3,13 +3,24 @@
 use super::TriangleMesh;
 use crate::math::Vec3;
 
+/// The faces of a box by their corners, counter-clockwise seen from outside.
+const FACES: [[u32; 4]; 6] =
+    [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+
+fn cuboid_corner(i: u32, size: Vec3) -> Vec3 {
+    Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * size
+}
+
+/// The corners of the faces of a box with a corner at the origin.
+pub fn cuboid_faces(size: Vec3) -> [[Vec3; 4]; 6] {
+    FACES.map(|face| face.map(|i| cuboid_corner(i, size)))
+}
+
 /// A box with a corner at the origin.
 pub fn cuboid(size: Vec3) -> TriangleMesh {
-    let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * size;
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     TriangleMesh {
-        positions: (0..8).map(corner).collect(),
-        triangles: quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+        positions: (0..8).map(|i| cuboid_corner(i, size)).collect(),
+        triangles: FACES.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
         ..Default::default()
     }
 }

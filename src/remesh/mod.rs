@@ -4,14 +4,19 @@
 //! [`Resolver::resolve`] is the whole of it: edges out of bounds are split, flipped, collapsed or cut through
 //! (`edges`), vertices in contact are joined (`contact`), and again until all bounds hold; what is left after
 //! eight rounds stays queued for the next call. Small parts without volume are removed (`specks`).
+//!
+//! [`decimate`] makes a mesh at rest coarser, without a change of topology.
 
 mod changes;
 mod contact;
+mod decimate;
 mod edges;
+mod obstacles;
 mod resolve;
 mod sampling;
 mod specks;
 
 pub use changes::Changes;
+pub use decimate::decimate;
 pub use resolve::{Resolver, Waiting};
 pub use sampling::Sampling;

@@ -134,6 +134,13 @@ export class Mesh {
   components(): Mesh[];
   /** One sqrt(3) refinement pass. */
   refine(): void;
+  /** Quadric decimation that keeps the mesh closed and its topology unchanged. */
+  decimate(targetTriangles: number): void;
+  /** Per vertex. */
+  curvature(kind: 'mean' | 'gaussian'): Float32Array;
+  geodesic(fromVertex: number): Float32Array;
+  /** Unsigned distance from each of this mesh's vertices to the other's surface, and both-way summaries. */
+  distanceTo(other: Mesh): { perVertex: Float32Array; mean: number; rms: number; p95: number; hausdorff: number };
   pick(
     origin: Vec3,
     direction: Vec3,

@@ -105,6 +105,137 @@ test('refining triples the triangles and counts versions up', () => {
   expect(mesh.check()).toEqual(HEALTHY);
 });
 
+/** Tube and ring of a torus about z, `along` × `around` vertices. */
+function torus(around: number, along: number): Mesh {
+  const positions: number[] = [];
+  const indices: number[] = [];
+  const at = (i: number, j: number) => (i % around) * along + (j % along);
+  for (let i = 0; i < around; i++) {
+    for (let j = 0; j < along; j++) {
+      const [u, v] = [(2 * Math.PI * i) / around, (2 * Math.PI * j) / along];
+      const ring = 3 + Math.cos(v);
+      positions.push(ring * Math.cos(u), ring * Math.sin(u), Math.sin(v));
+      indices.push(at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j), at(i + 1, j + 1), at(i, j + 1));
+    }
+  }
+  return Mesh.fromArrays(Float32Array.from(positions), Uint32Array.from(indices));
+}
+
+test('decimation reaches the target and keeps the shape', () => {
+  for (const [mesh, euler] of [
+    [sphere(1, 0.1), 2],
+    [torus(60, 30), 0],
+    [Mesh.marchingCubes(ball(24, 8), 100), 2],
+  ] as const) {
+    const before = mesh.info();
+    const [topology, geometry] = [mesh.topologyVersion, mesh.geometryVersion];
+    const target = mesh.triangleCount / 4 + 0.9;
+    mesh.decimate(target);
+    expect(target - mesh.triangleCount).toBeLessThan(2);
+    expect(mesh.triangleCount).toBeLessThanOrEqual(target);
+    expect(mesh.check()).toEqual(HEALTHY);
+    expect(mesh.info().euler).toBe(euler);
+    expect(mesh.info().volume / before.volume).toBeCloseTo(1, 2);
+    expect(mesh.topologyVersion).toBeGreaterThan(topology);
+    expect(mesh.geometryVersion).toBeGreaterThan(geometry);
+  }
+});
+
+test('decimation: nothing to do, nothing left to do, nothing closed to do it to', () => {
+  const uvs = Float32Array.from([0, 0, 1, 0, 0, 1, 1, 1]);
+  const mesh = Mesh.fromArrays(CORNERS, FACES, { uvs });
+  for (const target of [4, 5, 1e12]) mesh.decimate(target);
+  expect(mesh.arrays()).toMatchObject({ positions: CORNERS, indices: FACES, uvs });
+  expect(mesh.topologyVersion).toBe(0);
+  const small = sphere();
+  small.decimate(1);
+  expect(small.triangleCount).toBe(4);
+  for (const target of [1, 2, 3, 1000]) expect(failure(() => open().decimate(target)).code).toBe('not-closed');
+});
+
+test('decimation takes texture coordinates away, as refining does', () => {
+  for (const edit of [(mesh: Mesh) => mesh.decimate(100), (mesh: Mesh) => mesh.refine()]) {
+    const { positions, indices } = sphere().arrays();
+    const mesh = Mesh.fromArrays(positions, indices, { uvs: new Float32Array((2 * positions.length) / 3) });
+    edit(mesh);
+    expect(mesh.arrays().uvs).toBeUndefined();
+  }
+});
+
+test('curvature of a ball, of a cavity and of a torus', () => {
+  const { positions, indices } = sphere(2, 0.2).arrays();
+  const cavity = Mesh.fromArrays(positions, indices.slice().reverse());
+  for (const [mesh, sign] of [
+    [sphere(2, 0.2), 1],
+    [cavity, -1],
+  ] as const) {
+    const [mean, gaussian] = [mesh.curvature('mean'), mesh.curvature('gaussian')];
+    expect([mean.length, gaussian.length]).toEqual([mesh.vertexCount, mesh.vertexCount]);
+    for (const h of mean) expect(h * sign).toBeCloseTo(0.5, 2);
+    for (const k of gaussian) expect(k).toBeCloseTo(0.25, 1);
+  }
+  const k = torus(120, 40).curvature('gaussian');
+  expect(k[0]).toBeCloseTo(1 / 4, 2);
+  expect(k[10]).toBeCloseTo(0, 2);
+  expect(k[20]).toBeCloseTo(-1 / 2, 2);
+});
+
+test('geodesic distance: great circles, other components, straight lines', () => {
+  const mesh = sphere(1, 0.1);
+  const { positions } = mesh.arrays();
+  const distances = mesh.geodesic(3);
+  expect(distances).toHaveLength(mesh.vertexCount);
+  const [x, y, z] = positions.subarray(9, 12) as unknown as [number, number, number];
+  distances.forEach((distance, v) => {
+    const [a, b, c] = positions.subarray(3 * v, 3 * v + 3) as unknown as [number, number, number];
+    const arc = Math.acos(Math.min(1, Math.max(-1, a * x + b * y + c * z)));
+    expect(Math.abs(distance - arc)).toBeLessThan(0.05);
+    expect(distance).toBeGreaterThanOrEqual(Math.hypot(a - x, b - y, c - z) - 1e-6);
+  });
+  const tetrahedron = Mesh.fromArrays(CORNERS, FACES).arrays();
+  expect([...joined(tetrahedron, tetrahedron, 5).geodesic(4)].slice(0, 5)).toEqual([
+    Infinity,
+    Infinity,
+    Infinity,
+    Infinity,
+    0,
+  ]);
+});
+
+test('distance between concentric spheres, to itself, and the other way round', () => {
+  const [inner, outer] = [sphere(1, 0.1), sphere(1.5, 0.15)];
+  const { perVertex, ...there } = inner.distanceTo(outer);
+  const { perVertex: other, ...back } = outer.distanceTo(inner);
+  expect(perVertex).toBeInstanceOf(Float32Array);
+  expect([perVertex.length, other.length]).toEqual([inner.vertexCount, outer.vertexCount]);
+  expect(there).toEqual(back);
+  expect(Object.keys(there).sort()).toEqual(['hausdorff', 'mean', 'p95', 'rms']);
+  for (const distance of [...perVertex, ...Object.values(there)]) expect(distance).toBeCloseTo(0.5, 2);
+  expect(there.mean).toBeLessThanOrEqual(there.rms);
+  expect(there.p95).toBeLessThanOrEqual(there.hausdorff);
+  expect(inner.distanceTo(inner)).toEqual({
+    perVertex: new Float32Array(inner.vertexCount),
+    mean: 0,
+    rms: 0,
+    p95: 0,
+    hausdorff: 0,
+  });
+});
+
+test('distance to and from nothing', () => {
+  const nothing = Mesh.fromArrays(new Float32Array(), new Uint32Array());
+  for (const [mesh, other, named] of [
+    [sphere(), nothing, 'other'],
+    [nothing, sphere(), 'mesh'],
+  ] as const) {
+    const error = failure(() => mesh.distanceTo(other));
+    expect(error.code).toBe('invalid-argument');
+    expect(error.message).toContain(named);
+  }
+  expect(nothing.curvature('mean')).toEqual(new Float32Array());
+  expect(failure(() => nothing.geodesic(0)).message).toContain('fromVertex');
+});
+
 test('a clone goes its own way', () => {
   const mesh = sphere();
   const copy = mesh.clone();
@@ -194,6 +325,16 @@ const REFUSED: [string, string, () => unknown][] = [
   ['a frame too far', 'frame', () => Mesh.marchingCubes(ball(4, 1), 1, { frame: 1 })],
   ['a ray to nowhere', 'direction', () => sphere().pick([0, 0, 0], [0, 0, 0])],
   ['a plane without normal', 'normal', () => sphere().crossSection([0, 0, 0], [0, 0, 0])],
+  ['half a triangle as a target', 'targetTriangles', () => sphere().decimate(0.5)],
+  ['no triangle as a target', 'targetTriangles', () => sphere().decimate(0)],
+  ['less than none as a target', 'targetTriangles', () => sphere().decimate(-4)],
+  ['NaN as a target', 'targetTriangles', () => sphere().decimate(Number.NaN)],
+  ['no target', 'targetTriangles', () => sphere().decimate(wrong(undefined))],
+  ['another curvature', 'kind', () => sphere().curvature(wrong('principal'))],
+  ['half a vertex as a start', 'fromVertex', () => sphere().geodesic(0.5)],
+  ['a vertex too far', 'fromVertex', () => sphere().geodesic(sphere().vertexCount)],
+  ['a vertex below none', 'fromVertex', () => sphere().geodesic(-1)],
+  ['no other mesh', 'other', () => sphere().distanceTo(wrong({}))],
   ['another format', 'format', () => sphere().toBytes('fbx' as MeshFormat)],
   ['new', 'Mesh', () => new (wrong(Mesh))()],
 ];
@@ -218,7 +359,18 @@ test('use after free', () => {
   const mesh = sphere();
   mesh.free();
   mesh.free();
-  for (const use of [() => mesh.arrays(), () => mesh.vertexCount, () => mesh.clone(), () => mesh.toBytes('ply')]) {
+  const uses = [
+    () => mesh.arrays(),
+    () => mesh.vertexCount,
+    () => mesh.clone(),
+    () => mesh.toBytes('ply'),
+    () => mesh.decimate(10),
+    () => mesh.curvature('mean'),
+    () => mesh.geodesic(0),
+    () => mesh.distanceTo(sphere()),
+    () => sphere().distanceTo(mesh),
+  ];
+  for (const use of uses) {
     expect(failure(use).code).toBe('freed');
   }
 });

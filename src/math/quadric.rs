@@ -1,0 +1,114 @@
+//! Sums of squared distances to planes and points, as functions of a place (Garland & Heckbert, *Surface
+//! simplification using quadric error metrics*, 1997).
+
+use super::{DMat3, DVec3};
+use std::ops::{Add, AddAssign};
+
+/// x ↦ xᵀ A x − 2 b·x + c, with A symmetric and never negative.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Quadric {
+    /// A: xx, yy, zz, xy, yz, zx.
+    diagonal: DVec3,
+    mixed: DVec3,
+    linear: DVec3,
+    constant: f64,
+}
+
+impl Quadric {
+    /// `weight` times the squared distance to the plane through `point` across `normal`, of length 1.
+    pub fn of_plane(point: DVec3, normal: DVec3, weight: f64) -> Self {
+        let height = normal.dot(point);
+        Self {
+            diagonal: normal * normal * weight,
+            mixed: normal * DVec3::new(normal.y, normal.z, normal.x) * weight,
+            linear: normal * (height * weight),
+            constant: height * height * weight,
+        }
+    }
+
+    /// `weight` times the squared distance to `point`.
+    pub fn of_point(point: DVec3, weight: f64) -> Self {
+        Self {
+            diagonal: DVec3::splat(weight),
+            mixed: DVec3::ZERO,
+            linear: point * weight,
+            constant: point.length_squared() * weight,
+        }
+    }
+
+    /// The value at `p`; not negative.
+    pub fn at(&self, p: DVec3) -> f64 {
+        let value = (self.matrix() * p - 2.0 * self.linear).dot(p) + self.constant;
+        // Rounding can take the difference below zero.
+        value.max(0.0)
+    }
+
+    /// Where the value is least; `None` where that is not one finite place.
+    pub fn least(&self) -> Option<DVec3> {
+        let matrix = self.matrix();
+        let place = matrix.inverse() * self.linear;
+        (matrix.determinant() > 0.0 && place.is_finite()).then_some(place)
+    }
+
+    fn matrix(&self) -> DMat3 {
+        let ([xx, yy, zz], [xy, yz, zx]) = (self.diagonal.to_array(), self.mixed.to_array());
+        DMat3::from_cols_array(&[xx, xy, zx, xy, yy, yz, zx, yz, zz])
+    }
+}
+
+impl Add for Quadric {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            diagonal: self.diagonal + other.diagonal,
+            mixed: self.mixed + other.mixed,
+            linear: self.linear + other.linear,
+            constant: self.constant + other.constant,
+        }
+    }
+}
+
+impl AddAssign for Quadric {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    const P: DVec3 = DVec3::new(1.0, -2.0, 0.5);
+
+    #[test]
+    fn distances_to_a_plane_and_a_point() {
+        let normal = DVec3::new(2.0, 1.0, -2.0) / 3.0;
+        let plane = Quadric::of_plane(P, normal, 3.0);
+        let along = DVec3::new(1.0, 0.0, 1.0);
+        assert!((plane.at(P + 2.0 * normal + 7.0 * along) - 12.0).abs() < 1e-12);
+        assert!((Quadric::of_point(P, 0.5).at(P + along) - 1.0).abs() < 1e-15);
+        assert!(plane.least().is_none() || plane.at(plane.least().unwrap()) < 1e-12);
+        assert_eq!(Quadric::default().least(), None);
+    }
+
+    #[test]
+    fn least_where_three_planes_meet() {
+        let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::new(0.6, 0.0, 0.8)];
+        let corner =
+            Quadric::of_plane(P, x, 1.0) + Quadric::of_plane(P, y, 2.0) + Quadric::of_plane(P, z, 5.0);
+        assert!((corner.least().unwrap() - P).length() < 1e-14);
+    }
+
+    /// On a flat part the planes leave the place open, and a little of the points settles it.
+    #[test]
+    fn points_settle_what_planes_leave_open() {
+        let mut flat = Quadric::default();
+        for shift in [DVec3::X, DVec3::Y, -DVec3::X, -DVec3::Y] {
+            flat += Quadric::of_plane(P + shift, DVec3::Z, 1.0) + Quadric::of_point(P + shift, 1e-6);
+        }
+        assert!((flat.least().unwrap() - P).length() < 1e-9);
+    }
+}

@@ -1,0 +1,300 @@
+//! What new triangles may not touch: the rest of the surface, found through a tree of boxes that follows the edits.
+
+use crate::math::{Bounds, Vec3, triangle};
+use crate::mesh::{Facet, Mesh, VertexId, facets_cross};
+
+/// The stars of all vertices by where they are: a balanced tree of boxes over the vertices in the order of a space-filling
+/// curve.
+///
+/// The box of a vertex holds all triangles around it. The tree keeps its form while vertices go, so an edit costs
+/// O(log n); it is meant for passes that make a mesh coarser.
+pub(super) struct Obstacles {
+    /// A heap: the children of node i are 2i and 2i + 1, the leaves are the last half.
+    nodes: Vec<Bounds>,
+    /// The leaf of each vertex slot, counted from the first leaf.
+    leaves: Vec<u32>,
+    /// The vertex of each leaf.
+    vertices: Vec<VertexId>,
+    /// The component of each vertex slot.
+    components: Vec<u32>,
+    /// Pairs of a box and a triangle that may still be compared; see [`Self::is_exhausted`].
+    work_left: u64,
+    stack: Vec<u32>,
+}
+
+impl Obstacles {
+    /// The stars of `mesh`, for looking at `work` pairs.
+    pub fn new(mesh: &Mesh, work: u64) -> Self {
+        let vertices = along_a_curve(mesh);
+        let first_leaf = vertices.len().next_power_of_two();
+        let mut leaves = vec![0; mesh.slots()];
+        let mut nodes = vec![Bounds::EMPTY; 2 * first_leaf];
+        for (leaf, &v) in vertices.iter().enumerate() {
+            leaves[v.index()] = leaf as u32;
+            nodes[first_leaf + leaf] = star(mesh, v);
+        }
+        for i in (1..first_leaf).rev() {
+            nodes[i] = nodes[2 * i].joined(&nodes[2 * i + 1]);
+        }
+        let components = components(mesh);
+        Self { nodes, leaves, vertices, components, work_left: work, stack: Vec::new() }
+    }
+
+    /// Whether putting the triangles `fresh` in the place of the stars of `replaced` would do harm: they share more than
+    /// common corners and edges with each other or with other triangles of `mesh` (exact, touching included), or a whole
+    /// component changes sides without being touched.
+    ///
+    /// `mesh` is as it was before the edit. The first of `replaced` names the component that is edited.
+    pub fn block(&mut self, mesh: &Mesh, fresh: &[Facet], replaced: &[VertexId]) -> bool {
+        let boxes: Vec<Bounds> = fresh.iter().map(|facet| Bounds::of(&facet.points)).collect();
+        if cross_each_other(fresh, &boxes) {
+            return true;
+        }
+        let edit = Edit { fresh, boxes: &boxes, replaced, around: around(mesh, &boxes, replaced) };
+        self.stack.clear();
+        self.stack.push(1);
+        while let Some(i) = self.stack.pop() {
+            self.work_left = self.work_left.saturating_sub(1);
+            if !self.nodes[i as usize].meets(&edit.around) {
+                continue;
+            }
+            let blocked = match (i as usize).checked_sub(self.nodes.len() / 2) {
+                None => {
+                    self.stack.extend([2 * i, 2 * i + 1]);
+                    false
+                }
+                Some(leaf) => self.star_blocks(mesh, self.vertices[leaf], &edit),
+            };
+            if blocked {
+                return true;
+            }
+        }
+        false
+    }
+
+    fn star_blocks(&mut self, mesh: &Mesh, v: VertexId, edit: &Edit) -> bool {
+        if edit.replaced.contains(&v) {
+            return false;
+        }
+        let component = |w: VertexId| self.components[w.index()];
+        let is_apart = edit.replaced.first().is_some_and(|&u| component(u) != component(v));
+        self.star_crosses(mesh, v, edit) || is_apart && changes_sides(mesh, mesh.position(v), edit)
+    }
+
+    /// Whether one of the triangles of which `v` is the lowest corner, none of them in `replaced`, crosses a fresh one.
+    fn star_crosses(&mut self, mesh: &Mesh, v: VertexId, edit: &Edit) -> bool {
+        for (a, b) in mesh.ring(v).pairs().filter(|&(a, b)| v < a && v < b) {
+            let other = facet(mesh, [v, a, b]);
+            let bounds = Bounds::of(&other.points);
+            if !bounds.meets(&edit.around) || edit.replaced.contains(&a) || edit.replaced.contains(&b) {
+                continue;
+            }
+            self.work_left = self.work_left.saturating_sub(edit.fresh.len() as u64);
+            let mut near = edit.fresh.iter().zip(edit.boxes).filter(|(_, near)| near.meets(&bounds));
+            if near.any(|(fresh, _)| facets_cross(fresh, &other)) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Whether more was looked at than was allowed. Triangles whose boxes all meet make work quadratic in their number.
+    pub fn is_exhausted(&self) -> bool {
+        self.work_left == 0
+    }
+
+    /// Takes over that `gone` is gone and that the triangles around `centre` are new.
+    pub fn follow(&mut self, mesh: &Mesh, centre: VertexId, gone: VertexId) {
+        self.set(gone, Bounds::EMPTY);
+        self.set(centre, star(mesh, centre));
+        for &v in mesh.ring(centre).as_slice() {
+            self.set(v, star(mesh, v));
+        }
+    }
+
+    fn set(&mut self, v: VertexId, bounds: Bounds) {
+        let mut i = self.nodes.len() / 2 + self.leaves[v.index()] as usize;
+        self.nodes[i] = bounds;
+        while i > 1 {
+            i /= 2;
+            let joined = self.nodes[2 * i].joined(&self.nodes[2 * i + 1]);
+            if self.nodes[i] == joined {
+                return;
+            }
+            self.nodes[i] = joined;
+        }
+    }
+}
+
+/// Triangles that would stand in for others.
+struct Edit<'a> {
+    fresh: &'a [Facet],
+    boxes: &'a [Bounds],
+    replaced: &'a [VertexId],
+    /// A box around all of it, before and after.
+    around: Bounds,
+}
+
+fn around(mesh: &Mesh, boxes: &[Bounds], replaced: &[VertexId]) -> Bounds {
+    let before = replaced.iter().map(|&v| star(mesh, v));
+    boxes.iter().copied().chain(before).fold(Bounds::EMPTY, |all, one| all.joined(&one))
+}
+
+/// Whether `p` lies between the triangles that were and those that would be.
+fn changes_sides(mesh: &Mesh, p: Vec3, edit: &Edit) -> bool {
+    if !edit.around.contains(p) {
+        return false;
+    }
+    let fresh: f64 = edit.fresh.iter().map(|facet| triangle::solid_angle(facet.points, p)).sum();
+    let old = edit.replaced.iter().enumerate().flat_map(|(k, &v)| {
+        // A triangle at several of the vertices counts for the first of them.
+        let counted = move |&(a, b): &(VertexId, VertexId)| {
+            !edit.replaced[..k].contains(&a) && !edit.replaced[..k].contains(&b)
+        };
+        mesh.ring(v).pairs().filter(counted).map(move |(a, b)| [v, a, b])
+    });
+    let old: f64 = old.map(|corners| triangle::solid_angle(facet(mesh, corners).points, p)).sum();
+    // 4π between them, else 0.
+    (fresh - old).abs() > std::f64::consts::TAU
+}
+
+/// The number of the component of each slot.
+fn components(mesh: &Mesh) -> Vec<u32> {
+    let mut components = vec![0; mesh.slots()];
+    for (number, members) in (0..).zip(mesh.component_members()) {
+        members.into_iter().for_each(|v| components[v.index()] = number);
+    }
+    components
+}
+
+/// The triangle of `corners` as it is now.
+pub(super) fn facet(mesh: &Mesh, corners: [VertexId; 3]) -> Facet {
+    Facet { corners: corners.map(|v| v.0), points: corners.map(|v| mesh.position(v)) }
+}
+
+fn cross_each_other(fresh: &[Facet], boxes: &[Bounds]) -> bool {
+    (0..fresh.len()).any(|i| (0..i).any(|j| boxes[i].meets(&boxes[j]) && facets_cross(&fresh[i], &fresh[j])))
+}
+
+/// The box around all triangles at `v`.
+fn star(mesh: &Mesh, v: VertexId) -> Bounds {
+    let point = |p: Vec3| Bounds { min: p, max: p };
+    let ring = mesh.ring(v).as_slice().iter();
+    ring.fold(point(mesh.position(v)), |all, &w| all.joined(&point(mesh.position(w))))
+}
+
+/// The vertices in the order of a Z-curve through their box: those near each other in it are mostly near in space.
+fn along_a_curve(mesh: &Mesh) -> Vec<VertexId> {
+    let bounds = mesh
+        .vertices()
+        .fold(Bounds::EMPTY, |all, v| all.joined(&Bounds { min: mesh.position(v), max: mesh.position(v) }));
+    // In f64, where no size of finite coordinates overflows.
+    let (low, size) = (bounds.min.as_dvec3(), (bounds.max.as_dvec3() - bounds.min.as_dvec3()).max_element());
+    let mut keyed: Vec<(u64, VertexId)> = mesh
+        .vertices()
+        .map(|v| {
+            let cell = (mesh.position(v).as_dvec3() - low) / size * f64::from((1_u32 << CURVE_BITS) - 1);
+            // A size of 0 gives NaN, and NaN the cell 0.
+            (spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2, v)
+        })
+        .collect();
+    keyed.sort_unstable();
+    keyed.into_iter().map(|(_, v)| v).collect()
+}
+
+/// Cells of the curve along an axis are 2 to this power: more than enough to part the vertices of a mesh.
+const CURVE_BITS: u32 = 16;
+
+/// The bits of a number below 2^16 with two zeros after each.
+fn spread(cell: u32) -> u64 {
+    let mut bits = u64::from(cell);
+    let steps = [(16, 0xff00_00ff), (8, 0x00f0_0f00_f00f), (4, 0x0c30_c30c_30c3), (2, 0x2492_4924_9249)];
+    for (shift, mask) in steps {
+        bits = (bits | bits << shift) & mask;
+    }
+    bits
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Two balls beside each other, and the triangles that would stand around `v` if it were at `place`.
+    fn moved(place: Vec3) -> (Mesh, VertexId, Vec<Facet>) {
+        let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
+        mesh.append(&Mesh::icosphere(Vec3::X * 2.2, 1.0, 0.3).unwrap()).unwrap();
+        let nearest = mesh.vertices().max_by(|&a, &b| f32::total_cmp(&first_x(&mesh, a), &first_x(&mesh, b)));
+        let v = nearest.unwrap();
+        let fan = mesh.ring(v).pairs().map(|(a, b)| {
+            let mut facet = facet(&mesh, [v, a, b]);
+            facet.points[0] = place;
+            facet
+        });
+        let fan = fan.collect();
+        (mesh, v, fan)
+    }
+
+    /// How far along x a vertex of the first ball is.
+    fn first_x(mesh: &Mesh, v: VertexId) -> f32 {
+        let x = mesh.position(v).x;
+        if x < 1.1 { x } else { f32::MIN }
+    }
+
+    #[test]
+    fn what_is_touched_blocks() {
+        for (x, expected) in
+            [(1.0, false), (1.05, false), (1.3, true), (5.0, true), (-0.5, false), (-1.3, true)]
+        {
+            let (mesh, v, fan) = moved(Vec3::X * x);
+            assert_eq!(Obstacles::new(&mesh, u64::MAX).block(&mesh, &fan, &[v]), expected, "{x}");
+        }
+    }
+
+    #[test]
+    fn what_would_change_sides_blocks() {
+        for (x, expected) in [(1.01, false), (1.5, true), (0.95, false), (3.0, true)] {
+            let (mut mesh, v, fan) = moved(Vec3::X * x);
+            let other = mesh.vertices().find(|&w| mesh.position(w).x > 1.1).unwrap();
+            mesh.remove_component(other);
+            mesh.append(&Mesh::icosahedron(Vec3::X * 1.1, 0.01)).unwrap();
+            assert_eq!(Obstacles::new(&mesh, u64::MAX).block(&mesh, &fan, &[v]), expected, "{x}");
+        }
+    }
+
+    #[test]
+    fn a_tree_that_followed_is_one_made_anew() {
+        let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.2).unwrap();
+        let mut followed = Obstacles::new(&mesh, u64::MAX);
+        for i in 0..300 {
+            let (u, v) = mesh.edges().nth(i * 7 % mesh.edge_count()).unwrap();
+            let place = mesh.position(v);
+            if mesh.collapse(u, v, place).is_ok() {
+                followed.follow(&mesh, u, v);
+            }
+        }
+        let leaf =
+            |v: VertexId| followed.nodes[followed.nodes.len() / 2 + followed.leaves[v.index()] as usize];
+        assert!(mesh.vertices().all(|v| leaf(v) == star(&mesh, v)));
+        let root = mesh.vertices().fold(Bounds::EMPTY, |all, v| all.joined(&star(&mesh, v)));
+        assert_eq!(followed.nodes[1], root);
+    }
+
+    #[test]
+    fn work_ends() {
+        let (mesh, v, fan) = moved(Vec3::X);
+        let mut obstacles = Obstacles::new(&mesh, 1000);
+        let looks =
+            (0..1000).take_while(|_| !obstacles.block(&mesh, &fan, &[v]) && !obstacles.is_exhausted());
+        assert!((2..50).contains(&looks.count()));
+    }
+
+    #[test]
+    fn bits_are_spread() {
+        for cell in [0, 1, 0x8000, 0xffff, 0x1234, 0xa5c3] {
+            let expected = (0..16).fold(0, |all, k| all | u64::from(cell >> k & 1) << (3 * k));
+            assert_eq!(spread(cell), expected, "{cell:x}");
+        }
+    }
+}

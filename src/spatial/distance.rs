@@ -1,0 +1,226 @@
+//! How far two surfaces are from each other.
+
+use super::TriangleTree;
+use crate::math::triangle;
+use crate::mesh::{MeshError, TriangleMesh};
+
+/// Distances between two surfaces, in the meshes' units. All but `per_vertex` are the same to the bit when the
+/// two change places.
+///
+/// "One way" is from the vertices of one mesh to the whole surface of the other; each vertex counts by a third of the area
+/// of the triangles around it, so that dense parts do not count for more. Vertices of no triangle do not count. Between
+/// its vertices a surface may be further away than at them, by an edge at most.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceDistance {
+    /// From each vertex of the first mesh to the surface of the second; not negative.
+    pub per_vertex: Vec<f64>,
+    /// The mean of the two one-way means.
+    pub mean: f64,
+    /// The root of the mean of the two one-way mean squares.
+    pub rms: f64,
+    /// The larger of the two one-way 95th percentiles: each the least distance that at least 95 % of the area keep to.
+    pub p95: f64,
+    /// The largest distance of all, of both ways: the Hausdorff distance as the vertices show it.
+    pub hausdorff: f64,
+}
+
+/// The distance of two surfaces from each other; O(n log n) as long as the surfaces are not far apart.
+///
+/// # Errors
+/// [`MeshError::InvalidArgument`] where either has no triangle (`mesh` is the first, `other` the second), names a vertex
+/// that does not exist, or has a position that is not finite.
+pub fn surface_distance(mesh: &TriangleMesh, other: &TriangleMesh) -> Result<SurfaceDistance, MeshError> {
+    not_empty("mesh", mesh)?;
+    not_empty("other", other)?;
+    let per_vertex = one_way(mesh, &TriangleTree::new(other)?);
+    let back = one_way(other, &TriangleTree::new(mesh)?);
+    let [there, back] = [Summary::of(mesh, &per_vertex), Summary::of(other, &back)];
+    Ok(SurfaceDistance {
+        per_vertex,
+        mean: 0.5 * (there.mean + back.mean),
+        rms: (0.5 * (there.mean_square + back.mean_square)).sqrt(),
+        p95: there.p95.max(back.p95),
+        hausdorff: there.largest.max(back.largest),
+    })
+}
+
+fn not_empty(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MeshError> {
+    if !mesh.triangles.is_empty() {
+        return Ok(());
+    }
+    Err(MeshError::InvalidArgument { parameter, problem: "there is no triangle to measure to".into() })
+}
+
+fn one_way(mesh: &TriangleMesh, surface: &TriangleTree) -> Vec<f64> {
+    // The tree has triangles, and positions were found to be finite.
+    let distance = |p| surface.closest(p).map_or(0.0, |nearest| nearest.distance);
+    mesh.positions.iter().map(|&p| distance(p)).collect()
+}
+
+/// One way.
+struct Summary {
+    mean: f64,
+    mean_square: f64,
+    p95: f64,
+    largest: f64,
+}
+
+impl Summary {
+    fn of(mesh: &TriangleMesh, distances: &[f64]) -> Self {
+        let mut weighted: Vec<(f64, f64)> =
+            distances.iter().copied().zip(weights(mesh)).filter_map(|(d, w)| Some((d, w?))).collect();
+        weighted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let total: f64 = weighted.iter().map(|(_, w)| w).sum();
+        let mean_of = |value: fn(f64) -> f64| weighted.iter().map(|&(d, w)| value(d) * (w / total)).sum();
+        let largest = weighted.last().map_or(0.0, |&(d, _)| d);
+        let mut below = 0.0;
+        let reaches = |&&(_, w): &&(f64, f64)| {
+            below += w;
+            below >= 0.95 * total
+        };
+        let p95 = weighted.iter().find(reaches).map_or(largest, |&(d, _)| d);
+        Self { mean: mean_of(|d| d), mean_square: mean_of(|d| d * d), p95, largest }
+    }
+}
+
+/// A third of the area of the triangles around each vertex, `None` for one of no triangle; all the same where there is
+/// no area at all.
+fn weights(mesh: &TriangleMesh) -> Vec<Option<f64>> {
+    let mut weights = vec![None; mesh.positions.len()];
+    for (triangle, corners) in mesh.triangles.iter().zip(mesh.corners()) {
+        let share = triangle::area(corners) / 3.0;
+        triangle.iter().for_each(|&v| *weights[v as usize].get_or_insert(0.0) += share);
+    }
+    if weights.iter().flatten().all(|&w| w == 0.0) {
+        weights.iter_mut().flatten().for_each(|w| *w = 1.0);
+    }
+    weights
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::mesh::Mesh;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn sphere(radius: f32, edge: f32) -> TriangleMesh {
+        Mesh::icosphere(Vec3::ZERO, radius, edge).unwrap().to_triangles()
+    }
+
+    /// The square from the origin to (1, 1) at a height, in two triangles.
+    fn square(z: f32) -> TriangleMesh {
+        TriangleMesh {
+            positions: [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+                .map(|[x, y]| Vec3::new(x, y, z))
+                .to_vec(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..Default::default()
+        }
+    }
+
+    fn summaries(d: &SurfaceDistance) -> [f64; 4] {
+        [d.mean, d.rms, d.p95, d.hausdorff]
+    }
+
+    #[test]
+    fn concentric_spheres() {
+        let (inner, outer) = (sphere(1.0, 0.1), sphere(1.25, 0.04));
+        let there = surface_distance(&inner, &outer).unwrap();
+        let back = surface_distance(&outer, &inner).unwrap();
+        assert_eq!(summaries(&there), summaries(&back));
+        assert_eq!(
+            (there.per_vertex.len(), back.per_vertex.len()),
+            (inner.positions.len(), outer.positions.len())
+        );
+        // The flat triangles lie up to h² / 8 inside their sphere.
+        for d in there.per_vertex.iter().chain(&back.per_vertex).chain(&summaries(&there)) {
+            assert!((d - 0.25).abs() < 0.1 * 0.1 / 7.0, "{d}");
+        }
+    }
+
+    #[test]
+    fn the_same_surface_is_no_distance_away() {
+        let mesh = sphere(1.0, 0.3);
+        let finer = TriangleMesh { normals: None, ..mesh.clone() };
+        for other in [&mesh, &finer] {
+            let found = surface_distance(&mesh, other).unwrap();
+            assert_eq!(summaries(&found), [0.0; 4]);
+            assert!(found.per_vertex.iter().all(|&d| d == 0.0));
+        }
+    }
+
+    #[test]
+    fn a_shifted_square() {
+        let found = surface_distance(&square(0.0), &square(-2.0)).unwrap();
+        assert_eq!(found.per_vertex, [2.0; 4]);
+        assert_eq!(summaries(&found), [2.0; 4]);
+    }
+
+    /// One corner pulled up, of a sixth of the area one way and of little more the other.
+    #[test]
+    fn means_are_by_area_and_both_ways() {
+        let mut bent = square(0.0);
+        bent.positions[1].z = 1.0;
+        let (flat, bent) = (square(0.0), bent);
+        let found = surface_distance(&flat, &bent).unwrap();
+        let side = 0.5_f64.sqrt();
+        // Down from (1, 0, 1), and to the plane through the diagonal from (1, 0, 0).
+        let (up, down) = (1.0, side / 1.5_f64.sqrt());
+        assert!((found.per_vertex[1] - down).abs() < 1e-7 && found.per_vertex[0] == 0.0);
+        let bent_area = 0.5 * 1.5_f64.sqrt() * 2.0_f64.sqrt();
+        let share = bent_area / 3.0 / (bent_area + 0.5);
+        assert!((found.mean - 0.5 * (down / 6.0 + up * share)).abs() < 1e-7, "{}", found.mean);
+        assert!((found.rms - (0.5 * (down * down / 6.0 + up * share)).sqrt()).abs() < 1e-7, "{}", found.rms);
+        assert_eq!((found.p95, found.hausdorff), (1.0, 1.0));
+    }
+
+    #[test]
+    fn the_percentile_leaves_a_twentieth_out() {
+        let mesh = sphere(1.0, 0.1);
+        let mut dented = mesh.clone();
+        // A cap of height h has the share h / 2 of a sphere; pulled out it grows by its wall.
+        let dent = |height: f32| {
+            move |p: &mut Vec3| {
+                if p.z > 1.0 - 2.0 * height {
+                    *p *= 1.1
+                }
+            }
+        };
+        dented.positions.iter_mut().for_each(dent(0.02));
+        let found = surface_distance(&dented, &mesh).unwrap();
+        assert!(found.p95 < 0.06 && found.hausdorff > 0.099, "{:?}", summaries(&found));
+        let mut dented = mesh.clone();
+        dented.positions.iter_mut().for_each(dent(0.08));
+        let found = surface_distance(&dented, &mesh).unwrap();
+        assert!(found.p95 > 0.099, "{:?}", summaries(&found));
+    }
+
+    #[test]
+    fn loose_vertices_have_a_distance_and_do_not_count() {
+        let mut mesh = square(0.0);
+        mesh.positions.push(Vec3::new(0.0, 0.0, 50.0));
+        let found = surface_distance(&mesh, &square(0.0)).unwrap();
+        assert_eq!((found.per_vertex[4], found.hausdorff), (50.0, 0.0));
+    }
+
+    #[test]
+    fn surfaces_without_area_count_by_vertex() {
+        let flat = |z: f32| TriangleMesh {
+            positions: [0.0, 1.0, 2.0].map(|x| Vec3::new(x, 0.0, z)).to_vec(),
+            triangles: vec![[0, 1, 2]],
+            ..Default::default()
+        };
+        assert_eq!(summaries(&surface_distance(&flat(0.0), &flat(3.0)).unwrap()), [3.0; 4]);
+    }
+
+    #[test]
+    fn nothing_to_measure_to() {
+        let (empty, some) = (TriangleMesh::default(), square(0.0));
+        for (mesh, other, named) in [(&empty, &some, "mesh"), (&some, &empty, "other")] {
+            let refusal = surface_distance(mesh, other).unwrap_err();
+            assert!(matches!(refusal, MeshError::InvalidArgument { parameter, .. } if parameter == named));
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! Decimation: fewer triangles, the same topology, nothing crosses, and little of the shape is lost.
+
+#![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
+mod common;
+#[path = "common/scenes.rs"]
+mod scenes;
+
+use common::{Random, torus_around};
+use vesicle::math::{Vec3, triangle};
+use vesicle::mesh::{Mesh, TriangleMesh, count_crossings, measure, report};
+use vesicle::remesh::decimate;
+use vesicle::volume::{Volume, marching_cubes_world};
+#[cfg(target_arch = "wasm32")]
+use wasm_bindgen_test::wasm_bindgen_test as test;
+
+/// The mesh with `target` triangles or less, after all promises were checked.
+fn decimated(mesh: &TriangleMesh, target: usize) -> TriangleMesh {
+    assert_eq!(count_crossings(mesh), 0, "a crossing in the test's own mesh");
+    let mut dynamic = Mesh::from_triangles(mesh).unwrap();
+    let collapses = decimate(&mut dynamic, target);
+    assert_eq!(dynamic.check(), Ok(()));
+    assert_eq!(dynamic.occupancy(), 1.0);
+    let coarse = dynamic.to_triangles();
+    assert!(report(&coarse).unwrap().is_healthy(), "{:?}", report(&coarse));
+    assert_eq!(mesh.triangles.len() - 2 * collapses, coarse.triangles.len());
+    assert_eq!(euler_of_parts(&coarse), euler_of_parts(mesh));
+    coarse
+}
+
+fn euler_of_parts(mesh: &TriangleMesh) -> Vec<i64> {
+    let mut parts: Vec<i64> = mesh.components().iter().map(|part| measure(part).euler).collect();
+    parts.sort();
+    parts
+}
+
+/// Reaches the target, and keeps the volume but for `share`.
+fn keeps_volume(mesh: &TriangleMesh, target: usize, share: f64) {
+    let coarse = decimated(mesh, target);
+    let count = coarse.triangles.len();
+    assert!(count == target || count + 1 == target, "{count} for {target}");
+    let ratio = measure(&coarse).volume / measure(mesh).volume;
+    assert!((ratio - 1.0).abs() < share, "volume {ratio} with {target}");
+}
+
+fn ball(edge: f32) -> TriangleMesh {
+    Mesh::icosphere(Vec3::ZERO, 1.0, edge).unwrap().to_triangles()
+}
+
+fn surface(volume: &Volume, iso: f64) -> TriangleMesh {
+    marching_cubes_world(volume, iso, 0).unwrap()
+}
+
+#[test]
+fn a_ball() {
+    for (target, share) in [(1000, 0.005), (301, 0.02), (100, 0.06)] {
+        keeps_volume(&ball(0.06), target, share);
+    }
+}
+
+#[test]
+fn a_torus() {
+    let torus = torus_around(Vec3::ZERO, [120, 40], [3.0, 1.0]);
+    for (target, share) in [(2000, 0.005), (500, 0.02), (100, 0.1)] {
+        keeps_volume(&torus, target, share);
+    }
+}
+
+#[test]
+fn linked_rings_stay_linked() {
+    let chain = surface(&scenes::chain(), 0.5);
+    for (target, share) in [(chain.triangles.len() / 10, 0.01), (400, 0.05)] {
+        keeps_volume(&chain, target, share);
+    }
+    // As coarse as it gets, where the rings are in each other's way.
+    let coarse = decimated(&chain, 1);
+    assert!(coarse.triangles.len() < 100, "{} triangles", coarse.triangles.len());
+}
+
+/// A ball with noise so strong that crumbs float around it and holes go through it.
+#[test]
+fn a_noisy_surface() {
+    // By place, so that the order of voxels does not matter.
+    let noise = |p: Vec3| Random((p.x + 32.0 * (p.y + 32.0 * p.z)) as u64).unit();
+    let centre = Vec3::splat(15.5);
+    let noisy = scenes::volume([32; 3], |p| scenes::potential(p.distance(centre), 10.0) + 0.5 * noise(p));
+    let mesh = surface(&noisy, 0.75);
+    let parts = euler_of_parts(&mesh);
+    assert!(parts.len() > 20 && parts[0] < -20, "{parts:?}");
+    let coarse = decimated(&mesh, mesh.triangles.len() / 4);
+    assert!(coarse.triangles.len() <= mesh.triangles.len() / 4);
+    let ratio = measure(&coarse).volume / measure(&mesh).volume;
+    assert!((ratio - 1.0).abs() < 0.03, "volume {ratio}");
+    decimated(&mesh, 1);
+}
+
+/// Two sheets much nearer to each other than the edges that are asked for.
+#[test]
+fn a_thin_shell() {
+    let inner = ball(0.1);
+    let mut shell = TriangleMesh { normals: None, ..inner.clone() };
+    let first = shell.positions.len() as u32;
+    shell.positions.extend(inner.positions.iter().map(|&p| p * 0.99));
+    shell.triangles.extend(inner.triangles.iter().map(|&[a, b, c]| [a + first, c + first, b + first]));
+    for target in [2000, 500, 1] {
+        let coarse = decimated(&shell, target);
+        assert!(measure(&coarse).volume > 0.0);
+    }
+}
+
+/// Specks just below the surface, where the triangles of a coarser ball pass beneath them.
+#[test]
+fn specks_inside_stay_inside() {
+    let mut mesh = Mesh::from_triangles(&ball(0.05)).unwrap();
+    let ball_vertices = mesh.vertex_count();
+    let mut random = Random(3);
+    for _ in 0..60 {
+        let direction = Vec3::new(random.unit(), random.unit(), random.unit()) - 0.5;
+        mesh.append(&Mesh::icosahedron(direction.normalize() * 0.996, 0.001)).unwrap();
+    }
+    assert_eq!(mesh.vertex_count(), ball_vertices + 60 * 12);
+    let coarse = decimated(&mesh.to_triangles(), 600);
+    let mut parts = coarse.components();
+    parts.sort_by(|a, b| measure(b).volume.total_cmp(&measure(a).volume));
+    for speck in &parts[1..] {
+        let seen: f64 = parts[0].corners().map(|t| triangle::solid_angle(t, speck.positions[0])).sum();
+        assert!((seen - 4.0 * std::f64::consts::PI).abs() < 1e-9, "outside: {seen}");
+    }
+}
+
+#[test]
+fn flat_parts_and_sharp_edges() {
+    // A box of 2 × 3 × 4 voxels, cut to pieces of a tenth.
+    let mesh = surface(
+        &scenes::volume([30, 40, 50], |p| {
+            let inside = |c: f32, n: f32| (c - 4.5).min(n - 5.5 - c);
+            inside(p.x, 30.0).min(inside(p.y, 40.0)).min(inside(p.z, 50.0)).clamp(-1.0, 1.0)
+        }),
+        0.0,
+    );
+    let coarse = decimated(&mesh, 200);
+    assert_eq!(coarse.triangles.len(), 200);
+    let (before, after) = (measure(&mesh), measure(&coarse));
+    assert!((after.volume / before.volume - 1.0).abs() < 0.002, "{}", after.volume / before.volume);
+    assert!((after.bounds[1] - before.bounds[1]).length() < 0.5);
+    assert!(after.min_angle_degrees > 1.0, "{}", after.min_angle_degrees);
+}
+
+#[test]
+fn four_triangles_are_the_least_of_a_ball() {
+    assert_eq!(decimated(&ball(0.2), 1).triangles.len(), 4);
+    assert_eq!(decimated(&ball(0.2), 4).triangles.len(), 4);
+}
+
+#[test]
+fn nothing_to_do_changes_nothing() {
+    let before = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
+    let mut mesh = before.clone();
+    for target in [mesh.triangle_count(), mesh.triangle_count() + 1, usize::MAX] {
+        assert_eq!(decimate(&mut mesh, target), 0);
+        assert_eq!(mesh, before);
+        assert_eq!(mesh.topology_version(), before.topology_version());
+    }
+    let mut empty = Mesh::default();
+    assert_eq!((decimate(&mut empty, 0), empty.check()), (0, Ok(())));
+}
+
+#[test]
+fn what_crosses_keeps_its_topology() {
+    let mut mesh = Mesh::from_triangles(&ball(0.1)).unwrap();
+    let shifted = Mesh::icosphere(Vec3::X * 0.7, 1.0, 0.1).unwrap();
+    mesh.append(&shifted).unwrap();
+    let before = mesh.triangle_count();
+    decimate(&mut mesh, before / 4);
+    assert_eq!((mesh.check(), mesh.euler(), mesh.component_members().len()), (Ok(()), 4, 2));
+    assert!(mesh.triangle_count() < before / 2);
+}
+
+/// Flat, doubled, tiny and huge ones: the work ends, the invariants hold.
+#[test]
+fn hostile_meshes() {
+    for size in [
+        Vec3::new(1.0, 1.0, 0.0),
+        Vec3::new(1.0, 0.0, 0.0),
+        Vec3::ZERO,
+        Vec3::splat(1e-30),
+        Vec3::splat(1e30),
+    ] {
+        let mut mesh = Mesh::from_triangles(&ball(0.3)).unwrap();
+        mesh.positions_mut().iter_mut().for_each(|p| *p *= size);
+        decimate(&mut mesh, 50);
+        assert_eq!((mesh.check(), mesh.euler()), (Ok(()), 2), "{size}");
+    }
+    let mut needle = torus_around(Vec3::ZERO, [300, 3], [3.0, 1.0]);
+    needle.positions.iter_mut().for_each(|p| *p *= Vec3::new(1e4, 1e-4, 1.0));
+    decimated(&needle, 1);
+}
+
+#[test]
+fn the_same_every_time() {
+    let run = || {
+        let mut mesh = Mesh::from_triangles(&surface(&scenes::chain(), 0.5)).unwrap();
+        decimate(&mut mesh, 1500);
+        mesh
+    };
+    assert_eq!(run(), run());
+}
