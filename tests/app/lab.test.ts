@@ -159,7 +159,7 @@ describe('attractors', () => {
     await expect.poll(() => items().count()).toBe(1);
     expect(await items().first().textContent()).toContain('58, 22, 22');
     await reach(app.page, 'running', 'done');
-    await expect.poll(async () => (await measures(app.page)).volume).toBeGreaterThan(1.002 * before.volume);
+    await expect.poll(async () => (await measures(app.page)).volume).toBeGreaterThan(1.001 * before.volume);
     await pause();
   });
 
@@ -209,7 +209,7 @@ describe('attractors', () => {
     expect(await app.page.getAttribute('[data-transport=undo]', 'title')).toBe('Undo: removal of attractor 2');
     await app.page.keyboard.press('Control+z');
     await expect.poll(() => items().count()).toBe(3);
-    await reach(app.page, 'paused');
+    await reach(app.page, 'paused', 'done');
   });
 });
 
@@ -227,6 +227,14 @@ describe('colour', () => {
     await app.page.selectOption('[data-view=color]', 'plain');
     await legend.waitFor({ state: 'hidden' });
     await expect.poll(async () => (await picture('.view > canvas')).equals(plain)).toBe(true);
+  });
+
+  test('by curvature has a legend in the unit of the volume, and tells bulging from hollow', async () => {
+    await app.page.selectOption('[data-view=color]', 'mean curvature');
+    const legend = app.page.locator('.color-legend');
+    await expect.poll(() => legend.textContent()).toMatch(/^Mean curvature, 1\/unit−([\d.]+)0\1hollowbulging$/);
+    await app.page.selectOption('[data-view=color]', 'gaussian curvature');
+    await expect.poll(() => legend.textContent()).toMatch(/^Gaussian curvature, 1\/unit²−.*saddledome or cup$/);
   });
 
   test('shows at the start that nothing moves, and then that all moves inwards', async () => {

@@ -10,7 +10,7 @@ import { otsu, quantiles } from '../../www/src/threshold';
 import { History } from '../../www/src/ui/history';
 import { anatomyOf, type Grid, invert, sliceFrames, slicePlane, toWorld } from '../../www/src/view/anatomy';
 import { componentRoots } from '../../www/src/view/components';
-import { diverging, robustRange, shadeColors } from '../../www/src/view/shading';
+import { diverging, robustRange, shadeColors, shadeTitle } from '../../www/src/view/shading';
 import { discOf, levelIndex, paintSlice, projectSegments } from '../../www/src/view/slicing';
 
 /** A grid with the given columns as voxel axes. */
@@ -250,6 +250,11 @@ describe('numbers as colours', () => {
     values.set([50, -80], 10);
     expect(robustRange(values, 1e-4)).toBe(0.02);
     expect(robustRange(new Float32Array(10), 1e-4)).toBe(1e-4);
+  });
+
+  test('are told with the unit they are one over', () => {
+    expect(shadeTitle('mean curvature', 'mm')).toBe('Mean curvature, 1/mm');
+    expect(shadeTitle('gaussian curvature', '')).toBe('Gaussian curvature, 1/unit²');
   });
 
   test('reach the GPU as linear light, and NaN as zero', () => {

@@ -45,7 +45,7 @@ export interface LevelView {
 }
 
 /** What can be told of each vertex beside its place; the names are shown. */
-export type Shade = 'speed';
+export type Shade = 'speed' | 'mean curvature' | 'gaussian curvature';
 
 /** Everything a run has, to come back to it. */
 export interface SavedRun {

@@ -322,6 +322,7 @@ export class ExtractLab {
   #adoptVolume(volume: VolumeView, example: Example | undefined): void {
     this.#volume = volume;
     this.#measures.unit = example?.unit ?? 'mm';
+    this.#stage.unit = example?.unit ?? 'mm';
     this.#histogram.setVolume(volume);
     this.#data.show(volume, example);
     this.#stage.setVolume(volume);

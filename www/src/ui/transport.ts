@@ -44,8 +44,8 @@ export class Transport {
     this.#step = labelled(STEP, 'Step', () => onStep(1));
     this.#steps = labelled(STEPS, 'Step ×10', () => onStep(10));
     this.#reset = labelled(RESET, 'Reset', onReset);
-    this.#undo = h('button', { type: 'button', 'data-transport': 'undo', onclick: onUndo }, icon(UNDO));
-    this.#redo = h('button', { type: 'button', 'data-transport': 'redo', onclick: onRedo }, icon(REDO));
+    this.#undo = h('button', { type: 'button', 'data-transport': 'undo', onclick: onUndo }, icon(UNDO), word('Undo'));
+    this.#redo = h('button', { type: 'button', 'data-transport': 'redo', onclick: onRedo }, icon(REDO), word('Redo'));
     const all = [this.#play, this.#step, this.#steps, this.#reset, this.#undo, this.#redo];
     const buttons = h('div', { class: 'buttons' }, ...all);
     const where = h('div', { class: 'where' }, this.#iteration, this.#phase);
@@ -94,6 +94,11 @@ export class Transport {
     else if (!this.#progress.hasAttribute('value')) this.#progress.value = 0;
     if (state === 'done') this.#progress.value = 1;
   }
+}
+
+/** Shown where there is room. */
+function word(text: string): HTMLElement {
+  return h('span', { class: 'word' }, text);
 }
 
 function labelled(path: string, text: string, onclick: () => void): HTMLButtonElement {

@@ -26,8 +26,10 @@ const PLACEMENTS: { value: SlicePlacement; label: string }[] = [
 
 export const COLOR_MODES: { value: ColorMode; label: string }[] = [
   { value: 'plain', label: 'plain' },
-  { value: 'component', label: 'by component' },
-  { value: 'speed', label: 'by speed' },
+  { value: 'component', label: 'component' },
+  { value: 'speed', label: 'speed' },
+  { value: 'mean curvature', label: 'mean curvature' },
+  { value: 'gaussian curvature', label: 'Gaussian curvature' },
 ];
 
 /** What the 3D view shows. */

@@ -20,9 +20,28 @@ const SAMPLES = 4096;
 const TABLE = 256;
 
 /** What the legend says of each shade. */
-export const SHADES: Record<Shade, { title: string; below: string; above: string; least: number }> = {
+export const SHADES: Record<Shade, ShadeText> = {
   speed: { title: 'Speed along the normal, δ per iteration', below: 'inwards', above: 'outwards', least: 1e-4 },
+  'mean curvature': { title: 'Mean curvature', power: 1, below: 'hollow', above: 'bulging', least: 1e-6 },
+  'gaussian curvature': { title: 'Gaussian curvature', power: 2, below: 'saddle', above: 'dome or cup', least: 1e-9 },
 };
+
+interface ShadeText {
+  title: string;
+  /** Of the length it is one over. */
+  power?: 1 | 2;
+  below: string;
+  above: string;
+  /** Smaller ranges than this are not shown. */
+  least: number;
+}
+
+/** The title with the unit that goes with lengths in `unit`. */
+export function shadeTitle(shade: Shade, unit: string): string {
+  const { title, power } = SHADES[shade];
+  if (!power) return title;
+  return `${title}, 1/${unit || 'unit'}${power === 2 ? '²' : ''}`;
+}
 
 /** sRGB, 0..255, for t in −1..1. */
 export function diverging(t: number): [number, number, number] {

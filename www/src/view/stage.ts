@@ -8,7 +8,7 @@ import { VolumeFrame } from './frame';
 import { AttractorMarks } from './markers';
 import { AXIS_TOKENS, SlicePanel } from './panel';
 import { SlicePlane } from './planes';
-import { diverging, SHADES } from './shading';
+import { diverging, SHADES, shadeTitle } from './shading';
 import { levelIndex, slicePicture } from './slicing';
 import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
@@ -32,6 +32,8 @@ export class Stage {
   readonly legend = new Legend(diverging);
   /** Takes the place that is clicked, in a slice or on the surface, instead of the crosshair going there. */
   onPlace: ((point: Vec3) => void) | undefined;
+  /** Of lengths in the volume's world. */
+  unit = '';
   /** Called whenever the slices have moved. */
   onMoved: () => void = () => undefined;
   readonly #onPlanes: (planes: Plane[]) => void;
@@ -189,7 +191,7 @@ export class Stage {
     const { color } = this.#options;
     const { range } = this.#surface;
     if (color === 'plain' || color === 'component' || range === 0) this.legend.hide();
-    else this.legend.show(SHADES[color], range);
+    else this.legend.show({ ...SHADES[color], title: shadeTitle(color, this.unit) }, range);
   }
 
   #placeSlices(viewer: Vector3): void {

@@ -45,6 +45,8 @@ const SHADES: Record<Shade, (model: DeformableModel) => Float32Array> = {
     const factor = model.params.timeStep / model.delta;
     return model.speeds().map((speed) => speed * factor);
   },
+  'mean curvature': ({ mesh }) => mesh.curvature('mean'),
+  'gaussian curvature': ({ mesh }) => mesh.curvature('gaussian'),
 };
 
 export function valuesFor(model: DeformableModel, shade: Shade): Float32Array {
