@@ -146,6 +146,8 @@ export class ExtractLab {
   #attractorsInForce: Attractor[] = [];
   /** What the surface's vertices are asked for. */
   #shade: Shade | undefined;
+  /** Settled when all that was to be undone or done again is. */
+  #travels: Promise<void> = Promise.resolve();
   /** The level the model is on. */
   #level = 0;
   /** A link to a file of the user's, until the file is opened. */
@@ -575,7 +577,13 @@ export class ExtractLab {
     return { choice: this.#start.inForce, params: this.#params, attractors: this.#attractorsInForce, mark };
   }
 
-  async #travel(way: 'undo' | 'redo'): Promise<void> {
+  /** One after the other, however fast they are asked for. */
+  #travel(way: 'undo' | 'redo'): Promise<void> {
+    this.#travels = this.#travels.then(() => this.#travelOnce(way));
+    return this.#travels;
+  }
+
+  async #travelOnce(way: 'undo' | 'redo'): Promise<void> {
     if (!this.#volume || this.#engineBroken || this.#state.value === 'loading') return;
     this.#calm = this.#modelState === 'done' ? 'done' : 'paused';
     this.#enterLoading(way === 'undo' ? 'Going back.' : 'Going forth again.');
