@@ -1,6 +1,6 @@
 import type { ComparedRun, ComparingEvent, Requests } from '../protocol';
 import { h } from './dom';
-import { count, figure } from './format';
+import { count, figure, levelSymbol } from './format';
 import { addTimes, seconds, TIME_NOTE, TIME_ROWS, timeOf } from './times';
 
 type Result = NonNullable<Requests['compare']['reply']>;
@@ -127,7 +127,7 @@ function scrolling(label: string, table: HTMLTableElement): HTMLElement {
 /** Rows T, N, F and their sum, a column a level, for both ways. */
 function timeTable(coarseToFine: ComparedRun, direct: ComparedRun): HTMLTableElement {
   const levels = coarseToFine.byLevel.map(({ level }) => level);
-  const head = ['', ...levels.map((level) => `I${subscript(level)}`), 'total'].map((title) =>
+  const head = ['', ...levels.map((level) => levelSymbol(level)), 'total'].map((title) =>
     h('th', { scope: 'col' }, title),
   );
   const body = [...rowsOf('coarse to fine', coarseToFine, levels), ...rowsOf('direct', direct, levels)];
@@ -180,8 +180,4 @@ function outcomeTable(coarseToFine: ComparedRun, direct: ComparedRun): HTMLTable
       row('Volume', ({ info }) => figure(info.volume)),
     ),
   );
-}
-
-function subscript(level: number): string {
-  return [...String(level)].map((digit) => '₀₁₂₃₄₅₆₇₈₉'[Number(digit)]).join('');
 }

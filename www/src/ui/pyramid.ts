@@ -1,5 +1,6 @@
 import type { LevelView } from '../protocol';
 import { h } from './dom';
+import { levelSymbol } from './format';
 
 const VOLUME = 'Level 0: the volume itself';
 
@@ -12,7 +13,11 @@ export class PyramidPanel {
     {},
     this.#list,
     h('label', { class: 'check' }, this.#follow, 'Slices follow the model'),
-    h('p', { class: 'help' }, 'The model works from coarse to fine. Choose a level to see it in the slices.'),
+    h(
+      'p',
+      { class: 'help' },
+      'The model works from coarse to fine; a dot marks the level it is on, I₀ is the volume. Choose a level to see it in the slices.',
+    ),
   );
   readonly #onShow: (level: LevelView | undefined) => void;
   readonly #picture: (level: LevelView | undefined) => HTMLCanvasElement | undefined;
@@ -73,7 +78,7 @@ export class PyramidPanel {
       this.#follow.checked = false;
       this.#choose(level);
     };
-    const caption = h('span', { class: 'caption' }, `level ${level}`);
+    const caption = h('span', { class: 'caption' }, levelSymbol(level));
     return h('button', { type: 'button', 'data-level': level, onclick }, decorative(h('canvas')), caption);
   }
 
