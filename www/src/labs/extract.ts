@@ -1,9 +1,7 @@
-import { Client, RequestError } from '../client';
+import { Client, RequestError, toFailure } from '../client';
 import { EXAMPLES, type Example, exampleUrl } from '../examples';
 import { exampleById, isPreset, PRESETS, type Preset, startOf, type Variant, variantOf } from '../presets';
 import type {
-  Attractor,
-  Failure,
   MeshFormat,
   ParamValues,
   Plane,
@@ -18,13 +16,12 @@ import type {
   WorkerEvent,
 } from '../protocol';
 import { type LabState, Observable } from '../state';
-import { AttractorControls } from '../ui/attractors';
 import { ComparePanel } from '../ui/compare';
 import { h } from '../ui/dom';
 import { exercises } from '../ui/exercises';
 import { ExportButtons } from '../ui/exports';
 import { FigurePanel } from '../ui/figure';
-import { acceptDrops, download, fileChooser, readFiles } from '../ui/files';
+import { acceptDrops, fileChooser, readFiles } from '../ui/files';
 import { count, plural } from '../ui/format';
 import { Histogram } from '../ui/histogram';
 import { History } from '../ui/history';
@@ -40,10 +37,11 @@ import { TimeTable } from '../ui/times';
 import { Transport } from '../ui/transport';
 import { ViewOptionControls, type ViewOptions } from '../ui/view-options';
 import { Stage } from '../view/stage';
-import { toCsv } from './csv';
+import { Attracting } from './attracting';
 import { DataPanel, folded, layOut } from './extract-page';
 import { ADDRESS, fromHash, type Linked, linkOf, toHash, withLink } from './link';
 import { type Moment, type PageState, Rewinder } from './rewinder';
+import { Saving } from './saving';
 
 const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, color: 'plain', slices: 'walls' };
 /** Radius of the sphere placed at the crosshair, as a part of the volume's smallest side. */
@@ -88,19 +86,26 @@ export class ExtractLab {
     (level) => this.#stage.thumbnail(level),
     (level) => this.#stage.showLevel(level),
   );
-  readonly #attractors = new AttractorControls({
-    onChange: (attractors, what, tuning) => void this.#setAttractors(attractors, what, tuning),
+  readonly #attracting = new Attracting(this.#client, this.#stage, () => this.#rewinder, {
+    ready: () => this.#volume !== undefined && !this.#engineBroken,
+    onTaken: () => {
+      this.#updateAddress();
+      this.#goOn();
+    },
     onPlacing: (placing) => this.#setPlacing(placing),
-    onGoTo: (point) => this.#stage.goTo(point),
-    crosshair: () => this.#stage.crosshair,
   });
+  readonly #saving = new Saving(this.#client, (text) => this.#status.say(text));
   readonly #figure = new FigurePanel((preset, variant) => void this.#openVariant(preset, variant));
   readonly #compare = new ComparePanel({
     onStart: () => void this.#runComparison(),
     onCancel: () => this.#ask(this.#client.request('cancelCompare', undefined)),
   });
   readonly #compareHolder = folded('Direct against coarse to fine', this.#compare.element);
-  readonly #csv = h('button', { type: 'button', onclick: () => this.#saveCsv(), disabled: true }, 'Plot data (CSV)');
+  readonly #csv = h(
+    'button',
+    { type: 'button', onclick: () => this.#saving.plots(this.#history), disabled: true },
+    'Plot data (CSV)',
+  );
   readonly #rewinder = new Rewinder(
     this.#client,
     () => this.#pageState(),
@@ -129,7 +134,7 @@ export class ExtractLab {
       key: 'a',
       shown: 'a',
       text: 'attractor at the crosshair',
-      act: () => this.#attractors.add(this.#stage.crosshair),
+      act: () => this.#attracting.add(this.#stage.crosshair),
     },
     { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#travel('undo') },
     { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: () => void this.#travel('redo') },
@@ -142,8 +147,6 @@ export class ExtractLab {
   #params: ParamValues = {};
   #volume: VolumeView | undefined;
   #source: Source | undefined;
-  /** The attractors the model has; the list may hold one that is being asked for. */
-  #attractorsInForce: Attractor[] = [];
   /** What the surface's vertices are asked for. */
   #shade: Shade | undefined;
   /** Settled when all that was to be undone or done again is. */
@@ -201,7 +204,7 @@ export class ExtractLab {
       transport: this.#transport.element,
       figure: this.#figure.element,
       pyramid: this.#pyramid.element,
-      attractors: this.#attractors.element,
+      attractors: this.#attracting.element,
       options: this.#options.element,
       legend: this.#stage.legend.element,
       banner: this.#banner.element,
@@ -307,9 +310,8 @@ export class ExtractLab {
       this.#rewinder.clear();
       this.#compare.clear();
       this.#adoptVolume(loaded.volume, source.example);
-      this.#attractors.show(body.setup.attractors);
-      this.#attractors.radius = ATTRACTOR_PART * this.#smallestSide();
-      this.#showAttractors(body.setup.attractors);
+      this.#attracting.show(body.setup.attractors);
+      this.#attracting.radius = ATTRACTOR_PART * this.#smallestSide();
       if (source.linked?.color) this.#options.color = source.linked.color;
       this.#adoptModel(loaded);
       this.#rewinder.remember('Play');
@@ -323,6 +325,7 @@ export class ExtractLab {
 
   #adoptVolume(volume: VolumeView, example: Example | undefined): void {
     this.#volume = volume;
+    this.#saving.name = volume.name;
     this.#measures.unit = example?.unit ?? 'mm';
     this.#stage.unit = example?.unit ?? 'mm';
     this.#histogram.setVolume(volume);
@@ -394,7 +397,7 @@ export class ExtractLab {
     }
   }
 
-  #setup(choice: StartChoice, params: ParamValues, attractors = this.#attractors.value): Setup {
+  #setup(choice: StartChoice, params: ParamValues, attractors = this.#attracting.inForce): Setup {
     const { levels, edge } = choice;
     return { start: this.#startShape(choice), levels, edge, params, attractors };
   }
@@ -520,31 +523,8 @@ export class ExtractLab {
 
   // ── attractors, colours, comparison ───────────────────────────────────────────────────────────
 
-  async #setAttractors(attractors: Attractor[], what: string, tuning: boolean): Promise<void> {
-    if (!this.#volume || this.#engineBroken) return this.#attractors.show([]);
-    const before = this.#attractorsInForce;
-    const forget = this.#rewinder.remember(what, tuning ? what : '');
-    try {
-      await this.#client.request('setAttractors', attractors);
-      this.#showAttractors(attractors);
-      this.#goOn();
-    } catch (error) {
-      forget();
-      this.#attractors.show(before);
-      this.#showAttractors(before);
-      this.#attractors.complain(toFailure(error).message);
-    }
-  }
-
-  #showAttractors(attractors: Attractor[]): void {
-    this.#attractorsInForce = attractors;
-    this.#stage.showAttractors(attractors);
-    this.#updateAddress();
-  }
-
   #setPlacing(placing: boolean): void {
     this.#root.toggleAttribute('data-placing', placing);
-    this.#stage.onPlace = placing ? (point) => this.#attractors.add(point) : undefined;
     this.#status.say(placing ? 'Click in a slice or on the surface to place attractors.' : '');
   }
 
@@ -574,7 +554,7 @@ export class ExtractLab {
 
   #pageState(): PageState {
     const mark = this.#history.marker();
-    return { choice: this.#start.inForce, params: this.#params, attractors: this.#attractorsInForce, mark };
+    return { choice: this.#start.inForce, params: this.#params, attractors: this.#attracting.inForce, mark };
   }
 
   /** One after the other, however fast they are asked for. */
@@ -598,8 +578,7 @@ export class ExtractLab {
 
   #adoptMoment({ saved, page }: Moment): void {
     this.#start.show(page.choice);
-    this.#attractors.show(page.attractors);
-    this.#showAttractors(page.attractors);
+    this.#attracting.show(page.attractors);
     this.#showParams(page.params);
     this.#history.rewind(page.mark(saved.iteration));
     this.#log.clear();
@@ -625,7 +604,7 @@ export class ExtractLab {
         sphere: { center: this.#stage.crosshair, radius: this.#sphereRadius() },
         params: this.#params,
         defaults: this.#defaults,
-        attractors: this.#attractorsInForce,
+        attractors: this.#attracting.inForce,
         color: this.#options.value.color,
       }),
     );
@@ -642,17 +621,6 @@ export class ExtractLab {
     }
     if (!this.#source?.example)
       this.#status.say('Link copied. Your file is not in it: whoever opens it needs the file too.');
-  }
-
-  #saveCsv(): void {
-    const bytes = new TextEncoder().encode(toCsv(this.#history));
-    download(`${this.#stem}.csv`, bytes, 'text/csv');
-    this.#status.say(`Saved ${this.#stem}.csv.`);
-  }
-
-  /** Of the names of files that are saved. */
-  get #stem(): string {
-    return this.#volume?.name.replace(/\.(nii|nrrd|nhdr|mha|mhd|gz)\b.*$/i, '').replaceAll(' ', '-') ?? 'surface';
   }
 
   // ── what the worker tells ─────────────────────────────────────────────────────────────────────
@@ -765,18 +733,11 @@ export class ExtractLab {
 
   async #export(format: MeshFormat, type: string): Promise<void> {
     try {
-      const bytes = await this.#client.request('export', { format });
-      download(`${this.#stem}.${format}`, bytes, type);
-      this.#status.say(`Saved ${this.#stem}.${format}.`);
+      await this.#saving.mesh(format, type);
     } catch (error) {
       this.#fail('The surface could not be saved.', error);
     }
   }
-}
-
-function toFailure(error: unknown): Failure {
-  if (error instanceof RequestError) return { code: error.code, message: error.message };
-  return { code: 'page', message: error instanceof Error ? error.message : String(error) };
 }
 
 function transferable(source: VolumeSource): Transferable[] {

@@ -54,10 +54,6 @@ export class AttractorControls {
     );
   }
 
-  get value(): Attractor[] {
-    return this.#attractors;
-  }
-
   /** The reach of the next one, in world units. */
   set radius(radius: number) {
     this.#radius = Number(radius.toPrecision(2));
