@@ -181,6 +181,14 @@ export class DeformableModel implements Stepper {
     this.#handle.use((raw) => raw.setParams(values));
   }
 
+  /**
+   * Speed of each vertex along its outward normal, in the order of `mesh.arrays()`: world units per unit of time,
+   * negative inwards. A vertex that was just made has the speed of where it was made.
+   */
+  speeds(): Float32Array {
+    return this.#handle.use((raw) => raw.speeds());
+  }
+
   /** The whole state, for {@link DeformableModel.restore} of a model made with the same volume and options. */
   save(): Uint8Array {
     return this.#handle.use((raw) => raw.save());

@@ -243,6 +243,34 @@ fn fixed_topology_moves_vertices_and_keeps_every_edge() {
 }
 
 #[test]
+fn speeds_are_the_way_of_each_vertex_along_its_normal() {
+    let volume = ball([24, 24, 24], 6.0);
+    let params = DeformableParams {
+        topology: Topology::Fixed,
+        time_step: 0.5,
+        ..DeformableParams::for_volume(&volume)
+    };
+    let mut model =
+        DeformableModel::new(&volume, DeformableOptions { params: Some(params), ..Default::default() })
+            .unwrap();
+    assert!(model.speeds().iter().all(|&speed| speed == 0.0));
+    for _ in 0..8 {
+        model.step().unwrap();
+    }
+    let before = model.surface().positions;
+    model.step().unwrap();
+    let after = model.surface();
+    let speeds = model.speeds();
+    assert_eq!(speeds.len(), after.positions.len());
+    for (i, normal) in after.normals.iter().flatten().enumerate() {
+        let way = (after.positions[i] - before[i]).dot(*normal) / 0.5;
+        assert!((speeds[i] - way).abs() < 1e-4, "vertex {i}: {} for {way}", speeds[i]);
+    }
+    // The surface around the ball comes in.
+    assert!(speeds.iter().all(|&speed| speed < 0.0));
+}
+
+#[test]
 fn stiffness_and_rest_lengths_even_out_edges() {
     let volume = ball([32, 32, 32], 9.0);
     let spread = |stiffness, rest_length| {
@@ -260,12 +288,15 @@ fn an_attractor_pulls_the_surface_and_lets_go() {
     let volume = ball([40, 40, 40], 9.0);
     let (mut model, before) = surface_of(&volume, DeformableOptions::default());
     let point = DVec3::new(34.0, 19.5, 19.5);
+    model.set_attractors(vec![Attractor { point, strength: 0.1, radius: 12.0 }]).unwrap();
+    let gentle = run(&mut model, 300).last;
+    assert!(gentle.done, "a gentle pull comes to rest: {gentle:?}");
     model.set_attractors(vec![Attractor { point, strength: 0.3, radius: 12.0 }]).unwrap();
-    run(&mut model, 300);
+    run(&mut model, 500);
     let pulled = measure(&model.surface());
     assert!(pulled.bounds[1].x > before.bounds[1].x + 1.0);
     model.set_attractors(vec![]).unwrap();
-    run(&mut model, 900);
+    run(&mut model, 1100);
     close("volume", measure(&model.surface()).volume, before.volume, 0.01);
 }
 

@@ -137,6 +137,11 @@ impl RawDeformable {
         self.0.borrow().delta()
     }
 
+    /// Speed of each vertex along its normal, in the order of the mesh's arrays.
+    pub fn speeds(&self) -> Vec<f32> {
+        self.0.borrow().speeds()
+    }
+
     /// The whole state.
     pub fn save(&self) -> Vec<u8> {
         self.0.borrow().save()

@@ -1,10 +1,17 @@
 /** The parts of the app that are plain functions. */
-import { expect, test } from 'vitest';
+import { describe, expect, test } from 'vitest';
+import { EXAMPLES } from '../../www/src/examples';
+import { toCsv } from '../../www/src/labs/csv';
+import { fromHash, linkOf, toHash } from '../../www/src/labs/link';
+import { UndoStack } from '../../www/src/labs/undo';
+import type { StepReport } from '../../www/src/protocol';
 import { quantize } from '../../www/src/quantize';
 import { otsu, quantiles } from '../../www/src/threshold';
+import { History } from '../../www/src/ui/history';
 import { anatomyOf, type Grid, invert, sliceFrames, slicePlane, toWorld } from '../../www/src/view/anatomy';
 import { componentRoots } from '../../www/src/view/components';
-import { paintSlice, projectSegments } from '../../www/src/view/slicing';
+import { diverging, robustRange, shadeColors, shadeTitle } from '../../www/src/view/shading';
+import { discOf, levelIndex, paintSlice, projectSegments } from '../../www/src/view/slicing';
 
 /** A grid with the given columns as voxel axes. */
 function grid(columns: [number, number, number][], space: 'RAS' | 'LPS' = 'RAS'): Grid {
@@ -102,4 +109,181 @@ test('voxels for display are clamped to the window, and NaN is black', () => {
 
 test('two separate triangles are two components', () => {
   expect([...componentRoots(Uint32Array.from([4, 5, 3, 2, 1, 0]), 6, 6)]).toEqual([0, 0, 0, 3, 3, 3]);
+});
+
+describe('undo', () => {
+  const stack = (limits = { entries: 10, bytes: 1000 }) => new UndoStack<string>(limits);
+  const at = (state: string, bytes = 1) => ({ state, bytes });
+
+  test('goes back and forth through what was done', () => {
+    const done = stack();
+    done.push({ label: 'one', ...at('before one') });
+    done.push({ label: 'two', ...at('before two') });
+    expect(done.undoable).toBe('two');
+    expect(done.undo(at('after two'))).toBe('before two');
+    expect([done.undoable, done.redoable]).toEqual(['one', 'two']);
+    expect(done.redo(at('before two'))).toBe('after two');
+    expect(done.redoable).toBeUndefined();
+    expect(done.undo(at('after two'))).toBe('before two');
+    expect(done.undo(at('before two'))).toBe('before one');
+    expect(done.undo(at('before one'))).toBeUndefined();
+  });
+
+  test('something else done takes back what could be done again', () => {
+    const done = stack();
+    done.push({ label: 'one', ...at('before one') });
+    done.undo(at('after one'));
+    done.push({ label: 'other', ...at('before one') });
+    expect(done.redoable).toBeUndefined();
+  });
+
+  test('keeps no more than fits, but always the last', () => {
+    const done = stack({ entries: 10, bytes: 100 });
+    for (let i = 0; i < 5; i++) done.push({ label: String(i), ...at(`before ${i}`, 40) });
+    expect(done.undo(at('after 4', 0))).toBe('before 4');
+    expect(done.undo(at('before 4', 0))).toBe('before 3');
+    expect(done.undoable).toBeUndefined();
+    done.push({ label: 'large', ...at('before large', 1e6) });
+    expect(done.undoable).toBe('large');
+  });
+});
+
+/** A report as the model gives them. */
+function report(iteration: number, more: Partial<StepReport> = {}): StepReport {
+  const events = { creations: 0, deletions: 0, inversions: 0, axial: 0, annular: 0, vanished: 0 };
+  const counts = { vertices: 10, triangles: 16, components: 1, euler: 2 };
+  const end = { progress: 0, residual: 0.5, tolerance: 1e-6, done: false };
+  return { iteration, phase: 'level 1', events, times: { forces: 2, topology: 1 }, ...counts, ...end, ...more };
+}
+
+describe('the history', () => {
+  test('goes back to an iteration, and forth to what followed it', () => {
+    const history = new History();
+    history.add([report(1), report(2)]);
+    const early = history.marker();
+    history.add([report(3, { phase: 'level 0' })]);
+    const late = history.marker();
+    history.rewind(early(2));
+    expect(history.reports.map(({ iteration }) => iteration)).toEqual([1, 2]);
+    expect(history.phases).toEqual([{ iteration: 1, phase: 'level 1' }]);
+    history.add([report(3, { vertices: 99 })]);
+    history.rewind(late(3));
+    expect(history.reports.at(-1)).toMatchObject({ iteration: 3, vertices: 10, phase: 'level 0' });
+  });
+
+  test('adds up times by level and part, the end with the last level', () => {
+    const history = new History();
+    history.add([report(1), report(2), report(3, { phase: 'level 0' }), report(4, { phase: 'done', done: true })]);
+    expect([...history.times.keys()]).toEqual(['level 1', 'level 0']);
+    expect(history.times.get('level 0')?.get('forces')).toBe(4);
+  });
+
+  test('as CSV has a line an iteration and a column for all that is shown', () => {
+    const history = new History();
+    history.add([report(1), report(2, { residual: 0.25 })]);
+    const [head, first, second, end] = toCsv(history).split('\n');
+    expect(head).toMatch(
+      /^iteration,phase,energy,tolerance,vertices,.*axial,annular,vanished,forces \(ms\),topology \(ms\)$/,
+    );
+    expect(first).toBe('1,level 1,0.5,0.000001,10,16,1,2,0,0,0,0,0,0,2,1');
+    expect(second).toContain('2,level 1,0.25,');
+    expect(end).toBe('');
+  });
+});
+
+describe('a link', () => {
+  const tooth = EXAMPLES.find(({ id }) => id === 'tooth');
+  const settings = {
+    example: tooth,
+    file: 'tooth.nrrd',
+    choice: { kind: 'bubbles', bubbles: 7, levels: 2, edge: 1.5 } as const,
+    sphere: { center: [0, 0, 0] as [number, number, number], radius: 1 },
+    params: { ...tooth?.params, iso: 700, damping: 0.4, restLength: 'mean' },
+    defaults: { damping: 0.4, restLength: 'zero' },
+    attractors: [{ point: [1, -2.5, 3] as [number, number, number], strength: 0.1, radius: 8 }],
+    color: 'speed' as const,
+  };
+
+  test('says what differs from the example, and is read back as it was', () => {
+    const linked = linkOf(settings);
+    expect(linked).toEqual({
+      example: 'tooth',
+      start: 'bubbles',
+      bubbles: 7,
+      edge: 1.5,
+      params: { iso: 700, restLength: 'mean' },
+      attractors: settings.attractors,
+      color: 'speed',
+    });
+    expect(fromHash(toHash(linked))).toEqual(linked);
+  });
+
+  test('is the bare address where nothing differs', () => {
+    const [first] = EXAMPLES;
+    if (!first) throw new Error('no example');
+    const choice = { kind: 'enclosing', bubbles: 5, levels: first.levels, edge: first.edge } as const;
+    const plain = { ...settings, example: first, choice, attractors: [], color: 'plain' as const };
+    expect(toHash(linkOf({ ...plain, params: { ...first.params, damping: 0.4 } }))).toBe('#extract');
+  });
+
+  test('of another lab, or with nonsense in it, does no harm', () => {
+    expect(fromHash('#track?example=tooth')).toBeUndefined();
+    expect(fromHash('#extract')).toBeUndefined();
+    expect(fromHash('#extract?levels=many&attractor=1,2&p.iso=&start=')).toEqual({
+      params: { iso: '' },
+      attractors: [],
+    });
+  });
+});
+
+describe('numbers as colours', () => {
+  test('are blue below zero, red above, pale at zero, and the same sRGB at both ends of the range', () => {
+    const [low, middle, high] = [diverging(-1), diverging(0), diverging(1)];
+    expect(low[2]).toBeGreaterThan(low[0] + 100);
+    expect(high[0]).toBeGreaterThan(high[2] + 100);
+    expect(Math.min(...middle)).toBeGreaterThan(240);
+    expect(diverging(5)).toEqual(high);
+  });
+
+  test('have a range that a few wild vertices do not widen', () => {
+    const values = Float32Array.from({ length: 1000 }, (_, i) => (i % 2 ? 0.011 : -0.015));
+    values.set([50, -80], 10);
+    expect(robustRange(values, 1e-4)).toBe(0.02);
+    expect(robustRange(new Float32Array(10), 1e-4)).toBe(1e-4);
+  });
+
+  test('are told with the unit they are one over', () => {
+    expect(shadeTitle('mean curvature', 'mm')).toBe('Mean curvature, 1/mm');
+    expect(shadeTitle('gaussian curvature', '')).toBe('Gaussian curvature, 1/unit²');
+  });
+
+  test('reach the GPU as linear light, and NaN as zero', () => {
+    const out = new Float32Array(9);
+    shadeColors(Float32Array.of(-2, 0, Number.NaN), 1, out);
+    expect(out[2]).toBeCloseTo((172 / 255) ** 2.2, 2);
+    expect(out[3]).toBeCloseTo((247 / 255) ** 2.2, 2);
+    expect([...out.slice(6)]).toEqual([...out.slice(3, 6)]);
+  });
+});
+
+test('a slice of a coarser copy lies where the slice of the volume lies', () => {
+  const fine = { dims: [9, 9, 9] as [number, number, number], voxels: new Uint8Array() };
+  const coarse = { dims: [3, 3, 3] as [number, number, number], voxels: new Uint8Array() };
+  const [frame] = sliceFrames({ ...grid(STRAIGHT), dims: [9, 9, 9] });
+  if (!frame) throw new Error('no slice');
+  expect([0, 2, 3, 8].map((index) => levelIndex(fine, coarse, frame, index))).toEqual([0, 0, 1, 2]);
+});
+
+test('the reach of an attractor is a disc in the slices it meets', () => {
+  const { dims, ...rest } = grid(STRAIGHT);
+  const volume = { ...rest, dims };
+  const axial = sliceFrames(volume)[2];
+  if (!axial) throw new Error('no axial slice');
+  const attractor = { point: toWorld(rest.affine, [1, 2, 3]), strength: 1, radius: 5 };
+  const disc = (slice: number) => discOf(attractor, slice, invert(rest.affine), volume, axial);
+  // Slices are 3 apart, rows 2: at the next slice a radius of 4 is left.
+  expect(disc(3)).toMatchObject({ radiusX: 5, radiusY: 2.5, near: true });
+  expect(disc(4)?.radiusX).toBeCloseTo(4, 5);
+  expect(disc(4)?.near).toBe(false);
+  expect(disc(5)).toBeUndefined();
 });

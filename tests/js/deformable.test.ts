@@ -47,6 +47,24 @@ test('coarse to fine it ends on the volume itself, at the edge length asked for'
   expect(fitted.delta).toBeLessThan(coarse);
 });
 
+test('speeds are told for each vertex of the arrays, inwards while an enclosing surface comes in', () => {
+  const fitted = model();
+  expect([...fitted.speeds()].every((speed) => speed === 0)).toBe(true);
+  fitted.step(5);
+  const speeds = fitted.speeds();
+  expect(speeds).toHaveLength(fitted.mesh.vertexCount);
+  expect([...speeds].every((speed) => speed < 0)).toBe(true);
+  // No vertex goes farther than its bound.
+  const most = fitted.params.maxMove * fitted.delta * (1 + 1e-5);
+  expect(Math.min(...speeds)).toBeGreaterThanOrEqual(-most);
+  fitted.free();
+  expect(failure(() => fitted.speeds()).code).toBe('freed');
+});
+
+test('the time of a step is told for forces, motion, normals and topology', () => {
+  expect(Object.keys(model().step().times).sort()).toEqual(['forces', 'motion', 'normals', 'topology']);
+});
+
 test('every start shape', async () => {
   const starts: [Options['start'], number][] = [
     ['enclosing', 1],

@@ -21,6 +21,12 @@ export class RequestError extends Error {
   }
 }
 
+/** What went wrong, whoever threw it. */
+export function toFailure(error: unknown): Failure {
+  if (error instanceof RequestError) return { code: error.code, message: error.message };
+  return { code: 'page', message: error instanceof Error ? error.message : String(error) };
+}
+
 interface Waiting {
   resolve: (body: never) => void;
   reject: (error: RequestError) => void;

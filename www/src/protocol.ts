@@ -4,11 +4,11 @@
  * The page sends requests and gets exactly one reply each; the worker also sends events on its own.
  * Stopping a run is an ordinary request with an ordinary reply: a cancellation is not an error.
  */
-import type { MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, Vec3 } from 'vesicle';
+import type { Attractor, MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, Vec3 } from 'vesicle';
 
 import type { Shape } from './shapes';
 
-export type { MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, Vec3 };
+export type { Attractor, MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, Vec3 };
 
 export type ParamValues = Record<string, unknown>;
 
@@ -35,6 +35,24 @@ export interface Setup {
   edge: number | undefined;
   /** What differs from the defaults; without `iso` the worker chooses one from the histogram. */
   params: ParamValues;
+  attractors: Attractor[];
+}
+
+/** A coarser copy of the volume, reduced to 8 bits like the volume itself. */
+export interface LevelView {
+  dims: Vec3;
+  voxels: Uint8Array;
+}
+
+/** What can be told of each vertex beside its place; the names are shown. */
+export type Shade = 'speed' | 'mean curvature' | 'gaussian curvature';
+
+/** Everything a run has, to come back to it. */
+export interface SavedRun {
+  state: Uint8Array;
+  levels: number;
+  iteration: number;
+  done: boolean;
 }
 
 /** What the page needs to know of a volume, with its voxels reduced to 8 bits for display. */
@@ -71,6 +89,8 @@ export interface Surface extends SurfaceBuffers {
   /** How many vertices and triangles of the buffers are in use. */
   vertices: number;
   triangles: number;
+  /** One number a vertex, where a shade was asked for. */
+  values?: Float32Array;
 }
 
 /** `report` is there when the surface was checked, which costs time and is done only when it stands still. */
@@ -84,6 +104,16 @@ export interface Ready {
   params: ParamValues;
   /** Edge length the model starts with, world units. */
   delta: number;
+}
+
+/** One of the two ways in a comparison, and what it cost. */
+export interface ComparedRun {
+  levels: number;
+  /** How many iterations and milliseconds by part each level took, the coarsest first. */
+  byLevel: { level: number; iterations: number; times: Record<string, number> }[];
+  /** Of the last iteration. */
+  report: StepReport;
+  info: MeshInfo;
 }
 
 export interface Loaded extends Ready {
@@ -105,6 +135,18 @@ export interface Requests {
   /** The planes whose cuts with the surface are to be sent. */
   planes: { body: Plane[]; reply: undefined };
   export: { body: { format: MeshFormat }; reply: Uint8Array };
+  /** So many coarser copies of the volume, the finest first. */
+  pyramid: { body: { levels: number }; reply: LevelView[] };
+  setAttractors: { body: Attractor[]; reply: undefined };
+  /** What to tell of each vertex from now on. */
+  shade: { body: Shade | undefined; reply: undefined };
+  /** The run as it is at this moment, also while it goes on. */
+  save: { body: undefined; reply: SavedRun };
+  /** Back to a saved run of the same volume. */
+  restore: { body: SavedRun; reply: Ready };
+  /** The same extraction twice, direct and coarse to fine; nothing when it was cancelled. */
+  compare: { body: Setup; reply: { direct: ComparedRun; coarseToFine: ComparedRun } | undefined };
+  cancelCompare: { body: undefined; reply: undefined };
 }
 
 export type RequestKind = keyof Requests;
@@ -126,6 +168,8 @@ export type ReplyMessage = { id: number; ok: true; body: unknown } | { id: numbe
 export interface SnapshotEvent {
   event: 'snapshot';
   surface: Surface;
+  /** Pyramid level the model is on. */
+  level: number;
   /** Cuts with the planes, pairs of world points. */
   sections: Float32Array[];
   /** One per step since the last snapshot. */
@@ -145,5 +189,11 @@ export interface FailureEvent {
   event: 'failure';
   failure: Failure;
 }
-export type WorkerEvent = SnapshotEvent | SectionsEvent | StateEvent | FailureEvent;
+/** How far a comparison is. */
+export interface ComparingEvent {
+  event: 'comparing';
+  run: 'direct' | 'coarseToFine';
+  report: StepReport;
+}
+export type WorkerEvent = SnapshotEvent | SectionsEvent | StateEvent | FailureEvent | ComparingEvent;
 export type FromWorker = ReplyMessage | WorkerEvent;

@@ -1,28 +1,29 @@
-/** The worker: the only file that uses the vesicle package. It holds one volume and one model, and does what the page asks. */
-import init, { DeformableModel, type Mesh, paramSpecs, type StepReport, VesicleError, Volume, version } from 'vesicle';
+/** The worker: with the files of the folder beside it the only one that uses the vesicle package. It holds one volume and one model, and does what the page asks. */
+import init, { type DeformableModel, type Mesh, paramSpecs, type StepReport, type Volume, version } from 'vesicle';
 import type {
-  Failure,
+  Attractor,
+  LevelView,
   Loaded,
   Measures,
-  NamedBytes,
   ParamValues,
   Plane,
   Ready,
   RequestKind,
   RequestMessage,
   Requests,
+  SavedRun,
   Setup,
+  Shade,
   SurfaceBuffers,
   ToWorker,
   VolumeSource,
-  VolumeView,
   WorkerEvent,
 } from './protocol';
-import { quantize } from './quantize';
-import { shapeVoxels } from './shapes';
-import { otsu, quantiles } from './threshold';
+import { compare } from './worker/compare';
+import { buildModel, valuesFor } from './worker/models';
+import { Refusal, toFailure } from './worker/refusal';
+import { levelsOf, viewOf, volumeFrom } from './worker/volumes';
 
-const HISTOGRAM_BINS = 256;
 /** Two sets: one being shown while the next is filled. With one the run waits for the page; more only add delay. */
 const BUFFER_SETS = 2;
 /** Milliseconds between two looks at area and volume while running; they cost as much as a step on small meshes. */
@@ -32,22 +33,6 @@ type Handlers = {
   [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
 };
 
-/** A request that makes no sense now; the library was not even asked. */
-class Refusal extends Error {
-  readonly code: string;
-
-  constructor(code: string, message: string) {
-    super(message);
-    this.code = code;
-  }
-}
-
-/** What was wrong, for the page. Any other error means that the engine itself broke. */
-function toFailure(error: unknown): Failure {
-  if (error instanceof VesicleError || error instanceof Refusal) return { code: error.code, message: error.message };
-  return { code: 'internal', message: error instanceof Error ? error.message : String(error) };
-}
-
 function send(event: WorkerEvent, transfer: Transferable[] = []): void {
   self.postMessage(event, { transfer });
 }
@@ -56,82 +41,23 @@ function emptyBuffers(): SurfaceBuffers {
   return { positions: new Float32Array(0), normals: new Float32Array(0), indices: new Uint32Array(0) };
 }
 
-function isHeader({ name }: NamedBytes): boolean {
-  return /\.(nhdr|mhd)$/i.test(name);
-}
-
-/** A volume from one file; a header whose data is missing asks for it. */
-function parseFile(file: NamedBytes): Volume {
-  try {
-    return Volume.parse(file.bytes);
-  } catch (error) {
-    if (!(error instanceof VesicleError) || !isHeader(file)) throw error;
-    throw new Refusal(error.code, `${error.message}. Choose or drop a header together with the file of its voxels.`);
-  }
-}
-
-/** A volume from one file, or from a header and its data in either order. */
-function parseFiles(files: NamedBytes[]): Volume {
-  const [first, second] = files;
-  if (!first) throw new Refusal('bad-file', 'no file was given');
-  if (!second) return parseFile(first);
-  const [header, data] = isHeader(second) && !isHeader(first) ? [second, first] : [first, second];
-  return Volume.parse(header.bytes, { data: data.bytes });
-}
-
-function volumeFrom(source: VolumeSource): Volume {
-  return 'files' in source ? parseFiles(source.files) : new Volume(shapeVoxels(source.shape));
-}
-
-/** The volume reduced to what the page shows; slice by slice, so that no second full copy in floats is made. */
-function viewOf(volume: Volume, name: string): VolumeView {
-  const { dims, range } = volume;
-  const histogram = volume.histogram(HISTOGRAM_BINS);
-  // A few extreme voxels (metal, noise) must not make everything else grey.
-  const [low = range[0], high = range[1]] = quantiles(histogram, range, [0.001, 0.999]);
-  const window: [number, number] = high > low ? [low, high] : range;
-  const voxels = new Uint8Array(dims[0] * dims[1] * dims[2]);
-  for (let z = 0; z < dims[2]; z++) quantize(volume.slice(2, z), window, voxels, z * dims[0] * dims[1]);
-  const { frames, spacing, affine, space } = volume;
-  return { name, dims, frames, spacing, affine, space, range, histogram, window, voxels };
-}
-
-function startOf(setup: Setup, iso: number): ConstructorParameters<typeof DeformableModel>[0]['start'] {
-  const { start } = setup;
-  switch (start.kind) {
-    case 'enclosing':
-      return 'enclosing';
-    case 'bubbles':
-      return { bubbles: start.count };
-    case 'isosurface':
-      return { marchingCubes: iso };
-    case 'sphere':
-      return { seeds: new Float32Array(start.center), radius: start.radius };
-  }
-}
-
-function buildModel(volume: Volume, setup: Setup): DeformableModel {
-  const chosen = setup.params.iso;
-  const iso = typeof chosen === 'number' ? chosen : otsu(volume.histogram(HISTOGRAM_BINS), volume.range);
-  return new DeformableModel({
-    volume,
-    start: startOf(setup, iso),
-    levels: setup.levels,
-    ...(setup.edge === undefined ? {} : { edge: setup.edge }),
-    params: { ...setup.params, iso },
-  });
-}
-
 class Session {
   #volume: Volume | undefined;
   #model: DeformableModel | undefined;
+  /** The intensities shown as black and as white. */
+  #window: [number, number] = [0, 1];
   #planes: Plane[] = [];
+  #shade: Shade | undefined;
   #free: SurfaceBuffers[] = Array.from({ length: BUFFER_SETS }, emptyBuffers);
   /** Steps the page has not heard of yet. */
   #reports: StepReport[] = [];
   #done = false;
+  #iteration = 0;
+  /** Pyramid levels the model was built with. */
+  #levels = 0;
   #measuredAt = 0;
-  #run: { abort: AbortController; ended: Promise<void> } | undefined;
+  #run: { abort: AbortController; ended: Promise<unknown> } | undefined;
+  #comparison: { abort: AbortController; ended: Promise<unknown> } | undefined;
 
   readonly handlers: Handlers = {
     hello: async () => {
@@ -146,6 +72,13 @@ class Session {
     setParams: (params) => this.#setParams(params),
     planes: (planes) => this.#setPlanes(planes),
     export: ({ format }) => this.#current().mesh.toBytes(format),
+    pyramid: ({ levels }) => this.#pyramid(levels),
+    setAttractors: (attractors) => this.#setAttractors(attractors),
+    shade: (shade) => this.#setShade(shade),
+    save: () => this.#save(),
+    restore: (saved) => this.#restore(saved),
+    compare: (setup) => this.#compare(setup),
+    cancelCompare: () => this.#cancelCompare(),
   };
 
   takeBack(buffers: SurfaceBuffers): void {
@@ -160,6 +93,7 @@ class Session {
       const ready = this.#adopt(buildModel(volume, setup));
       this.#volume?.free();
       this.#volume = volume;
+      this.#window = view.window;
       return { ...ready, volume: view };
     } catch (error) {
       volume.free();
@@ -169,13 +103,14 @@ class Session {
 
   async #rebuild(setup: Setup): Promise<Ready> {
     await this.#pause();
-    if (!this.#volume) throw new Refusal('invalid-argument', 'no volume is loaded: open one first');
-    return this.#adopt(buildModel(this.#volume, setup));
+    return this.#adopt(buildModel(this.#image(), setup));
   }
 
   #adopt(model: DeformableModel): Ready {
     this.#model?.free();
     this.#model = model;
+    this.#levels = model.level;
+    this.#iteration = 0;
     this.#reports = [];
     this.#done = false;
     this.#snapshot('checked');
@@ -187,7 +122,13 @@ class Session {
     return this.#model;
   }
 
-  #play(): undefined {
+  #image(): Volume {
+    if (!this.#volume) throw new Refusal('invalid-argument', 'no volume is loaded: open one first');
+    return this.#volume;
+  }
+
+  async #play(): Promise<undefined> {
+    await this.#cancelCompare();
     const model = this.#current();
     if (this.#run) return;
     const abort = new AbortController();
@@ -208,16 +149,15 @@ class Session {
   #stepped(report: StepReport): void {
     this.#reports.push(report);
     this.#done = report.done;
+    this.#iteration = report.iteration;
     if (this.#free.length === 0) return;
     const due = performance.now() - this.#measuredAt > MEASURE_EVERY;
     this.#snapshot(due ? 'measured' : 'plain');
   }
 
   async #pause(): Promise<undefined> {
-    const run = this.#run;
-    if (!run) return;
-    run.abort.abort();
-    await run.ended;
+    await this.#cancelCompare();
+    await stop(this.#run);
   }
 
   async #step(count: number): Promise<undefined> {
@@ -239,6 +179,70 @@ class Session {
     return { ...model.params };
   }
 
+  #setAttractors(attractors: Attractor[]): undefined {
+    this.#current().setAttractors(attractors);
+    this.#done = false;
+  }
+
+  #pyramid(levels: number): LevelView[] {
+    return levelsOf(this.#image(), levels, this.#window);
+  }
+
+  #setShade(shade: Shade | undefined): undefined {
+    this.#shade = shade;
+    if (this.#model && !this.#run) this.#snapshot('checked');
+  }
+
+  #save(): SavedRun {
+    const model = this.#current();
+    return { state: model.save(), levels: this.#levels, iteration: this.#iteration, done: this.#done };
+  }
+
+  /** A state fits only a model with as many levels; whatever that one starts from is replaced at once. */
+  async #restore({ state, levels, iteration, done }: SavedRun): Promise<Ready> {
+    await this.#pause();
+    if (levels === this.#levels) this.#current().restore(state);
+    else this.#replaceBy(state, levels);
+    const model = this.#current();
+    this.#levels = levels;
+    this.#iteration = iteration;
+    this.#reports = [];
+    this.#done = done;
+    this.#standStill();
+    return { params: { ...model.params }, delta: model.delta };
+  }
+
+  #replaceBy(state: Uint8Array, levels: number): void {
+    const start = { kind: 'enclosing' } as const;
+    const model = buildModel(this.#image(), { start, levels, edge: undefined, params: {}, attractors: [] });
+    try {
+      model.restore(state);
+    } catch (error) {
+      model.free();
+      throw error;
+    }
+    this.#model?.free();
+    this.#model = model;
+  }
+
+  async #compare(setup: Setup): Promise<Requests['compare']['reply']> {
+    await this.#pause();
+    const abort = new AbortController();
+    const result = compare(this.#image(), setup, abort.signal, (run, report) =>
+      send({ event: 'comparing', run, report }),
+    );
+    this.#comparison = { abort, ended: result };
+    try {
+      return await result;
+    } finally {
+      this.#comparison = undefined;
+    }
+  }
+
+  async #cancelCompare(): Promise<undefined> {
+    await stop(this.#comparison);
+  }
+
   #setPlanes(planes: Plane[]): undefined {
     this.#planes = planes;
     if (this.#model && !this.#run) {
@@ -252,7 +256,8 @@ class Session {
   }
 
   #snapshot(detail: 'plain' | 'measured' | 'checked'): void {
-    const { mesh } = this.#current();
+    const model = this.#current();
+    const { mesh, level } = model;
     const buffers = this.#free.pop() ?? emptyBuffers();
     const counts = mesh.copyTo(buffers);
     const sections = this.#sections(mesh);
@@ -260,8 +265,10 @@ class Session {
     const reports = this.#reports;
     this.#reports = [];
     const { positions, normals, indices } = buffers;
-    send({ event: 'snapshot', surface: { ...buffers, ...counts }, sections, reports, ...(measures && { measures }) }, [
-      ...buffersOf([positions, normals, indices]),
+    const values = this.#shade && valuesFor(model, this.#shade);
+    const surface = { ...buffers, ...counts, ...(values && { values }) };
+    send({ event: 'snapshot', surface, level, sections, reports, ...(measures && { measures }) }, [
+      ...buffersOf([positions, normals, indices, ...(values ? [values] : [])]),
       ...buffersOf(sections),
     ]);
   }
@@ -271,6 +278,12 @@ class Session {
     this.#measuredAt = performance.now();
     return measures;
   }
+}
+
+/** Ends what is under way, where something is; how it ends is for whoever started it. */
+async function stop(work: { abort: AbortController; ended: Promise<unknown> } | undefined): Promise<undefined> {
+  work?.abort.abort();
+  await work?.ended.catch(() => undefined);
 }
 
 function buffersOf(arrays: (Float32Array | Uint32Array)[]): Transferable[] {

@@ -68,6 +68,8 @@ pub(super) struct Forces {
     pub(super) normal: Vec<Vec3>,
     /// The sum of all forces.
     pub(super) force: Vec<Vec3>,
+    /// Milliseconds of evaluating forces that no report has told of.
+    pub(super) spent: f64,
 }
 
 impl Forces {
@@ -118,8 +120,9 @@ impl Forces {
             if scale.uses_gradient() {
                 force += self.ridge_attraction(v, x, image, scale);
             }
-            for pull in pulls {
-                force += attraction(pull, x);
+            if !pulls.is_empty() {
+                let pull = pulls.iter().map(|pull| attraction(pull, x)).sum();
+                force += self.without_slide(v, pull, velocities[v], scale.delta);
             }
             self.force[v] = force;
         }
@@ -134,6 +137,15 @@ impl Forces {
         let across = normal * bending.dot(normal);
         let speed = velocity.dot(normal).abs() / (SLIDE_SPEED * delta);
         across + (bending - across) * if speed < 1.0 { speed } else { 1.0 }
+    }
+
+    /// A force whose part along the surface fades out at rest, faster than that of rigidity: it would draw the vertices around
+    /// to a point, where they vanish, and so on for ever.
+    fn without_slide(&self, v: usize, force: Vec3, velocity: Vec3, delta: f32) -> Vec3 {
+        let normal = self.normal[v];
+        let across = normal * force.dot(normal);
+        let speed = velocity.dot(normal) / (SLIDE_SPEED * delta);
+        across + (force - across) * (speed * speed).min(1.0)
     }
 
     /// f_I = δ α_I (π_I − Π(x)) n (7).

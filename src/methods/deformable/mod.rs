@@ -250,12 +250,21 @@ impl DeformableModel {
             domain: self.domain,
             params: &self.params,
             delta,
+            clock: self.clock,
         };
-        let carry =
-            |mesh: &mut Mesh, ways: &mut [Vec3]| self.resolver.carry(mesh, Sampling::new(delta), ways);
+        let (clock, mut embedding) = (self.clock, 0.0);
+        let carry = |mesh: &mut Mesh, ways: &mut [Vec3]| {
+            let begin = clock();
+            let held = self.resolver.carry(mesh, Sampling::new(delta), ways);
+            embedding = clock() - begin;
+            held
+        };
         self.movement = advance(&mut self.mesh, self.keys, &mut self.forces, &world, carry);
+        let forces = std::mem::take(&mut self.forces.spent);
         times.add("normals", normals - begin);
-        times.add("motion", (self.clock)() - normals);
+        times.add("forces", forces);
+        times.add("embedding", embedding);
+        times.add("motion", (self.clock)() - normals - forces - embedding);
     }
 
     /// Vertices that have travelled far enough since their bounds were last looked at, and those long not looked at.
@@ -417,6 +426,17 @@ impl DeformableModel {
     /// The surface in world space with normals, counter-clockwise seen from outside.
     pub fn surface(&self) -> TriangleMesh {
         self.mesh.to_triangles().transformed(&self.to_world)
+    }
+
+    /// Speed of each vertex of [`Self::surface`] along its outward normal, in world units per unit of time; negative
+    /// inwards. A vertex that an edit made has what its neighbourhood had.
+    pub fn speeds(&self) -> Vec<f32> {
+        let normals = self.surface().normals.unwrap_or_default();
+        let velocities = self.mesh.vector(self.keys.velocity);
+        let along = |(v, normal): (VertexId, Vec3)| {
+            (self.to_world.matrix3 * velocities[v.index()].as_dvec3()).dot(normal.as_dvec3()) as f32
+        };
+        self.mesh.vertices().zip(normals).map(along).collect()
     }
 
     /// Takes a clock in milliseconds, by which reports tell the time of each part.

@@ -31,12 +31,15 @@ pub(super) struct World<'a> {
     pub(super) domain: Domain,
     pub(super) params: &'a DeformableParams,
     pub(super) delta: f32,
+    pub(super) clock: fn() -> f64,
 }
 
 impl World<'_> {
     /// The forces at given positions, with the normals there.
     fn act(&self, forces: &mut Forces, mesh: &Mesh, positions: &[Vec3], velocities: &[Vec3]) {
+        let begin = (self.clock)();
         forces.evaluate(mesh.rings(), positions, velocities, self.image, &self.scale, self.pulls);
+        forces.spent += (self.clock)() - begin;
     }
 }
 

@@ -7,11 +7,15 @@ import { figure } from '../ui/format';
 export interface Parts {
   chooser: HTMLElement;
   data: DataPanel;
+  figure: HTMLElement;
   histogram: HTMLElement;
   start: HTMLElement;
   params: HTMLElement;
+  pyramid: HTMLElement;
+  attractors: HTMLElement;
   transport: HTMLElement;
   options: HTMLElement;
+  legend: HTMLElement;
   banner: HTMLElement;
   status: HTMLElement;
   canvas: HTMLElement;
@@ -19,41 +23,50 @@ export interface Parts {
   drop: HTMLElement;
   measures: HTMLElement;
   exports: HTMLElement;
+  link: HTMLElement;
   plots: HTMLElement;
+  csv: HTMLElement;
   times: HTMLElement;
   log: HTMLElement;
+  compare: HTMLDetailsElement;
+  exercises: HTMLElement;
 }
 
 /** Lays the lab out: set-up on one side, the view in the middle, what comes of it on the other side. */
 export function layOut(root: HTMLElement, parts: Parts): void {
   root.className = 'lab';
-  const view = h('div', { class: 'view' }, parts.canvas, parts.options, parts.banner, parts.drop);
-  const params = h(
-    'details',
-    { class: 'panel', open: matchMedia('(min-width: 700px)').matches },
-    h('summary', {}, h('h2', {}, 'Parameters')),
-    parts.params,
-  );
+  const view = h('div', { class: 'view' }, parts.canvas, parts.options, parts.legend, parts.banner, parts.drop);
+  const params = folded('Parameters', parts.params);
+  params.open = matchMedia('(min-width: 700px)').matches;
   root.replaceChildren(
     h('div', { class: 'stage' }, view, parts.transport, parts.status, parts.slices),
     h(
       'div',
       { class: 'column setup' },
-      section('Data', parts.data.element),
+      section('Data', parts.data.element, parts.figure),
       section('Intensities', parts.histogram),
       section('Start', parts.start),
+      section('Pyramid', parts.pyramid),
+      section('Attractors', parts.attractors),
       params,
     ),
     h(
       'div',
       { class: 'column results' },
       section('Surface', parts.measures),
-      section('Save', parts.exports),
-      section('Progress', parts.plots),
+      section('Save', parts.exports, parts.link),
+      section('Progress', parts.plots, parts.csv),
       section('Events', parts.log),
       section('Time per part', parts.times),
+      parts.compare,
+      folded('Exercises', parts.exercises),
     ),
   );
+}
+
+/** A titled part of a column that is closed at first. */
+export function folded(title: string, ...children: Node[]): HTMLDetailsElement {
+  return h('details', { class: 'panel' }, h('summary', {}, h('h2', {}, title)), ...children);
 }
 
 /** What is told of a volume, so that its place is there before one is open. */
@@ -67,12 +80,15 @@ export class DataPanel {
   readonly #facts = h('dl', { class: 'facts' });
   readonly #credit = h('p', { class: 'help credit' });
 
-  constructor(examples: Example[], chooser: HTMLElement, onExample: (example: Example) => void) {
+  /** `figures` are listed apart from the other examples. */
+  constructor(examples: Example[], figures: Example[], chooser: HTMLElement, onExample: (example: Example) => void) {
     const id = uniqueId('example');
-    const options = examples.map((example) => h('option', { value: example.id }, example.name));
-    this.#examples = h('select', { id }, this.#own, ...options);
+    const group = (label: string, list: Example[]) =>
+      h('optgroup', { label }, ...list.map((example) => h('option', { value: example.id }, example.name)));
+    const groups = [group('Volumes', examples), group('Figures of the paper', figures)];
+    this.#examples = h('select', { id }, this.#own, ...groups);
     this.#examples.addEventListener('change', () => {
-      const example = examples.find((one) => one.id === this.#examples.value);
+      const example = [...examples, ...figures].find((one) => one.id === this.#examples.value);
       if (example) onExample(example);
     });
     this.#showFacts(FACTS.map((name) => [name, '–']));

@@ -1,12 +1,13 @@
-import { Client, RequestError } from '../client';
+import { Client, RequestError, toFailure } from '../client';
 import { EXAMPLES, type Example, exampleUrl } from '../examples';
+import { exampleById, isPreset, PRESETS, type Preset, startOf, type Variant, variantOf } from '../presets';
 import type {
-  Failure,
   MeshFormat,
   ParamValues,
   Plane,
   Ready,
   Setup,
+  Shade,
   SnapshotEvent,
   StartShape,
   StepReport,
@@ -15,9 +16,12 @@ import type {
   WorkerEvent,
 } from '../protocol';
 import { type LabState, Observable } from '../state';
+import { ComparePanel } from '../ui/compare';
 import { h } from '../ui/dom';
+import { exercises } from '../ui/exercises';
 import { ExportButtons } from '../ui/exports';
-import { acceptDrops, download, fileChooser, readFiles } from '../ui/files';
+import { FigurePanel } from '../ui/figure';
+import { acceptDrops, fileChooser, readFiles } from '../ui/files';
 import { count, plural } from '../ui/format';
 import { Histogram } from '../ui/histogram';
 import { History } from '../ui/history';
@@ -25,18 +29,25 @@ import { EventLog } from '../ui/log';
 import { MeasurePanel } from '../ui/measures';
 import { ParamControls } from '../ui/params';
 import { Plots } from '../ui/plots';
+import { PyramidPanel } from '../ui/pyramid';
 import { listenForShortcuts, type Shortcut, shortcutDialog } from '../ui/shortcuts';
 import { type StartChoice, StartControls } from '../ui/start';
 import { ErrorBanner, StatusLine } from '../ui/status';
 import { TimeTable } from '../ui/times';
 import { Transport } from '../ui/transport';
-import { type ViewOptions, viewOptions } from '../ui/view-options';
+import { ViewOptionControls, type ViewOptions } from '../ui/view-options';
 import { Stage } from '../view/stage';
-import { DataPanel, layOut } from './extract-page';
+import { Attracting } from './attracting';
+import { DataPanel, folded, layOut } from './extract-page';
+import { ADDRESS, fromHash, type Linked, linkOf, toHash, withLink } from './link';
+import { type Moment, type PageState, Rewinder } from './rewinder';
+import { Saving } from './saving';
 
-const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, byComponent: false, slices: 'walls' };
+const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, color: 'plain', slices: 'walls' };
 /** Radius of the sphere placed at the crosshair, as a part of the volume's smallest side. */
 const SPHERE_PART = 0.1;
+/** Reach of a new attractor in the same measure. */
+const ATTRACTOR_PART = 0.15;
 
 const VANISHED =
   'It found nothing to hold it: try fewer pyramid levels (thin parts blur away on coarse ones), another iso value or start shape, or less rigidity.';
@@ -48,6 +59,8 @@ interface Source {
   name: string;
   volume: () => Promise<VolumeSource>;
   example?: Example;
+  /** What a link asks for beyond the example. */
+  linked?: Linked;
 }
 
 /** The Extract lab: a deformable surface grows onto a volume. */
@@ -68,6 +81,36 @@ export class ExtractLab {
   readonly #stage = new Stage(this.#canvas, this.#slices, INITIAL_VIEW, (planes) => this.#setPlanes(planes));
   readonly #histogram = new Histogram((iso) => this.#setParam('iso', iso));
   readonly #start = new StartControls(() => void this.#restart());
+  readonly #options = new ViewOptionControls(INITIAL_VIEW, (options) => this.#setView(options));
+  readonly #pyramid = new PyramidPanel(
+    (level) => this.#stage.thumbnail(level),
+    (level) => this.#stage.showLevel(level),
+  );
+  readonly #attracting = new Attracting(this.#client, this.#stage, () => this.#rewinder, {
+    ready: () => this.#volume !== undefined && !this.#engineBroken,
+    onTaken: () => {
+      this.#updateAddress();
+      this.#goOn();
+    },
+    onPlacing: (placing) => this.#setPlacing(placing),
+  });
+  readonly #saving = new Saving(this.#client, (text) => this.#status.say(text));
+  readonly #figure = new FigurePanel((preset, variant) => void this.#openVariant(preset, variant));
+  readonly #compare = new ComparePanel({
+    onStart: () => void this.#runComparison(),
+    onCancel: () => this.#ask(this.#client.request('cancelCompare', undefined)),
+  });
+  readonly #compareHolder = folded('Direct against coarse to fine', this.#compare.element);
+  readonly #csv = h(
+    'button',
+    { type: 'button', onclick: () => this.#saving.plots(this.#history), disabled: true },
+    'Plot data (CSV)',
+  );
+  readonly #rewinder = new Rewinder(
+    this.#client,
+    () => this.#pageState(),
+    (undoable, redoable) => this.#transport.showUndo(undoable, redoable),
+  );
   readonly #paramsHolder = h('div');
   readonly #measures = new MeasurePanel();
   readonly #exports = new ExportButtons((format, type) => void this.#export(format, type));
@@ -78,6 +121,8 @@ export class ExtractLab {
     onToggle: () => this.#toggle(),
     onStep: (steps) => this.#step(steps),
     onReset: () => void this.#reset(),
+    onUndo: () => void this.#travel('undo'),
+    onRedo: () => void this.#travel('redo'),
   });
   readonly #data: DataPanel;
   readonly #shortcuts: Shortcut[] = [
@@ -85,12 +130,31 @@ export class ExtractLab {
     { key: 's', shown: 's', text: 'one step', act: () => this.#step(1) },
     { key: 'd', shown: 'd', text: 'ten steps', act: () => this.#step(10) },
     { key: 'r', shown: 'r', text: 'reset', act: () => void this.#reset() },
+    {
+      key: 'a',
+      shown: 'a',
+      text: 'attractor at the crosshair',
+      act: () => this.#attracting.add(this.#stage.crosshair),
+    },
+    { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#travel('undo') },
+    { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: () => void this.#travel('redo') },
+    { key: 'y', ctrl: true, shown: 'Ctrl Y', text: 'redo', act: () => void this.#travel('redo') },
   ];
   #paramControls: ParamControls | undefined;
+  /** The defaults of the parameters that have one. */
+  #defaults: ParamValues = {};
   /** The parameters in force; they outlive a reset. */
   #params: ParamValues = {};
   #volume: VolumeView | undefined;
   #source: Source | undefined;
+  /** What the surface's vertices are asked for. */
+  #shade: Shade | undefined;
+  /** Settled when all that was to be undone or done again is. */
+  #travels: Promise<void> = Promise.resolve();
+  /** The level the model is on. */
+  #level = 0;
+  /** A link to a file of the user's, until the file is opened. */
+  #awaiting: Linked | undefined;
   /** Counts what was asked to be opened, so that a slow download does not replace what came after it. */
   #turn = 0;
   /** The state to return to when an error has been read. */
@@ -102,7 +166,8 @@ export class ExtractLab {
   constructor(root: HTMLElement, help: HTMLElement) {
     this.#root = root;
     const chooser = fileChooser((files) => void this.#openFiles(files));
-    this.#data = new DataPanel(EXAMPLES, chooser, (example) => void this.#openExample(example));
+    this.#data = new DataPanel(EXAMPLES, PRESETS, chooser, (example) => void this.#openExample(example));
+    this.#stage.onMoved = () => this.#pyramid.redraw();
     this.#layOut(chooser);
     this.#state.follow((state) => this.#showState(state));
     acceptDrops(this.#drop, (files) => void this.#openFiles(files));
@@ -125,8 +190,8 @@ export class ExtractLab {
       this.#fail('Vesicle could not start.', error);
       return;
     }
-    const [example] = EXAMPLES;
-    if (example) await this.#openExample(example);
+    window.addEventListener('hashchange', () => void this.#openLink());
+    await this.#openLink(EXAMPLES[0]);
   }
 
   #layOut(chooser: HTMLElement): void {
@@ -137,7 +202,11 @@ export class ExtractLab {
       start: this.#start.element,
       params: this.#paramsHolder,
       transport: this.#transport.element,
-      options: viewOptions(INITIAL_VIEW, (options) => this.#stage.setOptions(options)),
+      figure: this.#figure.element,
+      pyramid: this.#pyramid.element,
+      attractors: this.#attracting.element,
+      options: this.#options.element,
+      legend: this.#stage.legend.element,
       banner: this.#banner.element,
       status: this.#status.element,
       canvas: this.#canvas,
@@ -145,32 +214,83 @@ export class ExtractLab {
       drop: this.#drop,
       measures: this.#measures.element,
       exports: this.#exports.element,
+      link: h(
+        'button',
+        { type: 'button', class: 'wide', onclick: () => void this.#copyLink() },
+        'Copy link to these settings',
+      ),
       plots: this.#plots.element,
+      csv: this.#csv,
       times: this.#times.element,
       log: this.#log.element,
+      compare: this.#compareHolder,
+      exercises: exercises((id) => this.#openById(id)),
     });
   }
 
   async #greet(): Promise<void> {
     const { specs } = await this.#client.request('hello', undefined);
     if (this.#paramControls) return;
+    this.#defaults = Object.fromEntries(
+      specs.flatMap(({ name, default: value }) => (name === 'iso' ? [] : [[name, value]])),
+    );
     this.#paramControls = new ParamControls(specs, ['iso'], (name, value) => this.#setParam(name, value));
     this.#paramsHolder.replaceWith(this.#paramControls.element);
   }
 
   // ── opening ───────────────────────────────────────────────────────────────────────────────────
 
-  #openExample(example: Example): Promise<void> {
+  #openExample(example: Example, linked?: Linked): Promise<void> {
     const { source } = example;
-    if ('shape' in source) return this.#open({ name: source.shape, volume: async () => source, example });
+    const more = { example, ...(linked && { linked }) };
+    if ('shape' in source) return this.#open({ name: source.shape, volume: async () => source, ...more });
     const { file } = source;
     const volume = async () => ({ files: [{ name: file, bytes: await fetchBytes(exampleUrl(file)) }] });
-    return this.#open({ name: file, volume, example });
+    return this.#open({ name: file, volume, ...more });
   }
 
   #openFiles(files: File[]): Promise<void> {
     const name = files.map((file) => file.name).join(' + ');
-    return this.#open({ name, volume: async () => ({ files: await readFiles(files) }) });
+    const linked = this.#awaiting;
+    return this.#open({ name, volume: async () => ({ files: await readFiles(files) }), ...(linked && { linked }) });
+  }
+
+  #openById(id: string): void {
+    const example = exampleById(id);
+    if (example) void this.#openExample(example);
+  }
+
+  /** Opens what the page's address asks for; says why where that cannot be. `otherwise` is opened then. */
+  async #openLink(otherwise?: Example): Promise<void> {
+    const linked = fromHash(location.hash);
+    const id = linked?.example ?? (linked && !linked.file ? EXAMPLES[0]?.id : '');
+    const example = exampleById(id ?? '');
+    if (linked && example) return this.#openExample(example, linked);
+    if (otherwise) await this.#openExample(otherwise);
+    if (!linked) return;
+    this.#awaiting = linked.file ? linked : undefined;
+    if (linked.file)
+      this.#banner.show('This link needs a file.', `Open ${linked.file} from your disk: its settings will follow.`);
+    else this.#banner.show('This link cannot be followed.', `There is no example “${linked.example ?? ''}”.`);
+  }
+
+  /** Another picture of the figure that is open: other parameters, from the same start or from where the surface is. */
+  async #openVariant(preset: Preset, variant: Variant): Promise<void> {
+    if (!this.#volume || this.#state.value === 'loading' || this.#engineBroken) return;
+    const params = { ...preset.params, ...variant.params };
+    const forget = this.#rewinder.remember(`figure ${variant.id}`);
+    try {
+      if (preset.startsOver) {
+        this.#enterLoading('Starting over.');
+        this.#adoptModel(await this.#client.request('rebuild', this.#setup(this.#start.value, params)));
+      } else {
+        this.#showParams(await this.#client.request('setParams', params));
+      }
+      await this.#play();
+    } catch (error) {
+      forget();
+      this.#fail('That did not work.', error);
+    }
   }
 
   /** Opens a volume and runs the model on it. What is asked for last counts. When it fails, everything stays as it was. */
@@ -185,9 +305,16 @@ export class ExtractLab {
       const body = { name: source.name, source: volume, setup: this.#setupFor(source, choice) };
       const loaded = await this.#client.request('load', body, transferable(body.source));
       this.#source = source;
+      this.#awaiting = undefined;
       this.#start.show(choice);
+      this.#rewinder.clear();
+      this.#compare.clear();
       this.#adoptVolume(loaded.volume, source.example);
+      this.#attracting.show(body.setup.attractors);
+      this.#attracting.radius = ATTRACTOR_PART * this.#smallestSide();
+      if (source.linked?.color) this.#options.color = source.linked.color;
       this.#adoptModel(loaded);
+      this.#rewinder.remember('Play');
       await this.#play();
     } catch (error) {
       if (turn !== this.#turn) return;
@@ -198,10 +325,27 @@ export class ExtractLab {
 
   #adoptVolume(volume: VolumeView, example: Example | undefined): void {
     this.#volume = volume;
+    this.#saving.name = volume.name;
     this.#measures.unit = example?.unit ?? 'mm';
+    this.#stage.unit = example?.unit ?? 'mm';
     this.#histogram.setVolume(volume);
     this.#data.show(volume, example);
     this.#stage.setVolume(volume);
+    if (isPreset(example) && example.compares) this.#compareHolder.open = true;
+  }
+
+  /** Asks for the coarser copies the model works on, to show them. */
+  async #showPyramid(): Promise<void> {
+    const turn = this.#turn;
+    const volume = this.#volume;
+    const { levels } = this.#start.value;
+    try {
+      const coarser = await this.#client.request('pyramid', { levels });
+      if (volume && turn === this.#turn && levels === this.#start.value.levels)
+        this.#pyramid.setLevels(volume.dims, coarser, this.#level);
+    } catch (error) {
+      this.#fail('The pyramid cannot be shown.', error);
+    }
   }
 
   #adoptModel({ params }: Ready): void {
@@ -211,17 +355,21 @@ export class ExtractLab {
     this.#transport.showReport(undefined);
     this.#showHistory();
     this.#state.value = 'paused';
+    void this.#showPyramid();
+    this.#updateAddress();
   }
 
   /** Starts the model over, with the parameters as they are. */
   async #reset(): Promise<void> {
     if (!this.#volume || this.#state.value === 'loading') return;
     if (this.#engineBroken && this.#source) return this.#open(this.#source);
+    const forget = this.#rewinder.remember('Reset');
     this.#enterLoading('Starting over.');
     try {
       this.#adoptModel(await this.#client.request('rebuild', this.#setup(this.#start.value, this.#params)));
       this.#status.say('Ready to start.');
     } catch (error) {
+      forget();
       this.#fail('The model could not be built.', error);
     }
   }
@@ -232,6 +380,7 @@ export class ExtractLab {
     if (this.#engineBroken) return this.#start.refuse(BROKEN);
     const running = this.#state.value === 'running';
     const choice = this.#start.value;
+    const forget = this.#rewinder.remember('another start');
     this.#enterLoading('Starting over.');
     try {
       const ready = await this.#client.request('rebuild', this.#setup(choice, this.#params));
@@ -239,6 +388,7 @@ export class ExtractLab {
       this.#adoptModel(ready);
       await this.#play();
     } catch (error) {
+      forget();
       const failure = toFailure(error);
       this.#start.refuse(failure.message);
       if (failure.code === 'internal') return this.#fail('The model could not be built.', error);
@@ -247,22 +397,26 @@ export class ExtractLab {
     }
   }
 
-  #setup(choice: StartChoice, params: ParamValues): Setup {
+  #setup(choice: StartChoice, params: ParamValues, attractors = this.#attracting.inForce): Setup {
     const { levels, edge } = choice;
-    return { start: this.#startShape(choice), levels, edge, params };
+    return { start: this.#startShape(choice), levels, edge, params, attractors };
   }
 
   /** What suits an example; for a file, the settings as they are, except the iso value, which no other volume shares. */
-  #setupFor({ example }: Source, choice: StartChoice): Setup {
+  #setupFor({ example, linked }: Source, choice: StartChoice): Setup {
     const { iso: _, ...params } = this.#params;
-    return this.#setup(choice, example?.params ?? params);
+    const setup = this.#setup(choice, { ...(example?.params ?? params), ...linked?.params }, linked?.attractors ?? []);
+    if (linked?.sphere && choice.kind === 'sphere') setup.start = { kind: 'sphere', ...linked.sphere };
+    return setup;
   }
 
   /** What suits an example; for a file, the start as it is, except lengths and places of another volume's world. */
-  #startFor({ example }: Source): StartChoice {
+  #startFor({ example, linked }: Source): StartChoice {
     const choice = this.#start.value;
-    if (example) return { ...choice, kind: 'enclosing', levels: example.levels, edge: example.edge };
-    return { ...choice, kind: choice.kind === 'sphere' ? 'enclosing' : choice.kind, edge: undefined };
+    const suits: StartChoice = example
+      ? { ...choice, ...startOf(example), levels: example.levels, edge: example.edge }
+      : { ...choice, kind: choice.kind === 'sphere' ? 'enclosing' : choice.kind, edge: undefined };
+    return linked ? withLink(suits, linked) : suits;
   }
 
   #startShape({ kind, bubbles }: StartChoice): StartShape {
@@ -277,8 +431,13 @@ export class ExtractLab {
   }
 
   #sphereRadius(): number {
+    return SPHERE_PART * this.#smallestSide();
+  }
+
+  /** Of the volume, in world units. */
+  #smallestSide(): number {
     const { dims = [1, 1, 1], spacing = [1, 1, 1] } = this.#volume ?? {};
-    return SPHERE_PART * Math.min(...dims.map((n, axis) => n * (spacing[axis] ?? 1)));
+    return Math.min(...dims.map((n, axis) => n * (spacing[axis] ?? 1)));
   }
 
   async #restartEngine(): Promise<void> {
@@ -297,12 +456,14 @@ export class ExtractLab {
     const running = this.#state.value === 'running';
     if (!running && !this.#canRun()) return;
     this.#banner.hide();
+    if (!running) this.#rewinder.remember('Play');
     this.#ask(running ? this.#client.request('pause', undefined) : this.#play());
   }
 
   #step(steps: number): void {
     if (!this.#canRun()) return;
     this.#banner.hide();
+    this.#rewinder.remember(plural(steps, 'step'));
     this.#ask(this.#client.request('step', { count: steps }));
   }
 
@@ -326,11 +487,12 @@ export class ExtractLab {
 
   async #setParam(name: string, value: unknown): Promise<void> {
     if (!this.#volume) return;
+    const forget = this.#rewinder.remember(`change of ${this.#paramControls?.labelOf(name) ?? name}`, name);
     try {
       this.#showParams(await this.#client.request('setParams', { [name]: value }));
-      // A model that had settled has further to go under other parameters.
-      if (this.#modelState === 'done') this.#ask(this.#play());
+      this.#goOn();
     } catch (error) {
+      forget();
       this.#refuseParam(name, error);
     }
   }
@@ -348,6 +510,117 @@ export class ExtractLab {
     this.#params = params;
     this.#paramControls?.show(params);
     if (typeof params.iso === 'number') this.#histogram.setIso(params.iso);
+    const example = this.#source?.example;
+    if (isPreset(example)) this.#figure.show(example, variantOf(example, params));
+    else this.#figure.show(undefined);
+    this.#updateAddress();
+  }
+
+  /** A model that had settled has further to go under other forces. */
+  #goOn(): void {
+    if (this.#modelState === 'done') this.#ask(this.#play());
+  }
+
+  // ── attractors, colours, comparison ───────────────────────────────────────────────────────────
+
+  #setPlacing(placing: boolean): void {
+    this.#root.toggleAttribute('data-placing', placing);
+    this.#status.say(placing ? 'Click in a slice or on the surface to place attractors.' : '');
+  }
+
+  #setView(options: ViewOptions): void {
+    this.#stage.setOptions(options);
+    const { color } = options;
+    const shade = color === 'plain' || color === 'component' ? undefined : color;
+    if (shade !== this.#shade) this.#ask(this.#client.request('shade', shade));
+    this.#shade = shade;
+    this.#updateAddress();
+  }
+
+  async #runComparison(): Promise<void> {
+    if (!this.#volume || this.#engineBroken || this.#state.value === 'loading') return;
+    const { levels } = this.#start.value;
+    if (levels === 0) return this.#compare.refuse('Choose one pyramid level or more under Start first.');
+    this.#compare.begin();
+    try {
+      const setup = this.#setup(this.#start.value, this.#params, []);
+      this.#compare.finish(await this.#client.request('compare', setup));
+    } catch (error) {
+      this.#compare.refuse(`The comparison stopped: ${toFailure(error).message}`);
+    }
+  }
+
+  // ── back and forth ────────────────────────────────────────────────────────────────────────────
+
+  #pageState(): PageState {
+    const mark = this.#history.marker();
+    return { choice: this.#start.inForce, params: this.#params, attractors: this.#attracting.inForce, mark };
+  }
+
+  /** One after the other, however fast they are asked for. */
+  #travel(way: 'undo' | 'redo'): Promise<void> {
+    this.#travels = this.#travels.then(() => this.#travelOnce(way));
+    return this.#travels;
+  }
+
+  async #travelOnce(way: 'undo' | 'redo'): Promise<void> {
+    if (!this.#volume || this.#engineBroken || this.#state.value === 'loading') return;
+    this.#calm = this.#modelState === 'done' ? 'done' : 'paused';
+    this.#enterLoading(way === 'undo' ? 'Going back.' : 'Going forth again.');
+    try {
+      const moment = await this.#rewinder.travel(way);
+      if (moment) this.#adoptMoment(moment);
+      else this.#calmDown();
+    } catch (error) {
+      this.#fail('That did not work.', error);
+    }
+  }
+
+  #adoptMoment({ saved, page }: Moment): void {
+    this.#start.show(page.choice);
+    this.#attracting.show(page.attractors);
+    this.#showParams(page.params);
+    this.#history.rewind(page.mark(saved.iteration));
+    this.#log.clear();
+    this.#transport.showReport(this.#history.reports.at(-1));
+    this.#showHistory();
+    this.#calm = saved.done ? 'done' : 'paused';
+    this.#calmDown();
+    void this.#showPyramid();
+  }
+
+  // ── the address ───────────────────────────────────────────────────────────────────────────────
+
+  /** Keeps the page's address a link to what is open and how it is set. */
+  #updateAddress(): void {
+    if (!this.#source || this.#state.value === 'loading') return;
+    const { example, name } = this.#source;
+    const choice = this.#start.inForce;
+    const hash = toHash(
+      linkOf({
+        example,
+        file: name,
+        choice,
+        sphere: { center: this.#stage.crosshair, radius: this.#sphereRadius() },
+        params: this.#params,
+        defaults: this.#defaults,
+        attractors: this.#attracting.inForce,
+        color: this.#options.value.color,
+      }),
+    );
+    if (hash !== (location.hash || ADDRESS)) window.history.replaceState(null, '', hash);
+  }
+
+  async #copyLink(): Promise<void> {
+    this.#updateAddress();
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.#status.say('Link copied.');
+    } catch {
+      this.#status.say('The link is in the address bar.');
+    }
+    if (!this.#source?.example)
+      this.#status.say('Link copied. Your file is not in it: whoever opens it needs the file too.');
   }
 
   // ── what the worker tells ─────────────────────────────────────────────────────────────────────
@@ -363,6 +636,9 @@ export class ExtractLab {
       case 'state':
         this.#enter(event.state);
         break;
+      case 'comparing':
+        this.#compare.tell(event);
+        break;
       case 'failure':
         this.#fail('The run has stopped.', new RequestError(event.failure));
     }
@@ -373,6 +649,8 @@ export class ExtractLab {
     if (this.#history.add(event.reports)) this.#transport.showReport(event.reports.at(-1));
     if (this.#snapshot) this.#client.giveBack(this.#snapshot.surface);
     this.#snapshot = event;
+    this.#level = event.level;
+    this.#pyramid.setInUse(event.level);
     this.#showMeasures(event);
     this.#framePending ||= requestAnimationFrame(() => this.#showSnapshot());
   }
@@ -397,6 +675,7 @@ export class ExtractLab {
   #showHistory(): void {
     this.#plots.update();
     this.#times.update(this.#history);
+    this.#csv.disabled = this.#history.reports.length === 0;
     this.#log.update(this.#history);
   }
 
@@ -426,6 +705,7 @@ export class ExtractLab {
     const ready = this.#volume !== undefined;
     this.#transport.showState(this.#modelState, ready);
     this.#exports.enabled = ready && state !== 'loading';
+    this.#compare.enabled = ready && state !== 'loading';
   }
 
   #fail(title: string, error: unknown): void {
@@ -453,19 +733,11 @@ export class ExtractLab {
 
   async #export(format: MeshFormat, type: string): Promise<void> {
     try {
-      const bytes = await this.#client.request('export', { format });
-      const stem = this.#volume?.name.replace(/\.(nii|nrrd|nhdr|mha|mhd|gz)\b.*$/i, '') ?? 'surface';
-      download(`${stem}.${format}`, bytes, type);
-      this.#status.say(`Saved ${stem}.${format}.`);
+      await this.#saving.mesh(format, type);
     } catch (error) {
       this.#fail('The surface could not be saved.', error);
     }
   }
-}
-
-function toFailure(error: unknown): Failure {
-  if (error instanceof RequestError) return { code: error.code, message: error.message };
-  return { code: 'page', message: error instanceof Error ? error.message : String(error) };
 }
 
 function transferable(source: VolumeSource): Transferable[] {

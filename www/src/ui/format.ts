@@ -19,3 +19,8 @@ export function milliseconds(value: number): string {
 export function plural(value: number, one: string, many = `${one}s`): string {
   return `${count(value)} ${value === 1 ? one : many}`;
 }
+
+/** The paper's name of the image on a pyramid level: I₀ is the volume itself. */
+export function levelSymbol(level: number): string {
+  return `I${[...String(level)].map((digit) => '₀₁₂₃₄₅₆₇₈₉'[Number(digit)]).join('')}`;
+}

@@ -52,7 +52,7 @@ function kindOf(change: Change): string {
   return change.axial > 0 ? 'axial' : change.annular > 0 ? 'annular' : 'vanished';
 }
 
-function describe({ axial, annular, vanished }: Change): string {
+export function describe({ axial, annular, vanished }: Change): string {
   const parts: string[] = [];
   if (axial > 0) parts.push(plural(axial, 'join'));
   if (annular > 0) parts.push(plural(annular, 'cut'));
@@ -60,7 +60,8 @@ function describe({ axial, annular, vanished }: Change): string {
   return parts.join(', ');
 }
 
-function totals(changes: Change[]): string {
+/** All changes together in words. */
+export function totals(changes: Change[]): string {
   const sum = (of: (change: Change) => number) => changes.reduce((total, change) => total + of(change), 0);
   const joins = plural(
     sum((change) => change.axial),

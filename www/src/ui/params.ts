@@ -17,9 +17,11 @@ interface Control {
 export class ParamControls {
   readonly element: HTMLElement;
   readonly #controls = new Map<string, Control>();
+  readonly #specs: ParamSpec[];
 
   /** `skip` are parameters that are set elsewhere. */
   constructor(specs: ParamSpec[], skip: string[], onChange: (name: string, value: unknown) => void) {
+    this.#specs = specs;
     for (const spec of specs) {
       if (!skip.includes(spec.name))
         this.#controls.set(
@@ -28,6 +30,11 @@ export class ParamControls {
         );
     }
     this.element = h('div', { class: 'params' }, ...[...this.#controls.values()].map((control) => control.element));
+  }
+
+  /** What a parameter is called on the page. */
+  labelOf(name: string): string | undefined {
+    return this.#specs.find((spec) => spec.name === name)?.label.toLowerCase();
   }
 
   /** Shows the values in force, and takes complaints back. */

@@ -4,10 +4,13 @@ import type { StepReport } from '../protocol';
 import { h, onSchemeChange, token } from './dom';
 import { count, figure } from './format';
 import type { History } from './history';
+import { totals } from './log';
 
 const PLOT_HEIGHT = 144;
 /** Above a plot, for the names of the levels. */
 const MARK_ROOM = 16;
+/** Height of the ticks of one kind of event. */
+const MARK_LANE = 6;
 
 interface Curve {
   label: string;
@@ -38,7 +41,7 @@ const PLOTS: PlotKind[] = [
     title: 'Vertices',
     log: false,
     curves: [{ label: 'vertices', color: '--curve', of: (report) => report.vertices }],
-    tell: (history) => tellChange(history, 'vertices', (report) => report.vertices),
+    tell: (history) => `${tellChange(history, 'vertices', (report) => report.vertices)} ${tellByLevel(history)}`.trim(),
   },
   {
     title: 'Euler characteristic χ',
@@ -53,6 +56,7 @@ export class Plots {
   readonly element: HTMLElement;
   readonly #plots: Plot[];
   readonly #history: History;
+  readonly #events = h('p', { class: 'help', 'data-plot-events': '' });
   #pending = 0;
 
   constructor(history: History) {
@@ -64,10 +68,11 @@ export class Plots {
       'p',
       { class: 'legend' },
       key('level', 'level change'),
-      key('axial', 'join'),
-      key('annular', 'cut'),
+      key('axial', 'axial: parts join'),
+      key('annular', 'annular: a neck is cut'),
+      key('vanished', 'a part vanishes'),
     );
-    this.element = h('div', { class: 'plots' }, ...this.#plots.map((plot) => plot.element), legend);
+    this.element = h('div', { class: 'plots' }, ...this.#plots.map((plot) => plot.element), legend, this.#events);
     onSchemeChange(() => this.update());
   }
 
@@ -76,6 +81,7 @@ export class Plots {
     this.#pending ||= requestAnimationFrame(() => {
       this.#pending = 0;
       for (const plot of this.#plots) plot.update(this.#history);
+      this.#events.textContent = tellEvents(this.#history);
     });
   }
 }
@@ -180,7 +186,7 @@ function tickLabel(tick: number | null, log: boolean): string {
   return Math.abs(tick) >= 10_000 ? `${count(tick / 1000)}k` : Number.isInteger(tick) ? count(tick) : '';
 }
 
-/** Level changes as upright lines with their names; joins and cuts as ticks at the foot. */
+/** Level changes as upright lines with their names; joins, cuts and parts that vanish as ticks at the foot. */
 function drawMarks(plot: uPlot, history: History): void {
   const { ctx, bbox } = plot;
   ctx.save();
@@ -193,15 +199,21 @@ function drawMarks(plot: uPlot, history: History): void {
     const x = Math.round(plot.valToPos(iteration, 'x', true));
     upright(ctx, x, bbox.top, bbox.top + bbox.height, token('--line-strong'));
     ctx.fillStyle = token('--muted');
-    if (x + ctx.measureText(phase).width > free) continue;
-    ctx.fillText(phase, x, bbox.top - 4 * devicePixelRatio);
-    free = x - 4 * devicePixelRatio;
+    const { width } = ctx.measureText(phase);
+    const at = Math.min(x, bbox.left + bbox.width - width);
+    if (at + width > free) continue;
+    ctx.fillText(phase, at, bbox.top - 4 * devicePixelRatio);
+    free = at - 4 * devicePixelRatio;
   }
   const foot = bbox.top + bbox.height;
-  for (const { iteration, axial, annular } of history.changes) {
+  // A lane each, so that none hides another.
+  const lane = MARK_LANE * devicePixelRatio;
+  const [join, cut, vanish] = [token('--join'), token('--cut'), token('--vanished')];
+  for (const { iteration, axial, annular, vanished } of history.changes) {
     const x = plot.valToPos(iteration, 'x', true);
-    if (axial > 0) upright(ctx, x, foot - 6 * devicePixelRatio, foot, token('--join'));
-    if (annular > 0) upright(ctx, x, foot - 12 * devicePixelRatio, foot - 6 * devicePixelRatio, token('--cut'));
+    if (axial > 0) upright(ctx, x, foot - lane, foot, join);
+    if (annular > 0) upright(ctx, x, foot - 2 * lane, foot - lane, cut);
+    if (vanished > 0) upright(ctx, x, foot - 3 * lane, foot - 2 * lane, vanish);
   }
   ctx.restore();
 }
@@ -220,6 +232,23 @@ function tellEnergy({ reports }: History): string {
   if (!last) return '';
   const relation = last.residual < last.tolerance ? 'below' : 'above';
   return `After ${count(last.iteration)} iterations the energy is ${figure(last.residual)}, ${relation} the tolerance of ${figure(last.tolerance)}.`;
+}
+
+/** Where each level began, and all changes of topology. */
+function tellEvents({ phases, changes, reports }: History): string {
+  if (reports.length === 0) return '';
+  const levels = phases.map(({ phase, iteration }) => `${phase} from iteration ${count(iteration)}`).join(', ');
+  return `${levels[0]?.toUpperCase()}${levels.slice(1)}. ${totals(changes)}`;
+}
+
+/** How many vertices the surface had when it left each level. */
+function tellByLevel({ phases, reports }: History): string {
+  const left = phases.slice(1).map(({ iteration }, i) => {
+    const last = reports.filter((report) => report.iteration < iteration).at(-1);
+    return last && `${count(last.vertices)} at the end of ${phases[i]?.phase}`;
+  });
+  const known = left.filter(Boolean);
+  return known.length > 0 ? `${known.join(', ')}.` : '';
 }
 
 function tellChange({ reports }: History, name: string, of: (report: StepReport) => number): string {

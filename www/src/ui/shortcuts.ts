@@ -2,6 +2,8 @@ import { h } from './dom';
 
 export interface Shortcut {
   key: string;
+  /** With Ctrl, or ⌘. */
+  ctrl?: boolean;
   shown: string;
   text: string;
   act: () => void;
@@ -16,15 +18,43 @@ const VIEW_KEYS: [string, string][] = [
 
 /** Acts on keys anywhere on the page, except where the key already means something. */
 export function listenForShortcuts(shortcuts: Shortcut[]): () => void {
+  const typing = new Typing();
   const onKey = (event: KeyboardEvent) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
-    const shortcut = shortcuts.find(({ key }) => key === event.key);
-    if (!shortcut || isTakenBy(event)) return;
+    if (event.altKey || event.repeat) return;
+    const withCtrl = event.ctrlKey || event.metaKey;
+    const pressed = withCtrl && event.shiftKey ? `shift+${event.key.toLowerCase()}` : event.key;
+    const shortcut = shortcuts.find(({ key, ctrl = false }) => key === pressed && ctrl === withCtrl);
+    if (!shortcut || (withCtrl ? typing.isIn(event.target) : isTakenBy(event))) return;
     event.preventDefault();
     shortcut.act();
   };
   window.addEventListener('keydown', onKey);
   return () => window.removeEventListener('keydown', onKey);
+}
+
+/** Knows the field in which something was typed and not taken yet: there Ctrl+Z undoes the typing. */
+class Typing {
+  #field: EventTarget | null = null;
+
+  constructor() {
+    window.addEventListener('input', ({ target }) => {
+      this.#field = target;
+    });
+    for (const end of ['change', 'blur'])
+      window.addEventListener(
+        end,
+        () => {
+          this.#field = null;
+        },
+        true,
+      );
+  }
+
+  isIn(target: EventTarget | null): boolean {
+    return (
+      target !== null && target === this.#field && !(target instanceof HTMLInputElement && target.type === 'range')
+    );
+  }
 }
 
 /** Whether the focused element uses the key itself: space presses buttons, letters go into fields and choose in lists. */

@@ -1,7 +1,11 @@
 import type { StartShape } from '../protocol';
-import { h, uniqueId } from './dom';
+import { h, symbol, uniqueId } from './dom';
 
 type Kind = StartShape['kind'];
+
+export function isStartKind(text: string | undefined): text is Kind {
+  return SHAPES.some(({ kind }) => kind === text);
+}
 
 const SHAPES: { kind: Kind; label: string; help: string }[] = [
   {
@@ -41,7 +45,7 @@ export class StartControls {
     `A whole number from 2 to ${MOST_BUBBLES} is needed.`,
   );
   readonly #levels = new Field(
-    'Pyramid levels',
+    ['Pyramid levels ', symbol('m')],
     integer(0, MOST_LEVELS, DEFAULT_LEVELS),
     'Coarser copies of the volume to pass through first; 0 works on the volume itself at once.',
     `A whole number from 0 to ${MOST_LEVELS} is needed.`,
@@ -72,6 +76,11 @@ export class StartControls {
       levels: this.#levels.control.valueAsNumber,
       edge: edge.value === '' ? undefined : edge.valueAsNumber,
     };
+  }
+
+  /** What the model was started from; while another start is being tried, {@link value} is ahead of it. */
+  get inForce(): StartChoice {
+    return this.#inForce;
   }
 
   /** Shows what is now in force, and takes complaints back; no change is reported. */
@@ -115,7 +124,7 @@ class Field<Control extends HTMLInputElement | HTMLSelectElement = HTMLInputElem
   readonly #help: HTMLElement;
   readonly #error: HTMLElement;
 
-  constructor(label: string, control: Control, help: string, need: string) {
+  constructor(label: string | (string | Node)[], control: Control, help: string, need: string) {
     const id = uniqueId('start');
     this.control = control;
     this.need = need;
@@ -123,7 +132,12 @@ class Field<Control extends HTMLInputElement | HTMLSelectElement = HTMLInputElem
     this.#error = h('p', { class: 'field-error', id: `${id}-error`, role: 'alert' });
     control.id = id;
     control.setAttribute('aria-describedby', `${id}-help ${id}-error`);
-    const row = h('div', { class: 'row' }, h('label', { for: id }, label), h('span', { class: 'value' }, control));
+    const row = h(
+      'div',
+      { class: 'row' },
+      h('label', { for: id }, ...[label].flat()),
+      h('span', { class: 'value' }, control),
+    );
     this.element = h('div', {}, row, this.#help, this.#error);
   }
 

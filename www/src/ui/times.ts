@@ -1,47 +1,71 @@
 import { h } from './dom';
-import { milliseconds } from './format';
 import type { History } from './history';
 
-/** Where the time went, part by part, as the paper's tables show it. */
+/** The rows of the paper's tables 1 and 2: its letter, our word, and the parts of a step it is made of. */
+export const TIME_ROWS = [
+  { letter: 'T', name: 'topology', parts: ['topology'] },
+  { letter: 'N', name: 'normals', parts: ['normals'] },
+  { letter: 'F', name: 'dynamics', parts: ['forces', 'motion'] },
+] as const;
+const DETAILS = ['forces', 'motion'];
+export const TIME_NOTE =
+  'Seconds. T: finding and resolving topology; N: normals; F: dynamics, that is forces and motion.';
+
+/** Milliseconds by part. */
+export type PartTimes = ReadonlyMap<string, number>;
+
+/** Milliseconds of some parts together, or of all. */
+export function timeOf(times: PartTimes, parts?: readonly string[]): number {
+  return [...times].reduce((sum, [part, ms]) => sum + (!parts || parts.includes(part) ? ms : 0), 0);
+}
+
+export function addTimes(lists: PartTimes[]): PartTimes {
+  const sum = new Map<string, number>();
+  for (const list of lists) for (const [part, ms] of list) sum.set(part, (sum.get(part) ?? 0) + ms);
+  return sum;
+}
+
+export function seconds(ms: number): string {
+  return (ms / 1000).toFixed(ms < 9950 ? 2 : 1);
+}
+
+/** Where the time went, part by part and level by level, laid out as the paper's tables 1 and 2. */
 export class TimeTable {
   readonly element: HTMLElement;
-  readonly #body = h('tbody');
-  readonly #total = h('td');
-  readonly #rows = new Map<string, { time: HTMLElement; share: HTMLMeterElement }>();
+  readonly #table = h('table', { class: 'times' });
 
   constructor() {
-    const head = h(
-      'tr',
+    const label = 'Time per part and level';
+    this.element = h(
+      'div',
       {},
-      h('th', { scope: 'col' }, 'Part'),
-      h('th', { scope: 'col' }, 'Time'),
-      h('th', { scope: 'col' }, 'Share'),
+      h('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': label }, this.#table),
+      h('p', { class: 'help' }, TIME_NOTE),
     );
-    const foot = h('tr', {}, h('th', { scope: 'row' }, 'Together'), this.#total, h('td'));
-    this.element = h('table', { class: 'times' }, h('thead', {}, head), this.#body, h('tfoot', {}, foot));
   }
 
   update({ times }: History): void {
-    const sum = [...times.values()].reduce((a, b) => a + b, 0);
-    this.#total.textContent = milliseconds(sum);
-    if (times.size === 0) this.#clear();
-    for (const [part, time] of times) {
-      const row = this.#rows.get(part) ?? this.#addRow(part);
-      row.time.textContent = milliseconds(time);
-      row.share.value = sum > 0 ? time / sum : 0;
-      row.share.textContent = `${Math.round(100 * row.share.value)} %`;
-    }
-  }
-
-  #clear(): void {
-    this.#rows.clear();
-    this.#body.replaceChildren();
-  }
-
-  #addRow(part: string): { time: HTMLElement; share: HTMLMeterElement } {
-    const row = { time: h('td'), share: h('meter', { min: 0, max: 1, 'aria-label': `share of ${part}` }) };
-    this.#rows.set(part, row);
-    this.#body.append(h('tr', {}, h('th', { scope: 'row' }, part), row.time, h('td', {}, row.share)));
-    return row;
+    const columns = [...times, ['total', addTimes([...times.values()])] as const];
+    const row = (head: (Node | string)[], value: (parts: PartTimes) => number, className?: string) => {
+      const cells = columns.map(([, parts]) => h('td', {}, seconds(value(parts))));
+      return h('tr', { class: className }, h('th', { scope: 'row' }, ...head), ...cells);
+    };
+    const titles = columns.map(([title]) => h('th', { scope: 'col' }, title));
+    this.#table.replaceChildren(
+      h('thead', {}, h('tr', {}, h('th', { scope: 'col' }, 'Part'), ...titles)),
+      h(
+        'tbody',
+        {},
+        ...TIME_ROWS.map(({ letter, name, parts }) =>
+          row([h('i', {}, letter), ` ${name}`], (all) => timeOf(all, parts)),
+        ),
+        ...DETAILS.map((part) => row([part], (all) => timeOf(all, [part]), 'detail')),
+      ),
+      h(
+        'tfoot',
+        {},
+        row(['together'], (all) => timeOf(all)),
+      ),
+    );
   }
 }

@@ -7,12 +7,16 @@ const PLAY = 'M7 4.5v15l12-7.5z';
 const PAUSE = 'M6 5h4.5v14H6zM13.5 5H18v14h-4.5z';
 const STEP = 'M6 5v14l9-7zM16 5h2.5v14H16z';
 const STEPS = 'M3 5v14l7.5-7zM10.5 5v14L18 12zM18.5 5H21v14h-2.5z';
+const UNDO = 'M8 5 2.5 10 8 15v-3.5h6a3.5 3.5 0 0 1 0 7H8V21h6a6 6 0 0 0 0-12H8z';
+const REDO = 'm16 5 5.5 5-5.5 5v-3.5h-6a3.5 3.5 0 0 0 0 7h6V21h-6a6 6 0 0 1 0-12h6z';
 const RESET = 'M12 5V1L6 6.5 12 12V8a5 5 0 1 1-5 5H4a8 8 0 1 0 8-8z';
 
 export interface TransportEvents {
   onToggle: () => void;
   onStep: (count: number) => void;
   onReset: () => void;
+  onUndo: () => void;
+  onRedo: () => void;
 }
 
 /** Play, pause, step and reset, and how far the model has come. */
@@ -24,11 +28,13 @@ export class Transport {
   readonly #step: HTMLButtonElement;
   readonly #steps: HTMLButtonElement;
   readonly #reset: HTMLButtonElement;
+  readonly #undo: HTMLButtonElement;
+  readonly #redo: HTMLButtonElement;
   readonly #iteration = h('span', { class: 'iteration' });
   readonly #phase = h('span', { class: 'phase' });
   readonly #progress = h('progress', { max: 1, 'aria-label': 'Progress' });
 
-  constructor({ onToggle, onStep, onReset }: TransportEvents) {
+  constructor({ onToggle, onStep, onReset, onUndo, onRedo }: TransportEvents) {
     this.#play = h(
       'button',
       { type: 'button', class: 'primary play', onclick: onToggle },
@@ -38,11 +44,28 @@ export class Transport {
     this.#step = labelled(STEP, 'Step', () => onStep(1));
     this.#steps = labelled(STEPS, 'Step ×10', () => onStep(10));
     this.#reset = labelled(RESET, 'Reset', onReset);
-    const buttons = h('div', { class: 'buttons' }, this.#play, this.#step, this.#steps, this.#reset);
+    this.#undo = h('button', { type: 'button', 'data-transport': 'undo', onclick: onUndo }, icon(UNDO), word('Undo'));
+    this.#redo = h('button', { type: 'button', 'data-transport': 'redo', onclick: onRedo }, icon(REDO), word('Redo'));
+    const all = [this.#play, this.#step, this.#steps, this.#reset, this.#undo, this.#redo];
+    const buttons = h('div', { class: 'buttons' }, ...all);
     const where = h('div', { class: 'where' }, this.#iteration, this.#phase);
     this.element = h('div', { class: 'transport', role: 'group', 'aria-label': 'Run' }, buttons, where, this.#progress);
     this.showReport(undefined);
     this.showState('loading', false);
+    this.showUndo(undefined, undefined);
+  }
+
+  /** What can be undone and done again, in words. */
+  showUndo(undoable: string | undefined, redoable: string | undefined): void {
+    for (const [button, verb, what] of [
+      [this.#undo, 'Undo', undoable],
+      [this.#redo, 'Redo', redoable],
+    ] as const) {
+      button.disabled = what === undefined;
+      const title = what === undefined ? `${verb}: nothing` : `${verb}: ${what}`;
+      button.title = title;
+      button.setAttribute('aria-label', title);
+    }
   }
 
   /** `ready`: there is a model to run. */
@@ -71,6 +94,11 @@ export class Transport {
     else if (!this.#progress.hasAttribute('value')) this.#progress.value = 0;
     if (state === 'done') this.#progress.value = 1;
   }
+}
+
+/** Shown where there is room. */
+function word(text: string): HTMLElement {
+  return h('span', { class: 'word' }, text);
 }
 
 function labelled(path: string, text: string, onclick: () => void): HTMLButtonElement {

@@ -1,19 +1,22 @@
+import type { Shade } from '../protocol';
 import { h, uniqueId } from './dom';
 
 /** Where the slices stand in the 3D view: on the walls behind the surface, where they lie, or nowhere. */
 export type SlicePlacement = 'walls' | 'in place' | 'hidden';
 
+/** What the colour of the surface tells. */
+export type ColorMode = 'plain' | 'component' | Shade;
+
 export interface ViewOptions {
   surface: boolean;
   edges: boolean;
-  byComponent: boolean;
+  color: ColorMode;
   slices: SlicePlacement;
 }
 
 const SWITCHES = [
   { name: 'surface', label: 'Surface' },
   { name: 'edges', label: 'Wireframe' },
-  { name: 'byComponent', label: 'By component' },
 ] as const;
 const PLACEMENTS: { value: SlicePlacement; label: string }[] = [
   { value: 'walls', label: 'on the walls' },
@@ -21,23 +24,67 @@ const PLACEMENTS: { value: SlicePlacement; label: string }[] = [
   { value: 'hidden', label: 'hidden' },
 ];
 
+export const COLOR_MODES: { value: ColorMode; label: string }[] = [
+  { value: 'plain', label: 'plain' },
+  { value: 'component', label: 'component' },
+  { value: 'speed', label: 'speed' },
+  { value: 'mean curvature', label: 'mean curvature' },
+  { value: 'gaussian curvature', label: 'Gaussian curvature' },
+];
+
 /** What the 3D view shows. */
-export function viewOptions(initial: ViewOptions, onChange: (options: ViewOptions) => void): HTMLElement {
-  const value = { ...initial };
-  const change = (changed: Partial<ViewOptions>) => onChange({ ...Object.assign(value, changed) });
-  const switches = SWITCHES.map(({ name, label }) => {
-    const box = h('input', { type: 'checkbox', checked: value[name], 'data-view': name });
-    box.addEventListener('change', () => change({ [name]: box.checked }));
-    return h('label', {}, box, label);
-  });
-  const select = placementSelect(value.slices, (slices) => change({ slices }));
-  return h('div', { class: 'view-options', role: 'group', 'aria-label': 'What the view shows' }, ...switches, select);
+export class ViewOptionControls {
+  readonly element: HTMLElement;
+  readonly #color: HTMLSelectElement;
+  readonly #value: ViewOptions;
+  readonly #onChange: (options: ViewOptions) => void;
+
+  constructor(initial: ViewOptions, onChange: (options: ViewOptions) => void) {
+    this.#value = { ...initial };
+    this.#onChange = onChange;
+    const switches = SWITCHES.map(({ name, label }) => {
+      const box = h('input', { type: 'checkbox', checked: initial[name], 'data-view': name });
+      box.addEventListener('change', () => this.#change({ [name]: box.checked }));
+      return h('label', {}, box, label);
+    });
+    const color = choice('Colour', 'color', COLOR_MODES, initial.color, (color) => this.#change({ color }));
+    const slices = choice('Slices', 'slices', PLACEMENTS, initial.slices, (slices) => this.#change({ slices }));
+    this.#color = color.select;
+    this.element = h(
+      'div',
+      { class: 'view-options', role: 'group', 'aria-label': 'What the view shows' },
+      ...switches,
+      color.element,
+      slices.element,
+    );
+  }
+
+  get value(): ViewOptions {
+    return this.#value;
+  }
+
+  /** A name that is none counts as plain. */
+  set color(color: ColorMode) {
+    const known = COLOR_MODES.some(({ value }) => value === color) ? color : 'plain';
+    this.#color.value = known;
+    this.#change({ color: known });
+  }
+
+  #change(changed: Partial<ViewOptions>): void {
+    this.#onChange({ ...Object.assign(this.#value, changed) });
+  }
 }
 
-function placementSelect(initial: SlicePlacement, onChange: (placement: SlicePlacement) => void): HTMLElement {
-  const id = uniqueId('slices');
-  const options = PLACEMENTS.map(({ value, label }) => h('option', { value, selected: value === initial }, label));
-  const select = h('select', { id, 'data-view': 'slices' }, ...options);
-  select.addEventListener('change', () => onChange(select.value as SlicePlacement));
-  return h('span', { class: 'placement' }, h('label', { for: id }, 'Slices'), select);
+function choice<Value extends string>(
+  label: string,
+  name: string,
+  choices: { value: Value; label: string }[],
+  initial: Value,
+  onChange: (value: Value) => void,
+): { element: HTMLElement; select: HTMLSelectElement } {
+  const id = uniqueId(name);
+  const options = choices.map(({ value, label }) => h('option', { value, selected: value === initial }, label));
+  const select = h('select', { id, 'data-view': name }, ...options);
+  select.addEventListener('change', () => onChange(select.value as Value));
+  return { element: h('span', { class: 'placement' }, h('label', { for: id }, label), select), select };
 }

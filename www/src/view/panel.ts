@@ -1,7 +1,7 @@
-import type { Vec3, VolumeView } from '../protocol';
+import type { Attractor, LevelView, Vec3, VolumeView } from '../protocol';
 import { h, token, uniqueId } from '../ui/dom';
 import type { SliceFrame } from './anatomy';
-import { paintSlice, pictureSize, projectSegments } from './slicing';
+import { discOf, paintLevel, paintSlice, pictureSize, projectSegments } from './slicing';
 
 /** Colours of the three slice directions, by voxel axis, as style tokens. */
 export const AXIS_TOKENS = ['--axis-x', '--axis-y', '--axis-z'] as const;
@@ -9,8 +9,8 @@ export const AXIS_TOKENS = ['--axis-x', '--axis-y', '--axis-z'] as const;
 export interface PanelEvents {
   /** The slider moved to another slice. */
   onIndex: (index: number) => void;
-  /** The picture was clicked or dragged on: a voxel index, not rounded. */
-  onPoint: (index: Vec3) => void;
+  /** The picture was clicked or dragged on, at a voxel index. `pressed`: this is where it began. */
+  onPoint: (index: Vec3, pressed: boolean) => void;
 }
 
 /** One slice as a picture with the surface's outline over it, its crosshair, and a slider. */
@@ -27,6 +27,9 @@ export class SlicePanel {
   readonly #pixels: ImageData;
   readonly #observer = new ResizeObserver(() => this.draw());
   #outline: Float32Array = new Float32Array(0);
+  #attractors: Attractor[] = [];
+  /** The coarser copy that is shown instead of the volume. */
+  #level: LevelView | undefined;
   #crosshair: Vec3 = [0, 0, 0];
   #color = '#f80';
 
@@ -65,6 +68,18 @@ export class SlicePanel {
     this.draw();
   }
 
+  /** Shows a coarser copy of the volume, voxel by voxel, or the volume itself. */
+  setLevel(level: LevelView | undefined): void {
+    this.#level = level;
+    this.#paint(this.#crosshair[this.frame.axis]);
+    this.draw();
+  }
+
+  setAttractors(attractors: Attractor[]): void {
+    this.#attractors = attractors;
+    this.draw();
+  }
+
   /** Brings everything together on the visible canvas, in its own resolution. */
   draw(): void {
     const { clientWidth, clientHeight } = this.#canvas;
@@ -83,6 +98,7 @@ export class SlicePanel {
     context.restore();
     this.#drawCrosshair(context, scaleX, scaleY);
     this.#drawOutline(context, scaleX, scaleY);
+    this.#drawAttractors(context, scaleX, scaleY);
   }
 
   dispose(): void {
@@ -106,8 +122,12 @@ export class SlicePanel {
   }
 
   #paint(index: number): void {
-    paintSlice(this.#volume, this.frame, index, this.#pixels.data);
-    this.picture.getContext('2d')?.putImageData(this.#pixels, 0, 0);
+    if (this.#level) {
+      paintLevel(this.#volume, this.#level, this.frame, index, this.picture);
+    } else {
+      paintSlice(this.#volume, this.frame, index, this.#pixels.data);
+      this.picture.getContext('2d')?.putImageData(this.#pixels, 0, 0);
+    }
     this.#slider.valueAsNumber = index;
     this.#output.value = String(index);
     this.#color = token('--outline');
@@ -153,8 +173,27 @@ export class SlicePanel {
     context.stroke();
   }
 
-  #followPointer(onPoint: (index: Vec3) => void): void {
-    const report = (event: PointerEvent) => onPoint(this.#indexAt(event.offsetX, event.offsetY));
+  /** Where the reach of each attractor meets this slice; a dot where the point itself is near. */
+  #drawAttractors(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
+    context.lineWidth = 1.5;
+    context.strokeStyle = token('--attractor');
+    context.fillStyle = token('--attractor');
+    for (const attractor of this.#attractors) {
+      const disc = discOf(attractor, this.#crosshair[this.frame.axis], this.#inverse, this.#volume, this.frame);
+      if (!disc) continue;
+      const at = [disc.x * scaleX, disc.y * scaleY] as const;
+      context.beginPath();
+      context.ellipse(...at, disc.radiusX * scaleX, disc.radiusY * scaleY, 0, 0, 2 * Math.PI);
+      context.stroke();
+      context.beginPath();
+      context.arc(...at, disc.near ? 3.5 : 1.5, 0, 2 * Math.PI);
+      context.fill();
+    }
+  }
+
+  #followPointer(onPoint: PanelEvents['onPoint']): void {
+    const report = (event: PointerEvent) =>
+      onPoint(this.#indexAt(event.offsetX, event.offsetY), event.type === 'pointerdown');
     this.#canvas.addEventListener('pointerdown', (event) => {
       this.#canvas.setPointerCapture(event.pointerId);
       report(event);

@@ -1,13 +1,15 @@
-import type { VolumeView } from '../protocol';
+import type { Attractor, LevelView, VolumeView } from '../protocol';
 import type { SliceFrame } from './anatomy';
 
+type Voxels = Pick<VolumeView, 'dims' | 'voxels'>;
+
 /** How many voxels wide and high the pictures of a slice direction are. */
-export function pictureSize(volume: VolumeView, frame: SliceFrame): { width: number; height: number } {
+export function pictureSize(volume: Voxels, frame: SliceFrame): { width: number; height: number } {
   return { width: volume.dims[frame.horizontal.axis], height: volume.dims[frame.vertical.axis] };
 }
 
 /** One slice as grey RGBA pixels in reading order, turned the way its frame says. `out` holds 4 × width × height bytes. */
-export function paintSlice(volume: VolumeView, frame: SliceFrame, index: number, out: Uint8ClampedArray): void {
+export function paintSlice(volume: Voxels, frame: SliceFrame, index: number, out: Uint8ClampedArray): void {
   const { width, height } = pictureSize(volume, frame);
   const strides = [1, volume.dims[0], volume.dims[0] * volume.dims[1]] as const;
   const across = strides[frame.horizontal.axis] * (frame.horizontal.flip ? -1 : 1);
@@ -27,6 +29,62 @@ export function paintSlice(volume: VolumeView, frame: SliceFrame, index: number,
   }
 }
 
+/** The slice of a coarser copy that lies where the volume's slice with that index lies. */
+export function levelIndex(volume: Voxels, level: LevelView, frame: SliceFrame, index: number): number {
+  const last = level.dims[frame.axis] - 1;
+  return Math.min(last, Math.floor(((index + 0.5) * level.dims[frame.axis]) / volume.dims[frame.axis]));
+}
+
+/** One slice of a coarser copy, stretched over a picture of the volume's own size so that its voxels are seen. */
+export function paintLevel(
+  volume: Voxels,
+  level: LevelView,
+  frame: SliceFrame,
+  index: number,
+  picture: HTMLCanvasElement,
+): void {
+  const small = slicePicture(level, frame, levelIndex(volume, level, frame, index));
+  const context = picture.getContext('2d');
+  if (!context) return;
+  context.imageSmoothingEnabled = false;
+  context.drawImage(small, 0, 0, picture.width, picture.height);
+}
+
+/** One slice as a picture of its own. */
+export function slicePicture(volume: Voxels, frame: SliceFrame, index: number): HTMLCanvasElement {
+  const { width, height } = pictureSize(volume, frame);
+  const canvas = document.createElement('canvas');
+  canvas.width = width;
+  canvas.height = height;
+  const pixels = new ImageData(width, height);
+  paintSlice(volume, frame, index, pixels.data);
+  canvas.getContext('2d')?.putImageData(pixels, 0, 0);
+  return canvas;
+}
+
+/**
+ * Where the ball of an attractor's reach meets a slice, in the coordinates of {@link projectSegments}; nothing where it
+ * does not. `near`: the point itself lies within half a voxel of the slice.
+ */
+export function discOf(
+  { point, radius }: Attractor,
+  slice: number,
+  inverse: ArrayLike<number>,
+  volume: Pick<VolumeView, 'dims' | 'spacing'>,
+  frame: SliceFrame,
+): { x: number; y: number; radiusX: number; radiusY: number; near: boolean } | undefined {
+  const [x = 0, y = 0] = projectSegments(new Float32Array(point), inverse, volume, frame);
+  const { axis } = frame;
+  const row = [0, 4, 8].reduce((sum, column, i) => sum + (inverse[column + axis] ?? 0) * (point[i] ?? 0), 0);
+  const off = Math.abs(row + (inverse[12 + axis] ?? 0) - slice);
+  const left = radius ** 2 - (off * volume.spacing[axis]) ** 2;
+  if (left <= 0) return undefined;
+  const [radiusX, radiusY] = [frame.horizontal, frame.vertical].map(
+    (side) => Math.sqrt(left) / volume.spacing[side.axis],
+  );
+  return { x, y, radiusX: radiusX ?? 0, radiusY: radiusY ?? 0, near: off <= 0.5 };
+}
+
 /**
  * World segments (pairs of points) as picture coordinates in voxels, x y x y per segment; (0, 0) is the picture's top
  * left corner, so that the first voxel's centre is at (½, ½).
@@ -34,7 +92,7 @@ export function paintSlice(volume: VolumeView, frame: SliceFrame, index: number,
 export function projectSegments(
   segments: Float32Array,
   inverse: ArrayLike<number>,
-  volume: VolumeView,
+  volume: Pick<VolumeView, 'dims'>,
   frame: SliceFrame,
 ): Float32Array {
   const out = new Float32Array((segments.length / 3) * 2);

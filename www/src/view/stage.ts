@@ -1,11 +1,15 @@
-import type { Vector3 } from 'three';
-import type { Plane, Surface, Vec3, VolumeView } from '../protocol';
+import type { Raycaster, Vector3 } from 'three';
+import type { Attractor, LevelView, Plane, Surface, Vec3, VolumeView } from '../protocol';
 import { onSchemeChange, token } from '../ui/dom';
+import { Legend } from '../ui/legend';
 import type { ViewOptions } from '../ui/view-options';
 import { invert, sliceFrames, slicePlane, toWorld } from './anatomy';
 import { VolumeFrame } from './frame';
+import { AttractorMarks } from './markers';
 import { AXIS_TOKENS, SlicePanel } from './panel';
 import { SlicePlane } from './planes';
+import { diverging, SHADES, shadeTitle } from './shading';
+import { levelIndex, slicePicture } from './slicing';
 import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
 
@@ -23,9 +27,19 @@ export class Stage {
   readonly #viewport: Viewport;
   readonly #slices: HTMLElement;
   readonly #surface = new SurfaceObject();
+  readonly #marks = new AttractorMarks();
+  /** What the colours of the surface mean. */
+  readonly legend = new Legend(diverging);
+  /** Takes the place that is clicked, in a slice or on the surface, instead of the crosshair going there. */
+  onPlace: ((point: Vec3) => void) | undefined;
+  /** Of lengths in the volume's world. */
+  unit = '';
+  /** Called whenever the slices have moved. */
+  onMoved: () => void = () => undefined;
   readonly #onPlanes: (planes: Plane[]) => void;
   #options: ViewOptions;
   #scene: Scene | undefined;
+  #attractors: Attractor[] = [];
   /** Voxel index where the three slices meet. */
   #crosshair: Vec3 = [0, 0, 0];
 
@@ -41,6 +55,8 @@ export class Stage {
     this.#onPlanes = onPlanes;
     this.#options = options;
     this.#viewport.add(this.#surface.object);
+    this.#viewport.add(this.#marks.object);
+    this.#viewport.onClick = (ray) => this.#placeOnSurface(ray);
     this.#viewport.onDraw = (viewer) => this.#placeSlices(viewer);
     this.#recolor();
     onSchemeChange(() => this.#recolor());
@@ -53,7 +69,7 @@ export class Stage {
       (frame) =>
         new SlicePanel(volume, frame, inverse, {
           onIndex: (index) => this.#moveSlice(frame.axis, index),
-          onPoint: (index) => this.#moveTo(index),
+          onPoint: (index, pressed) => this.#point(index, pressed),
         }),
     );
     const planes = panels.map(
@@ -68,6 +84,7 @@ export class Stage {
       ...[...panels].sort((a, b) => a.frame.name.localeCompare(b.frame.name)).map((panel) => panel.element),
     );
     this.setOptions(this.#options);
+    this.showAttractors(this.#attractors);
     this.#viewport.frame(volume);
     this.#moveTo(volume.dims.map((n) => (n - 1) >> 1) as Vec3);
   }
@@ -75,6 +92,7 @@ export class Stage {
   /** Copies the surface; its arrays may be given away at once. */
   showSurface(surface: Surface): void {
     this.#surface.show(surface);
+    this.#showLegend();
     this.#viewport.invalidate();
   }
 
@@ -91,8 +109,43 @@ export class Stage {
     this.#options = options;
     this.#surface.edges = options.edges;
     this.#surface.solid = options.surface;
-    this.#surface.byComponent = options.byComponent;
+    this.#surface.color = options.color;
+    this.#showLegend();
     this.#viewport.invalidate();
+  }
+
+  showAttractors(attractors: Attractor[]): void {
+    this.#attractors = attractors;
+    this.#marks.show(attractors);
+    for (const panel of this.#scene?.panels ?? []) panel.setAttractors(attractors);
+    this.#viewport.invalidate();
+  }
+
+  /** Shows a coarser copy of the volume in the slices, or the volume itself. */
+  showLevel(level: LevelView | undefined): void {
+    for (const panel of this.#scene?.panels ?? []) panel.setLevel(level);
+    for (const [axis, plane] of this.#scene?.planes.entries() ?? []) plane.moveTo(this.#crosshair[axis] ?? 0);
+    this.#viewport.invalidate();
+  }
+
+  /** The axial slice through the crosshair as a picture, of the volume or of a coarser copy. */
+  thumbnail(level: LevelView | undefined): HTMLCanvasElement | undefined {
+    const scene = this.#scene;
+    const frame = scene?.panels.find((panel) => panel.frame.name === 'Axial')?.frame;
+    if (!scene || !frame) return undefined;
+    const index = this.#crosshair[frame.axis];
+    if (!level) return slicePicture(scene.volume, frame, index);
+    return slicePicture(level, frame, levelIndex(scene.volume, level, frame, index));
+  }
+
+  /** Moves the three slices to where they meet in a world point, as far as the volume goes. */
+  goTo(point: Vec3): void {
+    const scene = this.#scene;
+    if (!scene) return;
+    const index = toWorld(scene.inverse, point);
+    this.#moveTo(
+      index.map((x, axis) => Math.min((scene.volume.dims[axis] ?? 1) - 1, Math.max(0, Math.round(x)))) as Vec3,
+    );
   }
 
   /** The world point where the three slices meet. */
@@ -112,9 +165,33 @@ export class Stage {
     this.#crosshair = index;
     for (const panel of scene.panels) panel.setCrosshair(index);
     for (const [axis, plane] of scene.planes.entries()) plane.moveTo(index[axis] ?? 0);
+    this.onMoved();
     const { volume, inverse } = scene;
     this.#onPlanes(([0, 1, 2] as const).map((axis) => slicePlane(volume.affine, inverse, axis, index[axis])));
     this.#viewport.invalidate();
+  }
+
+  /** The crosshair follows the pointer; while something is being placed, only where it was pressed counts. */
+  #point(index: Vec3, pressed: boolean): void {
+    if (this.onPlace && !pressed) return;
+    this.#moveTo(index);
+    this.onPlace?.(this.crosshair);
+  }
+
+  #placeOnSurface(ray: Raycaster): void {
+    if (!this.onPlace) return;
+    const [hit] = ray.intersectObject(this.#surface.target, false);
+    if (!hit) return;
+    const point = hit.point.toArray();
+    this.goTo(point);
+    this.onPlace?.(point);
+  }
+
+  #showLegend(): void {
+    const { color } = this.#options;
+    const { range } = this.#surface;
+    if (color === 'plain' || color === 'component' || range === 0) this.legend.hide();
+    else this.legend.show({ ...SHADES[color], title: shadeTitle(color, this.unit) }, range);
   }
 
   #placeSlices(viewer: Vector3): void {
@@ -127,6 +204,7 @@ export class Stage {
 
   #recolor(): void {
     this.#surface.edgeColor = token('--wire');
+    this.#marks.color = token('--attractor');
     for (const panel of this.#scene?.panels ?? []) panel.draw();
     this.#viewport.invalidate();
   }

@@ -11,7 +11,9 @@ import {
   Vector3,
 } from 'three';
 import type { Surface } from '../protocol';
+import type { ColorMode } from '../ui/view-options';
 import { componentColors } from './components';
+import { robustRange, SHADES, shadeColors } from './shading';
 
 /** Room beyond what is needed now, so that a growing surface gets new GPU buffers only now and then. */
 const SPARE = 1.5;
@@ -29,12 +31,17 @@ export class SurfaceObject {
     polygonOffsetUnits: 1,
   });
   readonly #edgeMaterial = new LineBasicMaterial({ transparent: true, opacity: 0.4 });
-  readonly #mesh = new Mesh(new BufferGeometry(), this.#material);
+  /** With normals from the start: a shader that is made for a surface without them draws flat triangles for ever. */
+  readonly #mesh = new Mesh(allocate(1, 1), this.#material);
   readonly #edges = new LineSegments(new BufferGeometry(), this.#edgeMaterial);
   /** How much of the buffers is in use: vertices, and corners of triangles. */
   #vertices = 0;
   #corners = 0;
-  #byComponent = false;
+  #color: ColorMode = 'plain';
+  /** The numbers at the vertices, where the surface came with some. */
+  #values: Float32Array = new Float32Array(0);
+  /** The number at the ends of the colours; 0 where no numbers are shown. */
+  #range = 0;
 
   constructor() {
     // The bounding sphere is kept by hand; the surface nearly always fills the view.
@@ -54,7 +61,18 @@ export class SurfaceObject {
     fill(geometry, 'normal', surface.normals, 3 * this.#vertices);
     fillIndex(geometry, surface.indices, this.#corners);
     if (this.#edges.visible) this.#fillEdges();
-    if (this.#byComponent) this.#fillColors();
+    this.#values = surface.values ?? new Float32Array(0);
+    this.#fillColors();
+  }
+
+  /** The number that the strongest colours stand for; 0 where colours stand for no number. */
+  get range(): number {
+    return this.#range;
+  }
+
+  /** What a ray can hit. */
+  get target(): Mesh {
+    return this.#mesh;
   }
 
   set edges(visible: boolean) {
@@ -70,12 +88,11 @@ export class SurfaceObject {
     this.#mesh.visible = visible;
   }
 
-  set byComponent(on: boolean) {
-    this.#byComponent = on;
-    this.#material.vertexColors = on;
-    this.#material.color.set(on ? '#ffffff' : BONE);
-    this.#material.needsUpdate = true;
-    if (on) this.#fillColors();
+  set color(mode: ColorMode) {
+    if (mode === this.#color) return;
+    this.#color = mode;
+    this.#values = new Float32Array(0);
+    this.#fillColors();
   }
 
   dispose(): void {
@@ -107,12 +124,23 @@ export class SurfaceObject {
     geometry.setDrawRange(0, count);
   }
 
+  /** A shade whose numbers have not come yet is plain. */
   #fillColors(): void {
+    const mode = this.#color;
+    const shaded = mode !== 'plain' && mode !== 'component' && this.#values.length === this.#vertices;
+    const on = shaded || mode === 'component';
+    if (this.#material.vertexColors !== on) {
+      this.#material.vertexColors = on;
+      this.#material.color.set(on ? '#ffffff' : BONE);
+      this.#material.needsUpdate = true;
+    }
+    this.#range = shaded ? robustRange(this.#values, SHADES[mode].least) : 0;
     const { geometry } = this.#mesh;
-    if (!geometry.index) return;
+    if (!on || !geometry.index) return;
     const colors = geometry.getAttribute('color') as BufferAttribute;
-    const corners = geometry.index.array as Uint32Array;
-    componentColors(corners, this.#corners, this.#vertices, colors.array as Float32Array);
+    const out = colors.array as Float32Array;
+    if (shaded) shadeColors(this.#values, this.#range, out);
+    else componentColors(geometry.index.array as Uint32Array, this.#corners, this.#vertices, out);
     upload(colors, 3 * this.#vertices);
   }
 }
@@ -124,6 +152,7 @@ function allocate(vertices: number, triangles: number): BufferGeometry {
   }
   geometry.setIndex(new BufferAttribute(new Uint32Array(3 * triangles), 1));
   geometry.boundingSphere = new Sphere(new Vector3(), Number.POSITIVE_INFINITY);
+  geometry.setDrawRange(0, 0);
   return geometry;
 }
 

@@ -5,8 +5,10 @@ import {
   Matrix4,
   type Object3D,
   PerspectiveCamera,
+  Raycaster,
   Scene,
   Spherical,
+  Vector2,
   Vector3,
   WebGLRenderer,
 } from 'three';
@@ -17,6 +19,8 @@ const FIELD_OF_VIEW = 30;
 /** Radians the arrow keys turn the view, and the factor + and - zoom it by. */
 const KEY_TURN = 0.12;
 const KEY_ZOOM = 1.12;
+/** Pixels a pointer may travel between down and up and still be a click, and not a turn of the view. */
+const CLICK_SLACK = 4;
 
 /** The 3D view: a canvas, a camera that orbits by mouse, touch and keyboard, and light that comes with the camera. */
 export class Viewport {
@@ -29,6 +33,8 @@ export class Viewport {
   readonly #spherical = new Spherical();
   /** Called before each drawing, with the camera's place. */
   onDraw: (viewer: Vector3) => void = () => undefined;
+  /** Called with the ray through the place that was clicked. */
+  onClick: (ray: Raycaster) => void = () => undefined;
   #pending = 0;
   #home = { position: new Vector3(), target: new Vector3() };
   /** Width by height of the view, at most 1: in a narrow view the camera stands farther off. */
@@ -41,6 +47,7 @@ export class Viewport {
     this.#controls = new OrbitControls(this.#camera, canvas);
     this.#controls.addEventListener('change', () => this.invalidate());
     canvas.addEventListener('keydown', (event) => this.#onKey(event));
+    this.#followClicks();
     this.#light();
     this.#observer.observe(canvas);
   }
@@ -99,6 +106,20 @@ export class Viewport {
     fill.position.set(1, -0.2, 0.4);
     this.#camera.add(key, fill, key.target, fill.target);
     this.#scene.add(sky, this.#camera);
+  }
+
+  #followClicks(): void {
+    let down = { x: 0, y: 0 };
+    this.canvas.addEventListener('pointerdown', ({ offsetX: x, offsetY: y }) => {
+      down = { x, y };
+    });
+    this.canvas.addEventListener('pointerup', ({ offsetX: x, offsetY: y, button }) => {
+      if (button !== 0 || Math.hypot(x - down.x, y - down.y) > CLICK_SLACK) return;
+      const { clientWidth, clientHeight } = this.canvas;
+      const ray = new Raycaster();
+      ray.setFromCamera(new Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.#camera);
+      this.onClick(ray);
+    });
   }
 
   #resize(): void {

@@ -1,24 +1,17 @@
-/** Volumes that are computed instead of loaded: shapes whose topology is known. Intensities 0..255, x fastest, cubes as voxels. */
-export type Shape = 'linked rings' | 'sponge';
-
-export interface ShapeVoxels {
-  data: Uint8Array;
-  dims: [number, number, number];
-}
+/** Shapes whose topology is known. */
+import { type ShapeVoxels, sample } from './sampling';
 
 const RINGS_SIZE = 64;
 /** Of the linked rings, in voxels: from the middle of a ring to the middle of its tube, and the tube's radius. */
 const RING_RADIUS = 15;
 const TUBE_RADIUS = 5.5;
+/** Of the chain, in the same way. */
+const CHAIN = { size: [61, 45, 45] as [number, number, number], ring: 16, tube: 4.5 };
 /** Empty voxels around the sponge. */
 const SPONGE_MARGIN = 4;
 
-export function shapeVoxels(shape: Shape): ShapeVoxels {
-  return shape === 'sponge' ? spongeVoxels(2) : linkedRings();
-}
-
 /** Two rings that go through each other: two components of genus 1. */
-function linkedRings(): ShapeVoxels {
+export function linkedRings(): ShapeVoxels {
   const middle = (RINGS_SIZE - 1) / 2;
   const shift = RING_RADIUS / 2;
   return sample(RINGS_SIZE, (i, j, k) => {
@@ -30,8 +23,23 @@ function linkedRings(): ShapeVoxels {
   });
 }
 
+/**
+ * Two linked rings as a potential that falls evenly with the distance from their middle lines: all of it up to half of
+ * the tube's radius, half of it at the radius, none from one radius and a half.
+ */
+export function chain(): ShapeVoxels {
+  const { size, ring, tube } = CHAIN;
+  const middle = size.map((n) => (n - 1) / 2) as [number, number, number];
+  return sample(size, (i, j, k) => {
+    const [x, y, z] = [i - middle[0], j - middle[1], k - middle[2]];
+    const flat = Math.hypot(Math.hypot(x + ring / 2, y) - ring, z);
+    const upright = Math.hypot(Math.hypot(x - ring / 2, z) - ring, y);
+    return 255 * (1.5 - Math.min(flat, upright) / tube);
+  });
+}
+
 /** A Menger sponge of the given depth on 81³ voxels: a cube pierced by square tunnels on every scale. */
-function spongeVoxels(depth: number): ShapeVoxels {
+export function spongeVoxels(depth: number): ShapeVoxels {
   const side = 81;
   return sample(side + 2 * SPONGE_MARGIN, (i, j, k) => {
     const at = [i - SPONGE_MARGIN, j - SPONGE_MARGIN, k - SPONGE_MARGIN];
@@ -48,15 +56,4 @@ function isPierced(at: number[], side: number, depth: number): boolean {
     if (inMiddle.length >= 2) return true;
   }
   return false;
-}
-
-function sample(size: number, value: (i: number, j: number, k: number) => number): ShapeVoxels {
-  const data = new Uint8Array(size ** 3);
-  let voxel = 0;
-  for (let k = 0; k < size; k++) {
-    for (let j = 0; j < size; j++) {
-      for (let i = 0; i < size; i++) data[voxel++] = Math.min(255, Math.max(0, value(i, j, k)));
-    }
-  }
-  return { data, dims: [size, size, size] };
 }

@@ -1,0 +1,402 @@
+/** What a person does in the Extract lab beyond playing: looks, places, compares, goes back, passes on. */
+import { readFile } from 'node:fs/promises';
+import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
+import { type App, iteration, measures, openApp, reach } from './browser';
+
+let app: App;
+
+beforeAll(async () => {
+  app = await openApp();
+});
+afterAll(() => app.close());
+afterEach(() => {
+  expect(app.complaints.splice(0)).toEqual([]);
+});
+
+/** Opens the page anew at an address of the lab and waits for the surface to come to rest. */
+async function openAt(hash: string): Promise<void> {
+  await app.page.goto('about:blank');
+  await app.page.goto(app.address + hash);
+  await reach(app.page, 'done');
+}
+
+const text = (selector: string) => app.page.locator(selector).textContent();
+/** Of a canvas as it is shown. */
+const picture = (selector: string) => app.page.locator(selector).first().screenshot();
+
+describe('a figure of the paper', () => {
+  test('opens from the list, runs to rest and says what the paper saw and what comes out', async () => {
+    await reach(app.page, 'running', 'done');
+    await app.page.selectOption('.data select', 'figure-15-16');
+    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('head phantom'));
+    await reach(app.page, 'done');
+    expect(await measures(app.page)).toMatchObject({ components: 1, genus: 5, closed: true });
+    expect(await text('.figure')).toMatch(/Paper: On the CT of a head.*Here both end/);
+    expect(await app.page.evaluate(() => location.hash)).toBe('#extract?example=figure-15-16');
+  });
+
+  test('shows the levels of the pyramid, and marks where the model is', async () => {
+    const levels = await app.page.locator('.pyramid button').evaluateAll((buttons) =>
+      buttons.map((button) => ({
+        label: button.getAttribute('aria-label'),
+        width: button.querySelector('canvas')?.width ?? 0,
+        inUse: button.classList.contains('in-use'),
+      })),
+    );
+    expect(levels.map(({ width }) => width)).toEqual([20, 36, 64, 112]);
+    expect(levels.map(({ inUse }) => inUse)).toEqual([false, false, false, true]);
+    expect(levels[0]?.label).toBe('Level 3, 20 × 20 × 20 voxels');
+    expect(levels[3]?.label).toContain('the model is here');
+  });
+
+  test('a level that is chosen is shown in the slices, and the pictures follow the slice', async () => {
+    const slice = '.slice canvas';
+    const fine = await picture(slice);
+    await app.page.click('.pyramid [data-level="3"]');
+    expect(await app.page.getAttribute('.pyramid [data-level="3"]', 'aria-pressed')).toBe('true');
+    await expect.poll(async () => (await picture(slice)).equals(fine)).toBe(false);
+    const small = await picture('.pyramid [data-level="0"]');
+    await app.page.locator('.slice input[type=range]').first().press('Home');
+    await expect.poll(async () => (await picture('.pyramid [data-level="0"]')).equals(small)).toBe(false);
+    await app.page.locator('.slice input[type=range]').first().fill('55');
+    await app.page.check('[data-pyramid=follow]');
+    expect(await app.page.getAttribute('.pyramid [data-level="0"]', 'aria-pressed')).toBe('true');
+    await expect.poll(async () => (await picture(slice)).equals(fine)).toBe(true);
+    await app.page.uncheck('[data-pyramid=follow]');
+  });
+
+  test('tells in words where the levels began and what became of the topology', async () => {
+    await expect
+      .poll(() => text('[data-plot-events]'))
+      .toMatch(
+        /^Level 3 from iteration 1, level 2 from iteration \d+, level 1 from iteration \d+, level 0 from iteration \d+\. \d+ joins, \d+ cuts, \d+ parts vanished\.$/,
+      );
+    const [, vertices] = await app.page.locator('figcaption').allTextContents();
+    expect(vertices).toMatch(/\d at the end of level 3, [\d,]+ at the end of level 2, [\d,]+ at the end of level 1\.$/);
+  });
+
+  test('shows the time of each part on each level, as the paper does', async () => {
+    const table = app.page.getByRole('region', { name: 'Time per part and level' });
+    const head = await table.locator('thead th').allTextContents();
+    expect(head).toEqual(['Part', 'level 3', 'level 2', 'level 1', 'level 0', 'total']);
+    const rows = await table.locator('tbody tr, tfoot tr').allTextContents();
+    expect(rows.map((row) => row.replace(/[\d.]+/g, ''))).toEqual([
+      'T topology',
+      'N normals',
+      'F dynamics',
+      'forces',
+      'motion',
+      'together',
+    ]);
+    const numbers = async (row: string) =>
+      (await table.locator('tr', { hasText: row }).locator('td').allTextContents()).map(Number);
+    const [forces, motion, dynamics] = [await numbers('forces'), await numbers('motion'), await numbers('F dynamics')];
+    expect(forces.at(-1)).toBeGreaterThan(0);
+    for (const [i, sum] of dynamics.entries())
+      expect(Math.abs((forces[i] ?? 0) + (motion[i] ?? 0) - sum)).toBeLessThan(0.02);
+  });
+
+  test('compares direct with coarse to fine in a table, and the surface stays', async () => {
+    const before = await measures(app.page);
+    await app.page.click('[data-compare=start]');
+    await app.page.waitForFunction(() =>
+      document.querySelector('[data-compare=cancel]')?.textContent?.includes('iteration'),
+    );
+    await app.page.waitForFunction(
+      () => document.querySelector<HTMLElement>('[data-comparison]')?.dataset.comparison !== '{}',
+    );
+    const { direct, coarseToFine } = JSON.parse(
+      (await app.page.getAttribute('[data-comparison]', 'data-comparison')) ?? '{}',
+    );
+    expect(direct).toMatchObject({ levels: 0, done: true, components: 1, genus: 5 });
+    expect(coarseToFine).toMatchObject({ levels: 3, done: true, components: 1, genus: 5, vertices: before.vertices });
+    expect(direct.milliseconds).toBeGreaterThan(2.75 * coarseToFine.milliseconds);
+    expect(await text('.compare [role=status]')).toMatch(/times less time than direct\. Area differs by 0\.\d\d %/);
+    const table = app.page.getByRole('region', { name: 'Time of both ways' });
+    expect(await table.locator('thead th').allTextContents()).toEqual(['', 'I₃', 'I₂', 'I₁', 'I₀', 'total']);
+    const heads = await table.locator('tbody th').allTextContents();
+    expect(heads).toEqual(['coarse to fine', 'T', 'N', 'F', '=', 'steps', 'direct', 'T', 'N', 'F', '=', 'steps']);
+    expect(await measures(app.page)).toEqual(before);
+  });
+
+  test('a comparison can be cancelled', async () => {
+    await app.page.click('[data-compare=start]');
+    await app.page.click('[data-compare=cancel]');
+    await expect.poll(() => text('.compare [role=status]')).toBe('Cancelled.');
+    expect(await app.page.isVisible('[data-compare=start]')).toBe(true);
+    expect(await app.page.getAttribute('[data-comparison]', 'data-comparison')).toBe('{}');
+  });
+
+  test('with several pictures goes on from one to the next', async () => {
+    await openAt('#extract?example=figure-24');
+    const first = await iteration(app.page);
+    expect(await measures(app.page)).toMatchObject({ components: 1 });
+    await app.page.click('.figure button:has-text("0.75")');
+    await expect.poll(() => text('[data-figure=came]')).toContain('three granules');
+    await expect.poll(async () => (await measures(app.page)).components).toBe(3);
+    await reach(app.page, 'done');
+    expect(await iteration(app.page)).toBeGreaterThan(first);
+    expect(await app.page.getAttribute('.figure button:has-text("0.75")', 'aria-pressed')).toBe('true');
+  });
+});
+
+describe('attractors', () => {
+  const items = () => app.page.locator('.attractors li');
+  const pause = async () => {
+    await app.page.locator('.view > canvas').focus();
+    if ((await reach(app.page, 'running', 'paused', 'done')) === 'running') await app.page.keyboard.press(' ');
+    await reach(app.page, 'paused', 'done');
+  };
+
+  test('are placed at the crosshair by key, and pull the surface', async () => {
+    await openAt('#extract?example=figure-7');
+    // A place beside a ring: right end of the volume, half way up.
+    for (const slider of await app.page.locator('.slice input[type=range]').all()) await slider.fill('22');
+    await app.page.getByLabel('Sagittal', { exact: true }).fill('58');
+    const before = await measures(app.page);
+    await app.page.locator('.view > canvas').focus();
+    await app.page.keyboard.press('a');
+    await expect.poll(() => items().count()).toBe(1);
+    expect(await items().first().textContent()).toContain('58, 22, 22');
+    await reach(app.page, 'running', 'done');
+    await expect.poll(async () => (await measures(app.page)).volume).toBeGreaterThan(1.001 * before.volume);
+    await pause();
+  });
+
+  test('are shown in the slices and in 3D', async () => {
+    const pictures = async () => [await picture('.slice canvas'), await picture('.view > canvas')];
+    const before = await pictures();
+    await app.page.getByLabel('Radius of attractor 1').fill('11');
+    await app.page.getByLabel('Radius of attractor 1').press('Enter');
+    await pause();
+    await expect
+      .poll(async () => (await pictures()).map((one, i) => one.equals(before[i] ?? Buffer.of())))
+      .toEqual([false, false]);
+  });
+
+  test('are placed by clicking in a slice and on the surface', async () => {
+    await app.page.click('[data-attractor=place]');
+    const slice = app.page.locator('.slice canvas').first();
+    const box = await slice.boundingBox();
+    await slice.click({ position: { x: 0.5 * (box?.width ?? 0), y: 0.3 * (box?.height ?? 0) } });
+    await expect.poll(() => items().count()).toBe(2);
+    // Somewhere on a row of clicks through the middle there is surface.
+    const view = app.page.locator('.view > canvas');
+    const area = await view.boundingBox();
+    for (let part = 0.35; part < 0.7 && (await items().count()) < 3; part += 0.04) {
+      await view.click({ position: { x: part * (area?.width ?? 0), y: 0.5 * (area?.height ?? 0) } });
+    }
+    expect(await items().count()).toBe(3);
+    await app.page.click('[data-attractor=place]');
+    await slice.click();
+    expect(await items().count()).toBe(3);
+    await pause();
+  });
+
+  test('are part of the link, and are refused or removed one by one', async () => {
+    expect(await app.page.evaluate(() => location.hash.match(/attractor=/g)?.length)).toBe(3);
+    await app.page.getByLabel('Strength of attractor 2').fill('5000');
+    await app.page.getByLabel('Strength of attractor 2').press('Enter');
+    await app.page.waitForFunction(() => document.querySelector('.attractors + .field-error')?.textContent);
+    expect(await app.page.getByLabel('Strength of attractor 2').inputValue()).toBe('0.1');
+    await app.page.getByLabel('Remove attractor 2').click();
+    await expect.poll(() => items().count()).toBe(2);
+    await pause();
+  });
+
+  test('come back with undo', async () => {
+    await app.page.locator('.view > canvas').focus();
+    expect(await app.page.getAttribute('[data-transport=undo]', 'title')).toBe('Undo: removal of attractor 2');
+    await app.page.keyboard.press('Control+z');
+    await expect.poll(() => items().count()).toBe(3);
+    await reach(app.page, 'paused', 'done');
+  });
+});
+
+describe('colour', () => {
+  test('by speed has a legend with numbers, and colours the surface', async () => {
+    await openAt('#extract?example=figure-7');
+    // The focus is on the list from here on, and its ring in every picture.
+    await app.page.selectOption('[data-view=color]', 'plain');
+    const plain = await picture('.view > canvas');
+    await app.page.selectOption('[data-view=color]', 'speed');
+    const legend = app.page.getByRole('group', { name: 'Meaning of the colours' });
+    await legend.waitFor();
+    expect(await legend.textContent()).toMatch(/^Speed along the normal, δ per iteration−([\d.]+)0\1inwardsoutwards$/);
+    await expect.poll(async () => (await picture('.view > canvas')).equals(plain)).toBe(false);
+    await app.page.selectOption('[data-view=color]', 'plain');
+    await legend.waitFor({ state: 'hidden' });
+    await expect.poll(async () => (await picture('.view > canvas')).equals(plain)).toBe(true);
+  });
+
+  test('by curvature has a legend in the unit of the volume, and tells bulging from hollow', async () => {
+    await app.page.selectOption('[data-view=color]', 'mean curvature');
+    const legend = app.page.locator('.color-legend');
+    await expect.poll(() => legend.textContent()).toMatch(/^Mean curvature, 1\/unit−([\d.]+)0\1hollowbulging$/);
+    await app.page.selectOption('[data-view=color]', 'gaussian curvature');
+    await expect.poll(() => legend.textContent()).toMatch(/^Gaussian curvature, 1\/unit²−.*saddledome or cup$/);
+  });
+
+  test('shows at the start that nothing moves, and then that all moves inwards', async () => {
+    await app.page.selectOption('[data-view=color]', 'speed');
+    await app.page.click('text=Reset');
+    await reach(app.page, 'paused');
+    const legend = app.page.locator('.color-legend');
+    await expect.poll(() => legend.textContent()).toContain('−1.00e-4');
+    await app.page.click('text=Step ×10');
+    await expect.poll(() => legend.textContent()).toMatch(/−0\.[1-5]0/);
+    await app.page.selectOption('[data-view=color]', 'plain');
+  });
+});
+
+describe('undo', () => {
+  const undo = () => app.page.click('[data-transport=undo]');
+  const redo = () => app.page.click('[data-transport=redo]');
+  const rigidity = () => app.page.locator('[data-param=rigidity] input[type=number]');
+
+  test('goes back over a reset to the surface, the plots and the state that were there, and forth again', async () => {
+    await openAt('#extract?example=figure-7');
+    const before = await measures(app.page);
+    const told = await app.page.locator('figcaption').allTextContents();
+    await app.page.click('text=Reset');
+    await reach(app.page, 'paused');
+    expect(await app.page.getAttribute('[data-transport=undo]', 'title')).toBe('Undo: Reset');
+    await undo();
+    await reach(app.page, 'done');
+    expect(await measures(app.page)).toEqual(before);
+    expect(await iteration(app.page)).toBe(80);
+    await expect.poll(() => app.page.locator('figcaption').allTextContents()).toEqual(told);
+    await redo();
+    await reach(app.page, 'paused');
+    expect(await iteration(app.page)).toBe(0);
+    await undo();
+    await reach(app.page, 'done');
+  });
+
+  test('by Ctrl+Z takes a parameter back, and what it did', async () => {
+    const before = await measures(app.page);
+    await rigidity().fill('0.3');
+    await rigidity().press('Enter');
+    await expect.poll(() => iteration(app.page)).toBeGreaterThan(80);
+    await reach(app.page, 'done');
+    // The focus is in the field, but nothing is being typed.
+    await app.page.keyboard.press('Control+z');
+    await expect.poll(() => rigidity().inputValue()).toBe('0.1');
+    await reach(app.page, 'done');
+    expect(await measures(app.page)).toEqual(before);
+    await app.page.keyboard.press('Control+Shift+Z');
+    await expect.poll(() => rigidity().inputValue()).toBe('0.3');
+    await app.page.keyboard.press('Control+z');
+    await expect.poll(() => rigidity().inputValue()).toBe('0.1');
+  });
+
+  test('leaves a number alone that is being typed', async () => {
+    const title = await app.page.getAttribute('[data-transport=undo]', 'title');
+    await rigidity().click();
+    await app.page.keyboard.type('9');
+    await app.page.keyboard.press('Control+z');
+    expect(await rigidity().inputValue()).toBe('0.1');
+    expect(await app.page.getAttribute('[data-transport=undo]', 'title')).toBe(title);
+    await rigidity().blur();
+  });
+
+  test('takes back steps, then another start with other levels', async () => {
+    await reach(app.page, 'done');
+    const before = await measures(app.page);
+    await app.page.getByLabel('Pyramid levels').fill('1');
+    await app.page.getByLabel('Pyramid levels').press('Enter');
+    await expect.poll(() => app.page.locator('.pyramid button').count()).toBe(2);
+    await reach(app.page, 'done');
+    await app.page.click('text=Reset');
+    await reach(app.page, 'paused');
+    await app.page.click('text=Step ×10');
+    await expect.poll(() => iteration(app.page)).toBe(10);
+    await undo();
+    await expect.poll(() => iteration(app.page)).toBe(0);
+    // The reset and the other start, one right after the other.
+    await app.page.evaluate(() => {
+      for (let i = 0; i < 2; i++) document.querySelector<HTMLElement>('[data-transport=undo]')?.click();
+    });
+    await expect.poll(() => app.page.getByLabel('Pyramid levels').inputValue()).toBe('0');
+    await reach(app.page, 'done');
+    expect(await measures(app.page)).toEqual(before);
+    await expect.poll(() => app.page.locator('.pyramid button').count()).toBe(1);
+  });
+
+  test('has nothing to do on a volume that was just opened, except to stop it from having run', async () => {
+    await app.page.selectOption('.data select', 'figure-8');
+    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('chain'));
+    await expect.poll(() => app.page.getAttribute('[data-transport=undo]', 'title')).toBe('Undo: Play');
+    await reach(app.page, 'done');
+    await undo();
+    await reach(app.page, 'paused');
+    expect(await iteration(app.page)).toBe(0);
+    await expect.poll(() => app.page.isDisabled('[data-transport=undo]')).toBe(true);
+  });
+});
+
+describe('a link', () => {
+  test('restores example, start, parameters, attractors and colour', async () => {
+    const hash =
+      '#extract?example=linked-rings&start=bubbles&bubbles=9&levels=0&edge=2&color=speed&p.iso=130&p.rigidity=0.15&attractor=10,31,31,0.02,6';
+    await app.page.goto('about:blank');
+    await app.page.goto(app.address + hash);
+    await reach(app.page, 'running', 'done');
+    expect(await app.page.inputValue('.data select')).toBe('linked-rings');
+    expect(await app.page.inputValue('.start select')).toBe('bubbles');
+    expect(await app.page.getByLabel('Bubbles along each side').inputValue()).toBe('9');
+    expect(await app.page.getByLabel('Mean edge').inputValue()).toBe('2');
+    expect(await app.page.inputValue('[data-param=iso] input[type=number]')).toBe('130');
+    expect(await app.page.inputValue('[data-param=rigidity] input[type=number]')).toBe('0.15');
+    expect(await app.page.locator('.attractors li').count()).toBe(1);
+    expect(await app.page.inputValue('[data-view=color]')).toBe('speed');
+    const parts = (address: string) => [...new URLSearchParams(address.split('?')[1])].sort();
+    expect(parts(await app.page.evaluate(() => location.hash))).toEqual(parts(hash));
+  });
+
+  test('followed while the page is open opens what it says', async () => {
+    await app.page.evaluate(() => {
+      location.hash = '#extract?example=figure-8';
+    });
+    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('chain'));
+    await reach(app.page, 'done');
+    expect(await measures(app.page)).toMatchObject({ components: 2, genus: 2 });
+    expect(await app.page.locator('.attractors li').count()).toBe(0);
+  });
+
+  test('that cannot be followed says so, and the built-in example runs', async () => {
+    await app.page.goto('about:blank');
+    await app.page.goto(`${app.address}#extract?example=nowhere`);
+    await app.page.waitForSelector('.banner:not([hidden])');
+    expect(await text('.banner')).toContain('nowhere');
+    await reach(app.page, 'running', 'done');
+  });
+});
+
+describe('exercises', () => {
+  test('there are two, closed at first, that say what to do, to look for and to hand in', async () => {
+    await openAt('#extract?example=figure-7');
+    const exercises = app.page.locator('[data-exercise]');
+    expect(await exercises.count()).toBe(2);
+    await app.page.locator('summary', { hasText: 'Exercises' }).click();
+    await app.page.locator('[data-exercise] summary').last().click();
+    for (const words of ['Look for:', 'Hand in:', 'Compare'])
+      expect(await exercises.last().textContent()).toContain(words);
+    await exercises.last().locator('button').click();
+    await expect.poll(() => app.page.inputValue('.data select')).toBe('figure-15-16');
+    await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('head phantom'));
+    await reach(app.page, 'done');
+  });
+
+  test('the plot data can be saved as CSV', async () => {
+    const [download] = await Promise.all([
+      app.page.waitForEvent('download'),
+      app.page.getByRole('button', { name: 'Plot data (CSV)' }).click(),
+    ]);
+    expect(download.suggestedFilename()).toBe('head-phantom.csv');
+    const lines = (await readFile(await download.path(), 'utf8')).trim().split('\n');
+    expect(lines[0]).toMatch(/^iteration,phase,energy/);
+    expect(lines).toHaveLength((await iteration(app.page)) + 1);
+    expect(lines.at(-1)).toContain(`,${(await measures(app.page)).vertices},`);
+  });
+});

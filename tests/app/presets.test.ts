@@ -1,0 +1,97 @@
+/** The figures of the paper: what the page says comes of them does come of them. Run by the package from Node, which gives the same bits. */
+import { readFile } from 'node:fs/promises';
+import { beforeAll, expect, test } from 'vitest';
+import init, { DeformableModel, Mesh, Volume } from '../../pkg/index.js';
+import { at } from '../../scripts/shell.mjs';
+import type { Example } from '../../www/src/examples';
+import { type Outcome, PRESETS, type Preset, type Variant } from '../../www/src/presets';
+import { shapeVoxels } from '../../www/src/shapes';
+
+beforeAll(() => init());
+
+const CASES = PRESETS.flatMap((preset) =>
+  preset.variants.map((variant) => [variant.id, preset, variant] as [string, Preset, Variant]),
+);
+
+async function volumeOf({ source }: Example): Promise<Volume> {
+  if ('shape' in source) return new Volume(shapeVoxels(source.shape));
+  return Volume.parse(new Uint8Array(await readFile(at('www/public/data', source.file))));
+}
+
+async function outcomeOf(preset: Preset, variant: Variant, levels = preset.levels) {
+  const volume = await volumeOf(preset);
+  const params = { ...preset.params, ...variant.params };
+  const start =
+    preset.start.kind === 'bubbles'
+      ? { bubbles: preset.start.bubbles }
+      : preset.start.kind === 'isosurface'
+        ? { marchingCubes: params.iso }
+        : ('enclosing' as const);
+  const edge = preset.edge === undefined ? {} : { edge: preset.edge };
+  const model = new DeformableModel({ volume, start, levels, ...edge, params });
+  try {
+    const report = await model.run({ maxIterations: 3000 });
+    expect(report.done).toBe(true);
+    expect(model.mesh.check()).toMatchObject({ closed: true, oriented: true });
+    const { vertices, components, genus, area, volume: inside } = model.mesh.info();
+    return { iterations: report.iteration, vertices, components, genus, area, volume: inside };
+  } finally {
+    model.free();
+    volume.free();
+  }
+}
+
+/** Topology as said; counts within a tenth, as the model may become a little better or worse. */
+function expectOutcome(found: Outcome, said: Outcome) {
+  const { iterations, vertices, components, genus } = found;
+  expect({ components, genus }).toEqual({ components: said.components, genus: said.genus });
+  expect(vertices / said.vertices).toBeGreaterThan(0.9);
+  expect(vertices / said.vertices).toBeLessThan(1.1);
+  expect(iterations / said.iterations).toBeGreaterThan(0.75);
+  expect(iterations / said.iterations).toBeLessThan(1.25);
+}
+
+test.each(CASES)('figure %s ends as the page says', async (_, preset, variant) => {
+  expectOutcome(await outcomeOf(preset, variant), variant.outcome);
+});
+
+test('every figure has an id of its own, says what the paper saw and what comes out', () => {
+  expect(new Set(PRESETS.map(({ id }) => id)).size).toBe(PRESETS.length);
+  for (const [, { saw }, { came }] of CASES) {
+    for (const text of [saw, came]) expect(text).toMatch(/^[A-Z].{40,}\.$/);
+    expect(came).toMatch(/^Here/);
+  }
+});
+
+test('table 1: both ways end alike, within the bounds of the paper', async () => {
+  const [preset, variant] = figure('figure-15-16');
+  const coarseToFine = await outcomeOf(preset, variant);
+  const direct = await outcomeOf(preset, variant, 0);
+  expect([direct.components, direct.genus]).toEqual([coarseToFine.components, coarseToFine.genus]);
+  expect(Math.abs(coarseToFine.area / direct.area - 1)).toBeLessThan(0.001);
+  expect(Math.abs(coarseToFine.volume / direct.volume - 1)).toBeLessThan(0.001);
+});
+
+test('table 2: a direct run finds the loose vessels that coarse to fine loses', async () => {
+  const [preset, variant] = figure('figure-20');
+  const coarseToFine = await outcomeOf(preset, variant);
+  const direct = await outcomeOf(preset, variant, 0);
+  expect([coarseToFine.components, direct.components]).toEqual([1, 4]);
+  expect(direct.volume / coarseToFine.volume).toBeGreaterThan(1.02);
+  expect(direct.volume / coarseToFine.volume).toBeLessThan(1.03);
+});
+
+test('figure 23: so many parts and holes had marching cubes', async () => {
+  const [preset] = figure('figure-23');
+  const volume = await volumeOf(preset);
+  const mesh = Mesh.marchingCubes(volume, preset.params.iso);
+  expect(mesh.info()).toMatchObject({ components: 372, genus: 383 });
+  mesh.free();
+  volume.free();
+});
+
+function figure(id: string): [Preset, Variant] {
+  const preset = PRESETS.find((one) => one.id === id);
+  if (!preset) throw new Error(`there is no ${id}`);
+  return [preset, preset.variants[0]];
+}

@@ -1,0 +1,105 @@
+import type { Client } from '../client';
+import type { Attractor, ParamValues, SavedRun } from '../protocol';
+import type { HistoryMark } from '../ui/history';
+import type { StartChoice } from '../ui/start';
+import { UndoStack } from './undo';
+
+const LIMITS = { entries: 60, bytes: 96e6 };
+/** Milliseconds within which changes of the same thing are one, as when a slider is dragged. */
+const TOGETHER = 1500;
+
+/** What the page holds beside the model. */
+export interface PageState {
+  choice: StartChoice;
+  params: ParamValues;
+  attractors: Attractor[];
+  /** What had happened, up to whatever iteration the model was saved at. */
+  mark: (iteration: number) => HistoryMark;
+}
+
+/** A moment one can go back to. */
+export interface Moment {
+  saved: SavedRun;
+  page: PageState;
+}
+
+/** Undo and redo of everything that changes the model: the worker's saved states, kept by the page. */
+export class Rewinder {
+  readonly #client: Client;
+  readonly #page: () => PageState;
+  readonly #onChange: (undoable: string | undefined, redoable: string | undefined) => void;
+  readonly #stack = new UndoStack<Moment>(LIMITS);
+  /** Resolves when all that was to be remembered is. */
+  #ready: Promise<void> = Promise.resolve();
+  #last = { together: '', at: 0 };
+  /** Counts volumes: what is still on its way from the one before is not taken. */
+  #volume = 0;
+
+  constructor(
+    client: Client,
+    page: () => PageState,
+    onChange: (undoable: string | undefined, redoable: string | undefined) => void,
+  ) {
+    this.#client = client;
+    this.#page = page;
+    this.#onChange = onChange;
+  }
+
+  /** Another volume: no state of the one before fits it. */
+  clear(): void {
+    this.#volume += 1;
+    this.#last = { together: '', at: 0 };
+    this.#stack.clear();
+    this.#tell();
+  }
+
+  /**
+   * Keeps the state as it is before something is done. Requests are answered in order, so the state comes before
+   * whatever is asked of the worker next. Changes with the same `together` soon after each other count as one.
+   * Returns how to forget it, for when nothing was done after all.
+   */
+  remember(label: string, together = ''): () => void {
+    const now = performance.now();
+    const isOne = together !== '' && together === this.#last.together && now - this.#last.at < TOGETHER;
+    this.#last = { together, at: now };
+    if (isOne) return () => undefined;
+    const page = this.#page();
+    const volume = this.#volume;
+    const saving = this.#client.request('save', undefined);
+    const kept = this.#ready
+      .then(() => saving)
+      .then((saved) => {
+        const checkpoint = { label, bytes: saved.state.byteLength, state: { saved, page } };
+        if (volume === this.#volume) this.#stack.push(checkpoint);
+        return checkpoint;
+      })
+      // Where the engine broke there is nothing to keep; whoever asked it next tells.
+      .catch(() => undefined);
+    this.#ready = kept.then(() => this.#tell());
+    return () => {
+      this.#last.together = '';
+      this.#ready = kept.then((checkpoint) => {
+        if (checkpoint) this.#stack.drop(checkpoint);
+        this.#tell();
+      });
+    };
+  }
+
+  /** Goes back, or forth again; gives the moment the model is now in, or nothing where there is none. */
+  async travel(way: 'undo' | 'redo'): Promise<Moment | undefined> {
+    await this.#ready;
+    if ((way === 'undo' ? this.#stack.undoable : this.#stack.redoable) === undefined) return undefined;
+    this.#last.together = '';
+    await this.#client.request('pause', undefined);
+    const page = this.#page();
+    const saved = await this.#client.request('save', undefined);
+    const moment = this.#stack[way]({ bytes: saved.state.byteLength, state: { saved, page } });
+    if (moment) await this.#client.request('restore', moment.saved);
+    this.#tell();
+    return moment;
+  }
+
+  #tell(): void {
+    this.#onChange(this.#stack.undoable, this.#stack.redoable);
+  }
+}

@@ -1,0 +1,283 @@
+/** The paper's figures, on volumes that come with the page or are computed in it. */
+import { EXAMPLES, type Example } from './examples';
+import type { ParamValues } from './protocol';
+
+/** What came of a run to rest, for the tests to hold the words against. */
+export interface Outcome {
+  iterations: number;
+  vertices: number;
+  components: number;
+  genus: number;
+}
+
+/** One of several pictures of a figure: the same volume under other parameters. */
+export interface Variant {
+  id: string;
+  /** As on a button. */
+  name: string;
+  params: ParamValues;
+  /** What comes out here. */
+  came: string;
+  outcome: Outcome;
+}
+
+export interface Preset extends Example {
+  start: { kind: 'enclosing' } | { kind: 'bubbles'; bubbles: number } | { kind: 'isosurface' };
+  /** What the paper saw, in a sentence. */
+  saw: string;
+  /** The first is what the preset opens with. */
+  variants: [Variant, ...Variant[]];
+  /** Whether another variant starts over; else the surface goes on from where it is. */
+  startsOver?: boolean;
+  /** What to look at beside the surface. */
+  hint?: string;
+  /** The comparison of direct with coarse to fine belongs to it. */
+  compares?: boolean;
+}
+
+const ENCLOSING = { kind: 'enclosing' } as const;
+const COMPUTED = 'Computed in the page: the image of the paper cannot be passed on.';
+/** Every other force off, so that a preset says all that acts. */
+const BARE = { isoForce: -1, gradientNormal: 0, gradientTangent: 0, rigidity: 0, stiffness: 0 };
+/** Only the force towards maxima of intensity; per voxel here, so that 1 does what 0.1 does in the paper. */
+const RIDGE = { ...BARE, isoForce: 0 };
+
+export const PRESETS: Preset[] = [
+  {
+    id: 'figure-7',
+    name: 'Figure 7: a chain, from outside',
+    source: { shape: 'chain' },
+    unit: '',
+    start: ENCLOSING,
+    levels: 0,
+    // The gap between the rings is then four δ wide.
+    edge: 3.15,
+    params: { ...BARE, iso: 127.5, rigidity: 0.1, stiffness: 0.1 },
+    credit: 'Computed: a potential that falls with the distance from two linked circles.',
+    saw: 'One surface around two linked rings came to lie precisely on them in 90 iterations, and had become two tori on the way.',
+    variants: [
+      {
+        id: '7',
+        name: 'Figure 7',
+        params: {},
+        came: 'Here it takes 80 iterations: two components, each of genus 1.',
+        outcome: { iterations: 80, vertices: 489, components: 2, genus: 2 },
+      },
+    ],
+  },
+  {
+    id: 'figure-8',
+    name: 'Figure 8: the same chain, from 1331 bubbles',
+    source: { shape: 'chain' },
+    unit: '',
+    start: { kind: 'bubbles', bubbles: 11 },
+    levels: 0,
+    edge: 1.65,
+    params: { ...BARE, iso: 127.5 },
+    credit: 'Computed: a potential that falls with the distance from two linked circles.',
+    saw: 'With 11 × 11 × 11 small bubbles to start from and no internal force the same two rings were found, by iteration 160.',
+    variants: [
+      {
+        id: '8',
+        name: 'Figure 8',
+        params: {},
+        came: 'Here 39 iterations do: bubbles in the dark vanish, those in the rings meet and join to two components of genus 1.',
+        outcome: { iterations: 39, vertices: 2617, components: 2, genus: 2 },
+      },
+    ],
+  },
+  {
+    id: 'figure-14',
+    name: 'Figure 14: a fractal cube, coarse to fine',
+    source: { shape: 'deep sponge' },
+    unit: '',
+    start: ENCLOSING,
+    levels: 3,
+    params: { ...BARE, iso: 102, rigidity: 0.05, stiffness: 0.001 },
+    credit: 'Computed: the Menger sponge of depth 3 on 81³ voxels.',
+    saw: 'The model found the denser parts of a Sierpinski cube first and opened ever finer tunnels from level to level.',
+    variants: [
+      {
+        id: '14',
+        name: 'Figure 14',
+        params: {},
+        came: 'Here too: levels 2 and 1 open about eighty tunnels, level 0 all 1409 (χ = −2816, the exact number), after 457 iterations in all.',
+        outcome: { iterations: 457, vertices: 65508, components: 1, genus: 1409 },
+      },
+    ],
+  },
+  {
+    id: 'figure-15-16',
+    name: 'Figures 15 and 16, table 1: direct against coarse to fine',
+    source: { shape: 'head phantom' },
+    unit: '',
+    start: ENCLOSING,
+    levels: 3,
+    params: { ...BARE, iso: 130, rigidity: 0.4 },
+    credit: `${COMPUTED} A skull with six openings in soft tissue, with noise.`,
+    saw: 'On the CT of a head both ways led to one component of the same genus, areas within 1 % and volumes within 0.3 %, coarse to fine nearly three times faster (table 1: 112 against 41 minutes).',
+    variants: [
+      {
+        id: '16',
+        name: 'Figure 16',
+        params: {},
+        came: 'Here both end with one component of genus 5, area and volume within 0.1 %, coarse to fine more than ten times faster; the thin bone of a real skull, the example “Head, CT: bone”, vanishes on level 3.',
+        outcome: { iterations: 197, vertices: 12852, components: 1, genus: 5 },
+      },
+    ],
+    compares: true,
+    hint: 'The table appears under “Direct against coarse to fine” when you press Compare there.',
+  },
+  {
+    id: 'figure-20',
+    name: 'Figure 20, table 2: vessels of the brain',
+    source: { shape: 'vessel tree' },
+    unit: '',
+    start: ENCLOSING,
+    levels: 3,
+    params: { ...BARE, iso: 12.75, rigidity: 0.07 },
+    credit: `${COMPUTED} A tree of vessels and three loose pieces, with noise.`,
+    saw: 'Thin vessels blur away on coarse levels; the model still followed the connected ones on fine levels, kept one component, lost the small separate ones, and enclosed 3.7 % less than directly.',
+    variants: [
+      {
+        id: '20',
+        name: 'Figure 20',
+        params: {},
+        came: 'Here only the trunk is left on level 3, the tree grows back in one component on the way down, and the three loose pieces are lost that a direct run finds (4 components, 2.5 % more volume).',
+        outcome: { iterations: 402, vertices: 7372, components: 1, genus: 2 },
+      },
+    ],
+    compares: true,
+    hint: 'The table appears under “Direct against coarse to fine” when you press Compare there.',
+  },
+  {
+    id: 'figure-21',
+    name: 'Figure 21: skull, skin and hull of one head',
+    source: { shape: 'head phantom' },
+    unit: '',
+    start: ENCLOSING,
+    levels: 2,
+    params: { ...BARE, iso: 130, rigidity: 0.2 },
+    credit: `${COMPUTED} A skull with six openings in soft tissue, with noise.`,
+    saw: 'From one start the iso force found skull or skin, as πI said, and the gradient force a hull that lies in the bone and closes its gaps.',
+    variants: [
+      {
+        id: '21c',
+        name: 'c: skull',
+        params: {},
+        came: 'Here πI = 130 of 255 gives the skull with its six openings (genus 5).',
+        outcome: { iterations: 176, vertices: 12462, components: 1, genus: 5 },
+      },
+      {
+        id: '21d',
+        name: 'd: skin',
+        params: { iso: 38 },
+        came: 'Here πI = 38 of 255 gives the skin (genus 0).',
+        outcome: { iterations: 102, vertices: 10891, components: 1, genus: 0 },
+      },
+      {
+        id: '21e',
+        name: 'e: hull',
+        params: { ...RIDGE, gradientNormal: 1, gradientTangent: 0.5, rigidity: 0.4, stiffness: 0.1 },
+        came: 'Here the gradient force closes all six openings (genus 0); a little stiffness brings the surface in through air where there is no gradient.',
+        outcome: { iterations: 328, vertices: 8955, components: 1, genus: 0 },
+      },
+    ],
+    startsOver: true,
+  },
+  {
+    id: 'figure-22',
+    name: 'Figure 22: a nucleus with marked boundary',
+    source: { shape: 'marked nucleus' },
+    unit: '',
+    start: ENCLOSING,
+    levels: 1,
+    params: { ...RIDGE, iso: 120, gradientNormal: 1, stiffness: 0.2, rigidity: 1.5, integrator: 'runge-kutta' },
+    credit: `${COMPUTED} Three lobes of which only the boundary is bright, with noise.`,
+    saw: 'A bubble around the image was drawn in by a slight elastic force and came to rest on the marked boundary, which no iso-surface could give (1 component, 2 holes).',
+    variants: [
+      {
+        id: '22',
+        name: 'Figure 22',
+        params: {},
+        came: 'Here it comes to rest on the boundary of the three lobes, a single surface in the middle of the bright layer; this nucleus has no hole (genus 0).',
+        outcome: { iterations: 239, vertices: 3151, components: 1, genus: 0 },
+      },
+    ],
+  },
+  {
+    id: 'figure-23',
+    name: 'Figure 23: after marching cubes',
+    source: { file: 'visible-human-head.nii.gz' },
+    unit: 'mm',
+    start: { kind: 'isosurface' },
+    levels: 0,
+    params: { ...BARE, iso: 95, rigidity: 0.3 },
+    credit:
+      'Head CT: Visible Human Project, U.S. National Library of Medicine, public domain; volume from ipyvolume (MIT).',
+    saw: 'An iso-surface of 354 components and 958 holes was left with 45 components and 181 holes after some iterations with rigidity: the smoothing is physical, not geometrical.',
+    variants: [
+      {
+        id: '23',
+        name: 'Figure 23',
+        params: {},
+        came: 'Here marching cubes give 372 components of genus 383 together; 4 components and genus 43 are left after 117 iterations, and 34,000 of 114,000 vertices.',
+        outcome: { iterations: 117, vertices: 33935, components: 4, genus: 43 },
+      },
+    ],
+  },
+  {
+    id: 'figure-24',
+    name: 'Figure 24: one cell at three iso values',
+    source: { shape: 'cell' },
+    unit: '',
+    start: ENCLOSING,
+    levels: 1,
+    params: { ...BARE, iso: 76.5, rigidity: 0.2 },
+    credit: `${COMPUTED} A cell that is brighter towards its middle, with granules and noise.`,
+    saw: 'The surface of a lymphocyte was followed as πI rose from 0.3 over 0.45 to 0.75 of the range.',
+    variants: [
+      {
+        id: '24b',
+        name: 'b: 0.3',
+        params: {},
+        came: 'Here 0.3 of the range gives one surface around 61,200 voxels.',
+        outcome: { iterations: 118, vertices: 3975, components: 1, genus: 0 },
+      },
+      {
+        id: '24c',
+        name: 'c: 0.45',
+        params: { iso: 114.75 },
+        came: 'Here 0.45 of the range gives one surface around 40,900 voxels.',
+        outcome: { iterations: 133, vertices: 3080, components: 1, genus: 0 },
+      },
+      {
+        id: '24d',
+        name: 'd: 0.75',
+        params: { iso: 191.25 },
+        came: 'Here 0.75 of the range leaves three granules of 3,400 voxels together; back at 0.3 they grow and join to the one surface again.',
+        outcome: { iterations: 174, vertices: 839, components: 3, genus: 0 },
+      },
+    ],
+  },
+];
+
+export function exampleById(id: string): Example | undefined {
+  return [...EXAMPLES, ...PRESETS].find((one) => one.id === id);
+}
+
+export function isPreset(example: Example | undefined): example is Preset {
+  return example !== undefined && 'variants' in example;
+}
+
+/** The picture of a figure whose parameters are in force, if any is. */
+export function variantOf(preset: Preset, params: ParamValues): Variant | undefined {
+  return preset.variants.find((one) =>
+    Object.entries({ ...preset.params, ...one.params }).every(([name, value]) => Object.is(params[name], value)),
+  );
+}
+
+/** The start shape that suits an example. */
+export function startOf(example: Example): Preset['start'] {
+  return isPreset(example) ? example.start : ENCLOSING;
+}

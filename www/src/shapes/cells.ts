@@ -1,0 +1,51 @@
+/** Cells as a confocal microscope shows them: one whose nucleus has its boundary marked, one that is bright inside. */
+import { distance, noise, random, type ShapeVoxels, sample } from './sampling';
+
+type Point = [number, number, number];
+
+const NUCLEUS_SIZE = 72;
+/** The lobes of the nucleus: middle and radius, in voxels. */
+const LOBES: { middle: Point; radius: number }[] = [
+  { middle: [26, 30, 34], radius: 13 },
+  { middle: [44, 28, 38], radius: 13 },
+  { middle: [38, 46, 34], radius: 12 },
+];
+/** Voxels over which two lobes flow into each other. */
+const BLEND = 5;
+/** Half the thickness of the marked boundary, in voxels. */
+const MARK = 2.2;
+
+/** A nucleus of three lobes of which only the boundary is bright, with noise. */
+export function markedNucleus(): ShapeVoxels {
+  const grain = noise(22, 14);
+  return sample(NUCLEUS_SIZE, (i, j, k) => {
+    const depth = LOBES.map(({ middle, radius }) => radius - distance([i, j, k], middle));
+    const d = BLEND * Math.log(depth.reduce((sum, one) => sum + Math.exp(one / BLEND), 0));
+    return 20 + 200 * Math.exp(-((d / MARK) ** 2)) + grain();
+  });
+}
+
+const CELL_SIZE = 80;
+const CELL_RADIUS = 24;
+const GRANULES = 7;
+
+/** A cell whose intensity falls from its middle to its ragged rim, with granules brighter than the rest. */
+export function cell(): ShapeVoxels {
+  const next = random(24);
+  const middle: Point = [39.5, 39.5, 39.5];
+  const around = (radius: number): Point => {
+    const [turn, height] = [2 * Math.PI * next(), 2 * next() - 1];
+    const flat = radius * Math.sqrt(1 - height * height);
+    return [39.5 + flat * Math.cos(turn), 39.5 + flat * Math.sin(turn), 39.5 + radius * height];
+  };
+  const granules = Array.from({ length: GRANULES }, () => around(10 + 6 * next()));
+  const bulges = Array.from({ length: 14 }, () => around(CELL_RADIUS));
+  const grain = noise(4, 4);
+  return sample(CELL_SIZE, (i, j, k) => {
+    const at: Point = [i, j, k];
+    const bump = (points: Point[], width: number) =>
+      points.reduce((sum, point) => sum + Math.exp(-((distance(at, point) / width) ** 2)), 0);
+    const body = 150 / (1 + Math.exp((distance(at, middle) - CELL_RADIUS) / 3));
+    return body + 60 * bump(bulges, 5) + 110 * bump(granules, 5) + grain();
+  });
+}

@@ -1,0 +1,50 @@
+/** A head as a CT would show it: skin around soft tissue, and in it a skull with openings around a brain. */
+import { noise, type ShapeVoxels, sample, soft } from './sampling';
+
+const SIZE = 112;
+const MIDDLE = (SIZE - 1) / 2;
+/** Half axes in voxels: of the skin, of the skull's outside, and its thickness. */
+const SKIN = [43, 50, 48] as const;
+const SKULL = [35, 42, 40] as const;
+const THICKNESS = 9;
+const SOFT_TISSUE = 75;
+const BONE = 220;
+const NOISE = 6;
+
+/** Openings of the skull as cylinders through its middle: direction and radius. Orbits, ears, nose, spinal cord. */
+const OPENINGS: { direction: readonly [number, number, number]; radius: number }[] = [
+  { direction: [0.42, 0.88, 0.22], radius: 7 },
+  { direction: [-0.42, 0.88, 0.22], radius: 7 },
+  { direction: [0, 0.95, -0.31], radius: 6 },
+  { direction: [0, -0.25, -0.968], radius: 9 },
+  { direction: [0.97, -0.12, -0.21], radius: 5 },
+  { direction: [-0.97, -0.12, -0.21], radius: 5 },
+];
+
+export function headPhantom(): ShapeVoxels {
+  const grain = noise(15, NOISE);
+  return sample(SIZE, (i, j, k) => {
+    const at = [i - MIDDLE, j - MIDDLE, k - MIDDLE] as const;
+    const skin = depthInEllipsoid(at, SKIN);
+    const outside = depthInEllipsoid(at, SKULL);
+    const bone = Math.min(outside, THICKNESS - outside, -depthInOpenings(at));
+    return SOFT_TISSUE * soft(skin) + (BONE - SOFT_TISSUE) * soft(bone) + grain();
+  });
+}
+
+/** How deep a point lies in an ellipsoid, to first order at its surface. */
+function depthInEllipsoid([x, y, z]: readonly [number, number, number], [a, b, c]: readonly [number, number, number]) {
+  const level = Math.hypot(x / a, y / b, z / c);
+  const slope = Math.hypot(x / (a * a), y / (b * b), z / (c * c)) / (level || 1);
+  return slope > 0 ? (1 - level) / slope : a;
+}
+
+/** How deep a point lies in the nearest opening, negative outside of all. */
+function depthInOpenings(at: readonly [number, number, number]): number {
+  return OPENINGS.reduce((deepest, { direction, radius }) => {
+    const along = at[0] * direction[0] + at[1] * direction[1] + at[2] * direction[2];
+    if (along < 0) return deepest;
+    const off = Math.hypot(...at.map((x, axis) => x - along * (direction[axis] ?? 0)));
+    return Math.max(deepest, radius - off);
+  }, Number.NEGATIVE_INFINITY);
+}

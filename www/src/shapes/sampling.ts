@@ -1,0 +1,50 @@
+/** What the computed volumes share: a grid of bytes, x fastest, cubes as voxels. */
+
+export interface ShapeVoxels {
+  data: Uint8Array;
+  dims: [number, number, number];
+}
+
+type Point = readonly [number, number, number];
+
+/** Intensities of a function of voxel indices, held to 0..255; a single number makes a cube. */
+export function sample(
+  size: number | [number, number, number],
+  value: (i: number, j: number, k: number) => number,
+): ShapeVoxels {
+  const dims: [number, number, number] = typeof size === 'number' ? [size, size, size] : size;
+  const data = new Uint8Array(dims[0] * dims[1] * dims[2]);
+  let voxel = 0;
+  for (let k = 0; k < dims[2]; k++) {
+    for (let j = 0; j < dims[1]; j++) {
+      for (let i = 0; i < dims[0]; i++) data[voxel++] = Math.min(255, Math.max(0, value(i, j, k)));
+    }
+  }
+  return { data, dims };
+}
+
+/** A small seeded generator (mulberry32) of numbers in 0..1: the same volume on every machine. */
+export function random(seed: number): () => number {
+  let state = seed;
+  return () => {
+    state = (state + 0x6d2b79f5) | 0;
+    let t = Math.imul(state ^ (state >>> 15), 1 | state);
+    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
+    return ((t ^ (t >>> 14)) >>> 0) / 2 ** 32;
+  };
+}
+
+/** Noise around 0 with the given standard deviation, nearly normal: the sum of four even ones. */
+export function noise(seed: number, deviation: number): () => number {
+  const next = random(seed);
+  return () => deviation * Math.sqrt(3) * (next() + next() + next() + next() - 2);
+}
+
+export function distance(a: Point, b: Point): number {
+  return Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+}
+
+/** 255 well inside, 0 well outside, half at the border; `depth` in voxels, positive inside, over three voxels. */
+export function soft(depth: number): number {
+  return Math.min(1, Math.max(0, 0.5 + depth / 3));
+}

@@ -1,0 +1,162 @@
+import type { Attractor, Vec3 } from '../protocol';
+import { h, uniqueId } from './dom';
+import { figure } from './format';
+
+const STRENGTH = 0.1;
+const PLACE = 'Click to place';
+const STRONGEST = 1000;
+
+export interface AttractorEvents {
+  /** The whole list after a change; `what` names it. `tuning`: the same again soon after belongs to it. */
+  onChange: (attractors: Attractor[], what: string, tuning: boolean) => void;
+  /** Whether clicks in the views place attractors from now on. */
+  onPlacing: (placing: boolean) => void;
+  /** Shows a place in the slices. */
+  onGoTo: (point: Vec3) => void;
+  /** Where the slices meet. */
+  crosshair: () => Vec3;
+}
+
+/** The user's points that pull the surface: placed by clicking or at the crosshair, each with strength and reach. */
+export class AttractorControls {
+  readonly element: HTMLElement;
+  readonly #events: AttractorEvents;
+  readonly #place: HTMLButtonElement;
+  readonly #list = h('ol', { class: 'attractors' });
+  readonly #error = h('p', { class: 'field-error', role: 'alert' });
+  #attractors: Attractor[] = [];
+  #radius = 10;
+  #placing = false;
+
+  constructor(events: AttractorEvents) {
+    this.#events = events;
+    const add = () => this.add(events.crosshair());
+    const label = 'Place an attractor at the crosshair';
+    const button = h(
+      'button',
+      { type: 'button', onclick: add, 'data-attractor': 'add', title: label, 'aria-label': label },
+      'At crosshair',
+    );
+    this.#place = h(
+      'button',
+      { type: 'button', 'aria-pressed': 'false', 'data-attractor': 'place', onclick: () => this.place(!this.#placing) },
+      PLACE,
+    );
+    const help =
+      'Points that pull the surface like springs, or push it where the strength is negative, and fade out at their radius. A strong pull draws out a tip that never quite comes to rest: press Pause then.';
+    this.element = h(
+      'div',
+      {},
+      h('div', { class: 'buttons' }, this.#place, button),
+      h('p', { class: 'help' }, help),
+      this.#list,
+      this.#error,
+    );
+  }
+
+  /** The reach of the next one, in world units. */
+  set radius(radius: number) {
+    this.#radius = Number(radius.toPrecision(2));
+  }
+
+  show(attractors: Attractor[]): void {
+    this.#attractors = attractors;
+    this.#error.textContent = '';
+    this.#list.replaceChildren(...attractors.map((attractor, index) => this.#item(attractor, index)));
+  }
+
+  complain(message: string): void {
+    this.#error.textContent = message;
+  }
+
+  add(point: Vec3): void {
+    const rounded = point.map((x) => Number(x.toPrecision(6))) as Vec3;
+    this.#change([...this.#attractors, { point: rounded, strength: STRENGTH, radius: this.#radius }], 'new attractor');
+  }
+
+  place(placing: boolean): void {
+    this.#placing = placing;
+    this.#place.setAttribute('aria-pressed', String(placing));
+    this.#place.textContent = placing ? 'Stop placing' : PLACE;
+    this.#events.onPlacing(placing);
+  }
+
+  #change(attractors: Attractor[], what: string): void {
+    this.show(attractors);
+    this.#events.onChange(attractors, what, false);
+  }
+
+  #item(attractor: Attractor, index: number): HTMLElement {
+    const name = `Attractor ${index + 1}`;
+    const where = attractor.point.map((x) => figure(Number(x.toPrecision(4)))).join(', ');
+    const goTo = h(
+      'button',
+      {
+        type: 'button',
+        class: 'quiet',
+        title: 'Show it in the slices',
+        'aria-label': `${name} at ${where}: show it in the slices`,
+        onclick: () => this.#events.onGoTo(attractor.point),
+      },
+      `${index + 1}: ${where}`,
+    );
+    const remove = h(
+      'button',
+      {
+        type: 'button',
+        class: 'quiet',
+        'aria-label': `Remove ${name.toLowerCase()}`,
+        onclick: () => this.#remove(index),
+      },
+      'Remove',
+    );
+    const field = (key: 'strength' | 'radius', label: string, range: Record<string, number>) =>
+      this.#field({ attractor, index, key, label: `${label} of ${name.toLowerCase()}`, shown: label, range });
+    return h(
+      'li',
+      {},
+      h('div', { class: 'row' }, goTo, remove),
+      h(
+        'div',
+        { class: 'row' },
+        field('strength', 'Strength', { min: -STRONGEST, max: STRONGEST }),
+        field('radius', 'Radius', { min: 0 }),
+      ),
+    );
+  }
+
+  #remove(index: number): void {
+    this.#change(
+      this.#attractors.filter((_, i) => i !== index),
+      `removal of attractor ${index + 1}`,
+    );
+    // The button that had the focus is gone.
+    this.#place.focus();
+  }
+
+  #field(given: {
+    attractor: Attractor;
+    index: number;
+    key: 'strength' | 'radius';
+    label: string;
+    shown: string;
+    range: Record<string, number>;
+  }): HTMLElement {
+    const { attractor, index, key, label, shown, range } = given;
+    const id = uniqueId('attractor');
+    const value = attractor[key];
+    const input = h('input', { type: 'number', id, step: 'any', value, ...range, 'aria-label': label });
+    input.addEventListener('change', () => {
+      const number = input.valueAsNumber;
+      if (!Number.isFinite(number) || (key === 'radius' && number <= 0)) {
+        input.valueAsNumber = value;
+        return this.complain(key === 'radius' ? 'A radius above 0 is needed.' : 'A number is needed.');
+      }
+      const next = this.#attractors.map((one, i) => (i === index ? { ...one, [key]: number } : one));
+      this.#attractors = next;
+      this.#error.textContent = '';
+      this.#events.onChange(next, `${key} of attractor ${index + 1}`, true);
+    });
+    return h('span', { class: 'value' }, h('label', { for: id }, shown), input);
+  }
+}

@@ -1,0 +1,54 @@
+import { h } from './dom';
+
+interface Exercise {
+  title: string;
+  /** The example or figure to begin with. */
+  example: string;
+  steps: string[];
+  look: string;
+  handIn: string;
+}
+
+const EXERCISES: Exercise[] = [
+  {
+    title: '1. What does rigidity cost?',
+    example: 'figure-23',
+    steps: [
+      'Open the figure and let it come to rest. Note rigidity αc, genus, components, area and volume.',
+      'Set αc to 0, press Reset, then Play; note the same. Do it again with 0.1, 0.3 and 0.4.',
+      'Colour the surface by speed while it settles: where does it still move, and which way?',
+    ],
+    look: 'How do genus, area and volume change with αc? Which parts go first, and why does a force that is proportional to bending remove just these? Where would you stop for a surgeon, where for a printer?',
+    handIn:
+      'A table of αc against genus, components, area and volume; the plot data (CSV) of two runs; three sentences.',
+  },
+  {
+    title: '2. Direct against coarse to fine: what are you paying for?',
+    example: 'figure-15-16',
+    steps: [
+      'Open the figure and press Compare under “Direct against coarse to fine”. Note both times and where they are spent.',
+      'Do the same for figure 20 and for “Head, CT: bone” with 2 pyramid levels.',
+      'Step through the levels in the row of small pictures: what is left of the object on the coarsest?',
+    ],
+    look: 'Which row of the table (T, N or F) shrinks most, and what does it grow with? On which image do both ways end with the same topology, on which not, and what do the coarse pictures have to do with it?',
+    handIn:
+      'The three tables; for each image a sentence on whether you would go coarse to fine, and with how many levels.',
+  },
+];
+
+/** Two exercises for a lab course, each with a button that opens what it begins with. */
+export function exercises(onOpen: (example: string) => void): HTMLElement {
+  return h('div', { class: 'exercises' }, ...EXERCISES.map((exercise) => exerciseOf(exercise, onOpen)));
+}
+
+function exerciseOf({ title, example, steps, look, handIn }: Exercise, onOpen: (example: string) => void): HTMLElement {
+  return h(
+    'details',
+    { 'data-exercise': example },
+    h('summary', {}, title),
+    h('ol', {}, ...steps.map((step) => h('li', {}, step))),
+    h('p', {}, h('strong', {}, 'Look for: '), look),
+    h('p', {}, h('strong', {}, 'Hand in: '), handIn),
+    h('button', { type: 'button', onclick: () => onOpen(example) }, 'Set it up'),
+  );
+}

@@ -1,0 +1,40 @@
+import type { Preset, Variant } from '../presets';
+import { h } from './dom';
+
+/** Which figure of the paper is open: what the paper saw, what comes out here, and its other pictures. */
+export class FigurePanel {
+  readonly element = h('div', { class: 'figure', hidden: true });
+  readonly #onVariant: (preset: Preset, variant: Variant) => void;
+  #buttons: { variant: Variant; button: HTMLButtonElement }[] = [];
+  readonly #came = h('p', { 'data-figure': 'came' });
+
+  constructor(onVariant: (preset: Preset, variant: Variant) => void) {
+    this.#onVariant = onVariant;
+  }
+
+  /** Shows a figure, with the variant that is in force, or nothing. */
+  show(preset: Preset | undefined, variant?: Variant): void {
+    this.element.hidden = preset === undefined;
+    if (!preset) return;
+    this.#buttons = preset.variants.map((one) => ({ variant: one, button: this.#button(preset, one) }));
+    const several = preset.variants.length > 1;
+    const group = h('div', { class: 'buttons', role: 'group', 'aria-label': 'Pictures of the figure' });
+    group.append(...this.#buttons.map(({ button }) => button));
+    this.element.replaceChildren(
+      h('p', {}, h('strong', {}, 'Paper: '), preset.saw),
+      this.#came,
+      ...(several ? [group] : []),
+      ...(preset.hint ? [h('p', { class: 'help' }, preset.hint)] : []),
+    );
+    this.choose(variant ?? preset.variants[0]);
+  }
+
+  choose(variant: Variant): void {
+    this.#came.textContent = variant.came;
+    for (const { variant: one, button } of this.#buttons) button.setAttribute('aria-pressed', String(one === variant));
+  }
+
+  #button(preset: Preset, variant: Variant): HTMLButtonElement {
+    return h('button', { type: 'button', onclick: () => this.#onVariant(preset, variant) }, variant.name);
+  }
+}

@@ -1,0 +1,107 @@
+import type { LevelView } from '../protocol';
+import { h } from './dom';
+import { levelSymbol } from './format';
+
+const VOLUME = 'Level 0: the volume itself';
+
+/** The levels of the image pyramid as small pictures of the present slice; the one the model works on is marked. */
+export class PyramidPanel {
+  readonly #list = h('div', { class: 'pyramid', role: 'group', 'aria-label': 'Levels of the pyramid, axial slice' });
+  readonly #follow = h('input', { type: 'checkbox', 'data-pyramid': 'follow' });
+  readonly element = h(
+    'div',
+    {},
+    this.#list,
+    h('label', { class: 'check' }, this.#follow, 'Slices follow the model'),
+    h(
+      'p',
+      { class: 'help' },
+      'The model works from coarse to fine; a dot marks the level it is on, I₀ is the volume. Choose a level to see it in the slices.',
+    ),
+  );
+  readonly #onShow: (level: LevelView | undefined) => void;
+  readonly #picture: (level: LevelView | undefined) => HTMLCanvasElement | undefined;
+  #buttons: HTMLButtonElement[] = [];
+  #dims: string[] = [];
+  /** Coarser copies, the finest first. */
+  #levels: LevelView[] = [];
+  #inUse: number | undefined;
+  #shown = 0;
+  #pending = 0;
+
+  /** `picture` draws the present slice of a level; `onShow` shows a level in the slices. */
+  constructor(
+    picture: (level: LevelView | undefined) => HTMLCanvasElement | undefined,
+    onShow: (level: LevelView | undefined) => void,
+  ) {
+    this.#picture = picture;
+    this.#onShow = onShow;
+    this.#follow.addEventListener('change', () => this.#choose(this.#follow.checked ? (this.#inUse ?? 0) : 0));
+  }
+
+  /** `volume` are the sizes of the volume itself, `levels` its coarser copies, the finest first. */
+  setLevels(volume: readonly number[], levels: LevelView[], inUse: number): void {
+    this.#levels = levels;
+    const dims = [volume, ...levels.map((level) => level.dims)].map((sizes) => sizes.join(' × '));
+    // On the same volume the choice stays, where there is still such a level.
+    const shown = dims[0] === this.#dims[0] ? this.#shown : 0;
+    this.#dims = dims;
+    this.#buttons = this.#dims.map((_, level) => this.#button(level));
+    // Coarse to fine, as the model goes.
+    this.#list.replaceChildren(...[...this.#buttons].reverse());
+    this.#inUse = inUse;
+    this.#choose(this.#follow.checked ? inUse : shown);
+    this.redraw();
+  }
+
+  /** Marks the level the model works on. */
+  setInUse(level: number): void {
+    if (level === this.#inUse) return;
+    this.#inUse = level;
+    this.#mark();
+    if (this.#follow.checked) this.#choose(level);
+  }
+
+  /** Draws the pictures again, at the next animation frame: the slice has moved. */
+  redraw(): void {
+    this.#pending ||= requestAnimationFrame(() => {
+      this.#pending = 0;
+      for (const [level, button] of this.#buttons.entries()) {
+        const picture = this.#picture(this.#levels[level - 1]);
+        if (picture) button.querySelector('canvas')?.replaceWith(decorative(picture));
+      }
+    });
+  }
+
+  #button(level: number): HTMLButtonElement {
+    const onclick = () => {
+      this.#follow.checked = false;
+      this.#choose(level);
+    };
+    const caption = h('span', { class: 'caption' }, levelSymbol(level));
+    return h('button', { type: 'button', 'data-level': level, onclick }, decorative(h('canvas')), caption);
+  }
+
+  #choose(level: number): void {
+    this.#shown = this.#buttons[level] ? level : 0;
+    this.#mark();
+    this.#onShow(this.#levels[this.#shown - 1]);
+  }
+
+  #mark(): void {
+    for (const [level, button] of this.#buttons.entries()) {
+      const inUse = level === this.#inUse;
+      button.setAttribute('aria-pressed', String(level === this.#shown));
+      button.classList.toggle('in-use', inUse);
+      const name = level === 0 ? VOLUME : `Level ${level}`;
+      const label = `${name}, ${this.#dims[level]} voxels${inUse ? ', the model is here' : ''}`;
+      button.setAttribute('aria-label', label);
+      button.title = label;
+    }
+  }
+}
+
+function decorative(canvas: HTMLCanvasElement): HTMLCanvasElement {
+  canvas.setAttribute('aria-hidden', 'true');
+  return canvas;
+}

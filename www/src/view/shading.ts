@@ -1,0 +1,87 @@
+/** Colours for numbers on the surface: a diverging map, blue below zero, red above, light at zero (ColorBrewer RdBu). */
+import type { Shade } from '../protocol';
+
+type Rgb = readonly [number, number, number];
+
+/** At −1, −½, 0, ½ and 1. */
+const STOPS: readonly Rgb[] = [
+  [33, 102, 172],
+  [103, 169, 207],
+  [247, 247, 247],
+  [239, 138, 98],
+  [178, 24, 43],
+];
+
+/** Of the values, so many lie within the range shown: a few extreme vertices must not make all others pale. */
+const WITHIN = 0.98;
+/** Values looked at to find the range. */
+const SAMPLES = 4096;
+/** Entries of the table that colours are taken from. */
+const TABLE = 256;
+
+/** What the legend says of each shade. */
+export const SHADES: Record<Shade, ShadeText> = {
+  speed: { title: 'Speed along the normal, δ per iteration', below: 'inwards', above: 'outwards', least: 1e-4 },
+  'mean curvature': { title: 'Mean curvature', power: 1, below: 'hollow', above: 'bulging', least: 1e-6 },
+  'gaussian curvature': { title: 'Gaussian curvature', power: 2, below: 'saddle', above: 'dome or cup', least: 1e-9 },
+};
+
+interface ShadeText {
+  title: string;
+  /** Of the length it is one over. */
+  power?: 1 | 2;
+  below: string;
+  above: string;
+  /** Smaller ranges than this are not shown. */
+  least: number;
+}
+
+/** The title with the unit that goes with lengths in `unit`. */
+export function shadeTitle(shade: Shade, unit: string): string {
+  const { title, power } = SHADES[shade];
+  if (!power) return title;
+  return `${title}, 1/${unit || 'unit'}${power === 2 ? '²' : ''}`;
+}
+
+/** sRGB, 0..255, for t in −1..1. */
+export function diverging(t: number): [number, number, number] {
+  const at = (Math.min(1, Math.max(-1, t)) + 1) * 2;
+  const i = Math.min(STOPS.length - 2, Math.floor(at));
+  const [low, high] = [STOPS[i] ?? [0, 0, 0], STOPS[i + 1] ?? [0, 0, 0]];
+  return [0, 1, 2].map((c) => (low[c] ?? 0) + (at - i) * ((high[c] ?? 0) - (low[c] ?? 0))) as [number, number, number];
+}
+
+const LINEAR = Float32Array.from({ length: 3 * (TABLE + 1) }, (_, i) => {
+  const t = (2 * Math.floor(i / 3)) / TABLE - 1;
+  return ((diverging(t)[i % 3] ?? 0) / 255) ** 2.2;
+});
+
+/** The largest size worth showing: nearly all values lie within it, rounded up to 1, 2 or 5 times a power of ten. */
+export function robustRange(values: Float32Array, least: number): number {
+  const stride = Math.max(1, Math.floor(values.length / SAMPLES));
+  const sizes: number[] = [];
+  for (let i = 0; i < values.length; i += stride) {
+    const size = Math.abs(values[i] ?? 0);
+    if (Number.isFinite(size)) sizes.push(size);
+  }
+  sizes.sort((a, b) => a - b);
+  return roundUp(Math.max(least, sizes[Math.floor(WITHIN * (sizes.length - 1))] ?? 0));
+}
+
+function roundUp(value: number): number {
+  const power = 10 ** Math.floor(Math.log10(value));
+  const step = [1, 2, 5, 10].find((factor) => factor * power >= value * (1 - 1e-9)) ?? 10;
+  return Number((step * power).toPrecision(1));
+}
+
+/** Linear rgb of each vertex, three numbers each, into `out`. */
+export function shadeColors(values: Float32Array, range: number, out: Float32Array): void {
+  for (let vertex = 0; vertex < values.length; vertex++) {
+    // What is no number is drawn as zero.
+    const t = Math.min(1, Math.max(-1, (values[vertex] || 0) / range));
+    const entry = 3 * Math.round(((t + 1) * TABLE) / 2);
+    out[3 * vertex] = LINEAR[entry] ?? 1;
+    out[3 * vertex + 1] = LINEAR[entry + 1] ?? 1;
+    out[3 * vertex + 2] = LINEAR[entry + 2] ?? 1;
+  }
+}

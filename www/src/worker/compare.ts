@@ -1,0 +1,62 @@
+/** The same extraction twice: on the volume itself, and coarse to fine (section 5.2 of the paper). */
+import type { StepReport, Volume } from 'vesicle';
+import type { ComparedRun, ComparingEvent, Requests, Setup } from '../protocol';
+import { buildModel } from './models';
+
+/** Iterations after which a run that does not come to rest is taken as it is. */
+const MOST_ITERATIONS = 4000;
+/** Milliseconds between two reports to the page. */
+const TELL_EVERY = 150;
+
+type Tell = (run: ComparingEvent['run'], report: StepReport) => void;
+
+/** Undefined when the signal aborts it. */
+export async function compare(
+  volume: Volume,
+  setup: Setup,
+  signal: AbortSignal,
+  tell: Tell,
+): Promise<Requests['compare']['reply']> {
+  try {
+    const direct = await once(volume, { ...setup, levels: 0 }, signal, (report) => tell('direct', report));
+    const coarseToFine = await once(volume, setup, signal, (report) => tell('coarseToFine', report));
+    return { direct, coarseToFine };
+  } catch (error) {
+    if (signal.aborted) return undefined;
+    throw error;
+  }
+}
+
+async function once(
+  volume: Volume,
+  setup: Setup,
+  signal: AbortSignal,
+  tell: (report: StepReport) => void,
+): Promise<ComparedRun> {
+  const model = buildModel(volume, setup);
+  try {
+    const byLevel = Array.from({ length: setup.levels + 1 }, (_, i) => ({
+      level: setup.levels - i,
+      iterations: 0,
+      times: {} as Record<string, number>,
+    }));
+    let toldAt = 0;
+    // A step belongs to the level it began on: the last one of a level ends with the way down to the next.
+    let level = model.level;
+    const onStep = (report: StepReport) => {
+      const entry = byLevel[setup.levels - level];
+      level = model.level;
+      if (entry) {
+        entry.iterations += 1;
+        for (const [part, time] of Object.entries(report.times)) entry.times[part] = (entry.times[part] ?? 0) + time;
+      }
+      if (performance.now() - toldAt < TELL_EVERY && !report.done) return;
+      toldAt = performance.now();
+      tell(report);
+    };
+    const report = await model.run({ signal, onStep, maxIterations: MOST_ITERATIONS });
+    return { levels: setup.levels, byLevel, report, info: model.mesh.info() };
+  } finally {
+    model.free();
+  }
+}

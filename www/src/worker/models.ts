@@ -1,0 +1,54 @@
+/** Models as the page asks for them. */
+import { DeformableModel, type Volume } from 'vesicle';
+import type { Setup, Shade } from '../protocol';
+import { otsu } from '../threshold';
+import { HISTOGRAM_BINS } from './volumes';
+
+type Options = ConstructorParameters<typeof DeformableModel>[0];
+
+function startOf({ start }: Setup, iso: number): Options['start'] {
+  switch (start.kind) {
+    case 'enclosing':
+      return 'enclosing';
+    case 'bubbles':
+      return { bubbles: start.count };
+    case 'isosurface':
+      return { marchingCubes: iso };
+    case 'sphere':
+      return { seeds: new Float32Array(start.center), radius: start.radius };
+  }
+}
+
+export function buildModel(volume: Volume, setup: Setup): DeformableModel {
+  const chosen = setup.params.iso;
+  const iso = typeof chosen === 'number' ? chosen : otsu(volume.histogram(HISTOGRAM_BINS), volume.range);
+  const model = new DeformableModel({
+    volume,
+    start: startOf(setup, iso),
+    levels: setup.levels,
+    ...(setup.edge === undefined ? {} : { edge: setup.edge }),
+    params: { ...setup.params, iso },
+  });
+  try {
+    model.setAttractors(setup.attractors);
+  } catch (error) {
+    model.free();
+    throw error;
+  }
+  return model;
+}
+
+/** One number a vertex for each shade, in the order of the mesh's arrays. A new shade needs a line here and one in `view/shading`. */
+const SHADES: Record<Shade, (model: DeformableModel) => Float32Array> = {
+  /** In δ per iteration. */
+  speed: (model) => {
+    const factor = model.params.timeStep / model.delta;
+    return model.speeds().map((speed) => speed * factor);
+  },
+  'mean curvature': ({ mesh }) => mesh.curvature('mean'),
+  'gaussian curvature': ({ mesh }) => mesh.curvature('gaussian'),
+};
+
+export function valuesFor(model: DeformableModel, shade: Shade): Float32Array {
+  return SHADES[shade](model);
+}

@@ -1,0 +1,67 @@
+/** Volumes as the worker opens them, and as the page sees them. */
+import { VesicleError, Volume } from 'vesicle';
+import type { LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
+import { quantize } from '../quantize';
+import { shapeVoxels } from '../shapes';
+import { quantiles } from '../threshold';
+import { Refusal } from './refusal';
+
+export const HISTOGRAM_BINS = 256;
+
+function isHeader({ name }: NamedBytes): boolean {
+  return /\.(nhdr|mhd)$/i.test(name);
+}
+
+/** A volume from one file; a header whose data is missing asks for it. */
+function parseFile(file: NamedBytes): Volume {
+  try {
+    return Volume.parse(file.bytes);
+  } catch (error) {
+    if (!(error instanceof VesicleError) || !isHeader(file)) throw error;
+    throw new Refusal(error.code, `${error.message}. Choose or drop a header together with the file of its voxels.`);
+  }
+}
+
+/** A volume from one file, or from a header and its data in either order. */
+function parseFiles(files: NamedBytes[]): Volume {
+  const [first, second] = files;
+  if (!first) throw new Refusal('bad-file', 'no file was given');
+  if (!second) return parseFile(first);
+  const [header, data] = isHeader(second) && !isHeader(first) ? [second, first] : [first, second];
+  return Volume.parse(header.bytes, { data: data.bytes });
+}
+
+export function volumeFrom(source: VolumeSource): Volume {
+  return 'files' in source ? parseFiles(source.files) : new Volume(shapeVoxels(source.shape));
+}
+
+/** The volume reduced to what the page shows. */
+export function viewOf(volume: Volume, name: string): VolumeView {
+  const { range } = volume;
+  const histogram = volume.histogram(HISTOGRAM_BINS);
+  // A few extreme voxels (metal, noise) must not make everything else grey.
+  const [low = range[0], high = range[1]] = quantiles(histogram, range, [0.001, 0.999]);
+  const window: [number, number] = high > low ? [low, high] : range;
+  const { dims, frames, spacing, affine, space } = volume;
+  return { name, dims, frames, spacing, affine, space, range, histogram, window, voxels: greys(volume, window) };
+}
+
+/** The coarser copies that a model with so many levels works on, shown with the greys of the volume itself. */
+export function levelsOf(volume: Volume, levels: number, window: [number, number]): LevelView[] {
+  const [, ...coarser] = volume.pyramid(levels + 1);
+  return coarser.map((level) => {
+    try {
+      return { dims: level.dims, voxels: greys(level, window) };
+    } finally {
+      level.free();
+    }
+  });
+}
+
+/** Slice by slice, so that no second full copy in floats is made. */
+function greys(volume: Volume, window: [number, number]): Uint8Array {
+  const [nx, ny, nz] = volume.dims;
+  const voxels = new Uint8Array(nx * ny * nz);
+  for (let z = 0; z < nz; z++) quantize(volume.slice(2, z), window, voxels, z * nx * ny);
+  return voxels;
+}
