@@ -3,11 +3,9 @@
 use crate::math::{Bounds, Vec3};
 use crate::mesh::VertexId;
 
-/// Levels of cells, a factor of four apart, and the one of the size the grid was made for. A star that is smaller than
-/// those of the finest level is kept there, where cells only hold more; a larger one than those of the coarsest there,
-/// where it is found by looking further.
-const LEVELS: usize = 12;
-const ORDINARY: usize = 2;
+/// Levels of cells, a factor of four apart. All stars up to the size the grid was made for are on the first; one that is
+/// larger than those of the last is kept there, where it is found by looking further.
+const LEVELS: usize = 10;
 const FACTOR: f32 = 4.0;
 
 /// Side of a cell in the longest edge of the stars it holds: twice the usual radius of a search, which so meets eight
@@ -88,7 +86,7 @@ impl StarGrid {
     /// `vertices`; more may come.
     pub fn new(edge: f32, blur: f32, vertices: usize) -> Self {
         let mut grid = Self { blur, ..Self::default() };
-        let mut bound = edge / (FACTOR * FACTOR);
+        let mut bound = edge;
         for level in 0..LEVELS {
             grid.bound[level] = bound;
             grid.inverse_cell[level] = 1.0 / (CELL * bound);
@@ -240,12 +238,7 @@ impl StarGrid {
     }
 
     fn level_of(&self, longest: f32) -> usize {
-        let fits = |&level: &usize| longest <= self.bound[level];
-        // Nearly every star is an ordinary one.
-        if fits(&ORDINARY) && !fits(&(ORDINARY - 1)) {
-            return ORDINARY;
-        }
-        (0..LEVELS).find(fits).unwrap_or(LEVELS - 1)
+        (0..LEVELS).find(|&level| longest <= self.bound[level]).unwrap_or(LEVELS - 1)
     }
 
     #[inline]

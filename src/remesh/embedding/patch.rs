@@ -35,12 +35,21 @@ impl Embedding {
             self.mark(v);
             // Triangles of marked vertices have been looked at.
             let is_new = |&(a, b): &(VertexId, VertexId)| !self.is_marked(a) && !self.is_marked(b);
-            let mut others = mesh.ring(v).pairs().filter(is_new).map(|(a, b)| changed(mesh.facet([v, a, b])));
-            others.any(|other| other.1.meets(&whole) && crosses_one(&other, fresh))
+            let others = mesh.ring(v).pairs().filter(is_new).map(|(a, b)| mesh.facet([v, a, b]));
+            others.filter(|other| !is_beside(other, &whole)).any(|other| crosses_one(&changed(other), fresh))
         });
         self.found = near;
         crosses
     }
+}
+
+/// Whether all corners are beyond one side of the box.
+#[inline]
+fn is_beside(facet: &Facet, bounds: &Bounds) -> bool {
+    let [a, b, c] = facet.points;
+    let below = a.cmplt(bounds.min) & b.cmplt(bounds.min) & c.cmplt(bounds.min);
+    let above = a.cmpgt(bounds.max) & b.cmpgt(bounds.max) & c.cmpgt(bounds.max);
+    below.any() || above.any()
 }
 
 /// Whether two triangles with a corner in common cross, at the corners of the changed ones.

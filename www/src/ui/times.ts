@@ -3,13 +3,13 @@ import type { History } from './history';
 
 /** The rows of the paper's tables 1 and 2: its letter, our word, and the parts of a step it is made of. */
 export const TIME_ROWS = [
-  { letter: 'T', name: 'topology', parts: ['topology'] },
+  { letter: 'T', name: 'topology', parts: ['topology', 'embedding'] },
   { letter: 'N', name: 'normals', parts: ['normals'] },
   { letter: 'F', name: 'dynamics', parts: ['forces', 'motion'] },
 ] as const;
-const DETAILS = ['forces', 'motion'];
+const DETAILS = ['topology', 'embedding', 'forces', 'motion'];
 export const TIME_NOTE =
-  'Seconds. T: finding and resolving topology; N: normals; F: dynamics, that is forces and motion.';
+  'Seconds. T: finding and resolving topology, and looking for triangles that would cross (embedding); N: normals; F: dynamics, that is forces and motion.';
 
 /** Milliseconds by part. */
 export type PartTimes = ReadonlyMap<string, number>;
