@@ -29,6 +29,8 @@ pub struct Resolver {
     /// Vertices that were moved or made since contact was last looked for.
     stirred: Vec<VertexId>,
     is_stirred: Vec<bool>,
+    /// Vertices that the last move could not move at all.
+    pub(super) stuck: Vec<VertexId>,
     /// Vertices made or displaced by the last call.
     edited: Vec<VertexId>,
     pub(super) embedding: Embedding,
@@ -63,6 +65,7 @@ impl Resolver {
             queued: Vec::new(),
             stirred: Vec::new(),
             is_stirred: Vec::new(),
+            stuck: Vec::new(),
             edited: Vec::new(),
             embedding: Embedding::default(),
             changes: Changes::default(),
@@ -95,6 +98,7 @@ impl Resolver {
         let effort = LEAST_EFFORT + EFFORT_PER_VERTEX * mesh.vertex_count() as u64;
         self.most_effort = self.embedding.effort() + effort;
         self.edited.clear();
+        self.remove_crushed(mesh, sampling);
         for &v in active {
             self.touch(v);
         }
@@ -111,7 +115,10 @@ impl Resolver {
     /// Moves the vertices as [`Embedding::carry`] does.
     pub fn carry(&mut self, mesh: &mut Mesh, sampling: Sampling, ways: &mut [Vec3]) -> Vec<(VertexId, f32)> {
         self.embedding.follow_with(mesh, sampling.longest());
-        self.embedding.carry(mesh, ways)
+        let held = self.embedding.carry(mesh, ways);
+        self.stuck.clear();
+        self.stuck.extend(held.iter().filter(|(_, share)| *share == 0.0).map(|(v, _)| *v));
+        held
     }
 
     /// Whether no two triangles cross, exactly.

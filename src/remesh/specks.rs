@@ -6,6 +6,9 @@ use crate::mesh::{Mesh, VertexId};
 /// Components of more vertices are never removed, whatever their volume: a cavity has a negative one.
 const LARGEST_SPECK: usize = 32;
 
+/// The volume in δ³ of an icosahedron with edges of δ: the smallest ball that is no speck.
+const SMALLEST_BALL: f32 = 2.18;
+
 impl Resolver {
     /// Removes the component of `v` where it is a speck, and says whether it is gone.
     ///
@@ -13,11 +16,23 @@ impl Resolver {
     ///
     /// A speck has at most 32 vertices and less than δ³ of volume. Those of negative volume would grow in empty space.
     pub(super) fn remove_speck(&mut self, mesh: &mut Mesh, sampling: Sampling, v: VertexId) -> bool {
+        self.remove_below(mesh, v, sampling.smallest_volume())
+    }
+
+    /// Removes small components that a force squeezes flat: where two sides are pressed on each other, every vertex is
+    /// held, no edge gets short, and they would stay for ever.
+    pub(super) fn remove_crushed(&mut self, mesh: &mut Mesh, sampling: Sampling) {
+        for v in std::mem::take(&mut self.stuck) {
+            self.remove_below(mesh, v, SMALLEST_BALL * sampling.smallest_volume());
+        }
+    }
+
+    fn remove_below(&mut self, mesh: &mut Mesh, v: VertexId, least: f32) -> bool {
         if !mesh.is_live(v) {
             return true;
         }
         let members = mesh.component_of(v, LARGEST_SPECK + 1);
-        if members.len() > LARGEST_SPECK || volume(mesh, &members) >= sampling.smallest_volume() {
+        if members.len() > LARGEST_SPECK || volume(mesh, &members) >= least {
             return false;
         }
         self.embedding.remove_component(mesh, v);

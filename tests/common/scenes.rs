@@ -42,17 +42,23 @@ pub fn chain() -> Volume {
     chain_of(16.0, 4.5, 2.0)
 }
 
+fn chain_dims(major: f32, tube: f32, margin: f32) -> [usize; 3] {
+    let reach = major + tube + margin;
+    [(2.0 * reach + major) as usize, (2.0 * reach) as usize, (2.0 * reach) as usize]
+}
+
+/// Distance to two linked circles about the origin.
+fn to_linked_circles(p: Vec3, major: f32) -> f32 {
+    let half = Vec3::X * 0.5 * major;
+    let (a, b) = (p + half, p - half);
+    to_circle(a, major).min(to_circle(Vec3::new(b.x, b.z, b.y), major))
+}
+
 /// Two linked tori with `margin` voxels of empty space around them.
 pub fn chain_of(major: f32, tube: f32, margin: f32) -> Volume {
-    let reach = major + tube + margin;
-    let dims = [(2.0 * reach + major) as usize, (2.0 * reach) as usize, (2.0 * reach) as usize];
+    let dims = chain_dims(major, tube, margin);
     let centre = Vec3::from(dims.map(|n| 0.5 * (n as f32 - 1.0)));
-    let half = Vec3::X * 0.5 * major;
-    volume(dims, |p| {
-        let (a, b) = (p - centre + half, p - centre - half);
-        let distance = to_circle(a, major).min(to_circle(Vec3::new(b.x, b.z, b.y), major));
-        potential(distance, tube)
-    })
+    volume(dims, |p| potential(to_linked_circles(p - centre, major), tube))
 }
 
 /// Figure 14: the Menger sponge of a depth in 81³ voxels, 1 inside and 0 outside.
@@ -71,4 +77,47 @@ pub fn menger(depth: u32) -> Volume {
         1.0
     };
     volume([81, 81, 81], |p| solid(p.x as u32, p.y as u32, p.z as u32))
+}
+
+/// Distance from `p` to the skeleton of [`chain`].
+pub fn to_chain(p: Vec3) -> f32 {
+    let centre = Vec3::from(chain_dims(16.0, 4.5, 2.0).map(|n| 0.5 * (n as f32 - 1.0)));
+    to_linked_circles(p - centre, 16.0)
+}
+
+/// A vessel that parts in two, three times; in a volume of 64 × 64 × 72 voxels.
+pub struct VesselTree {
+    /// Both ends and the radius of each branch.
+    branches: Vec<(Vec3, Vec3, f32)>,
+}
+
+impl VesselTree {
+    pub fn new() -> Self {
+        let mut branches = vec![(Vec3::new(31.5, 31.5, 6.0), Vec3::new(31.5, 31.5, 22.0), 4.5)];
+        let mut tips = branches.clone();
+        for k in 0..3 {
+            let sideways = if k % 2 == 0 { Vec3::X } else { Vec3::Y };
+            let (spread, rise, radius) = ([13.0, 12.0, 6.5][k], [15.0, 14.0, 11.0][k], [3.6, 2.9, 2.3][k]);
+            let grow = |&(_, tip, _): &(Vec3, Vec3, f32)| {
+                [-1.0, 1.0].map(|side| (tip, tip + sideways * (side * spread) + Vec3::Z * rise, radius))
+            };
+            tips = tips.iter().flat_map(grow).collect();
+            branches.extend(&tips);
+        }
+        Self { branches }
+    }
+
+    /// Distance from `p` to the surface, negative inside.
+    pub fn distance(&self, p: Vec3) -> f32 {
+        let to_branch = |&(a, b, radius): &(Vec3, Vec3, f32)| {
+            let along = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+            p.distance(a + (b - a) * along) - radius
+        };
+        self.branches.iter().map(to_branch).fold(f32::INFINITY, f32::min)
+    }
+
+    /// Intensity falls from 1 to 0 over four voxels across the surface, which is at 0.5.
+    pub fn volume(&self) -> Volume {
+        volume([64, 64, 72], |p| (0.5 - 0.25 * self.distance(p)).clamp(0.0, 1.0))
+    }
 }

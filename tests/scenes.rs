@@ -1,0 +1,212 @@
+//! The scenes of the paper, whole: what each must come to, and no crossing on the way. A line a scene is printed.
+//!
+//! By default those that take seconds. `VESICLE_SCENES=all` runs all (some minutes): `npm run scenes`.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test fails by panicking, a scene reports a line"
+)]
+
+mod common;
+#[path = "common/scenes.rs"]
+mod scenes;
+
+use common::Random;
+use vesicle::math::Vec3;
+use vesicle::mesh::{Measures, Mesh, count_crossings, measure};
+use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Start};
+use vesicle::volume::{Volume, marching_cubes_world};
+#[cfg(target_arch = "wasm32")]
+use wasm_bindgen_test::wasm_bindgen_test as test;
+
+/// Whether long scenes are to be run, too.
+fn all() -> bool {
+    std::env::var("VESICLE_SCENES").is_ok_and(|which| which == "all")
+}
+
+/// What a scene came to.
+struct Outcome {
+    measures: Measures,
+    /// χ of each component, lowest first.
+    euler: Vec<i64>,
+}
+
+/// Runs a model to rest. After every iteration the mesh is sound, χ is as predicted, no two triangles cross, and the
+/// volume of the whole is positive.
+fn play(name: &str, volume: &Volume, options: DeformableOptions, most: u32) -> (DeformableModel, Outcome) {
+    let mut model = DeformableModel::new(volume, options).unwrap();
+    let iterations = loop {
+        let report = model.step().unwrap();
+        let what = format!("{name}, iteration {}", report.iteration);
+        assert_eq!(model.mesh().check(), Ok(()), "{what}");
+        assert_eq!(i64::from(report.euler), model.mesh().euler(), "{what}");
+        let triangles = model.mesh().to_triangles();
+        assert_eq!(count_crossings(&triangles), 0, "{what}");
+        assert!(measure(&triangles).volume > 0.0, "{what}");
+        if report.done {
+            break report.iteration;
+        }
+        assert!(report.iteration < most, "{what}: not at rest, {report:?}");
+    };
+    let surface = model.surface();
+    let mut euler: Vec<i64> = surface.components().iter().map(|part| measure(part).euler).collect();
+    euler.sort_unstable();
+    let outcome = Outcome { measures: measure(&surface), euler };
+    println!(
+        "{name}: {iterations} iterations, {} vertices, χ {:?}, area {:.0}, volume {:.0}",
+        surface.positions.len(),
+        outcome.euler,
+        outcome.measures.area,
+        outcome.measures.volume
+    );
+    (model, outcome)
+}
+
+fn params(volume: &Volume, iso: f64, rigidity: f64, stiffness: f64) -> Option<DeformableParams> {
+    Some(DeformableParams { iso, rigidity, stiffness, ..DeformableParams::for_volume(volume) })
+}
+
+/// Mean distance of the vertices from the surface of which `distance` is the distance.
+fn mean_distance(model: &DeformableModel, distance: impl Fn(Vec3) -> f32) -> f32 {
+    let surface = model.surface();
+    surface.positions.iter().map(|&p| distance(p).abs()).sum::<f32>() / surface.positions.len() as f32
+}
+
+/// Figure 7: from spheres of twelve radii around the two rings.
+#[test]
+fn chain_from_twelve_radii() {
+    let volume = scenes::chain();
+    let centre = Vec3::from(volume.dims().map(|n| 0.5 * (n as f32 - 1.0)));
+    for k in (0..12).filter(|k| all() || k % 4 == 0) {
+        let radius = 33.0 + k as f32;
+        let sphere = Mesh::icosphere(centre, radius, 3.0).unwrap().to_triangles();
+        let options = DeformableOptions {
+            start: Start::Mesh(sphere),
+            edge: Some(3.15),
+            params: params(&volume, 0.5, 0.1, 0.1),
+            ..Default::default()
+        };
+        let (_, outcome) = play(&format!("chain from radius {radius}"), &volume, options, 200);
+        assert_eq!(outcome.euler, [0, 0]);
+    }
+}
+
+/// At an edge of a voxel the rings are found to a tenth of a voxel.
+#[test]
+fn the_chain_is_true() {
+    let volume = scenes::chain();
+    let options = DeformableOptions { params: params(&volume, 0.5, 0.1, 0.0), ..Default::default() };
+    let (model, outcome) = play("chain, fine", &volume, options, 600);
+    assert_eq!(outcome.euler, [0, 0]);
+    let off = mean_distance(&model, |p| scenes::to_chain(p) - 4.5);
+    println!("chain, fine: {off:.4} voxels from the true surface in the mean");
+    assert!(off <= 0.1);
+}
+
+/// Figure 14, depth 3: holes three voxels wide. Depth 4, holes of one voxel, is beyond what two vertices may be apart
+/// without contact.
+#[test]
+fn menger_sponge_of_depth_three() {
+    if !all() {
+        return;
+    }
+    let volume = scenes::menger(3);
+    let options =
+        DeformableOptions { levels: 3, params: params(&volume, 0.4, 0.05, 0.001), ..Default::default() };
+    let (_, outcome) = play("Menger sponge, depth 3", &volume, options, 2000);
+    assert_eq!(outcome.euler, [-2816]);
+}
+
+/// A tree of vessels: each branch parts in two, thinner ones.
+#[test]
+fn a_vessel_tree_is_one_tree() {
+    let tree = scenes::VesselTree::new();
+    let volume = tree.volume();
+    let options = DeformableOptions {
+        start: Start::MarchingCubes(0.5),
+        params: params(&volume, 0.5, 0.05, 0.0),
+        ..Default::default()
+    };
+    let (model, outcome) = play("vessel tree", &volume, options, 600);
+    assert_eq!(outcome.euler, [2]);
+    let true_volume = measure(&marching_cubes_world(&volume, 0.5, 0).unwrap()).volume;
+    let less = 1.0 - outcome.measures.volume / true_volume;
+    let off = mean_distance(&model, |p| tree.distance(p));
+    println!("vessel tree: volume −{:.2} %, {off:.4} voxels from the true surface in the mean", 100.0 * less);
+    assert!(less.abs() < 0.02 && off <= 0.1);
+}
+
+/// A ball in noise: marching cubes find thousands of specks and handles.
+fn noisy_ball() -> Volume {
+    let mut random = Random(7);
+    let noise: Vec<f32> = (0..48 * 48 * 48).map(|_| random.unit() - 0.5).collect();
+    scenes::volume([48, 48, 48], |p| {
+        let ball = 0.5 + 0.1 * (14.0 - p.distance(Vec3::splat(23.5))).clamp(-3.0, 3.0);
+        ball + 0.8 * noise[p.x as usize + 48 * (p.y as usize + 48 * p.z as usize)]
+    })
+}
+
+#[test]
+fn rigidity_cleans_marching_cubes_of_noise() {
+    let volume = noisy_ball();
+    let found = measure(&marching_cubes_world(&volume, 0.5, 0).unwrap());
+    println!("noisy ball: marching cubes give {} components, χ {}", found.components, found.euler);
+    assert!(found.components > 500);
+    let options = DeformableOptions {
+        start: Start::MarchingCubes(0.5),
+        params: params(&volume, 0.5, 0.3, 0.0),
+        ..Default::default()
+    };
+    let (_, outcome) = play("noisy ball, rigidity 0.3", &volume, options, 600);
+    assert_eq!(outcome.euler.len(), 1);
+}
+
+/// Nothing holds the surface together here; it must stay sound, whether it rests or not.
+#[test]
+fn marching_cubes_of_noise_without_rigidity_stay_sound() {
+    let volume = noisy_ball();
+    let options = DeformableOptions {
+        start: Start::MarchingCubes(0.5),
+        params: params(&volume, 0.5, 0.0, 0.0),
+        ..Default::default()
+    };
+    let mut model = DeformableModel::new(&volume, options).unwrap();
+    let steps = if all() { 300 } else { 25 };
+    for step in 0..steps {
+        model.step().unwrap();
+        assert_eq!(model.mesh().check(), Ok(()), "step {step}");
+        assert_eq!(count_crossings(&model.mesh().to_triangles()), 0, "step {step}");
+    }
+    println!("noisy ball, no rigidity: {steps} iterations, {} vertices", model.mesh().vertex_count());
+}
+
+/// The model goes on from a state saved in the middle of a merge as if nothing had been.
+#[test]
+fn a_state_saved_in_a_merge_goes_on_bit_for_bit() {
+    let volume = scenes::chain();
+    let options = || DeformableOptions {
+        start: Start::Bubbles(11),
+        edge: Some(1.65),
+        params: params(&volume, 0.5, 0.0, 0.0),
+        ..Default::default()
+    };
+    let mut model = DeformableModel::new(&volume, options()).unwrap();
+    let mut merges = 0;
+    for _ in 0..40 {
+        let report = model.step().unwrap();
+        if report.events.axial > 0 {
+            merges += 1;
+            let mut other = DeformableModel::new(&volume, options()).unwrap();
+            other.restore(&model.save()).unwrap();
+            let mut one = model.clone();
+            for _ in 0..5 {
+                one.step().unwrap();
+                other.step().unwrap();
+            }
+            assert!(one.mesh().positions() == other.mesh().positions());
+            assert!(one.save() == other.save());
+        }
+    }
+    assert!(merges > 3, "{merges} iterations with a merge");
+}
