@@ -61,8 +61,8 @@ test('speeds are told for each vertex of the arrays, inwards while an enclosing 
   expect(failure(() => fitted.speeds()).code).toBe('freed');
 });
 
-test('the time of a step is told for forces, motion, normals and topology', () => {
-  expect(Object.keys(model().step().times).sort()).toEqual(['forces', 'motion', 'normals', 'topology']);
+test('the time of a step is told for each of its parts', () => {
+  expect(Object.keys(model().step().times).sort()).toEqual(['embedding', 'forces', 'motion', 'normals', 'topology']);
 });
 
 test('every start shape', async () => {

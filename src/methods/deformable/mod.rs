@@ -7,12 +7,13 @@
 //! refined by √3 and goes on one level down (`schedule`; section 5.1).
 //!
 //! # What it guarantees
-//! After every step the mesh is closed, oriented and 2-manifold, and χ is what the edits predict. The same input gives
-//! the same bits, natively and in wasm, also after [`DeformableModel::save`] and [`DeformableModel::restore`].
+//! After every step the mesh is closed, oriented and 2-manifold, no two of its triangles cross, and χ is what the edits
+//! predict. The same input gives the same bits, natively and in wasm, also after [`DeformableModel::save`] and
+//! [`DeformableModel::restore`].
 //!
 //! # What it does not
-//! The distance bounds of the paper keep the surface from crossing itself nearly always, not always: in hard scenes a
-//! few pairs of triangles cross for some iterations.
+//! Sheets nearer to each other than the contact distance, 2.5/√3 δ, meet: holes and walls thinner than that are lost, on
+//! coarse levels those thinner than the contact distance there.
 //!
 //! # Example
 //! ```
