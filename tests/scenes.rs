@@ -13,6 +13,7 @@ mod common;
 mod scenes;
 
 use common::Random;
+use std::collections::BTreeMap;
 use vesicle::math::Vec3;
 use vesicle::mesh::{Measures, Mesh, count_crossings, measure};
 use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Start};
@@ -209,4 +210,77 @@ fn a_state_saved_in_a_merge_goes_on_bit_for_bit() {
         }
     }
     assert!(merges > 3, "{merges} iterations with a merge");
+}
+
+/// Direct against coarse to fine, as the paper's table 1: seconds by part and level.
+#[test]
+fn a_head_direct_and_coarse_to_fine() {
+    if !all() {
+        return;
+    }
+    let volume = scenes::head_phantom();
+    let [direct, coarse_to_fine] = [0, 2].map(|levels| {
+        let options =
+            DeformableOptions { levels, params: params(&volume, 0.5, 0.4, 0.0), ..Default::default() };
+        let mut model = DeformableModel::new(&volume, options).unwrap();
+        model.set_clock(milliseconds);
+        let began = milliseconds();
+        let mut table = BTreeMap::<(usize, &str), f64>::new();
+        let report = loop {
+            let level = model.level();
+            let report = model.step().unwrap();
+            for (part, time) in &report.times.0 {
+                *table.entry((level, part)).or_default() += time;
+            }
+            if report.done {
+                break report;
+            }
+            assert!(report.iteration < 3000);
+        };
+        let seconds = 0.001 * (milliseconds() - began);
+        println!("head, {levels} levels: {seconds:.1} s, {} iterations", report.iteration);
+        for ((level, part), time) in table {
+            println!("  level {level}  {part:<10} {:>7.2} s", 0.001 * time);
+        }
+        let surface = model.surface();
+        assert_eq!(count_crossings(&surface), 0);
+        let found = measure(&surface);
+        println!(
+            "  {} vertices, χ {}, area {:.0}, volume {:.0}",
+            report.vertices, found.euler, found.area, found.volume
+        );
+        (found, seconds)
+    });
+    let off = |a: f64, b: f64| (a / b - 1.0).abs();
+    assert_eq!(direct.0.euler, coarse_to_fine.0.euler);
+    assert!(off(coarse_to_fine.0.area, direct.0.area) < 0.01);
+    assert!(off(coarse_to_fine.0.volume, direct.0.volume) < 0.003);
+    println!("head: coarse to fine {:.2} times as fast", direct.1 / coarse_to_fine.1);
+}
+
+/// Nothing in the core asks for the time; this test does.
+#[allow(clippy::disallowed_methods, reason = "the table is of times")]
+fn milliseconds() -> f64 {
+    static BEGAN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+    BEGAN.get_or_init(std::time::Instant::now).elapsed().as_secs_f64() * 1e3
+}
+
+/// FNV-1a over the bits of all positions.
+fn fingerprint(positions: &[Vec3]) -> u64 {
+    let bytes = positions.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes);
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
+}
+
+/// The same bits after 200 steps natively and in wasm; the package is held to the same number.
+#[test]
+fn two_hundred_steps_end_in_the_same_bits_everywhere() {
+    let volume = scenes::menger(2);
+    let options =
+        DeformableOptions { levels: 3, params: params(&volume, 0.4, 0.05, 0.001), ..Default::default() };
+    let mut model = DeformableModel::new(&volume, options).unwrap();
+    for _ in 0..200 {
+        model.step().unwrap();
+    }
+    let found = fingerprint(&model.surface().positions);
+    assert_eq!(format!("{found:016x}"), "5af38d845d62e4a4");
 }

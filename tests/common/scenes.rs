@@ -121,3 +121,28 @@ impl VesselTree {
         volume([64, 64, 72], |p| (0.5 - 0.25 * self.distance(p)).clamp(0.0, 1.0))
     }
 }
+
+/// A head of 256 × 256 × 68 voxels: two nested shells six voxels thick, with holes through them, in noise of deviation
+/// 0.02. The surface is at 0.5.
+pub fn head_phantom() -> Volume {
+    let centre = Vec3::new(127.5, 127.5, 33.5);
+    // About the distance to an ellipsoid.
+    let to_ellipsoid = |q: Vec3, axes: Vec3| {
+        let steepness = (q / (axes * axes)).length().max(1e-6);
+        (q / axes).length() * ((q / axes).length() - 1.0) / steepness
+    };
+    let to_hole = |q: Vec3, x: f32, y: f32, radius: f32| Vec3::new(q.x - x, q.y - y, 0.0).length() - radius;
+    let mut random = super::common::Random(1);
+    let noise: Vec<f32> =
+        (0..256 * 256 * 68).map(|_| (0..12).map(|_| random.unit()).sum::<f32>() - 6.0).collect();
+    volume([256, 256, 68], |p| {
+        let q = p - centre;
+        let shell = |axes: Vec3| to_ellipsoid(q, axes).abs() - 3.0;
+        let shells = shell(Vec3::new(112.0, 120.0, 29.0)).min(shell(Vec3::new(84.0, 92.0, 14.5)));
+        let holes = [(40.0, 20.0, 9.0), (-50.0, -30.0, 7.0), (10.0, -60.0, 12.0)];
+        let above = holes.into_iter().map(|(x, y, radius)| to_hole(q, x, y, radius));
+        let hole = if q.z > 0.0 { above.fold(f32::INFINITY, f32::min) } else { f32::INFINITY };
+        let at = p.x as usize + 256 * (p.y as usize + 256 * p.z as usize);
+        (0.5 - 0.25 * shells.max(-hole)).clamp(0.0, 1.0) + 0.02 * noise[at]
+    })
+}
