@@ -54,8 +54,8 @@ pub struct Embedding {
 }
 
 impl Embedding {
-    /// As [`Self::follow`]. `edge` is longer than most of its edges; it makes a
-    /// difference to speed only.
+    /// As [`Self::follow`]. `edge` is longer than most of its edges. It makes a difference to speed, and bounds what
+    /// [`Self::company`] can be asked for; not to what is found to cross.
     pub fn follow_with(&mut self, mesh: &Mesh, edge: f32) {
         if self.edge != edge {
             self.edge = edge;
@@ -88,12 +88,15 @@ impl Embedding {
     ) -> Result<T, EditError> {
         self.follow(mesh);
         mesh.begin();
-        let mut done = edit(mesh);
-        if done.is_ok() && self.changes_cross(mesh) {
-            done = Err(EditError::WouldCross);
-        }
+        let done = edit(mesh).and_then(|done| {
+            let changed = mesh.changed_triangles();
+            if self.changes_cross(mesh, &changed) {
+                return Err(EditError::WouldCross);
+            }
+            self.follow_changes(mesh, &changed);
+            Ok(done)
+        });
         if done.is_ok() {
-            self.follow_changes(mesh);
             mesh.commit();
         } else {
             mesh.roll_back();
@@ -123,7 +126,7 @@ impl Embedding {
     }
 
     /// Takes the changes since [`Mesh::begin`] into the grid.
-    fn follow_changes(&mut self, mesh: &Mesh) {
+    fn follow_changes(&mut self, mesh: &Mesh, changed: &[[VertexId; 3]]) {
         self.tight.resize(mesh.slots(), UNKNOWN);
         for v in mesh.touched() {
             self.tight[v.index()] = UNKNOWN;
@@ -134,10 +137,10 @@ impl Embedding {
             }
         }
         // Neighbours of what moved have longer edges, too.
-        for names in mesh.changed_triangles() {
+        for names in changed {
             let [a, b, c] = names.map(|v| mesh.position(v));
             let square = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
-            for v in names {
+            for &v in names {
                 self.tight[v.index()] = UNKNOWN;
                 self.grid.stretch(v, square.sqrt());
             }

@@ -13,14 +13,13 @@ fn changed(facet: Facet) -> Changed {
 }
 
 impl Embedding {
-    /// Whether the triangles changed since [`Mesh::begin`] cross each other or any other. The grid still holds the mesh as
-    /// it was.
-    pub(super) fn changes_cross(&mut self, mesh: &Mesh) -> bool {
-        let names = mesh.changed_triangles();
+    /// Whether the triangles changed since [`Mesh::begin`], by their corners, cross each other or any other. The grid still
+    /// holds the mesh as it was.
+    pub(super) fn changes_cross(&mut self, mesh: &Mesh, names: &[[VertexId; 3]]) -> bool {
         let fresh: Vec<Changed> = names.iter().map(|&names| changed(mesh.facet(names))).collect();
         // Refusals for what is close at hand are cheap, but not free.
         self.effort += 1;
-        stars_cross(mesh, &names) || cross_each_other(&fresh) || self.cross_others(mesh, &fresh)
+        stars_cross(mesh, names) || cross_each_other(&fresh) || self.cross_others(mesh, &fresh)
     }
 
     /// Whether a changed triangle crosses one that is not and has no corner in common with it.
