@@ -13,8 +13,7 @@ mod common;
 #[path = "common/scenes.rs"]
 mod scenes;
 
-use common::Random;
-use std::ops::Range;
+use common::{Named, Random, seeds};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::count_crossings;
 use vesicle::methods::deformable::{
@@ -28,10 +27,6 @@ const STEPS: usize = 40;
 
 /// Where the usual seeds end; in wasm, which is slower to report, fewer do.
 const SEEDS: u64 = if cfg!(target_arch = "wasm32") { 100 } else { 400 };
-
-fn number(random: &mut Random, low: f64, high: f64) -> f64 {
-    low + (high - low) * f64::from(random.unit())
-}
 
 fn dims(random: &mut Random) -> [usize; 3] {
     [8 + random.below(30), 8 + random.below(30), 4 + random.below(30)]
@@ -56,10 +51,10 @@ fn image(random: &mut Random, dims: [usize; 3]) -> Volume {
 fn start(random: &mut Random, dims: [usize; 3]) -> Start {
     match random.below(5) {
         0 => Start::Bubbles(1 + random.below(4) as u32),
-        1 => Start::MarchingCubes(number(random, 0.3, 0.7)),
+        1 => Start::MarchingCubes(random.within(0.3, 0.7)),
         2 => {
             let middle = DVec3::from(dims.map(|n| n as f64)) * 0.5;
-            Start::Seeds { points: vec![middle], radius: number(random, 1.0, 7.0) }
+            Start::Seeds { points: vec![middle], radius: random.within(1.0, 7.0) }
         }
         _ => Start::Enclosing,
     }
@@ -67,31 +62,32 @@ fn start(random: &mut Random, dims: [usize; 3]) -> Start {
 
 fn params(random: &mut Random, volume: &Volume) -> DeformableParams {
     DeformableParams {
-        iso: number(random, 0.2, 0.8),
-        iso_force: if random.below(3) == 0 { number(random, -4.0, 4.0) } else { -1.0 },
-        rigidity: number(random, 0.0, 0.4),
-        stiffness: if random.below(2) == 0 { 0.0 } else { number(random, 0.0, 0.2) },
-        gradient_normal: if random.below(3) == 0 { number(random, 0.0, 1.0) } else { 0.0 },
-        damping: number(random, 0.2, 0.8),
-        max_move: number(random, 0.1, 0.5),
+        iso: random.within(0.2, 0.8),
+        iso_force: if random.below(3) == 0 { random.within(-4.0, 4.0) } else { -1.0 },
+        rigidity: random.within(0.0, 0.4),
+        stiffness: if random.below(2) == 0 { 0.0 } else { random.within(0.0, 0.2) },
+        gradient_normal: if random.below(3) == 0 { random.within(0.0, 1.0) } else { 0.0 },
+        damping: random.within(0.2, 0.8),
+        max_move: random.within(0.1, 0.5),
         integrator: if random.below(4) == 0 { Integrator::RungeKutta } else { Integrator::Euler },
         ..DeformableParams::for_volume(volume)
     }
 }
 
 /// One run, with parameters changed and attractors set on the way. A start that does not fit is refused.
-fn run(seed: u64) {
+/// Returns how many steps were made.
+fn run(seed: u64) -> usize {
     let mut random = Random(seed);
     let dims = dims(&mut random);
     let volume = image(&mut random, dims);
     let options = DeformableOptions {
         start: start(&mut random, dims),
         levels: random.below(3),
-        edge: Some(number(&mut random, 1.0, 3.0)),
+        edge: Some(random.within(1.0, 3.0)),
         params: Some(params(&mut random, &volume)),
         ..Default::default()
     };
-    let Ok(mut model) = DeformableModel::new(&volume, options) else { return };
+    let Ok(mut model) = DeformableModel::new(&volume, options) else { return 0 };
     for step in 0..STEPS {
         let report = model.step().unwrap_or_else(|error| panic!("seed {seed}, step {step}: {error}"));
         assert_eq!(model.mesh().check(), Ok(()), "seed {seed}, step {step}");
@@ -101,46 +97,22 @@ fn run(seed: u64) {
         match random.below(40) {
             0 => model.set_params(params(&mut random, &volume)).unwrap(),
             1 => {
-                let point = DVec3::from(dims.map(|n| number(&mut random, 0.0, n as f64)));
-                let pull = Attractor { point, strength: number(&mut random, -0.5, 0.5), radius: 8.0 };
+                let point = DVec3::from(dims.map(|n| random.within(0.0, n as f64)));
+                let pull = Attractor { point, strength: random.within(-0.5, 0.5), radius: 8.0 };
                 model.set_attractors(vec![pull]).unwrap();
             }
             _ => {}
         }
     }
-}
-
-fn seeds() -> Range<u64> {
-    let Ok(named) = std::env::var("FUZZ_SEEDS") else { return 0..SEEDS };
-    let ends =
-        named.split_once("..").and_then(|(first, last)| Some((first.parse().ok()?, last.parse().ok()?)));
-    let Some((first, last)) = ends else { panic!("FUZZ_SEEDS is {named}; <first>..<last> is needed") };
-    first..last
-}
-
-/// Names the seed of a run that panics. In wasm a panic ends the program, so each seed is said before.
-struct Named(u64);
-
-impl Named {
-    fn new(seed: u64) -> Self {
-        #[cfg(target_arch = "wasm32")]
-        wasm_bindgen_test::console_log!("seed {seed}");
-        Self(seed)
-    }
-}
-
-impl Drop for Named {
-    fn drop(&mut self) {
-        if std::thread::panicking() {
-            println!("failing seed: {}", self.0);
-        }
-    }
+    STEPS
 }
 
 #[test]
 fn any_run_is_sound_after_every_step() {
-    for seed in seeds() {
+    let mut steps = 0;
+    for seed in seeds(SEEDS) {
         let named = Named::new(seed);
-        run(named.0);
+        steps += run(named.0);
     }
+    println!("{steps} steps");
 }

@@ -74,13 +74,14 @@ fn mean_distance(model: &DeformableModel, distance: impl Fn(Vec3) -> f32) -> f32
     surface.positions.iter().map(|&p| distance(p).abs()).sum::<f32>() / surface.positions.len() as f32
 }
 
-/// Figure 7: from spheres of twelve radii around the two rings.
+/// Figure 7: from spheres of twelve radii around the two rings, which reach 28.5 voxels from the centre. The paper needed
+/// 90 iterations.
 #[test]
 fn chain_from_twelve_radii() {
     let volume = scenes::chain();
     let centre = Vec3::from(volume.dims().map(|n| 0.5 * (n as f32 - 1.0)));
     for k in (0..12).filter(|k| all() || k % 4 == 0) {
-        let radius = 33.0 + k as f32;
+        let radius = 29.0 + 0.35 * k as f32;
         let sphere = Mesh::icosphere(centre, radius, 3.0).unwrap().to_triangles();
         let options = DeformableOptions {
             start: Start::Mesh(sphere),
@@ -88,7 +89,7 @@ fn chain_from_twelve_radii() {
             params: params(&volume, 0.5, 0.1, 0.1),
             ..Default::default()
         };
-        let (_, outcome) = play(&format!("chain from radius {radius}"), &volume, options, 200);
+        let (_, outcome) = play(&format!("chain from radius {radius}"), &volume, options, 90);
         assert_eq!(outcome.euler, [0, 0]);
     }
 }

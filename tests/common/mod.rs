@@ -1,7 +1,9 @@
 //! What several test files need.
 #![allow(dead_code, reason = "each test file uses a part of it")]
+#![allow(clippy::panic, clippy::print_stdout, reason = "the lints spare tests, but not their helpers")]
 
 use std::f32::consts::TAU;
+use std::ops::Range;
 use vesicle::math::Vec3;
 use vesicle::mesh::TriangleMesh;
 
@@ -22,9 +24,42 @@ impl Random {
         (self.next() % n as u64) as usize
     }
 
+    /// In `low`..`high`.
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * f64::from(self.unit())
+    }
+
     /// In 0..1.
     pub fn unit(&mut self) -> f32 {
         (self.next() >> 40) as f32 / (1u64 << 24) as f32
+    }
+}
+
+/// The seeds of a test: `0..usual`, or those of the environment's `FUZZ_SEEDS=<first>..<last>`.
+pub fn seeds(usual: u64) -> Range<u64> {
+    let Ok(named) = std::env::var("FUZZ_SEEDS") else { return 0..usual };
+    let ends =
+        named.split_once("..").and_then(|(first, last)| Some((first.parse().ok()?, last.parse().ok()?)));
+    let Some((first, last)) = ends else { panic!("FUZZ_SEEDS is {named}; <first>..<last> is needed") };
+    first..last
+}
+
+/// Names the seed of a run that panics. In wasm a panic ends the program, so each seed is said before.
+pub struct Named(pub u64);
+
+impl Named {
+    pub fn new(seed: u64) -> Self {
+        #[cfg(target_arch = "wasm32")]
+        wasm_bindgen_test::console_log!("seed {seed}");
+        Self(seed)
+    }
+}
+
+impl Drop for Named {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            println!("failing seed: {}", self.0);
+        }
     }
 }
 

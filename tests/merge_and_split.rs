@@ -1,0 +1,183 @@
+//! Shapes of random topology, found from outside by parting and from within by merging: each part with its χ.
+//!
+//! A seed that fails prints itself. `FUZZ_SEEDS=<first>..<last>` runs others than the usual ones.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "the lints spare tests, but not their helpers"
+)]
+
+mod common;
+#[path = "common/scenes.rs"]
+mod scenes;
+
+use common::{Named, Random, seeds};
+use vesicle::math::Vec3;
+use vesicle::mesh::{count_crossings, measure};
+use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Start};
+use vesicle::volume::Volume;
+#[cfg(target_arch = "wasm32")]
+use wasm_bindgen_test::wasm_bindgen_test as test;
+
+/// Where the usual seeds end.
+const SEEDS: u64 = if cfg!(target_arch = "wasm32") { 4 } else { 25 };
+
+/// Iterations after which everything is where it belongs, from any start.
+const MOST: u32 = 400;
+
+/// Balls on a lattice of 3 × 2 × 2, some of them joined to their neighbours by bars. Nothing is thinner than 5 voxels, and
+/// nothing else than what is joined is nearer than 4.
+struct Frame {
+    balls: Vec<Vec3>,
+    bars: Vec<[usize; 2]>,
+    radius: f32,
+}
+
+const LATTICE: [usize; 3] = [3, 2, 2];
+const MARGIN: f32 = 11.0;
+/// Radius of a bar.
+const BAR: f32 = 4.0;
+const SPACING: f32 = 22.0;
+
+impl Frame {
+    fn random(random: &mut Random) -> Self {
+        let (some_balls, some_bars) = (0.5 + 0.5 * random.unit(), 0.2 + 0.7 * random.unit());
+        let mut frame = Self { balls: Vec::new(), bars: Vec::new(), radius: 6.0 + random.unit() };
+        let mut places = Vec::new();
+        for i in 0..LATTICE.iter().product::<usize>() {
+            if i > 0 && random.unit() > some_balls {
+                continue;
+            }
+            let place = [i % 3, i / 3 % 2, i / 6];
+            for (other, there) in places.iter().enumerate() {
+                if are_neighbours(place, *there) && random.unit() < some_bars {
+                    frame.bars.push([other, places.len()]);
+                }
+            }
+            let shift = Vec3::new(random.unit(), random.unit(), random.unit()) * 2.0 - 1.0;
+            frame.balls.push(Vec3::from(place.map(|k| MARGIN + SPACING * k as f32)) + shift);
+            places.push(place);
+        }
+        frame
+    }
+
+    fn distance(&self, p: Vec3) -> f32 {
+        let to_ball = |&centre: &Vec3| p.distance(centre) - self.radius;
+        let to_bar = |&[a, b]: &[usize; 2]| {
+            let (a, b) = (self.balls[a], self.balls[b]);
+            let along = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+            p.distance(a + (b - a) * along) - BAR
+        };
+        let balls = self.balls.iter().map(to_ball);
+        balls.chain(self.bars.iter().map(to_bar)).fold(f32::INFINITY, f32::min)
+    }
+
+    /// Intensity falls from 1 to 0 over four voxels across the surface, which is at 0.5.
+    fn volume(&self) -> Volume {
+        let dims = LATTICE.map(|n| (2.0 * MARGIN + SPACING * (n - 1) as f32) as usize);
+        scenes::volume(dims, |p| (0.5 - 0.25 * self.distance(p)).clamp(0.0, 1.0))
+    }
+
+    /// For each ball the first one that is joined to it, over any number of bars.
+    fn parts(&self) -> Vec<usize> {
+        let mut part: Vec<usize> = (0..self.balls.len()).collect();
+        for _ in 0..self.balls.len() {
+            for &[a, b] in &self.bars {
+                let first = part[a].min(part[b]);
+                (part[a], part[b]) = (first, first);
+            }
+        }
+        part
+    }
+
+    /// χ = 2 (balls − bars) of each part, lowest first.
+    fn euler(&self) -> Vec<i64> {
+        let part = self.parts();
+        let one = |k: usize| {
+            let balls = part.iter().filter(|&&p| p == k).count() as i64;
+            let bars = self.bars.iter().filter(|bar| part[bar[0]] == k).count() as i64;
+            2 * (balls - bars)
+        };
+        let mut euler: Vec<i64> = (0..part.len()).filter(|&k| part[k] == k).map(one).collect();
+        euler.sort_unstable();
+        euler
+    }
+
+    /// A start that everything is found from: all around; a seed in each part, which grows through its bars and meets
+    /// itself behind the holes; or seeds in all balls and bars, which meet each other.
+    fn start(&self, random: &mut Random) -> Start {
+        let part = self.parts();
+        let balls = (0..part.len()).map(|k| self.balls[k]);
+        let middles = self.bars.iter().map(|&[a, b]| (self.balls[a] + self.balls[b]) * 0.5);
+        let points: Vec<Vec3> = match random.below(3) {
+            0 => return Start::Enclosing,
+            1 => (0..part.len()).filter(|&k| part[k] == k).map(|k| self.balls[k]).collect(),
+            _ => balls.chain(middles).collect(),
+        };
+        Start::Seeds { points: points.into_iter().map(Vec3::into).collect(), radius: 3.0 }
+    }
+}
+
+fn are_neighbours(a: [usize; 3], b: [usize; 3]) -> bool {
+    (0..3).map(|k| a[k].abs_diff(b[k])).sum::<usize>() == 1
+}
+
+/// χ of each component of the model, lowest first.
+fn euler_of_parts(model: &DeformableModel) -> Vec<i64> {
+    let mut euler: Vec<i64> = model.surface().components().iter().map(|part| measure(part).euler).collect();
+    euler.sort_unstable();
+    euler
+}
+
+/// Returns how many parts merged or parted on the way.
+fn run(seed: u64) -> [u32; 2] {
+    let mut random = Random(seed);
+    let frame = Frame::random(&mut random);
+    let volume = frame.volume();
+    let params = DeformableParams {
+        iso: 0.5,
+        rigidity: random.within(0.0, 0.1),
+        stiffness: random.within(0.0, 0.03),
+        damping: random.within(0.3, 0.6),
+        ..DeformableParams::for_volume(&volume)
+    };
+    let levels = random.below(2);
+    let options = DeformableOptions {
+        start: frame.start(&mut random),
+        levels,
+        edge: Some(random.within(1.7, 2.4)),
+        params: Some(params),
+        ..Default::default()
+    };
+    let what = format!("seed {seed}, {options:?}");
+    let mut model = DeformableModel::new(&volume, options).unwrap();
+    let mut changes = [0, 0];
+    for _ in 0..MOST {
+        let report = model.step().unwrap();
+        assert_eq!(i64::from(report.euler), model.mesh().euler(), "{what}: {report:?}");
+        assert_eq!(count_crossings(&model.mesh().to_triangles()), 0, "{what}: {report:?}");
+        changes[0] += report.events.axial;
+        changes[1] += report.events.annular;
+        if report.done {
+            break;
+        }
+    }
+    assert_eq!(model.mesh().check(), Ok(()), "{what}");
+    if euler_of_parts(&model) != frame.euler() { for p in model.surface().components() { let m=measure(&p); println!("{} vertices, χ {} area {} volume {} at {:?}", p.positions.len(), m.euler, m.area, m.volume, p.positions[0]); } }
+    assert_eq!(euler_of_parts(&model), frame.euler(), "{what}");
+    changes
+}
+
+#[test]
+fn every_part_of_a_random_shape_is_found_with_its_holes() {
+    let mut all = [0, 0];
+    for seed in seeds(SEEDS) {
+        let named = Named::new(seed);
+        let [merges, partings] = run(named.0);
+        all = [all[0] + merges, all[1] + partings];
+    }
+    println!("{} axial and {} annular changes", all[0], all[1]);
+    assert!(all.iter().all(|&count| count > 0));
+}
