@@ -13,7 +13,7 @@ mod common;
 #[path = "common/scenes.rs"]
 mod scenes;
 
-use common::{Named, Random, seeds};
+use common::{Named, Random, misplaced_parts, seeds};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::count_crossings;
 use vesicle::methods::deformable::{
@@ -104,6 +104,8 @@ fn run(seed: u64) -> usize {
             _ => {}
         }
     }
+    let misplaced = misplaced_parts(&model.mesh().to_triangles());
+    assert!(misplaced.is_empty(), "seed {seed}: {misplaced:?}");
     STEPS
 }
 

@@ -13,7 +13,7 @@ mod common;
 #[path = "common/scenes.rs"]
 mod scenes;
 
-use common::{Named, Random, seeds};
+use common::{Named, Random, misplaced_parts, seeds};
 use vesicle::math::Vec3;
 use vesicle::mesh::{count_crossings, measure};
 use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Start};
@@ -157,7 +157,10 @@ fn run(seed: u64) -> [u32; 2] {
     for _ in 0..MOST {
         let report = model.step().unwrap();
         assert_eq!(i64::from(report.euler), model.mesh().euler(), "{what}: {report:?}");
-        assert_eq!(count_crossings(&model.mesh().to_triangles()), 0, "{what}: {report:?}");
+        let triangles = model.mesh().to_triangles();
+        assert_eq!(count_crossings(&triangles), 0, "{what}: {report:?}");
+        let misplaced = misplaced_parts(&triangles);
+        assert!(misplaced.is_empty(), "{what}: {misplaced:?}, {report:?}");
         changes[0] += report.events.axial;
         changes[1] += report.events.annular;
         if report.done {
@@ -165,7 +168,6 @@ fn run(seed: u64) -> [u32; 2] {
         }
     }
     assert_eq!(model.mesh().check(), Ok(()), "{what}");
-    if euler_of_parts(&model) != frame.euler() { for p in model.surface().components() { let m=measure(&p); println!("{} vertices, χ {} area {} volume {} at {:?}", p.positions.len(), m.euler, m.area, m.volume, p.positions[0]); } }
     assert_eq!(euler_of_parts(&model), frame.euler(), "{what}");
     changes
 }

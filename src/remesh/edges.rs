@@ -80,8 +80,7 @@ impl Resolver {
             Ok(_) => self.collapse(mesh, u, v),
             Err(EditError::NeckInTheWay(_)) => self.cut_neck(mesh, sampling, u, v),
             Err(EditError::ValenceTooLow(_)) if mesh.is_tetrahedron(u) => {
-                mesh.remove_tetrahedron(u)?;
-                self.changes.vanished += 1;
+                self.remove_part(mesh, u);
                 Ok(true)
             }
             Err(refusal) => Err(refusal),

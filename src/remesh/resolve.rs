@@ -1,5 +1,6 @@
 //! The loop of figure 9: edges, then contact, until every bound holds.
 
+use super::specks::SmallParts;
 use super::{Changes, Embedding, Sampling};
 use crate::math::Vec3;
 use crate::mesh::{Mesh, MeshError, VertexId};
@@ -31,8 +32,10 @@ pub struct Resolver {
     is_stirred: Vec<bool>,
     /// Vertices that the last move could not move at all.
     pub(super) stuck: Vec<VertexId>,
+    /// Components that may vanish.
+    pub(super) small: SmallParts,
     /// Vertices made or displaced by the last call.
-    edited: Vec<VertexId>,
+    pub(super) edited: Vec<VertexId>,
     pub(super) embedding: Embedding,
     pub(super) changes: Changes,
 }
@@ -66,6 +69,7 @@ impl Resolver {
             stirred: Vec::new(),
             is_stirred: Vec::new(),
             stuck: Vec::new(),
+            small: SmallParts::default(),
             edited: Vec::new(),
             embedding: Embedding::default(),
             changes: Changes::default(),
@@ -109,11 +113,13 @@ impl Resolver {
                 break;
             }
         }
+        self.note_small_parts(mesh, sampling);
         self.changes
     }
 
     /// Moves the vertices as [`Embedding::carry`] does.
     pub fn carry(&mut self, mesh: &mut Mesh, sampling: Sampling, ways: &mut [Vec3]) -> Vec<(VertexId, f32)> {
+        self.small.find(mesh);
         self.embedding.follow_with(mesh, sampling.longest());
         let held = self.embedding.carry(mesh, ways);
         self.stuck.clear();

@@ -3,9 +3,10 @@
 #![allow(clippy::panic, clippy::print_stdout, reason = "the lints spare tests, but not their helpers")]
 
 use std::f32::consts::TAU;
+use std::f64::consts::PI;
 use std::ops::Range;
-use vesicle::math::Vec3;
-use vesicle::mesh::TriangleMesh;
+use vesicle::math::{DVec3, Vec3};
+use vesicle::mesh::{TriangleMesh, measure};
 
 /// A small seeded generator (SplitMix64), the same numbers natively and in wasm.
 pub struct Random(pub u64);
@@ -78,4 +79,30 @@ pub fn torus_around(centre: Vec3, [n, m]: [u32; 2], [ring, tube]: [f32; 2]) -> T
         }
     }
     mesh
+}
+
+/// The parts of a surface that are not where they belong: solid ones within others, and cavities not within one.
+pub fn misplaced_parts(surface: &TriangleMesh) -> Vec<String> {
+    let parts = surface.components();
+    let windings = |k: usize| {
+        let others = (0..parts.len()).filter(|&other| other != k).map(|other| &parts[other]);
+        (others.map(|other| solid_angle(other, parts[k].positions[0])).sum::<f64>() / (4.0 * PI)).round()
+    };
+    let misplaced = |k: usize| {
+        let (volume, windings) = (measure(&parts[k]).volume, windings(k));
+        (windings != if volume > 0.0 { 0.0 } else { 1.0 }).then(|| {
+            format!("{} vertices with volume {volume} within {windings} others", parts[k].positions.len())
+        })
+    };
+    (0..parts.len()).filter_map(misplaced).collect()
+}
+
+/// The solid angle under which a closed surface is seen from `p`: 4π from within.
+fn solid_angle(surface: &TriangleMesh, p: Vec3) -> f64 {
+    let seen = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|i| DVec3::from(surface.positions[i as usize]) - DVec3::from(p));
+        let [x, y, z] = [a, b, c].map(DVec3::length);
+        2.0 * libm::atan2(a.dot(b.cross(c)), x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y)
+    };
+    surface.triangles.iter().map(seen).sum()
 }
