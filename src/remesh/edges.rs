@@ -104,7 +104,8 @@ impl Resolver {
         Err(EditError::WouldCross)
     }
 
-    /// Annular change through the edge `uv` and the common neighbour that makes the shortest ring.
+    /// Annular change through the edge `uv` and a common neighbour: the one that makes the shortest ring, where nothing
+    /// crosses then.
     fn cut_neck(
         &mut self,
         mesh: &mut Mesh,
@@ -117,21 +118,14 @@ impl Resolver {
             let p = mesh.position(*o);
             p.distance(mesh.position(u)) + p.distance(mesh.position(v))
         };
-        let third = mesh.common_neighbours(u, v).into_iter();
-        let third = third.filter(|&o| o != opposite.left && o != opposite.right);
-        let Some(o) = third.min_by(|a, b| around(a).total_cmp(&around(b))) else {
+        let mut thirds = mesh.common_neighbours(u, v);
+        thirds.retain(|&mut o| o != opposite.left && o != opposite.right);
+        thirds.sort_by(|a, b| around(a).total_cmp(&around(b)));
+        if thirds.is_empty() {
             return Ok(false);
-        };
-        let mut apart = |push: f32| {
-            self.embedding.attempt(mesh, |mesh| {
-                let cut = mesh.cut(u, v, o)?;
-                part(mesh, cut, push * sampling.shortest());
-                Ok(cut)
-            })
-        };
-        let Some(cut) = CUT_PUSHES.into_iter().find_map(|push| apart(push).ok()) else {
-            return Err(EditError::WouldCross);
-        };
+        }
+        let cut = thirds.into_iter().find_map(|o| self.cut_apart(mesh, sampling, [u, v, o]));
+        let cut = cut.ok_or(EditError::WouldCross)?;
         self.changes.annular += 1;
         for side in [cut.kept, cut.copies] {
             if !self.remove_speck(mesh, sampling, side[0]) {
@@ -139,6 +133,36 @@ impl Resolver {
             }
         }
         Ok(true)
+    }
+
+    /// Cuts the mesh along a ring and moves the two sides apart as far as nothing crosses.
+    fn cut_apart(&mut self, mesh: &mut Mesh, sampling: Sampling, [u, v, o]: [VertexId; 3]) -> Option<Cut> {
+        let mut apart = |push: f32| {
+            self.embedding.attempt(mesh, |mesh| {
+                let cut = mesh.cut(u, v, o)?;
+                part(mesh, cut, push * sampling.shortest());
+                Ok(cut)
+            })
+        };
+        CUT_PUSHES.into_iter().find_map(|push| apart(push).ok())
+    }
+
+    /// Cuts necks through vertices that could not move: pressed together until its vertices are held, a neck would stay
+    /// for ever where no edge gets short.
+    pub(super) fn cut_crushed(&mut self, mesh: &mut Mesh, sampling: Sampling, stuck: &[VertexId]) {
+        for &u in stuck {
+            if !mesh.is_live(u) {
+                continue;
+            }
+            for v in mesh.ring(u).as_slice().to_vec() {
+                if mesh.is_live(u)
+                    && mesh.ring(u).contains(v)
+                    && self.cut_neck(mesh, sampling, u, v) == Ok(true)
+                {
+                    break;
+                }
+            }
+        }
     }
 }
 

@@ -102,7 +102,9 @@ impl Resolver {
         let effort = LEAST_EFFORT + EFFORT_PER_VERTEX * mesh.vertex_count() as u64;
         self.most_effort = self.embedding.effort() + effort;
         self.edited.clear();
-        self.remove_crushed(mesh, sampling);
+        let stuck = std::mem::take(&mut self.stuck);
+        self.remove_crushed(mesh, sampling, &stuck);
+        self.cut_crushed(mesh, sampling, &stuck);
         for &v in active {
             self.touch(v);
         }

@@ -66,9 +66,8 @@ impl Resolver {
     /// Where two sides are pressed on each other, vertices are held, no edge gets short, and a part would stay for ever:
     /// so those go that are flat, or of which no vertex could move. And a part so small may turn inside out between two
     /// states of which neither crosses itself, as when the tip of a tetrahedron passes through its base.
-    pub(super) fn remove_crushed(&mut self, mesh: &mut Mesh, sampling: Sampling) {
+    pub(super) fn remove_crushed(&mut self, mesh: &mut Mesh, sampling: Sampling, stuck: &[VertexId]) {
         self.small.find(mesh);
-        let stuck = std::mem::take(&mut self.stuck);
         let is_stuck = |v: &VertexId| stuck.binary_search(v).is_ok();
         for (v, was_solid) in std::mem::take(&mut self.small.parts) {
             let members = mesh.component_of(v, LARGEST_SPECK + 1);

@@ -57,6 +57,13 @@ impl LevelImage {
         Ok(())
     }
 
+    /// The mean of all intensities above `iso`, or of all below. `None` where there are none.
+    pub(super) fn mean_beyond(&self, iso: f32, above: bool) -> Option<f32> {
+        let beyond = self.grid.values.iter().filter(|&&value| if above { value > iso } else { value < iso });
+        let (sum, count) = beyond.fold((0.0, 0), |(sum, count), &value| (sum + f64::from(value), count + 1));
+        (count > 0).then(|| (sum / f64::from(count)) as f32)
+    }
+
     /// The grid of this level, and the way from its voxel indices to positions of the model.
     pub(super) fn grid(&self) -> (&Grid, impl Fn(Vec3) -> Vec3) {
         (&self.grid, |index| (index - self.offset) / self.scale)

@@ -123,6 +123,14 @@ const CHECK_PERIOD: f32 = 50.0;
 /// Slots in use below which the mesh is put in order again.
 const LEAST_OCCUPANCY: f32 = 0.7;
 
+/// How far outside π_I the surface rests on coarse levels, as a share of the way to the mean intensity out there.
+///
+/// A wall thinner than the contact distance of a coarse level is pierced and eaten up, and rigidity keeps it from growing
+/// back on a finer one. A little outside, where the blurred wall is thicker, it is kept; the finer level takes back what
+/// is too much, since the surface comes from outside anyway. On computed tomographies the area found through one coarse
+/// level was 1.2 % to 15 % too small with 0, up to 1.3 % with 0.3; with 0.4 and more the finest level has much to do.
+const COARSE_MARGIN: f32 = 0.35;
+
 /// The per-vertex attributes of the model.
 #[derive(Clone, Copy, Debug)]
 struct Keys {
@@ -147,6 +155,8 @@ pub struct DeformableModel {
     attractors: Vec<Attractor>,
     finest_delta: f64,
     level: usize,
+    /// π_I on this level, normalised.
+    level_iso: f32,
     mesh: Mesh,
     keys: Keys,
     resolver: Resolver,
@@ -196,6 +206,7 @@ impl DeformableModel {
             attractors: Vec::new(),
             finest_delta,
             level: options.levels,
+            level_iso: 0.0,
             mesh,
             keys,
             resolver: Resolver::with_room_for(domain.most_vertices(delta_at(finest_delta, 0))),
@@ -207,7 +218,7 @@ impl DeformableModel {
             clock: || 0.0,
         };
         model.settle_in();
-        model.prepare_gradient()?;
+        model.prepare_level()?;
         Ok(model)
     }
 
@@ -242,11 +253,10 @@ impl DeformableModel {
         self.forces.look_around(self.mesh.rings(), self.mesh.positions());
         let normals = (self.clock)();
         let delta = self.model_delta();
-        let iso = self.pyramid.normalised(self.params.iso);
         let pulls = self.pulls();
         let world = World {
             image: &self.pyramid.levels[self.level],
-            scale: ForceScale::new(&self.params, iso, self.voxel, delta),
+            scale: ForceScale::new(&self.params, self.level_iso, self.voxel, delta),
             pulls: &pulls,
             domain: self.domain,
             params: &self.params,
@@ -352,8 +362,9 @@ impl DeformableModel {
     pub fn set_params(&mut self, params: DeformableParams) -> Result<(), MethodError> {
         params.validate()?;
         let before = std::mem::replace(&mut self.params, params);
-        if let Err(error) = self.prepare_gradient() {
+        if let Err(error) = self.prepare_level() {
             self.params = before;
+            self.level_iso = self.iso_of_level();
             return Err(error);
         }
         self.rest.wake();
@@ -398,11 +409,25 @@ impl DeformableModel {
         self.attractors.iter().map(local).collect()
     }
 
-    fn prepare_gradient(&mut self) -> Result<(), MethodError> {
+    /// What the forces need of the level and the parameters.
+    fn prepare_level(&mut self) -> Result<(), MethodError> {
+        self.level_iso = self.iso_of_level();
         if self.params.gradient_normal != 0.0 || self.params.gradient_tangent != 0.0 {
             self.pyramid.levels[self.level].prepare_gradient()?;
         }
         Ok(())
+    }
+
+    /// π_I as the surface meets it on this level; see [`COARSE_MARGIN`].
+    fn iso_of_level(&self) -> f32 {
+        let iso = self.pyramid.normalised(self.params.iso);
+        if self.level == 0 {
+            return iso;
+        }
+        let outside = self.pyramid.levels[self.level].mean_beyond(iso, self.params.iso_force > 0.0);
+        outside.map_or(iso, |outside| {
+            outside + libm::powf(1.0 - COARSE_MARGIN, self.level as f32) * (iso - outside)
+        })
     }
 
     /// The pyramid level the surface is on; 0 is the volume itself.

@@ -103,6 +103,6 @@ impl DeformableModel {
         self.level -= 1;
         self.rest = Rest { began: self.iteration, ..Rest::default() };
         self.settle_in();
-        self.prepare_gradient()
+        self.prepare_level()
     }
 }

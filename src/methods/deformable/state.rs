@@ -126,7 +126,7 @@ impl DeformableModel {
         next.rest = state.rest;
         next.movement = Movement { energy: state.energy, fastest: state.fastest };
         next.components = next.mesh.component_members().len() as u32;
-        next.prepare_gradient()?;
+        next.prepare_level()?;
         *self = next;
         Ok(())
     }
