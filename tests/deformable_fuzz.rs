@@ -118,3 +118,21 @@ fn any_run_is_sound_after_every_step() {
     }
     println!("{steps} steps");
 }
+
+/// Marching cubes of noise, resolved with edges much longer than voxels. Collapses drew needles through all of it, and a
+/// step took half a minute.
+#[test]
+fn a_start_much_finer_than_its_edges_makes_no_needles() {
+    let mut random = Random(201_797);
+    let dims = dims(&mut random);
+    let volume = image(&mut random, dims);
+    let options = DeformableOptions {
+        start: Start::MarchingCubes(0.417),
+        edge: Some(2.814),
+        params: Some(DeformableParams { iso: 0.426, ..DeformableParams::for_volume(&volume) }),
+        ..Default::default()
+    };
+    let model = DeformableModel::new(&volume, options).unwrap();
+    let longest = model.mesh().longest_edge();
+    assert!(longest < 6.0, "{longest}");
+}

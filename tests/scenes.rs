@@ -277,7 +277,7 @@ fn a_tomography_direct_and_coarse_to_fine() {
     if all() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/www/public/data/visible-human-head-full.nii.gz");
         let volume = vesicle::io::parse_volume(&std::fs::read(path).unwrap(), None).unwrap();
-        compare("computed tomography", &volume, 1, 35.0);
+        compare("computed tomography", &volume, 2, 35.0);
     }
 }
 
@@ -305,5 +305,5 @@ fn two_hundred_steps_end_in_the_same_bits_everywhere() {
         model.step().unwrap();
     }
     let found = fingerprint(&model.surface().positions);
-    assert_eq!(format!("{found:016x}"), "c9483f2319ce0af5");
+    assert_eq!(format!("{found:016x}"), "c9350b5b3983bba4");
 }

@@ -11,6 +11,11 @@ const CUT_PUSHES: [f32; 4] = [0.75, 0.4, 0.2, 0.05];
 /// The share of the way to its own side's neighbours that a side is pushed at most, so that no triangle turns over.
 const CUT_PUSH_LIMIT: f32 = 0.6;
 
+/// The longest edge that a collapse may make, in the upper bound of edges. Where all are within bounds it makes none longer
+/// than 1.4; in a surface much finer than δ and too crowded for splits, one collapse after the other would draw needles
+/// through all of it.
+const LENGTHENED: f32 = 1.6;
+
 impl Resolver {
     /// Works through the queue until every edge around its vertices is within bounds.
     pub(super) fn settle_edges(&mut self, mesh: &mut Mesh, sampling: Sampling) {
@@ -77,7 +82,7 @@ impl Resolver {
         v: VertexId,
     ) -> Result<bool, EditError> {
         match mesh.can_collapse(u, v) {
-            Ok(_) => self.collapse(mesh, u, v),
+            Ok(_) => self.collapse(mesh, sampling, u, v),
             Err(EditError::NeckInTheWay(_)) => self.cut_neck(mesh, sampling, u, v),
             Err(EditError::ValenceTooLow(_)) if mesh.is_tetrahedron(u) => {
                 self.remove_part(mesh, u);
@@ -88,8 +93,17 @@ impl Resolver {
     }
 
     /// Draws the edge together at the best of the places where nothing crosses.
-    fn collapse(&mut self, mesh: &mut Mesh, u: VertexId, v: VertexId) -> Result<bool, EditError> {
+    fn collapse(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        u: VertexId,
+        v: VertexId,
+    ) -> Result<bool, EditError> {
         for place in collapse_places(mesh, u, v) {
+            if lengthens(mesh, [u, v], place, LENGTHENED * sampling.longest()) {
+                continue;
+            }
             match self.embedding.attempt(mesh, |mesh| mesh.collapse(u, v, place)) {
                 Ok(()) => {
                     self.changes.deletions += 1;
@@ -151,7 +165,7 @@ impl Resolver {
     /// for ever where no edge gets short.
     pub(super) fn cut_crushed(&mut self, mesh: &mut Mesh, sampling: Sampling, stuck: &[VertexId]) {
         for &u in stuck {
-            if !mesh.is_live(u) {
+            if !mesh.is_live(u) || self.embedding.effort() >= self.most_effort {
                 continue;
             }
             for v in mesh.ring(u).as_slice().to_vec() {
@@ -172,6 +186,17 @@ fn collapse_places(mesh: &Mesh, u: VertexId, v: VertexId) -> [Vec3; 3] {
     let mut places = [(p + q) * 0.5, p, q];
     places.sort_by_cached_key(|&at| turns_over(mesh, u, v, at) || turns_over(mesh, v, u, at));
     places
+}
+
+/// Whether `u` and `v` drawn together `at` a place makes an edge longer than `most`, and than it was.
+fn lengthens(mesh: &Mesh, ends: [VertexId; 2], at: Vec3, most: f32) -> bool {
+    ends.into_iter().any(|end| {
+        let from = mesh.position(end);
+        mesh.ring(end).as_slice().iter().any(|&w| {
+            let (p, new) = (mesh.position(w), at.distance_squared(mesh.position(w)));
+            new > square(most) && new > from.distance_squared(p)
+        })
+    })
 }
 
 /// Whether moving `u` to `to` turns over a triangle around it that does not have `v` as a corner.

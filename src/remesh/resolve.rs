@@ -230,11 +230,12 @@ mod tests {
             assert_eq!(mesh.check(), Ok(()));
             assert!(resolver.is_embedded(&mesh));
             active.clear();
-            // One edit more than is allowed, which may look at all.
-            let most = LEAST_EFFORT + (EFFORT_PER_VERTEX + 10) * 500;
+            // An edit more than is allowed, which may look at all and change all of the triangles, in some variants.
+            let most = LEAST_EFFORT + (EFFORT_PER_VERTEX + 200) * 500;
             assert!(resolver.embedding.effort() - effort < most);
             effort = resolver.embedding.effort();
         }
-        assert!(mesh.vertex_count() <= 500);
+        // Joints add a few where no edge is split any more.
+        assert!(mesh.vertex_count() <= 520);
     }
 }

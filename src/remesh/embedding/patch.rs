@@ -5,6 +5,9 @@ use super::{Embedding, NEAREST_CORNER};
 use crate::math::Bounds;
 use crate::mesh::{Facet, Mesh, VertexId, facets_cross};
 
+/// Triangles that an edit changes, at the most where no vertex has very many neighbours.
+const ORDINARY_PATCH: usize = 24;
+
 /// A changed triangle and the box around it.
 type Changed = (Facet, Bounds);
 
@@ -28,7 +31,7 @@ impl Embedding {
         let mut near = std::mem::take(&mut self.found);
         near.clear();
         self.grid.near_box(&whole, NEAREST_CORNER, |v| near.push(v));
-        self.effort += near.len() as u64;
+        self.effort += (near.len() * (1 + fresh.len() / ORDINARY_PATCH)) as u64;
         self.new_marks(mesh);
         let crosses = near.iter().any(|&v| {
             self.mark(v);
