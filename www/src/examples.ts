@@ -29,7 +29,6 @@ export const EXAMPLES: Example[] = [
     name: 'Head, CT: bone',
     source: { file: 'visible-human-head.nii.gz' },
     unit: 'mm',
-    // Bone is thin: on a coarser copy it would blur away, and the surface with it.
     levels: 1,
     // Bone thinner than the contact distance is eaten from its rims: shorter edges keep more of it.
     edge: 2.2,
