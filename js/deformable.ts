@@ -68,7 +68,10 @@ export interface DeformableOptions {
   frame?: number;
   /** Default 'enclosing'. */
   start?: DeformableStart;
-  /** Pyramid levels above the volume itself; 0 (the default) = direct. */
+  /**
+   * Pyramid levels above the volume itself; 0 (the default) = direct. On those above, the surface rests a little outside
+   * `iso`, so that thin walls are not lost there.
+   */
   levels?: number;
   /** Target edge at the finest level, world units; default from the voxel size. */
   edge?: number;

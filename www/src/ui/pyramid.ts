@@ -96,7 +96,7 @@ export class PyramidPanel {
       const name = level === 0 ? VOLUME : `Level ${level}`;
       const label = `${name}, ${this.#dims[level]} voxels${inUse ? ', the model is here' : ''}`;
       button.setAttribute('aria-label', label);
-      button.title = label;
+      button.title = level === 0 ? label : `${label}. On it the surface rests a little outside πI.`;
     }
   }
 }
