@@ -5,7 +5,7 @@ mod common;
 #[path = "common/scenes.rs"]
 mod scenes;
 
-use common::{Random, torus_around};
+use common::{Random, euler_of_parts, torus_around};
 use vesicle::math::{Vec3, triangle};
 use vesicle::mesh::{Mesh, TriangleMesh, count_crossings, measure, report};
 use vesicle::remesh::decimate;
@@ -25,12 +25,6 @@ fn decimated(mesh: &TriangleMesh, target: usize) -> TriangleMesh {
     assert_eq!(mesh.triangles.len() - 2 * collapses, coarse.triangles.len());
     assert_eq!(euler_of_parts(&coarse), euler_of_parts(mesh));
     coarse
-}
-
-fn euler_of_parts(mesh: &TriangleMesh) -> Vec<i64> {
-    let mut parts: Vec<i64> = mesh.components().iter().map(|part| measure(part).euler).collect();
-    parts.sort();
-    parts
 }
 
 /// Reaches the target, and keeps the volume but for `share`.

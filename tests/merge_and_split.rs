@@ -13,9 +13,9 @@ mod common;
 #[path = "common/scenes.rs"]
 mod scenes;
 
-use common::{Named, Random, misplaced_parts, seeds};
+use common::{Named, Random, euler_of_parts, misplaced_parts, seeds};
 use vesicle::math::Vec3;
-use vesicle::mesh::{count_crossings, measure};
+use vesicle::mesh::count_crossings;
 use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Start};
 use vesicle::volume::Volume;
 #[cfg(target_arch = "wasm32")]
@@ -27,8 +27,8 @@ const SEEDS: u64 = if cfg!(target_arch = "wasm32") { 4 } else { 25 };
 /// Iterations after which everything is where it belongs, from any start.
 const MOST: u32 = 400;
 
-/// Balls on a lattice of 3 × 2 × 2, some of them joined to their neighbours by bars. Nothing is thinner than 5 voxels, and
-/// nothing else than what is joined is nearer than 4.
+/// Balls on a lattice of 3 × 2 × 2, some of them joined to their neighbours by bars. Nothing is thinner than 8 voxels, and
+/// what is not joined is 6 apart or more.
 struct Frame {
     balls: Vec<Vec3>,
     bars: Vec<[usize; 2]>,
@@ -65,11 +65,7 @@ impl Frame {
 
     fn distance(&self, p: Vec3) -> f32 {
         let to_ball = |&centre: &Vec3| p.distance(centre) - self.radius;
-        let to_bar = |&[a, b]: &[usize; 2]| {
-            let (a, b) = (self.balls[a], self.balls[b]);
-            let along = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
-            p.distance(a + (b - a) * along) - BAR
-        };
+        let to_bar = |&[a, b]: &[usize; 2]| scenes::to_segment(p, self.balls[a], self.balls[b]) - BAR;
         let balls = self.balls.iter().map(to_ball);
         balls.chain(self.bars.iter().map(to_bar)).fold(f32::INFINITY, f32::min)
     }
@@ -124,13 +120,6 @@ fn are_neighbours(a: [usize; 3], b: [usize; 3]) -> bool {
     (0..3).map(|k| a[k].abs_diff(b[k])).sum::<usize>() == 1
 }
 
-/// χ of each component of the model, lowest first.
-fn euler_of_parts(model: &DeformableModel) -> Vec<i64> {
-    let mut euler: Vec<i64> = model.surface().components().iter().map(|part| measure(part).euler).collect();
-    euler.sort_unstable();
-    euler
-}
-
 /// Returns how many parts merged or parted on the way.
 fn run(seed: u64) -> [u32; 2] {
     let mut random = Random(seed);
@@ -168,7 +157,7 @@ fn run(seed: u64) -> [u32; 2] {
         }
     }
     assert_eq!(model.mesh().check(), Ok(()), "{what}");
-    assert_eq!(euler_of_parts(&model), frame.euler(), "{what}");
+    assert_eq!(euler_of_parts(&model.surface()), frame.euler(), "{what}");
     changes
 }
 

@@ -12,7 +12,7 @@ mod common;
 #[path = "common/scenes.rs"]
 mod scenes;
 
-use common::Random;
+use common::{Random, euler_of_parts};
 use std::collections::BTreeMap;
 use vesicle::math::Vec3;
 use vesicle::mesh::{Measures, Mesh, count_crossings, measure};
@@ -51,9 +51,7 @@ fn play(name: &str, volume: &Volume, options: DeformableOptions, most: u32) -> (
         assert!(report.iteration < most, "{what}: not at rest, {report:?}");
     };
     let surface = model.surface();
-    let mut euler: Vec<i64> = surface.components().iter().map(|part| measure(part).euler).collect();
-    euler.sort_unstable();
-    let outcome = Outcome { measures: measure(&surface), euler };
+    let outcome = Outcome { measures: measure(&surface), euler: euler_of_parts(&surface) };
     println!(
         "{name}: {iterations} iterations, {} vertices, χ {:?}, area {:.0}, volume {:.0}",
         surface.positions.len(),

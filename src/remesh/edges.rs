@@ -168,14 +168,8 @@ impl Resolver {
             if !mesh.is_live(u) || self.embedding.effort() >= self.most_effort {
                 continue;
             }
-            for v in mesh.ring(u).as_slice().to_vec() {
-                if mesh.is_live(u)
-                    && mesh.ring(u).contains(v)
-                    && self.cut_neck(mesh, sampling, u, v) == Ok(true)
-                {
-                    break;
-                }
-            }
+            let ring = mesh.ring(u).as_slice().to_vec();
+            ring.into_iter().any(|v| self.cut_neck(mesh, sampling, u, v) == Ok(true));
         }
     }
 }

@@ -81,6 +81,13 @@ pub fn torus_around(centre: Vec3, [n, m]: [u32; 2], [ring, tube]: [f32; 2]) -> T
     mesh
 }
 
+/// χ of each component, lowest first.
+pub fn euler_of_parts(surface: &TriangleMesh) -> Vec<i64> {
+    let mut euler: Vec<i64> = surface.components().iter().map(|part| measure(part).euler).collect();
+    euler.sort_unstable();
+    euler
+}
+
 /// The parts of a surface that are not where they belong: solid ones within others, and cavities not within one.
 pub fn misplaced_parts(surface: &TriangleMesh) -> Vec<String> {
     let parts = surface.components();

@@ -37,6 +37,12 @@ pub fn to_circle(p: Vec3, radius: f32) -> f32 {
     (ring * ring + p.z * p.z).sqrt()
 }
 
+/// Distance from `p` to the straight way from `a` to `b`.
+pub fn to_segment(p: Vec3, a: Vec3, b: Vec3) -> f32 {
+    let along = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+    p.distance(a + (b - a) * along)
+}
+
 /// Figure 7: two linked tori of major radius 16 and tube radius 4.5 as a potential, surface at 0.5.
 pub fn chain() -> Volume {
     chain_of(16.0, 4.5, 2.0)
@@ -109,10 +115,7 @@ impl VesselTree {
 
     /// Distance from `p` to the surface, negative inside.
     pub fn distance(&self, p: Vec3) -> f32 {
-        let to_branch = |&(a, b, radius): &(Vec3, Vec3, f32)| {
-            let along = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
-            p.distance(a + (b - a) * along) - radius
-        };
+        let to_branch = |&(a, b, radius): &(Vec3, Vec3, f32)| to_segment(p, a, b) - radius;
         self.branches.iter().map(to_branch).fold(f32::INFINITY, f32::min)
     }
 

@@ -365,7 +365,6 @@ impl DeformableModel {
         let before = std::mem::replace(&mut self.params, params);
         if let Err(error) = self.prepare_level() {
             self.params = before;
-            self.level_iso = self.iso_of_level();
             return Err(error);
         }
         self.rest.wake();
@@ -412,10 +411,10 @@ impl DeformableModel {
 
     /// What the forces need of the level and the parameters.
     fn prepare_level(&mut self) -> Result<(), MethodError> {
-        self.level_iso = self.iso_of_level();
         if self.params.gradient_normal != 0.0 || self.params.gradient_tangent != 0.0 {
             self.pyramid.levels[self.level].prepare_gradient()?;
         }
+        self.level_iso = self.iso_of_level();
         Ok(())
     }
 
