@@ -1,20 +1,18 @@
 //! Wavefront OBJ: vertices, texture coordinates, normals and faces; everything else in a file is passed over.
 
-use super::FormatError;
 use super::mesh_file::is_text;
+use super::text::numbered_lines;
+use super::{FormatError, PointCloud};
 use crate::math::{Vec2, Vec3};
 use crate::mesh::TriangleMesh;
 use std::fmt::Write;
+use std::mem;
 
-const FORMAT: &str = "OBJ";
+pub(super) const FORMAT: &str = "OBJ";
 
 /// Whether some line is a vertex, in what is text.
 pub(super) fn is_obj(bytes: &[u8]) -> bool {
-    is_text(bytes) && lines(bytes).any(|line| words(line).next() == Some(b"v"))
-}
-
-fn lines(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
-    bytes.split(|&b| b == b'\n' || b == b'\r')
+    is_text(bytes) && numbered_lines(bytes).any(|(_, line)| words(line).next() == Some(b"v"))
 }
 
 fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
@@ -24,9 +22,19 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 /// Texture coordinates are taken where every face has them, and colours where every vertex has; normals likewise, the
 /// mean per vertex.
 pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
+    Ok(read(bytes)?.into_mesh())
+}
+
+/// The vertices, of files without faces, too. Normals are those that the faces name, or, where they name none and
+/// there are as many as vertices, those of the vertices in order.
+pub(super) fn parse_points(bytes: &[u8]) -> Result<PointCloud, FormatError> {
+    Ok(read(bytes)?.into_points())
+}
+
+fn read(bytes: &[u8]) -> Result<Reader, FormatError> {
     let mut reader = Reader::default();
     let mut continued = Vec::new();
-    for (number, line) in (1..).zip(lines(bytes)) {
+    for (number, line) in numbered_lines(bytes) {
         // A backslash at the end joins the next line to this one.
         if let Some(start) = line.strip_suffix(b"\\") {
             continued.extend_from_slice(start);
@@ -41,7 +49,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
             continued.clear();
         }
     }
-    reader.finish()
+    Ok(reader)
 }
 
 /// Indices from 0 into the tables of the file.
@@ -111,7 +119,7 @@ impl Reader {
         Ok(Corner { position: position.ok_or_else(problem)?, uv, normal })
     }
 
-    fn finish(self) -> Result<TriangleMesh, FormatError> {
+    fn into_mesh(self) -> TriangleMesh {
         let triangles: Vec<[u32; 3]> = self.corners.iter().map(|c| c.map(|corner| corner.position)).collect();
         let corner_uvs = self.per_corner(|corner| corner.uv.map(|i| self.uvs[i as usize]));
         let corner_normals = self.per_corner(|corner| corner.normal.map(|i| self.normals[i as usize]));
@@ -122,7 +130,19 @@ impl Reader {
             sums.into_iter().map(|n| n.normalize_or_zero()).collect()
         });
         let colors = (self.colors.len() == self.positions.len()).then_some(self.colors);
-        Ok(TriangleMesh { positions: self.positions, triangles, normals, uvs: None, corner_uvs, colors })
+        TriangleMesh { positions: self.positions, triangles, normals, uvs: None, corner_uvs, colors }
+    }
+
+    fn into_points(mut self) -> PointCloud {
+        let named = self.corners.as_flattened().iter().any(|corner| corner.normal.is_some());
+        let in_order = !named && self.normals.len() == self.positions.len();
+        let own = in_order.then(|| mem::take(&mut self.normals));
+        let mesh = self.into_mesh();
+        PointCloud {
+            points: mesh.positions,
+            normals: own.or(mesh.normals.filter(|_| named)),
+            colors: mesh.colors,
+        }
     }
 
     /// What `read` finds, if it finds it at every corner.

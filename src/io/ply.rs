@@ -5,9 +5,21 @@ use super::mesh_file::{color_bytes, push_floats};
 use crate::math::{Vec2, Vec3};
 use crate::mesh::TriangleMesh;
 
-const FORMAT: &str = "PLY";
+pub(super) const FORMAT: &str = "PLY";
 
 pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
+    read(bytes, Reader::faces)
+}
+
+/// The vertices with their extras; faces are passed over, whatever they hold.
+pub(super) fn parse_vertices(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
+    read(bytes, |_, element, body| pass_over(element, body))
+}
+
+fn read(
+    bytes: &[u8],
+    faces: impl Fn(&mut Reader, &Element, &mut Body) -> Result<(), FormatError>,
+) -> Result<TriangleMesh, FormatError> {
     let (header, body) = Header::parse(bytes)?;
     let mut body = Body { encoding: header.encoding, bytes: body };
     let mut reader = Reader::default();
@@ -15,7 +27,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
         element.check_size(&body)?;
         match element.name.as_str() {
             "vertex" => reader.vertices(element, &mut body)?,
-            "face" => reader.faces(element, &mut body)?,
+            "face" => faces(&mut reader, element, &mut body)?,
             _ => pass_over(element, &mut body)?,
         }
     }

@@ -1,6 +1,23 @@
-//! Headers that are lines of text.
+//! Headers that are lines of text, and lines of whole files of text.
 
 use super::FormatError;
+use std::iter;
+
+/// The lines of a file with their numbers from 1, without their ends (\n, \r\n or \r).
+pub(super) fn numbered_lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+    let mut rest = bytes;
+    let lines = iter::from_fn(move || {
+        if rest.is_empty() {
+            return None;
+        }
+        let end = rest.iter().position(|&b| b == b'\n' || b == b'\r').unwrap_or(rest.len());
+        let (line, after) = rest.split_at(end);
+        let ended = if after.starts_with(b"\r\n") { 2 } else { after.len().min(1) };
+        rest = &after[ended..];
+        Some(line)
+    });
+    (1..).zip(lines)
+}
 
 /// Longest line and longest header taken; real ones have a few kilobytes.
 const MAX_HEADER: usize = 1 << 20;

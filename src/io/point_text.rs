@@ -1,0 +1,469 @@
+//! Points as text, a line each: numbers in columns (XYZ, PTS, CSV and their kin), or a keyword first (`p x y z`).
+
+use super::text::{Field, numbered_lines};
+use super::{FormatError, PointCloud, points::full_channel};
+use crate::math::Vec3;
+use std::borrow::Cow;
+use std::iter::Peekable;
+
+pub(super) const FORMAT: &str = "point text";
+/// The format of the data of Hoppe's surface reconstruction.
+pub(super) const KEYED: &str = "PTS";
+
+/// Most columns that a file may name; real ones have some dozens. Without a limit, a file of nothing but commas would
+/// take forty times its size.
+const MAX_COLUMNS: usize = 1000;
+
+/// A line that says something, without blanks around it.
+struct Line<'a> {
+    number: usize,
+    text: Cow<'a, str>,
+}
+
+impl Line<'_> {
+    fn field(&self) -> String {
+        format!("line {}", self.number)
+    }
+
+    fn invalid(&self, format: &'static str, problem: &str) -> FormatError {
+        Field { format, name: &self.field(), text: &self.text }.invalid(problem)
+    }
+
+    /// Whether numbers are all there is.
+    fn is_row(&self) -> bool {
+        cells(&self.text, mark(&self.text)).iter().all(|cell| cell.parse::<f32>().is_ok())
+    }
+
+    /// What a cell of the line says.
+    fn number(&self, format: &'static str, cell: &str) -> Result<f32, FormatError> {
+        let invalid = |problem| Err(Field { format, name: &self.field(), text: cell }.invalid(problem));
+        match cell.parse::<f32>() {
+            Ok(number) if number.is_finite() => Ok(number),
+            Ok(_) => invalid("finite numbers below 3.4e38 in size are accepted"),
+            Err(_) => invalid("a number is needed, with a point before its decimals"),
+        }
+    }
+}
+
+/// The lines of text that are neither empty nor comments. Bytes that are no UTF-8 are replaced: in comments they do
+/// not matter, and elsewhere they are no number.
+fn content(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
+    lines(bytes).filter(|line| !line.text.is_empty() && comment(&line.text).is_none())
+}
+
+fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
+    numbered_lines(bytes)
+        .map(|(number, raw)| Line { number, text: String::from_utf8_lossy(raw.trim_ascii()) })
+}
+
+/// What follows the mark of a comment.
+fn comment(line: &str) -> Option<&str> {
+    ["#", "//", "%"].iter().find_map(|mark| line.strip_prefix(mark))
+}
+
+/// What sets the cells of the line apart; `None` stands for blanks.
+fn mark(line: &str) -> Option<char> {
+    [';', ','].into_iter().find(|&mark| line.contains(mark))
+}
+
+/// The cells of a line, without blanks and quotes around them; of too many, one too many.
+fn cells(line: &str, mark: Option<char>) -> Vec<&str> {
+    let mut quoted = false;
+    let ends = |c: char| {
+        quoted ^= c == '"';
+        !quoted && mark.map_or(c.is_whitespace(), |mark| c == mark)
+    };
+    // Several blanks end one cell.
+    let cells = line.split(ends).filter(|cell| mark.is_some() || !cell.is_empty());
+    cells.take(MAX_COLUMNS + 1).map(unquoted).collect()
+}
+
+fn unquoted(cell: &str) -> &str {
+    let cell = cell.trim();
+    cell.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(cell, str::trim)
+}
+
+/// Points in columns; [`parse_points`](super::parse_points) says which.
+pub(super) fn parse(bytes: &[u8]) -> Result<PointCloud, FormatError> {
+    let mut lines = content(bytes).peekable();
+    let count_line = lines.next_if(|line| announced(line).is_some());
+    let named = take_names(&mut lines, count_line.is_some())?;
+    let Some(first) = lines.peek() else { return Ok(PointCloud::default()) };
+    let mark = mark(&first.text);
+    let count = cells(&first.text, mark).len();
+    let columns = match named.or_else(|| named_in_comment(bytes, count)) {
+        Some(columns) => columns,
+        None => Columns::unnamed(count, first)?,
+    };
+    let table = Table::read(columns, mark, lines)?;
+    if let Some(line) = count_line {
+        check_count(&line, table.rows().len())?;
+    }
+    table.into_points()
+}
+
+/// How many points are to come, where the line says nothing else.
+fn announced(line: &Line) -> Option<u64> {
+    line.text.parse().ok()
+}
+
+/// Nothing is ever made ready for an announced count, so it is enough to look at it in the end.
+fn check_count(line: &Line, rows: usize) -> Result<(), FormatError> {
+    if announced(line) == Some(rows as u64) {
+        return Ok(());
+    }
+    let problem = format!("points are announced, {rows} follow; the same number is accepted");
+    Err(line.invalid(FORMAT, &problem))
+}
+
+/// The columns as the next line names them, unless it is one of numbers already. After a count it may say anything.
+fn take_names<'a>(
+    lines: &mut Peekable<impl Iterator<Item = Line<'a>>>,
+    counted: bool,
+) -> Result<Option<Columns>, FormatError> {
+    let Some(line) = lines.next_if(|line| !line.is_row()) else { return Ok(None) };
+    let named = Columns::named(&line.text);
+    if named.is_none() && !counted {
+        let problem = "numbers in columns, or names of columns with x, y and z among them, are accepted";
+        return Err(line.invalid(FORMAT, problem));
+    }
+    Ok(named)
+}
+
+/// The columns as the last comment before everything else names them, if one names as many as there are.
+fn named_in_comment(bytes: &[u8], count: usize) -> Option<Columns> {
+    let before = lines(bytes).take_while(|line| line.text.is_empty() || comment(&line.text).is_some());
+    let named = before.filter_map(|line| Columns::named(comment(&line.text)?));
+    named.filter(|columns| columns.count == count).last()
+}
+
+/// What the columns hold.
+struct Columns {
+    /// How many there are.
+    count: usize,
+    /// Those that are read, coordinates of the points first.
+    read: Vec<usize>,
+    /// `None` where nothing but the numbers tells.
+    extras: Option<Extras>,
+}
+
+/// Where normals and colours begin, among the columns that are read.
+struct Extras {
+    normals: Option<usize>,
+    colors: Option<usize>,
+}
+
+impl Columns {
+    /// `None` where x, y and z do not all have a name, or there are too many.
+    fn named(line: &str) -> Option<Self> {
+        let names: Vec<String> = cells(line, mark(line)).into_iter().map(str::to_ascii_lowercase).collect();
+        let set = |set: [&str; 3]| -> Option<Vec<usize>> {
+            set.into_iter().map(|name| names.iter().position(|found| found == name)).collect()
+        };
+        if names.len() > MAX_COLUMNS {
+            return None;
+        }
+        let points = set(["x", "y", "z"]).or_else(|| axes(&names))?;
+        let normals = set(["nx", "ny", "nz"]);
+        let colors = set(["red", "green", "blue"]).or_else(|| set(["r", "g", "b"]));
+        let extras = Extras {
+            normals: normals.as_ref().map(|_| 3),
+            colors: colors.as_ref().map(|_| if normals.is_some() { 6 } else { 3 }),
+        };
+        let read = [Some(points), normals, colors].into_iter().flatten().flatten().collect();
+        Some(Self { count: names.len(), read, extras: Some(extras) })
+    }
+
+    fn unnamed(count: usize, first: &Line) -> Result<Self, FormatError> {
+        if ![3, 4, 6, 7, 9].contains(&count) {
+            let accepted = "3, 4, 6, 7 or 9, or a first line that names them";
+            return Err(FormatError::unsupported(FORMAT, first.field(), columns(count), accepted));
+        }
+        Ok(Self { count, read: (0..count).collect(), extras: None })
+    }
+}
+
+/// Columns of x, y and z under the names that napari gives: its axes run from the slowest to the fastest.
+fn axes(names: &[String]) -> Option<Vec<usize>> {
+    let place = |axis: usize| names.iter().position(|name| *name == format!("axis-{axis}"));
+    let all: Vec<usize> = (0..5).map_while(place).collect();
+    match all.as_slice() {
+        [z, y, x] | [_, z, y, x] => Some(vec![*x, *y, *z]),
+        _ => None,
+    }
+}
+
+fn columns(count: usize) -> String {
+    if count == 1 { "1 column".into() } else { format!("{count} columns") }
+}
+
+/// The numbers of all lines, one line after the other.
+struct Table {
+    columns: Columns,
+    numbers: Vec<f32>,
+}
+
+impl Table {
+    fn read<'a>(
+        columns: Columns,
+        mark: Option<char>,
+        mut lines: impl Iterator<Item = Line<'a>>,
+    ) -> Result<Self, FormatError> {
+        let mut table = Self { columns, numbers: Vec::new() };
+        lines.try_for_each(|line| table.push(&line, mark))?;
+        Ok(table)
+    }
+
+    fn push(&mut self, line: &Line, mark: Option<char>) -> Result<(), FormatError> {
+        let cells = cells(&line.text, mark);
+        if cells.len() != self.columns.count {
+            let (found, accepted) = (columns(cells.len()), columns(self.columns.count));
+            let problem =
+                format!("{found}; {accepted}, as named or in the first line of numbers, are accepted");
+            return Err(line.invalid(FORMAT, &problem));
+        }
+        for &column in &self.columns.read {
+            self.numbers.push(line.number(FORMAT, cells[column])?);
+        }
+        Ok(())
+    }
+
+    fn rows(&self) -> impl ExactSizeIterator<Item = &[f32]> + Clone {
+        self.numbers.chunks_exact(self.columns.read.len())
+    }
+
+    /// The three numbers from column `at` of all lines.
+    fn vectors(&self, at: usize) -> impl Iterator<Item = Vec3> + Clone {
+        self.rows().map(move |row| Vec3::from_slice(&row[at..]))
+    }
+
+    fn into_points(self) -> Result<PointCloud, FormatError> {
+        let extras = match &self.columns.extras {
+            Some(known) => known,
+            None => &self.guessed_extras()?,
+        };
+        let all = |at: usize| self.vectors(at).collect();
+        Ok(PointCloud { points: all(0), normals: extras.normals.map(all), colors: extras.colors.map(all) })
+    }
+
+    /// What stands in columns without names: normals are known by their length.
+    fn guessed_extras(&self) -> Result<Extras, FormatError> {
+        let (normals, colors) = match self.columns.count {
+            6 if self.are_normals(3) => (Some(3), None),
+            6 => (None, Some(3)),
+            7 => (None, Some(4)),
+            9 if self.are_normals(6) && self.are_colors(3) => (Some(6), Some(3)),
+            9 => (Some(3), Some(6)),
+            _ => (None, None),
+        };
+        if normals.is_none_or(|at| self.are_normals(at)) && colors.is_none_or(|at| self.are_colors(at)) {
+            return Ok(Extras { normals, colors });
+        }
+        let problem = "in columns without names, normals (lengths within 1 % of 1) and colours (all 0 to 1, or whole \
+             numbers of 0 to 255) are accepted";
+        Err(FormatError::invalid(FORMAT, format!("columns 4 to {}", self.columns.count), problem))
+    }
+
+    fn are_normals(&self, at: usize) -> bool {
+        self.vectors(at).all(|v| (v.length() - 1.0).abs() <= 0.01)
+    }
+
+    fn are_colors(&self, at: usize) -> bool {
+        full_channel(self.vectors(at)).is_some()
+    }
+}
+
+/// Whether some line is a point that says so: `p x y z`.
+pub(super) fn is_keyed(bytes: &[u8]) -> bool {
+    content(bytes).any(|line| {
+        let mut words = line.text.split_whitespace();
+        words.next() == Some("p") && words.next().is_some_and(|word| word.parse::<f32>().is_ok())
+    })
+}
+
+/// Points that say so; colours (`d`, `s`) and gloss (`g`), which hold for all that follows, are passed over.
+pub(super) fn parse_keyed(bytes: &[u8]) -> Result<PointCloud, FormatError> {
+    let mut points = Vec::new();
+    for line in content(bytes) {
+        // One word more than a point has is enough to see that there are too many.
+        let words: Vec<&str> = line.text.split_whitespace().take(5).collect();
+        match words.as_slice() {
+            ["p", x, y, z] => {
+                let number = |word| line.number(KEYED, word);
+                points.push(Vec3::new(number(x)?, number(y)?, number(z)?));
+            }
+            ["d" | "s" | "g", ..] => {}
+            _ => return Err(line.invalid(KEYED, "p and three numbers, or d, s or g, are accepted")),
+        }
+    }
+    Ok(PointCloud { points, ..PointCloud::default() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parse_points;
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn read(text: &str) -> PointCloud {
+        parse_points(text.as_bytes()).unwrap_or_else(|error| panic!("{error} in {text:?}"))
+    }
+
+    fn refusal(text: &str) -> String {
+        parse_points(text.as_bytes()).unwrap_err().to_string()
+    }
+
+    fn two() -> Vec<Vec3> {
+        vec![Vec3::new(1.0, -2.5, 3e-2), Vec3::new(4.0, 5.0, 6.0)]
+    }
+
+    #[test]
+    fn three_columns_however_they_are_set_apart() {
+        for text in [
+            "1 -2.5 3e-2\n4 5 6\n",
+            "1\t-2.5\t0.03\r\n4\t5\t6",
+            "  1  -2.50\t +.03  \n\n 4. 5 6 \n\n",
+            "1,-2.5,0.03\n4,5,6\n",
+            "1, -2.5, 0.03\r4, 5, 6\r",
+            "1;-2.5;0.03\n4; 5; 6\n",
+            "\"1\",\"-2.5\",\"0.03\"\n4,5,6\n",
+            "\u{feff}1 -2.5 0.03\n4 5 6\n",
+        ] {
+            assert_eq!(read(text), PointCloud { points: two(), ..PointCloud::default() }, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn comments_and_counts_are_passed_over() {
+        for text in [
+            "# one\n// two\n  % three\n1 -2.5 0.03\n# four\n4 5 6\n",
+            "2\n1 -2.5 0.03\n4 5 6\n",
+            "2\nany words, or 3 numbers\n1 -2.5 0.03\n4 5 6\n",
+            "2\n\n1 -2.5 0.03\n4 5 6\n",
+            "# marked\n 2 \n# again\n1;-2.5;0.03\n4;5;6\n",
+            "2\nz y x\n0.03 -2.5 1\n6 5 4\n",
+        ] {
+            assert_eq!(read(text).points, two(), "{text:?}");
+        }
+        let latin = b"# gr\xfc\xdfe\n1 -2.5 0.03\n4 5 6";
+        assert_eq!(parse_points(latin).unwrap().points, two());
+    }
+
+    #[test]
+    fn named_columns_are_found_in_any_order() {
+        for text in [
+            "x,y,z\n1,-2.5,0.03\n4,5,6\n",
+            ",t,z,y,x\n0,0.0,0.03,-2.5,1\n1,7.0,6,5,4\n",
+            "index;Z;label;Y;X\n0;0.03;ground;-2.5;1\n1;6;;5;4\n",
+            "\"X\" \"Y\" \"Z\"\n1 -2.5 0.03\n4 5 6\n",
+            "name,x,y,z\n\"a, b\",1,-2.5,0.03\nc,4,5,6\n",
+            "index,axis-0,axis-1,axis-2\n0,0.03,-2.5,1\n1,6,5,4\n",
+            "axis-0,axis-1,axis-2,axis-3\n0,0.03,-2.5,1\n1,6,5,4\n",
+            "# z y x\n0.03 -2.5 1\n6 5 4\n",
+        ] {
+            assert_eq!(read(text), PointCloud { points: two(), ..PointCloud::default() }, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn named_columns_bring_normals_and_colours() {
+        let cloud = read("Red,Green,Blue,nz,ny,nx,x,y,z\n255,0,51,3,2,1,1,-2.5,0.03\n0,0,0,6,5,4,4,5,6\n");
+        let normals = Some(vec![Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
+        let colors = Some(vec![Vec3::new(1.0, 0.0, 0.2), Vec3::ZERO]);
+        assert_eq!(cloud, PointCloud { points: two(), normals, colors: colors.clone() });
+        // As CloudCompare writes it; without the names, the intensity would stand elsewhere.
+        let cloud = read("//X Y Z R G B Intensity\n2\n1 -2.5 0.03 255 0 51 9\n4 5 6 0 0 0 7\n");
+        assert_eq!(cloud, PointCloud { points: two(), normals: None, colors });
+        let partial = read("x,y,z,nx,ny,r,red\n1,-2.5,0.03,0,1,8,9\n4,5,6,0,1,8,9\n");
+        assert_eq!(partial, PointCloud { points: two(), ..PointCloud::default() });
+    }
+
+    #[test]
+    fn columns_without_names_are_known_by_their_number() {
+        let (p, q) = ("1 -2.5 0.03", "4 5 6");
+        let (n, m) = ("0.6 -0.8 0", "0 0 1.005");
+        let (c, d) = ("255 0 51", "0 0 0");
+        let normals = Some(vec![Vec3::new(0.6, -0.8, 0.0), Vec3::new(0.0, 0.0, 1.005)]);
+        let colors = Some(vec![Vec3::new(1.0, 0.0, 0.2), Vec3::ZERO]);
+        for (text, has_normals, has_colors) in [
+            (format!("{p} 0.5\n{q} 100"), false, false),
+            (format!("{p} {n}\n{q} {m}"), true, false),
+            (format!("{p} {c}\n{q} {d}"), false, true),
+            (format!("{p} 1 0 0.2\n{q} {d}"), false, true),
+            (format!("{p} -500 {c}\n{q} 40 {d}"), false, true),
+            (format!("{p} {c} {n}\n{q} {d} {m}"), true, true),
+            (format!("{p} {n} {c}\n{q} {m} {d}"), true, true),
+        ] {
+            let cloud = read(&text);
+            assert_eq!(cloud.points, two(), "{text:?}");
+            assert_eq!(cloud.normals, normals.clone().filter(|_| has_normals), "{text:?}");
+            assert_eq!(cloud.colors, colors.clone().filter(|_| has_colors), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn points_behind_a_keyword() {
+        let text = "# made\nd 1 1 1\ns 1 1 1\ng 1 0 0\np 1 -2.5 0.03\nd\np 4 5 6\n#\n";
+        assert_eq!(read(text), PointCloud { points: two(), ..PointCloud::default() });
+        for (text, said) in [
+            ("p 1 2 3\np 1 2\n", "PTS: line 2: 'p 1 2'"),
+            ("p 1 2 3\nq 1 2 3\n", "PTS: line 2: 'q 1 2 3'"),
+            ("# a\r\np 1 2 x\r\n", "PTS: line 2: 'x': a number"),
+            ("p 1 2 inf\n", "PTS: line 1: 'inf': finite"),
+        ] {
+            assert!(refusal(text).starts_with(said), "{}", refusal(text));
+        }
+        // A column of pressures is no keyword.
+        assert_eq!(read("p x y z\n7 1 -2.5 0.03\n8 4 5 6\n").points, two());
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line() {
+        for (text, said) in [
+            ("1 2 3\r\n4 5\r\n", "point text: line 2: '4 5': 2 columns; 3 columns"),
+            ("1,2,3\n4,5,6,\n", "point text: line 2: '4,5,6,': 4 columns; 3 columns"),
+            ("x,y,z\n1,2,3,4\n", "point text: line 2: '1,2,3,4': 4 columns; 3 columns"),
+            ("1 2 3\n4 five 6\n", "point text: line 2: 'five': a number"),
+            ("1;2;3\n1,5;2;3\n", "point text: line 2: '1,5': a number"),
+            ("x,y,z\n1,,3\n", "point text: line 2: '': a number"),
+            ("1 2 3\n\n4 nan 6\n", "point text: line 3: 'nan': finite"),
+            ("1 2 -inf\n", "point text: line 1: '-inf': finite"),
+            ("1 2 3\n1e39 2 3\n", "point text: line 2: '1e39': finite"),
+            ("3\n1 2 3\n4 5 6\n", "point text: line 1: '3': points are announced, 2 follow"),
+            ("1\n1 2 3\n4 5 6\n", "point text: line 1: '1': points are announced, 2 follow"),
+            ("99999999999999999999\n1 2 3\n", "point text: line 1: 1 column"),
+            ("1 2\n3 4\n", "point text: line 1: 2 columns is not supported; accepted: 3, 4"),
+            ("1 2 3 4 5\n", "point text: line 1: 5 columns"),
+            ("1 2 3 4 5 -6\n", "point text: columns 4 to 6: in columns without names"),
+            ("1 2 3 0.5 0.5 200\n", "point text: columns 4 to 6"),
+            ("1 2 3 9 256 0 0\n", "point text: columns 4 to 7"),
+            ("1 2 3 0 0 1 -1 0 0.5\n", "point text: columns 4 to 9"),
+            ("x,y,z,r,g,b\n1,2,3,300,0,0\n", "point text: colours: some are out of range"),
+            ("a,b,c\n1,2,3\n", "point text: line 1: 'a,b,c': numbers in columns, or names"),
+            ("axis-0,axis-1\n1,2\n", "point text: line 1: 'axis-0,axis-1'"),
+            ("p 1 2 3\np 1 2 3 4 5 6\n", "PTS: line 2: 'p 1 2 3 4 5 6'"),
+            ("Dear all,\n", "point text: line 1: 'Dear all,'"),
+            ("x,y,z\n", "point text: points: there are none"),
+            ("0\n", "point text: points: there are none"),
+            ("# nothing\n\n", "point text: points: there are none"),
+        ] {
+            assert!(refusal(text).starts_with(said), "{text:?}: {}", refusal(text));
+        }
+    }
+
+    #[test]
+    fn a_file_may_have_a_thousand_columns() {
+        let wide =
+            |columns: usize| format!("x,y,z{}\n1,2,3{}\n", ",".repeat(columns - 3), ",".repeat(columns - 3));
+        assert_eq!(read(&wide(1000)).points, [Vec3::new(1.0, 2.0, 3.0)]);
+        assert!(refusal(&wide(1001)).starts_with("point text: line 1: 'x,y,z,"));
+    }
+
+    #[test]
+    fn long_words_are_cut_in_messages() {
+        let long = "1".repeat(100_000);
+        assert!(refusal(&format!("1 2 {long}")).len() < 200);
+        assert!(refusal(&"ä".repeat(100_000)).len() < 400);
+    }
+}

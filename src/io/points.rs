@@ -1,0 +1,363 @@
+//! Point clouds: which format the bytes are in, and what holds for points of every format.
+
+use super::mesh_file::is_text;
+use super::{FormatError, obj, ply, point_text, stl};
+use crate::math::Vec3;
+use crate::mesh::TriangleMesh;
+
+/// Points in space, in the order of the file. Each extra, where there is one, has one entry per point.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PointCloud {
+    /// Where the points are, in the file's own units.
+    pub points: Vec<Vec3>,
+    /// Normals as the file has them, meant to be of unit length; zero where a point has none.
+    pub normals: Option<Vec<Vec3>>,
+    /// Colours, rgb in 0..1.
+    pub colors: Option<Vec<Vec3>>,
+}
+
+/// The points in a PLY or OBJ file, or in text with a line a point (XYZ, PTS, CSV, TXT), told apart by their content.
+///
+/// Points of a mesh are its vertices as they stand, also where several are in one place. Colours are taken as they
+/// are where all are within 0..1, else divided by 255 where all are whole numbers up to that. Memory is linear in the
+/// size of the file.
+///
+/// # Text
+/// Columns are set apart by semicolons, else by commas, else by blanks and tabs, as the first line of numbers has it.
+/// Empty lines and those that start with `#`, `//` or `%` are comments. A first line of one whole number announces
+/// how many points there are, and the line after it may be a comment without a mark.
+///
+/// Columns may be named, in the first line or in a comment before it: `x`, `y`, `z`, and, in whole sets, `nx`, `ny`,
+/// `nz`, and `red`, `green`, `blue` or `r`, `g`, `b`; capitals and quotes make no difference. In place of the first
+/// set, `axis-0` to `axis-2` are z, y, x, and `axis-0` to `axis-3` time, z, y, x. All others are passed over: a file
+/// with a column of times gives the points of all times.
+///
+/// Without names, there are
+///
+/// - three columns: x y z;
+/// - four: x y z and an intensity, which is passed over;
+/// - six: x y z and normals where all are of unit length within 1 %, else colours;
+/// - seven: x y z, an intensity, a colour;
+/// - nine: x y z, a colour and a normal, or the normal first: again, normals are of unit length.
+///
+/// Lines `p x y z` are points as well; then only lines that start with `d`, `s` or `g` may stand between them, and are
+/// passed over.
+///
+/// # Errors
+/// [`FormatError`] with the format and the field (of text, the line) for bytes in no such format, files that end
+/// early or contradict themselves, numbers that are not finite as 32-bit ones, colours of another range, and files
+/// without points.
+pub fn parse_points(bytes: &[u8]) -> Result<PointCloud, FormatError> {
+    // Some programs mark text as UTF-8.
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    let (format, cloud) = parse(bytes)?;
+    checked(format, cloud)
+}
+
+fn parse(bytes: &[u8]) -> Result<(&'static str, PointCloud), FormatError> {
+    if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
+        return Ok((ply::FORMAT, vertices(ply::parse_vertices(bytes)?)));
+    }
+    if let Some(found) = foreign(bytes) {
+        const ACCEPTED: &str = "PLY, OBJ and text in columns (XYZ, PTS, CSV, TXT)";
+        return Err(FormatError::unsupported("point file", "format", found, ACCEPTED));
+    }
+    if bytes.is_empty() {
+        return Err(FormatError::truncated("point file", "content", 1, 0));
+    }
+    if obj::is_obj(bytes) {
+        return Ok((obj::FORMAT, obj::parse_points(bytes)?));
+    }
+    if point_text::is_keyed(bytes) {
+        return Ok((point_text::KEYED, point_text::parse_keyed(bytes)?));
+    }
+    Ok((point_text::FORMAT, point_text::parse(bytes)?))
+}
+
+/// What bytes are that hold neither a PLY file nor text with points, as far as their start tells.
+fn foreign(bytes: &[u8]) -> Option<&'static str> {
+    let start = |mark: &[u8]| bytes.starts_with(mark);
+    Some(match bytes {
+        _ if start(b"glTF") => "GLB",
+        _ if stl::is_binary(bytes) || stl::is_text_stl(bytes) => "STL",
+        _ if start(b"<?xml") || start(b"<VTKFile") => "XML",
+        _ if start(b"# vtk") => "VTK legacy",
+        _ if start(b"# .PCD") => "PCD",
+        _ if start(b"OFF") || start(b"COFF") || start(b"NOFF") => "OFF",
+        _ if start(b"LASF") => "LAS",
+        [b'{', ..] => "JSON",
+        [0x1f, 0x8b, ..] => "gzip",
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "text in UTF-16 (it must be UTF-8)",
+        _ if !is_text(bytes) => "a binary file without a known mark",
+        _ => return None,
+    })
+}
+
+fn vertices(mesh: TriangleMesh) -> PointCloud {
+    PointCloud { points: mesh.positions, normals: mesh.normals, colors: mesh.colors }
+}
+
+/// The cloud with colours in 0..1, once it is found sound.
+fn checked(format: &'static str, cloud: PointCloud) -> Result<PointCloud, FormatError> {
+    let count = cloud.points.len();
+    if count == 0 {
+        return Err(FormatError::invalid(format, "points", "there are none; at least one is needed"));
+    }
+    check_finite(format, "points", &cloud.points)?;
+    if let Some(normals) = &cloud.normals {
+        check_count(format, "normals", normals, count)?;
+        check_finite(format, "normals", normals)?;
+    }
+    let Some(colors) = cloud.colors else { return Ok(cloud) };
+    check_count(format, "colours", &colors, count)?;
+    let colors = Some(unit_colors(format, colors)?);
+    Ok(PointCloud { colors, ..cloud })
+}
+
+fn check_finite(format: &'static str, field: &str, vectors: &[Vec3]) -> Result<(), FormatError> {
+    let Some(i) = vectors.iter().position(|v| !v.is_finite()) else { return Ok(()) };
+    let problem = format!("that of point {i}, from 0, is {}; finite numbers are accepted", vectors[i]);
+    Err(FormatError::invalid(format, field, problem))
+}
+
+fn check_count(format: &'static str, field: &str, found: &[Vec3], count: usize) -> Result<(), FormatError> {
+    if found.len() == count {
+        return Ok(());
+    }
+    let problem = format!("there are {} for {count} points; one each is accepted", found.len());
+    Err(FormatError::invalid(format, field, problem))
+}
+
+fn unit_colors(format: &'static str, colors: Vec<Vec3>) -> Result<Vec<Vec3>, FormatError> {
+    let full = full_channel(colors.iter().copied()).ok_or_else(|| {
+        let problem = "some are out of range; all 0 to 1, or whole numbers of 0 to 255, are accepted";
+        FormatError::invalid(format, "colours", problem)
+    })?;
+    Ok(colors.into_iter().map(|color| color / full).collect())
+}
+
+/// The value that stands for a full channel; `None` where these are no colours.
+pub(super) fn full_channel(colors: impl Iterator<Item = Vec3> + Clone) -> Option<f32> {
+    let all = |fits: fn(f32) -> bool| colors.clone().all(|color| color.to_array().into_iter().all(fits));
+    if all(|c| (0.0..=1.0).contains(&c)) {
+        return Some(1.0);
+    }
+    all(|c| (0.0..=255.0).contains(&c) && c.fract() == 0.0).then_some(255.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Two of the three points are in one place.
+    fn made() -> PointCloud {
+        let p = Vec3::new(0.1, -2.5, 1e10);
+        PointCloud {
+            points: vec![p, Vec3::new(4.0, 5.0, 6.0), p],
+            normals: Some(vec![Vec3::X, Vec3::NEG_Z, Vec3::new(0.6, 0.0, 0.8)]),
+            colors: Some(vec![Vec3::new(1.0, 0.0, 0.2), Vec3::ZERO, Vec3::new(0.4, 0.6, 0.8)]),
+        }
+    }
+
+    /// Numbers of a point one after the other, colours as they are written for `full`.
+    fn rows(cloud: &PointCloud, full: f32) -> Vec<Vec<f32>> {
+        let extras = cloud.normals.iter().flatten().zip(cloud.colors.iter().flatten());
+        let row = |(p, (n, c)): (&Vec3, (&Vec3, &Vec3))| {
+            [p.to_array(), n.to_array(), (*c * full).to_array()].concat()
+        };
+        cloud.points.iter().zip(extras).map(row).collect()
+    }
+
+    fn text(rows: &[Vec<f32>], before: &str, between: &str) -> String {
+        let line = |row: &Vec<f32>| row.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(between);
+        rows.iter().map(|row| format!("{before}{}\n", line(row))).collect()
+    }
+
+    fn ply_header(encoding: &str, coordinate: &str, color: &str, names: [&str; 3]) -> String {
+        let coordinates = ["x", "y", "z", "nx", "ny", "nz"].map(|n| format!("property {coordinate} {n}\n"));
+        let colors = names.map(|n| format!("property {color} {n}\n"));
+        format!(
+            "ply\nformat {encoding} 1.0\ncomment made\nelement camera 1\nproperty list uchar short view\n\
+             element vertex 3\nproperty uchar quality\n{}{}element face 1\nproperty uchar flags\n\
+             property list uchar int corners\nend_header\n",
+            coordinates.concat(),
+            colors.concat(),
+        )
+    }
+
+    fn ply_text(color: &str, full: f32) -> Vec<u8> {
+        let header = ply_header("ascii", "float", color, ["red", "green", "blue"]);
+        format!("{header}2 7 8\n{}0 2 9 9\n", text(&rows(&made(), full), "77 ", " ")).into_bytes()
+    }
+
+    /// Doubles and 16-bit colours.
+    fn ply_binary(little: bool) -> Vec<u8> {
+        let encoding = if little { "binary_little_endian" } else { "binary_big_endian" };
+        let mut out = ply_header(encoding, "double", "ushort", ["r", "g", "b"]).into_bytes();
+        let mut put = |mut bytes: Vec<u8>| {
+            if little {
+                bytes.reverse();
+            }
+            out.extend(bytes);
+        };
+        [vec![2], vec![0, 7], vec![0, 8]].into_iter().for_each(&mut put);
+        for row in rows(&made(), 65535.0) {
+            put(vec![77]);
+            row[..6].iter().for_each(|&x| put(f64::from(x).to_be_bytes().into()));
+            row[6..].iter().for_each(|&x| put((x.round() as u16).to_be_bytes().into()));
+        }
+        [vec![0], vec![2], vec![0, 0, 0, 9], vec![0, 0, 0, 9]].into_iter().for_each(put);
+        out
+    }
+
+    fn obj(faces: &str) -> Vec<u8> {
+        let (mut vertices, mut normals) = (rows(&made(), 1.0), Vec::new());
+        for row in &mut vertices {
+            normals.push(row.drain(3..6).collect());
+        }
+        format!("o made\n{}{}{faces}", text(&vertices, "v ", " "), text(&normals, "vn ", " ")).into_bytes()
+    }
+
+    fn columns(head: &str, between: &str, full: f32) -> Vec<u8> {
+        format!("{head}{}", text(&rows(&made(), full), "", between)).into_bytes()
+    }
+
+    /// One file of each kind, all with the same points.
+    fn files() -> Vec<(&'static str, Vec<u8>)> {
+        vec![
+            ("PLY text", ply_text("uchar", 255.0)),
+            ("PLY text, floats", ply_text("float", 1.0)),
+            ("PLY text, floats of 255", ply_text("float", 255.0)),
+            ("PLY little-endian", ply_binary(true)),
+            ("PLY big-endian", ply_binary(false)),
+            ("OBJ", obj("")),
+            ("OBJ, faces without normals", obj("f 1 2 3\n")),
+            ("OBJ, faces with normals", obj("f 1//1 2//2 3//3\n")),
+            ("XYZ", columns("", " ", 255.0)),
+            ("PTS", columns("3\n", " ", 1.0)),
+            ("CSV", columns("x,y,z,nx,ny,nz,red,green,blue\n", ",", 255.0)),
+        ]
+    }
+
+    fn keyed() -> Vec<u8> {
+        let rows: Vec<Vec<f32>> = made().points.iter().map(|p| p.to_array().into()).collect();
+        format!("# made\nd 1 1 1\ns 1 1 1\ng 1 0 0\n{}", text(&rows, "p ", " ")).into_bytes()
+    }
+
+    #[test]
+    fn every_format_gives_the_same_points() {
+        for (name, bytes) in files() {
+            let cloud = parse_points(&bytes).unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert_eq!((&cloud.points, &cloud.normals), (&made().points, &made().normals), "{name}");
+            for (found, expected) in cloud.colors.unwrap().iter().zip(made().colors.unwrap()) {
+                assert!((*found - expected).abs().max_element() < 1e-6, "{name}: {found} {expected}");
+            }
+        }
+        let expected = PointCloud { points: made().points, ..PointCloud::default() };
+        assert_eq!(parse_points(&keyed()).unwrap(), expected);
+    }
+
+    #[test]
+    fn extras_are_there_only_where_the_file_has_them() {
+        let bare = PointCloud { points: vec![Vec3::X, Vec3::Y], ..PointCloud::default() };
+        for text in [
+            "v 1 0 0\nv 0 1 0\n",
+            "v 1 0 \\\r\n0\r\nv 0 1 0\r\n",
+            "v 1 0 0 1 1 1\nv 0 1 0\nvn 0 0 1\n",
+            "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
+             end_header\n1 0 0\n0 1 0\n",
+        ] {
+            assert_eq!(parse_points(text.as_bytes()).unwrap(), bare, "{text}");
+        }
+        let part = "v 1 0 0\nv 0 1 0\nv 0 0 1\nv 9 9 9\nvn 0 0 2\nf 1//1 2//1 3//1\n";
+        let normals = parse_points(part.as_bytes()).unwrap().normals.unwrap();
+        assert_eq!(normals, [Vec3::Z, Vec3::Z, Vec3::Z, Vec3::ZERO]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_said() {
+        let ply = |vertices: &str, color: &str| {
+            let properties = "property float x\nproperty float y\nproperty double z\n";
+            let colors = ["red", "green", "blue"].map(|name| format!("property {color} {name}\n")).concat();
+            format!("ply\nformat ascii 1.0\nelement vertex 2\n{properties}{colors}end_header\n{vertices}")
+        };
+        for (bytes, said) in [
+            (
+                ply("1 2 3 0 0 0\n4 nan 6 0 0 0\n", "uchar"),
+                "PLY: points: that of point 1, from 0, is [4, NaN, 6]",
+            ),
+            (
+                ply("1 2 3 0 0 0\n4 5 1e39 0 0 0\n", "uchar"),
+                "PLY: points: that of point 1, from 0, is [4, 5, inf]",
+            ),
+            (ply("1 2 3 0 0 0\n4 5 6 0 0 256\n", "uchar"), "PLY: colours: some are out of range"),
+            (ply("1 2 3 0 0 0\n4 5 6 0 0 1.5\n", "float"), "PLY: colours: some are out of range"),
+            (ply("1 2 3 0 0 0\n4 5 6 0\n", "float"), "PLY: green: needs 1 bytes"),
+            (ply("1 2 3 0 0 0\n4 5 six 0 0 0\n", "float"), "PLY: z: \"six\" is no number"),
+            (ply("", "float").replace("vertex 2", "vertex 4000000000"), "PLY: element vertex: needs"),
+            (ply("", "float").replace("vertex 2", "vertex 0"), "PLY: points: there are none"),
+            ("v 1 2 3\nvn nan 0 0\n".into(), "OBJ: normals: that of point 0"),
+            ("v 1 2 3\r\nv 1 2\r\n".into(), "OBJ: line 2: 3 or more numbers"),
+            (String::new(), "point file: content: needs 1 bytes"),
+            (
+                "solid made\nendsolid\n".into(),
+                "point file: format: STL is not supported; accepted: PLY, OBJ and",
+            ),
+            ("<?xml version=\"1.0\"?>".into(), "point file: format: XML"),
+            ("{\"points\": []}".into(), "point file: format: JSON"),
+            ("# .PCD v0.7\nVERSION 0.7\n".into(), "point file: format: PCD"),
+            ("OFF\n1 0 0\n1 2 3\n".into(), "point file: format: OFF"),
+            ("glTF\u{2}\0\0\0".into(), "point file: format: GLB"),
+            ("1 2 3\n\0\u{1}".into(), "point file: format: a binary file"),
+        ] {
+            let error = parse_points(bytes.as_bytes()).unwrap_err().to_string();
+            assert!(error.starts_with(said), "{bytes:?}: {error}");
+        }
+        let mut stl = vec![b' '; 80];
+        stl.extend([1, 0, 0, 0]);
+        stl.extend([0; 50]);
+        let error = parse_points(&stl).unwrap_err().to_string();
+        assert!(error.starts_with("point file: format: STL"), "{error}");
+    }
+
+    /// What holds for whatever was read.
+    fn assert_sound(bytes: &[u8], place: &str) {
+        let Ok(cloud) = parse_points(bytes) else { return };
+        let count = cloud.points.len();
+        assert!((1..=bytes.len()).contains(&count), "{place}");
+        let normals = cloud.normals.unwrap_or(cloud.points.clone());
+        let colors = cloud.colors.unwrap_or(vec![Vec3::ZERO; count]);
+        assert_eq!((normals.len(), colors.len()), (count, count), "{place}");
+        assert!(cloud.points.iter().chain(&normals).all(|v| v.is_finite()), "{place}");
+        assert_eq!(full_channel(colors.into_iter()), Some(1.0), "{place}");
+    }
+
+    #[test]
+    fn cut_files_are_refused_or_sound() {
+        for (name, bytes) in files().into_iter().chain([("keyed", keyed())]) {
+            (0..bytes.len()).for_each(|end| assert_sound(&bytes[..end], &format!("{name} cut at {end}")));
+        }
+        for (name, bytes) in [("little", ply_binary(true)), ("big", ply_binary(false))] {
+            (0..bytes.len()).for_each(|end| assert!(parse_points(&bytes[..end]).is_err(), "{name} at {end}"));
+        }
+    }
+
+    #[test]
+    fn files_with_a_wrong_byte_are_refused_or_sound() {
+        let mut state = 1u64;
+        let mut random = |below: usize| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as usize % below
+        };
+        for (name, bytes) in files().into_iter().chain([("keyed", keyed())]) {
+            for turn in 0..3000 {
+                let (at, byte) = (random(bytes.len()), random(256) as u8);
+                let mut broken = bytes.clone();
+                broken[at] = byte;
+                assert_sound(&broken, &format!("{name}, turn {turn}: byte {at} is {byte}"));
+            }
+        }
+    }
+}
