@@ -13,7 +13,7 @@ use crate::mesh::TriangleMesh;
 /// Least distance of a vertex from the ends of its grid edge, in voxels. At 0 triangles around a voxel that equals
 /// the iso value have no area; much smaller and `f32` positions of a large volume fall together. The surface moves
 /// by no more than this.
-const MARGIN: f32 = 1.0 / 256.0;
+pub(super) const MARGIN: f32 = 1.0 / 256.0;
 
 /// The surface where the intensity of one frame passes `iso`, in world space.
 ///

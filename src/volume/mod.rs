@@ -24,6 +24,7 @@
 mod contour;
 mod cube_cases;
 mod error;
+mod follow;
 mod grid;
 mod pyramid;
 mod sampling;
@@ -33,6 +34,7 @@ mod voxels;
 
 pub use contour::{marching_cubes, marching_cubes_world};
 pub use error::VolumeError;
+pub use follow::{Follower, Lattice};
 pub use grid::{Grid, VectorGrid};
 pub use voxels::Voxels;
 

@@ -1,0 +1,302 @@
+//! Values at the nodes of a large lattice, kept in blocks of 8 × 8 × 8 that are made where they are needed.
+//!
+//! The lattice is padded by one layer of nodes that are outside, so lattice node (i, j, k) is node
+//! (i + 1, j + 1, k + 1) here. A cell is named by its corner of lowest coordinates. A slot is the number of a node,
+//! or of the cell that starts there, in the blocks so far.
+
+use super::super::cube_cases::corner;
+use super::super::error::{VolumeError, reserve};
+
+/// A node of the padded lattice.
+pub(super) type Node = [usize; 3];
+
+/// Nodes along the side of a block. Smaller, and the table of blocks grows; larger, and more of each block lies off
+/// the surface.
+const SIDE: usize = 8;
+/// Nodes of a block.
+const BLOCK: usize = SIDE * SIDE * SIDE;
+/// Three vertices a node can still be told apart by a `u32` with this many blocks.
+const MAX_BLOCKS: usize = u32::MAX as usize / (3 * BLOCK);
+
+/// Slot of a node whose block has not been made, and block of a place that has none.
+pub(super) const ABSENT: u32 = u32::MAX;
+
+/// Value of a node that has not been asked for.
+const UNKNOWN: f64 = f64::NAN;
+/// Value of a node beyond the lattice, and of one where the function is not a number.
+const OUTSIDE: f64 = f64::NEG_INFINITY;
+
+/// Whether a value is that of a node inside.
+pub(super) fn is_inside(value: f64) -> bool {
+    value >= 0.0
+}
+
+/// What is kept of a function's value: not a number is far outside.
+pub(super) fn sound(value: f64) -> f64 {
+    if value.is_nan() { OUTSIDE } else { value }
+}
+
+/// The node one further along an axis.
+pub(super) fn next(mut node: Node, axis: usize) -> Node {
+    node[axis] += 1;
+    node
+}
+
+/// Offset of a cell's corner, numbered as in [`corner`].
+fn corner_offset(number: usize) -> [usize; 3] {
+    [number >> 2 & 1, number & 1, number >> 1 & 1]
+}
+
+/// Number of a node within its block.
+fn local(node: Node) -> usize {
+    let [x, y, z] = node.map(|k| k % SIDE);
+    (z * SIDE + y) * SIDE + x
+}
+
+/// Values and marks of the nodes of all blocks so far.
+pub(super) struct Blocks {
+    /// Nodes of the padded lattice.
+    nodes: [usize; 3],
+    /// Blocks that cover them.
+    dims: [usize; 3],
+    /// The block at each place.
+    table: Vec<u32>,
+    /// The first node of each block.
+    origins: Vec<[u16; 3]>,
+    values: Vec<f64>,
+    /// A bit a cell: whether the flood has looked at it, or is about to.
+    seen: Vec<u64>,
+}
+
+impl Blocks {
+    /// No blocks yet, for a lattice of `dims` nodes, padded here.
+    pub fn new(dims: [usize; 3]) -> Result<Self, VolumeError> {
+        let nodes = dims.map(|n| n + 2);
+        let dims = nodes.map(|n| n.div_ceil(SIDE));
+        let places = dims.iter().product();
+        let mut table = reserve(places)?;
+        table.resize(places, ABSENT);
+        Ok(Self { nodes, dims, table, origins: Vec::new(), values: Vec::new(), seen: Vec::new() })
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.table[..])
+            + size_of_val(&self.origins[..])
+            + size_of_val(&self.values[..])
+            + size_of_val(&self.seen[..])
+    }
+
+    /// One more than the highest slot.
+    pub fn slots(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Cells along each axis.
+    pub fn cells(&self) -> [usize; 3] {
+        self.nodes.map(|n| n - 1)
+    }
+
+    /// Whether a node lies beyond the lattice proper.
+    pub fn is_padding(&self, node: Node) -> bool {
+        (0..3).any(|k| node[k] == 0 || node[k] + 1 >= self.nodes[k])
+    }
+
+    fn place(&self, node: Node) -> usize {
+        let [x, y, z] = node.map(|k| k / SIDE);
+        (z * self.dims[1] + y) * self.dims[0] + x
+    }
+
+    /// The slot of a node, [`ABSENT`] where its block has not been made.
+    pub fn slot(&self, node: Node) -> u32 {
+        match self.table[self.place(node)] {
+            ABSENT => ABSENT,
+            block => block * BLOCK as u32 + local(node) as u32,
+        }
+    }
+
+    /// The node of a slot.
+    pub fn node(&self, slot: u32) -> Node {
+        let (block, local) = (slot as usize / BLOCK, slot as usize % BLOCK);
+        let [x, y, z] = self.origins[block].map(usize::from);
+        [x + local % SIDE, y + local / SIDE % SIDE, z + local / (SIDE * SIDE)]
+    }
+
+    /// A number that orders slots by block, then node, whichever block was made first.
+    pub fn rank(&self, slot: u32) -> u64 {
+        let place = self.place(self.node(slot)) as u64;
+        place * BLOCK as u64 + u64::from(slot) % BLOCK as u64
+    }
+
+    /// The slot of a node, whose block is made if need be.
+    pub fn open(&mut self, node: Node) -> Result<u32, VolumeError> {
+        if self.slot(node) == ABSENT {
+            self.make_block(node)?;
+        }
+        Ok(self.slot(node))
+    }
+
+    /// Makes the blocks of a cell's corners.
+    pub fn open_corners(&mut self, cell: u32) -> Result<(), VolumeError> {
+        let node = self.node(cell);
+        if node.iter().any(|k| k % SIDE == SIDE - 1) {
+            for number in 1..8 {
+                self.open(at_corner(node, number))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn make_block(&mut self, node: Node) -> Result<(), VolumeError> {
+        let bytes = (self.bytes() + BLOCK * size_of::<f64>()) as u64;
+        let too_large = VolumeError::TooLarge { bytes };
+        if self.origins.len() >= MAX_BLOCKS {
+            return Err(too_large);
+        }
+        let room = self.values.try_reserve(BLOCK).and_then(|()| self.seen.try_reserve(BLOCK / 64));
+        room.and_then(|()| self.origins.try_reserve(1)).map_err(|_| too_large)?;
+        let place = self.place(node);
+        self.table[place] = self.origins.len() as u32;
+        self.origins.push(node.map(|k| (k / SIDE * SIDE) as u16));
+        self.seen.resize(self.seen.len() + BLOCK / 64, 0);
+        for slot in self.slots()..self.slots() + BLOCK {
+            let value = if self.is_padding(self.node(slot as u32)) { OUTSIDE } else { UNKNOWN };
+            self.values.push(value);
+        }
+        Ok(())
+    }
+
+    /// The slots of a cell's corners, numbered as in [`corner`]; [`ABSENT`] where a block has not been made.
+    pub fn corners(&self, cell: u32) -> [u32; 8] {
+        let first = cell as usize % BLOCK;
+        let at_border = [first % SIDE, first / SIDE % SIDE, first / (SIDE * SIDE)].contains(&(SIDE - 1));
+        if at_border {
+            let node = self.node(cell);
+            return std::array::from_fn(|number| self.slot(at_corner(node, number)));
+        }
+        std::array::from_fn(|number| cell + local(corner_offset(number)) as u32)
+    }
+
+    /// The value at a node; not a number where it is not known.
+    pub fn value(&self, slot: u32) -> f64 {
+        self.values.get(slot as usize).copied().unwrap_or(UNKNOWN)
+    }
+
+    /// Whether the value at a node has still to be asked for.
+    pub fn is_unknown(&self, slot: u32) -> bool {
+        self.value(slot).is_nan()
+    }
+
+    /// Sets the value at a node.
+    pub fn set(&mut self, slot: u32, value: f64) {
+        self.values[slot as usize] = sound(value);
+    }
+
+    /// The case of a cell, a bit a corner inside. Corners that are not known count as outside.
+    pub fn case(&self, cell: u32) -> u8 {
+        let corners = self.corners(cell).into_iter().enumerate();
+        corners.fold(0, |case, (number, slot)| case | u8::from(is_inside(self.value(slot))) << number)
+    }
+
+    /// Marks a cell as seen; false where it was already.
+    pub fn see(&mut self, cell: u32) -> bool {
+        let (word, bit) = (&mut self.seen[cell as usize / 64], 1 << (cell % 64));
+        let is_new = *word & bit == 0;
+        *word |= bit;
+        is_new
+    }
+
+    /// Whether a cell was marked as seen.
+    pub fn is_seen(&self, cell: u32) -> bool {
+        self.seen.get(cell as usize / 64).is_some_and(|word| word >> (cell % 64) & 1 == 1)
+    }
+
+    /// Whether the surface followed so far crosses a straight line an odd number of times, while no cell is left to be
+    /// looked at. The line runs from `from` along `axis` up to coordinate `to`.
+    ///
+    /// All four cells at a cut edge are joined through its faces, so it is enough to look at the one that starts there.
+    pub fn crosses_oddly(&self, from: Node, axis: usize, to: usize) -> bool {
+        let mut odd = false;
+        let mut node = from;
+        while node[axis] < to {
+            let slot = self.slot(node);
+            if slot == ABSENT {
+                node[axis] = (node[axis] / SIDE + 1) * SIDE;
+                continue;
+            }
+            let after = next(node, axis);
+            if self.is_seen(slot) {
+                odd ^= is_inside(self.value(slot)) != is_inside(self.value(self.slot(after)));
+            }
+            node = after;
+        }
+        odd
+    }
+}
+
+/// A corner of the cell that starts at a node.
+fn at_corner(node: Node, number: usize) -> Node {
+    let offset = corner_offset(number);
+    debug_assert_eq!(corner(offset), number);
+    std::array::from_fn(|k| node[k] + offset[k])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn slots_and_nodes_are_told_apart_across_blocks() {
+        let mut blocks = Blocks::new([20, 9, 30]).unwrap();
+        let mut slots = Vec::new();
+        for node in [[21, 10, 31], [0, 0, 0], [7, 8, 15], [8, 7, 16]] {
+            let slot = blocks.open(node).unwrap();
+            assert_eq!((blocks.node(slot), blocks.slot(node)), (node, slot));
+            slots.push(slot);
+        }
+        slots.sort_unstable_by_key(|&slot| blocks.rank(slot));
+        let ordered: Vec<Node> = slots.iter().map(|&slot| blocks.node(slot)).collect();
+        assert_eq!(ordered, [[0, 0, 0], [7, 8, 15], [8, 7, 16], [21, 10, 31]]);
+        assert_eq!(blocks.slot([8, 8, 8]), ABSENT);
+    }
+
+    #[test]
+    fn corners_are_numbered_as_in_the_table_of_cases() {
+        let mut blocks = Blocks::new([14; 3]).unwrap();
+        for cell in [[2, 3, 4], [7, 3, 7]] {
+            let slot = blocks.open(cell).unwrap();
+            blocks.open_corners(slot).unwrap();
+            for (number, slot) in blocks.corners(slot).into_iter().enumerate() {
+                let node = blocks.node(slot);
+                assert_eq!(corner([0, 1, 2].map(|k| node[k] - cell[k])), number);
+            }
+        }
+    }
+
+    #[test]
+    fn only_padding_is_known_from_the_start() {
+        let mut blocks = Blocks::new([6; 3]).unwrap();
+        blocks.open([0; 3]).unwrap();
+        let unknown = (0..512).filter(|&slot| blocks.is_unknown(slot)).count();
+        assert_eq!(unknown, 6 * 6 * 6);
+        assert!(!blocks.is_padding([6; 3]) && blocks.is_padding([6, 7, 6]) && blocks.is_padding([1, 0, 1]));
+    }
+
+    #[test]
+    fn a_line_counts_only_what_was_followed() {
+        let mut blocks = Blocks::new([30; 3]).unwrap();
+        for x in 9..16 {
+            let slot = blocks.open([x, 1, 1]).unwrap();
+            blocks.set(slot, if x == 12 { 1.0 } else { -1.0 });
+        }
+        assert!(!blocks.crosses_oddly([1; 3], 0, 30));
+        let seen = blocks.slot([12, 1, 1]);
+        assert!(blocks.see(seen) && !blocks.see(seen) && blocks.is_seen(seen));
+        assert!(blocks.crosses_oddly([1; 3], 0, 30));
+        assert!(!blocks.crosses_oddly([1; 3], 0, 12) && blocks.crosses_oddly([12, 1, 1], 0, 13));
+        assert!(blocks.see(seen - 1));
+        assert!(!blocks.crosses_oddly([1; 3], 0, 30));
+    }
+}

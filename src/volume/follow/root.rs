@@ -1,0 +1,188 @@
+//! Where a function passes 0 on a lattice edge.
+
+use super::super::contour::MARGIN;
+use super::blocks::{is_inside, sound};
+
+/// A step of less than this fraction of an edge is not worth an evaluation: steps shrink so fast that the next one is
+/// far less than `f32` positions can show.
+const SETTLED: f64 = 1e-6;
+
+/// Bend of a parabola, beyond which a straight line is taken. At 1 it is level at one end, as where the surface is tangent
+/// to an edge; a jump makes far more, and the parabola would creep along one side of it.
+const MAX_BEND: f64 = 4.0;
+
+/// A place on the edge, as a fraction of the way along it, and the value there.
+#[derive(Clone, Copy, Debug)]
+struct Sample {
+    at: f64,
+    value: f64,
+}
+
+/// A zero on an edge between a place inside and one outside, ever nearer to each other.
+///
+/// The estimate is where the parabola through both and the one before them passes 0: an edge that the surface is nearly
+/// tangent to is bent as much as it falls, and a straight line would take many steps.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Root {
+    inside: Sample,
+    outside: Sample,
+    /// The one that was last replaced; at first its value is not a number.
+    before: Sample,
+}
+
+impl Root {
+    /// Between values `start` and `end`, one of them inside and the other outside.
+    pub fn between(start: f64, end: f64) -> Self {
+        let (start, end) = (Sample { at: 0.0, value: start }, Sample { at: 1.0, value: end });
+        let (inside, outside) = if is_inside(start.value) { (start, end) } else { (end, start) };
+        Self { inside, outside, before: Sample { at: 0.5, value: f64::NAN } }
+    }
+
+    /// In the middle for good.
+    pub fn fixed() -> Self {
+        let (inside, outside) = (Sample { at: 0.5, value: 1.0 }, Sample { at: 0.5, value: -1.0 });
+        Self { inside, outside, before: inside }
+    }
+
+    /// The fraction to be evaluated next.
+    pub fn estimate(&self) -> f64 {
+        let Self { inside, outside, .. } = self;
+        inside.at + self.share() * (outside.at - inside.at)
+    }
+
+    /// Share of the way from inside to outside at which the parabola passes 0; half of it next to infinite values.
+    ///
+    /// On that way it is, over the fall from one value to the other, height − s + bend s (s − 1) at share s.
+    fn share(&self) -> f64 {
+        let Self { inside, outside, before } = self;
+        let fall = inside.value - outside.value;
+        if !fall.is_finite() {
+            return 0.5;
+        }
+        let height = inside.value / fall;
+        let s = (before.at - inside.at) / (outside.at - inside.at);
+        let bend = ((before.value - inside.value) / fall + s) / (s * (s - 1.0));
+        if bend.is_nan() || bend.abs() > MAX_BEND {
+            return height;
+        }
+        let slope = 1.0 + bend;
+        let share = 2.0 * height / (slope + (slope * slope - 4.0 * bend * height).sqrt());
+        // Rounding can lead out of the bracket, and a zero at its very end to 0 / 0.
+        if (0.0..=1.0).contains(&share) { share } else { height }
+    }
+
+    /// Takes the value at [`Self::estimate`].
+    pub fn take(&mut self, value: f64) {
+        let sample = Sample { at: self.estimate(), value: sound(value) };
+        let end = if is_inside(sample.value) { &mut self.inside } else { &mut self.outside };
+        self.before = std::mem::replace(end, sample);
+    }
+
+    /// Whether another value would not move the estimate to speak of.
+    pub fn is_settled(&self) -> bool {
+        [self.inside, self.outside].iter().any(|end| (self.estimate() - end.at).abs() <= SETTLED)
+    }
+
+    /// The estimate, kept [`MARGIN`] away from both ends of the edge.
+    pub fn fraction(&self) -> f64 {
+        let margin = f64::from(MARGIN);
+        self.estimate().clamp(margin, 1.0 - margin)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// The root and the number of evaluations until it settles, at most `most`.
+    fn solved(f: impl Fn(f64) -> f64, most: usize) -> (Root, usize) {
+        let mut root = Root::between(f(0.0), f(1.0));
+        let mut steps = 0;
+        while steps < most && !root.is_settled() {
+            root.take(f(root.estimate()));
+            steps += 1;
+        }
+        (root, steps)
+    }
+
+    #[test]
+    fn smooth_functions_take_a_few_steps() {
+        for k in 1..100 {
+            let zero = f64::from(k) / 100.0;
+            for (bend, most) in [(0.0, 1), (0.01, 2), (0.1, 2), (-0.9, 3)] {
+                let f = |t: f64| (t - zero) * (1.0 + bend * t);
+                for sign in [1.0, -1.0] {
+                    let (root, steps) = solved(|t| sign * f(t), 10);
+                    let error = (root.fraction() - zero).abs();
+                    assert!(error < 1e-8 && steps <= most, "{zero}, {bend}: {error}, {steps}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn steep_and_flat_zeros_take_a_few_more() {
+        for k in 1..100 {
+            let zero = f64::from(k) / 100.0;
+            let (root, steps) = solved(|t| libm::exp(2.0 * t) - libm::exp(2.0 * zero), 10);
+            assert!((root.fraction() - zero).abs() < 1e-8 && steps <= 5, "{zero}: {steps}");
+            let (root, steps) = solved(|t| t * t * (1.0 + 0.05 * t) - zero * zero * (1.0 + 0.05 * zero), 10);
+            assert!((root.fraction() - zero).abs() < 1e-8 && steps <= 4, "{zero}: {steps}");
+        }
+    }
+
+    #[test]
+    fn jumps_are_closed_in_on() {
+        let (root, _) = solved(|t| if t < 0.3 { 1.0 } else { -1.0 }, 12);
+        assert!((root.estimate() - 0.3).abs() < 0.01);
+        let (root, _) = solved(|t| if t < 0.3 { 1.0 } else { -1e9 * t }, 12);
+        assert!(root.estimate() <= 0.3);
+        let (root, _) = solved(|t| if t < 0.7 { f64::NEG_INFINITY } else { 1.0 }, 12);
+        assert!((root.estimate() - 0.7).abs() <= 1.0 / 4096.0);
+    }
+
+    #[test]
+    fn every_estimate_stays_between_values_of_different_sign() {
+        let f = |t: f64| (t - 0.2) * (t - 0.5) * (t - 0.55) * if t > 0.9 { 1e9 } else { 1.0 };
+        let mut root = Root::between(f(0.0), f(1.0));
+        for _ in 0..20 {
+            let ends = [root.inside.at, root.outside.at];
+            assert!(is_inside(f(ends[0])) && !is_inside(f(ends[1])));
+            assert!((root.estimate() - ends[0]) * (root.estimate() - ends[1]) <= 0.0);
+            root.take(f(root.estimate()));
+        }
+    }
+
+    #[test]
+    fn an_exact_zero_stays_one_whatever_the_bend() {
+        for (start, middle, end) in
+            [(1.0, 0.0, -3.0), (0.0, 1.0, -1.0), (-1e-320, 4.0, 1.0), (1.0, -1e-320, -1.0)]
+        {
+            for [start, end] in [[start, end], [end, start]] {
+                let mut root = Root::between(start, end);
+                for value in [middle, 0.0, middle, -1.0, 0.0] {
+                    root.take(value);
+                    assert!((0.0..=1.0).contains(&root.estimate()), "{root:?}");
+                }
+            }
+        }
+        let zero = Sample { at: 0.5, value: 0.0 };
+        let bent = Root {
+            inside: zero,
+            outside: Sample { at: 1.0, value: -1.0 },
+            before: Sample { at: 0.0, value: -3.0 },
+        };
+        assert!(bent.estimate() == 0.5 && bent.is_settled());
+    }
+
+    #[test]
+    fn vertices_keep_off_the_ends() {
+        assert_eq!(Root::between(0.0, -1.0).fraction(), 1.0 / 256.0);
+        assert_eq!(Root::between(-1.0, 0.0).fraction(), 255.0 / 256.0);
+        assert_eq!(Root::between(3.0, -1.0).fraction(), 0.75);
+        assert!(Root::between(0.0, -1.0).is_settled());
+        assert!(Root::fixed().is_settled() && Root::fixed().fraction() == 0.5);
+    }
+}

@@ -1,0 +1,126 @@
+//! Vertices and triangles of the crossed cells, in an order that does not depend on how they were found.
+
+use super::super::cube_cases::{Case, EDGES, cases, corner};
+use super::super::error::{VolumeError, reserve};
+use super::Lattice;
+use super::batch::Batch;
+use super::blocks::{Blocks, next};
+use super::flood::CutCell;
+use super::root::Root;
+use crate::math::DVec3;
+use crate::mesh::TriangleMesh;
+
+const NONE: u32 = u32::MAX;
+
+/// The cut edges that start where a cell does, bit by axis.
+fn near_cuts(case: u8) -> u8 {
+    let far_ends = [corner([1, 0, 0]), corner([0, 1, 0]), corner([0, 0, 1])];
+    (0..3).fold(0, |cuts, axis| cuts | ((case ^ case >> far_ends[axis]) & 1) << axis)
+}
+
+/// A vertex: where the surface cuts the lattice edge from a node along an axis.
+struct Vertex {
+    slot: u32,
+    axis: usize,
+    root: Root,
+}
+
+/// Crossed cells and their vertices, both by block, then node.
+pub(super) struct Surface {
+    cells: Vec<CutCell>,
+    /// The vertex on the first cut edge that starts where each cell does; the others follow.
+    first: Vec<u32>,
+    /// Where the cell of each slot stands in `cells`.
+    index: Vec<u32>,
+    vertices: Vec<Vertex>,
+    /// Vertices whose values were asked for.
+    asked: Vec<usize>,
+}
+
+impl Surface {
+    /// The surface in the given cells, vertices where lines through the nodes' values pass 0.
+    pub fn new(cut: &[CutCell], blocks: &Blocks) -> Result<Self, VolumeError> {
+        let mut cells = reserve(cut.len())?;
+        cells.extend_from_slice(cut);
+        cells.sort_unstable_by_key(|cell| blocks.rank(cell.slot));
+        let count = cells.iter().map(|cell| near_cuts(cell.case).count_ones() as usize).sum();
+        let (mut vertices, mut first, mut index) =
+            (reserve(count)?, reserve(cells.len())?, reserve(blocks.slots())?);
+        index.resize(blocks.slots(), NONE);
+        for (at, &CutCell { slot, case }) in cells.iter().enumerate() {
+            index[slot as usize] = at as u32;
+            first.push(vertices.len() as u32);
+            let axes = (0..3).filter(|axis| near_cuts(case) >> axis & 1 == 1);
+            vertices.extend(axes.map(|axis| Vertex { slot, axis, root: root(slot, axis, blocks) }));
+        }
+        Ok(Self { cells, first, index, vertices, asked: Vec::new() })
+    }
+
+    /// Fills `batch` with the estimates of all vertices that are not settled; false where all are.
+    pub fn ask(&mut self, blocks: &Blocks, lattice: &Lattice, batch: &mut Batch) -> bool {
+        let Self { vertices, asked, .. } = self;
+        asked.clear();
+        asked.extend((0..vertices.len()).filter(|&v| !vertices[v].root.is_settled()));
+        batch.extend(asked.iter().map(|&v| {
+            let Vertex { slot, axis, root } = &vertices[v];
+            lattice.on_edge(blocks.node(*slot), *axis, root.estimate())
+        }));
+        !asked.is_empty()
+    }
+
+    /// Takes the values that were asked for.
+    pub fn take(&mut self, values: &[f64]) {
+        for (v, &value) in self.asked.drain(..).zip(values) {
+            self.vertices[v].root.take(value);
+        }
+    }
+
+    /// Where the vertices are.
+    pub fn positions(&self, blocks: &Blocks, lattice: &Lattice) -> impl ExactSizeIterator<Item = DVec3> {
+        self.vertices.iter().map(|v| lattice.on_edge(blocks.node(v.slot), v.axis, v.root.fraction()))
+    }
+
+    /// The triangles whose vertices are all there, which are all once the flood is done.
+    pub fn mesh(&self, blocks: &Blocks, lattice: &Lattice) -> Result<TriangleMesh, VolumeError> {
+        let cases = cases();
+        let case = |cell: &CutCell| &cases[usize::from(cell.case)];
+        let mut positions = reserve(self.vertices.len())?;
+        positions.extend(self.positions(blocks, lattice).map(|p| p.as_vec3()));
+        let mut triangles = reserve(self.cells.iter().map(|cell| case(cell).triangles.len()).sum())?;
+        for cell in &self.cells {
+            triangles.extend(self.triangles(cell, case(cell), blocks));
+        }
+        Ok(TriangleMesh { positions, triangles, ..Default::default() })
+    }
+
+    fn triangles<'a>(
+        &'a self,
+        cell: &CutCell,
+        case: &'a Case,
+        blocks: &Blocks,
+    ) -> impl Iterator<Item = [u32; 3]> + 'a {
+        let corners = blocks.corners(cell.slot);
+        let on_edge = move |edge: u8| {
+            let (axis, offset) = EDGES[usize::from(edge)];
+            self.vertex(corners[corner(offset)], axis)
+        };
+        case.triangles.iter().filter_map(move |&[a, b, c]| Some([on_edge(a)?, on_edge(b)?, on_edge(c)?]))
+    }
+
+    /// The vertex on the cut edge from a node along an axis; none while the cell that starts there is still to come.
+    fn vertex(&self, slot: u32, axis: usize) -> Option<u32> {
+        let at = *self.index.get(slot as usize)? as usize;
+        let before = near_cuts(self.cells.get(at)?.case) & ((1 << axis) - 1);
+        Some(self.first[at] + before.count_ones())
+    }
+}
+
+/// The zero on a cut edge; in its middle for good where it leads out of the lattice.
+fn root(slot: u32, axis: usize, blocks: &Blocks) -> Root {
+    let from = blocks.node(slot);
+    let to = next(from, axis);
+    if blocks.is_padding(from) || blocks.is_padding(to) {
+        return Root::fixed();
+    }
+    Root::between(blocks.value(slot), blocks.value(blocks.slot(to)))
+}
