@@ -82,7 +82,8 @@ impl Bounds {
         (enter <= leave * ROUNDING).then_some(enter)
     }
 
-    fn widest_axis(&self) -> usize {
+    /// The axis along which the box is longest: 0, 1 or 2.
+    pub fn widest_axis(&self) -> usize {
         let size = self.max - self.min;
         if size.x >= size.y && size.x >= size.z {
             0

@@ -3,9 +3,11 @@
 mod bounds;
 pub mod predicates;
 mod quadric;
+mod random;
 pub mod symmetric;
 pub mod triangle;
 
 pub use bounds::{Bounds, BoxTree};
 pub use glam::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3};
 pub use quadric::Quadric;
+pub use random::Random;

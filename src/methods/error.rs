@@ -28,6 +28,14 @@ pub enum MethodError {
         /// The number accepted.
         most: usize,
     },
+    /// A linear system without a usable solution.
+    #[error("the system of {constraints} constraints cannot be solved to the tolerance asked for: {cause}")]
+    Singular {
+        /// Its size.
+        constraints: usize,
+        /// The likely cause, and what to do about it.
+        cause: &'static str,
+    },
     /// Bytes that are not a saved state of this model.
     #[error("saved state, {field}: {problem}")]
     BadState {

@@ -1,5 +1,6 @@
 //! Parameters that describe themselves, so that a page can build its controls from them.
 
+use super::MethodError;
 use serde::Serialize;
 
 /// One parameter of a method.
@@ -38,6 +39,24 @@ pub struct ParamSpec {
     /// The words a choice accepts; a number is accepted too where `min` is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub choices: Option<&'static [&'static str]>,
+}
+
+impl ParamSpec {
+    /// Tests a number against the range.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] that names the parameter and what it accepts.
+    pub fn check(&self, value: f64) -> Result<(), MethodError> {
+        let (low, high) = (self.min.unwrap_or(f64::MIN), self.max.unwrap_or(f64::MAX));
+        if value >= low && value <= high {
+            return Ok(());
+        }
+        let range = match (self.min, self.max) {
+            (Some(low), Some(high)) => format!("a number from {low} to {high}"),
+            _ => "a finite number".into(),
+        };
+        Err(MethodError::invalid(self.name, format!("{value} given, {range} accepted")))
+    }
 }
 
 /// The type of a parameter.

@@ -83,18 +83,8 @@ impl DeformableParams {
     /// # Errors
     /// [`MethodError::InvalidArgument`] with the name of the first parameter out of range and what it accepts.
     pub fn validate(&self) -> Result<(), MethodError> {
-        for (spec, value) in SPECS.iter().zip(self.numbers()) {
-            let Some(value) = value else { continue };
-            let (low, high) = (spec.min.unwrap_or(f64::MIN), spec.max.unwrap_or(f64::MAX));
-            if !(value >= low && value <= high) {
-                let range = match (spec.min, spec.max) {
-                    (Some(low), Some(high)) => format!("a number from {low} to {high}"),
-                    _ => "a finite number".into(),
-                };
-                return Err(MethodError::invalid(spec.name, format!("{value} given, {range} accepted")));
-            }
-        }
-        Ok(())
+        let given = SPECS.iter().zip(self.numbers());
+        given.filter_map(|(spec, value)| Some((spec, value?))).try_for_each(|(spec, value)| spec.check(value))
     }
 
     /// The values that have a range, in the order of [`SPECS`].

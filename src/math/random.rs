@@ -1,0 +1,61 @@
+//! Random numbers that are the same everywhere: PCG-XSH-RR (O'Neill, 2014).
+
+/// A seeded stream of numbers.
+#[derive(Clone, Debug)]
+pub struct Random(u64);
+
+impl Random {
+    /// The stream of a seed.
+    pub fn new(seed: u64) -> Self {
+        let mut random = Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x853C_49E6_748F_EA9B);
+        random.bits();
+        random
+    }
+
+    /// 32 random bits.
+    pub fn bits(&mut self) -> u32 {
+        let state = self.0;
+        self.0 = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let mixed = (((state >> 18) ^ state) >> 27) as u32;
+        mixed.rotate_right((state >> 59) as u32)
+    }
+
+    /// A whole number below `limit`.
+    pub fn below(&mut self, limit: u32) -> u32 {
+        ((u64::from(self.bits()) * u64::from(limit)) >> 32) as u32
+    }
+
+    /// 0 to `count` − 1 in random order.
+    pub fn order(&mut self, count: usize) -> Vec<u32> {
+        let mut order: Vec<u32> = (0..count as u32).collect();
+        for i in (1..count).rev() {
+            order.swap(i, self.below(i as u32 + 1) as usize);
+        }
+        order
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn an_order_has_every_number_once_and_a_seed_gives_one_order() {
+        let order = Random::new(3).order(1000);
+        assert_eq!(order, Random::new(3).order(1000));
+        assert_ne!(order, Random::new(4).order(1000));
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, (0..1000).collect::<Vec<_>>());
+        assert!(order.iter().zip(0..).filter(|(a, b)| *a == b).count() < 10);
+    }
+
+    #[test]
+    fn numbers_are_spread_evenly() {
+        let (mut random, mut counts) = (Random::new(1), [0; 10]);
+        (0..10_000).for_each(|_| counts[random.below(10) as usize] += 1);
+        assert!(counts.iter().all(|c| (850..1150).contains(c)), "{counts:?}");
+    }
+}

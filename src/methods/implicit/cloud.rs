@@ -1,0 +1,295 @@
+//! The points in the box: scaled, without duplicates, without outliers, thinned (paper, sections VI-B and VI-D).
+
+use crate::math::{Bounds, DAffine3, DMat3, DVec3, Random, Vec3, symmetric};
+use crate::methods::MethodError;
+use crate::spatial::PointGrid;
+
+/// Points near a surface, with what is known of each.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cloud {
+    /// Where they are.
+    pub points: Vec<Vec3>,
+    /// Unit normals that point outwards.
+    pub normals: Option<Vec<Vec3>>,
+    /// How sure each is, in (0, 1].
+    pub confidence: Option<Vec<f32>>,
+    /// rgb, 0..1.
+    pub colors: Option<Vec<Vec3>>,
+}
+
+/// Fewer different points span no volume.
+const LEAST_POINTS: usize = 4;
+/// A cloud is flat where its thickness is at most this share of its length.
+const FLAT: f64 = 1e-6;
+
+impl Cloud {
+    /// Tests the lengths and the values.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] naming the array and the first bad entry, or what is wrong with the whole.
+    pub fn validate(&self) -> Result<(), MethodError> {
+        let count = self.points.len();
+        check_finite("points", &self.points)?;
+        for (name, found) in [
+            ("normals", self.normals.as_ref().map(Vec::len)),
+            ("confidence", self.confidence.as_ref().map(Vec::len)),
+            ("colors", self.colors.as_ref().map(Vec::len)),
+        ] {
+            if let Some(found) = found.filter(|&found| found != count) {
+                let problem = format!("{found} entries for {count} points; one a point is needed");
+                return Err(MethodError::invalid(name, problem));
+            }
+        }
+        check_finite("normals", self.normals.as_deref().unwrap_or_default())?;
+        check_finite("colors", self.colors.as_deref().unwrap_or_default())?;
+        let confidence = self.confidence.as_deref().unwrap_or_default();
+        match confidence.iter().position(|&c| !(c > 0.0 && c <= 1.0)) {
+            Some(i) => {
+                let problem = format!("{} at point {i}; above 0, and at most 1, is accepted", confidence[i]);
+                Err(MethodError::invalid("confidence", problem))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The number of points.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// The points of the given indices, in that order.
+    pub fn gathered(&self, indices: &[u32]) -> Self {
+        fn gather<T: Copy>(all: &[T], indices: &[u32]) -> Vec<T> {
+            indices.iter().map(|&i| all[i as usize]).collect()
+        }
+        Self {
+            points: gather(&self.points, indices),
+            normals: self.normals.as_ref().map(|all| gather(all, indices)),
+            confidence: self.confidence.as_ref().map(|all| gather(all, indices)),
+            colors: self.colors.as_ref().map(|all| gather(all, indices)),
+        }
+    }
+
+    /// The first of each set of equal points, in order.
+    pub fn distinct(&self) -> Self {
+        let bits = |i: u32| self.points[i as usize].to_array().map(|x| (x + 0.0).to_bits());
+        let mut order: Vec<u32> = (0..self.len() as u32).collect();
+        order.sort_unstable_by_key(|&i| (bits(i), i));
+        let mut first: Vec<u32> = order.chunk_by(|&a, &b| bits(a) == bits(b)).map(|same| same[0]).collect();
+        first.sort_unstable();
+        if first.len() == self.len() { self.clone() } else { self.gathered(&first) }
+    }
+
+    /// Nothing, where there are points enough.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] for fewer than four.
+    pub fn check_count(&self) -> Result<(), MethodError> {
+        if self.len() >= LEAST_POINTS {
+            return Ok(());
+        }
+        let problem = format!("{} different ones; at least {LEAST_POINTS} are needed", self.len());
+        Err(MethodError::invalid("points", problem))
+    }
+
+    /// Nothing, where the points, in the box, span a volume.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] for points in one plane.
+    pub fn check_span(&self) -> Result<(), MethodError> {
+        let mean = self.points.iter().map(|p| p.as_dvec3()).sum::<DVec3>() / self.len() as f64;
+        let (spread, _) = symmetric::eigen(self.points.iter().fold(DMat3::ZERO, |sum, p| {
+            let d = p.as_dvec3() - mean;
+            sum + DMat3::from_cols(d * d.x, d * d.y, d * d.z)
+        }));
+        if spread.x <= FLAT * FLAT * spread.z {
+            return Err(MethodError::invalid("points", "all lie in one plane; they have to span a volume"));
+        }
+        Ok(())
+    }
+
+    /// Everything moved and scaled by `map`, which does not turn or mirror.
+    pub fn mapped(&self, map: &BoxMap) -> Self {
+        Self { points: self.points.iter().map(|&p| map.to_box(p)).collect(), ..self.clone() }
+    }
+}
+
+/// Tests that all values are finite.
+///
+/// # Errors
+/// [`MethodError::InvalidArgument`] naming the first that is not.
+pub fn check_finite(name: &'static str, values: &[Vec3]) -> Result<(), MethodError> {
+    match values.iter().position(|p| !p.is_finite()) {
+        Some(i) => Err(MethodError::invalid(
+            name,
+            format!("point {i} is {}; finite numbers are accepted", values[i]),
+        )),
+        None => Ok(()),
+    }
+}
+
+/// From the points' own units into the box, whose longest side is 2, and back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoxMap {
+    centre: DVec3,
+    /// Box units a unit of the points.
+    scale: f64,
+}
+
+impl BoxMap {
+    /// The map that puts the bounds of `points`, not all equal, into the box.
+    pub fn of(points: &[Vec3]) -> Self {
+        let bounds = Bounds::of(points);
+        let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
+        // Halves first: the sum of two large coordinates can overflow.
+        Self { centre: min * 0.5 + max * 0.5, scale: 1.0 / (max * 0.5 - min * 0.5).max_element() }
+    }
+
+    /// Box units a unit of the points.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// A point in the box.
+    pub fn to_box(&self, p: Vec3) -> Vec3 {
+        self.to_box_exactly(p.as_dvec3()).as_vec3()
+    }
+
+    /// A point in the box, not rounded.
+    pub fn to_box_exactly(&self, p: DVec3) -> DVec3 {
+        (p - self.centre) * self.scale
+    }
+
+    /// A point of the box in the points' units.
+    pub fn from_box(&self, p: DVec3) -> DVec3 {
+        p / self.scale + self.centre
+    }
+
+    /// The map into the box.
+    pub fn affine(&self) -> DAffine3 {
+        DAffine3::from_scale(DVec3::splat(self.scale)) * DAffine3::from_translation(-self.centre)
+    }
+}
+
+/// The mean distance from a point to the one nearest to it, over at most [`SPACING_SAMPLE`] of them.
+pub fn mean_spacing(points: &[Vec3]) -> f64 {
+    let tree =
+        crate::math::BoxTree::new(&points.iter().map(|&p| Bounds { min: p, max: p }).collect::<Vec<_>>());
+    let step = points.len().div_ceil(SPACING_SAMPLE);
+    let sampled = (0..points.len()).step_by(step);
+    let distance = |i: usize| {
+        let mut best = f64::INFINITY;
+        tree.nearest(points[i], |j, bound| {
+            let squared = f64::from(points[j as usize].distance_squared(points[i]));
+            best = if j as usize != i && squared < best { squared } else { best };
+            if best < bound { best } else { bound }
+        });
+        best.sqrt()
+    };
+    let count = sampled.len();
+    sampled.map(distance).sum::<f64>() / count as f64
+}
+
+/// Points that the mean spacing is taken from: enough for a hundredth of it.
+const SPACING_SAMPLE: usize = 4000;
+
+/// The points of the `keep` largest clusters, in order; `cell` is the edge of the cells whose 26 neighbours join them.
+pub fn largest_clusters(points: &[Vec3], cell: f32, keep: usize) -> Vec<u32> {
+    let mut clusters = clusters(points, cell);
+    clusters.sort_by_key(|cluster| std::cmp::Reverse(cluster.len()));
+    clusters.truncate(keep);
+    let mut kept = clusters.concat();
+    kept.sort_unstable();
+    kept
+}
+
+/// Points whose cells touch, even at a corner, by the lowest index of each cluster.
+fn clusters(points: &[Vec3], cell: f32) -> Vec<Vec<u32>> {
+    let cell_of = |p: Vec3| (p / cell).floor().to_array().map(|x| x as i32);
+    let mut by_cell: Vec<([i32; 3], u32)> = points.iter().map(|&p| cell_of(p)).zip(0..).collect();
+    by_cell.sort_unstable();
+    let occupied: Vec<&[([i32; 3], u32)]> = by_cell.chunk_by(|a, b| a.0 == b.0).collect();
+    let mut seen = vec![false; occupied.len()];
+    let mut found = Vec::new();
+    for start in 0..occupied.len() {
+        let (mut cluster, mut stack) = (Vec::new(), vec![start]);
+        while let Some(at) = stack.pop() {
+            if std::mem::replace(&mut seen[at], true) {
+                continue;
+            }
+            cluster.extend(occupied[at].iter().map(|&(_, i)| i));
+            let around = neighbours(occupied[at][0].0);
+            stack.extend(around.filter_map(|c| occupied.binary_search_by_key(&c, |cell| cell[0].0).ok()));
+        }
+        if !cluster.is_empty() {
+            found.push(cluster);
+        }
+    }
+    found.sort_by_key(|cluster| cluster.iter().copied().min());
+    found
+}
+
+fn neighbours([x, y, z]: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
+    let steps = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
+    steps.map(move |[dx, dy, dz]| [x + dx, y + dy, z + dz])
+}
+
+/// Poisson-disc sampling: the points in a random order without those nearer than `radius` to one before.
+pub fn thinned(points: &[Vec3], order: &[u32], radius: f32) -> Vec<u32> {
+    let mut grid = PointGrid::new(radius, points.len());
+    let mut kept = Vec::new();
+    for &i in order {
+        let p = points[i as usize];
+        if !grid.has_within(p, radius) {
+            grid.insert(p);
+            kept.push(i);
+        }
+    }
+    kept
+}
+
+/// At most `most` of the points by Poisson-disc sampling, with the largest radius that gives nearly so many; all, where
+/// there are no more. In random order, the same for the same seed.
+pub fn subsampled(points: &[Vec3], most: usize, seed: u64) -> Vec<u32> {
+    let order = Random::new(seed).order(points.len());
+    if points.len() <= most {
+        return order;
+    }
+    // Between too small and large enough a radius; a surface of side 2 has a hundred points a tenth apart or so.
+    let (mut small, mut large) = (0.0_f32, 0.0_f32);
+    let mut radius = 2.0 / (most as f32).sqrt();
+    let mut best = Vec::new();
+    for _ in 0..ROUNDS {
+        let kept = thinned(points, &order, radius);
+        let count = kept.len();
+        if count <= most {
+            (large, best) = (radius, kept);
+            if count as f64 >= NEARLY * most as f64 {
+                break;
+            }
+        } else {
+            small = radius;
+        }
+        // On a surface the number falls with the square of the radius.
+        let guess = radius * (count as f32 / (0.5 * (1.0 + NEARLY as f32) * most as f32)).sqrt();
+        let bracketed = guess > small && (large == 0.0 || guess < large);
+        radius = if bracketed {
+            guess
+        } else if large > 0.0 {
+            0.5 * (small + large)
+        } else {
+            2.0 * small
+        };
+    }
+    if best.is_empty() { order[..most].to_vec() } else { best }
+}
+
+/// Trials for the radius.
+const ROUNDS: usize = 16;
+/// The share of the points wanted that is near enough.
+const NEARLY: f64 = 0.97;

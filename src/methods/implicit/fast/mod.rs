@@ -1,0 +1,273 @@
+//! The function at very many places: a fast multipole method with Chebyshev interpolation (Fong & Darve, *The black-box
+//! fast multipole method*, 2009).
+//!
+//! Near terms are summed one by one. What all others add up to is smooth within a cube, and is interpolated there. Cubes
+//! are filled when first asked about, so only those around the surface are. Off by about a thousandth of what f changes
+//! by from one point of the surface to the next; sums that must be right to rounding are [`Field`]'s. Kernels that grow
+//! with the distance are summed one by one here, too: what is large in them cancels.
+
+mod chebyshev;
+mod translate;
+
+use super::field::Field;
+use crate::math::DVec3;
+use chebyshev::{CUBE, Chebyshev, Nodal};
+use translate::{Translations, Turns};
+
+/// Terms in a finest cube, about. More, and near terms take longer; fewer, and there are more cubes.
+const TERMS_A_CUBE: usize = 24;
+/// Levels of cubes at most: tables of the finest have 8^this entries.
+const MOST_LEVELS: usize = 6;
+/// No cube, or none yet.
+const NONE: u32 = u32::MAX;
+
+/// A function with a fast way to many of its values.
+#[derive(Clone, Debug)]
+pub struct FastField {
+    field: Field,
+    chebyshev: Chebyshev,
+    turns: Turns,
+    /// The lowest corner and the edge of the cube that holds everything.
+    origin: DVec3,
+    edge: f64,
+    levels: Vec<Level>,
+    /// The terms by finest cube, those of one together.
+    terms: Vec<(DVec3, f64)>,
+    /// For each finest cube with terms, where they begin and end.
+    ranges: Vec<[usize; 2]>,
+    /// Whether all is summed term by term.
+    direct: bool,
+}
+
+/// The cubes of one size.
+#[derive(Clone, Debug)]
+struct Level {
+    /// Cubes along a side.
+    side: i32,
+    /// By place, the number of a cube with sources.
+    with_sources: Vec<u32>,
+    sources: Vec<Nodal>,
+    /// By place, the number of a cube that was asked about.
+    with_places: Vec<u32>,
+    places: Vec<Nodal>,
+    translations: Option<Translations>,
+}
+
+type Place = [i32; 3];
+
+impl Level {
+    fn new(side: i32) -> Self {
+        let empty = vec![NONE; (side * side * side) as usize];
+        Self {
+            side,
+            with_sources: empty.clone(),
+            sources: Vec::new(),
+            with_places: empty,
+            places: Vec::new(),
+            translations: None,
+        }
+    }
+
+    fn index(&self, place: Place) -> Option<usize> {
+        let inside = place.iter().all(|&k| k >= 0 && k < self.side);
+        inside.then(|| ((place[2] * self.side + place[1]) * self.side + place[0]) as usize)
+    }
+
+    fn sources_at(&self, place: Place) -> Option<usize> {
+        let number = self.with_sources[self.index(place)?];
+        (number != NONE).then_some(number as usize)
+    }
+}
+
+impl FastField {
+    /// `field`, fast in a box between two corners.
+    pub fn new(field: Field, low: DVec3, high: DVec3) -> Self {
+        let terms = field.terms();
+        let low = terms.iter().fold(low, |low, (c, _)| low.min(*c));
+        let high = terms.iter().fold(high, |high, (c, _)| high.max(*c));
+        let edge = (high - low).max_element() * 1.0001;
+        let origin = (low + high) * 0.5 - DVec3::splat(0.5 * edge);
+        let mut fast = Self {
+            chebyshev: Chebyshev::new(),
+            turns: Turns::new(),
+            origin,
+            edge,
+            levels: Vec::new(),
+            terms: terms.to_vec(),
+            ranges: Vec::new(),
+            direct: field.table().kernel().is_conditional(),
+            field,
+        };
+        if !fast.direct {
+            fast.choose_levels();
+            fast.gather_sources();
+        }
+        fast
+    }
+
+    /// f at each place.
+    pub fn values(&mut self, places: &[DVec3], out: &mut [f64]) {
+        for (p, value) in places.iter().zip(out) {
+            *value = match self.local(*p) {
+                Some((cube, number, at)) => {
+                    let far = self.chebyshev.value(&self.finest().places[number], at);
+                    far + self.near_terms(cube).map(|t| self.field.term(t, *p)).sum::<f64>()
+                        + self.field.polynomial(*p)
+                }
+                None => self.field.value(*p),
+            };
+        }
+    }
+
+    /// f and ∇f at `p`.
+    pub fn value_and_gradient(&mut self, p: DVec3) -> (f64, DVec3) {
+        let Some((cube, number, at)) = self.local(p) else { return self.field.value_and_gradient(p) };
+        let (far, slope) = self.chebyshev.value_and_gradient(&self.finest().places[number], at);
+        let (mut sum, mut gradient) = (far, slope * (2.0 / self.cube_edge(self.levels.len() - 1)));
+        for term in self.near_terms(cube) {
+            let (value, slope) = self.field.term_and_gradient(term, p);
+            sum += value;
+            gradient += slope;
+        }
+        (sum + self.field.polynomial(p), gradient + self.field.slopes())
+    }
+
+    fn finest(&self) -> &Level {
+        &self.levels[self.levels.len() - 1]
+    }
+
+    fn cube_edge(&self, level: usize) -> f64 {
+        self.edge / f64::from(self.levels[level].side)
+    }
+
+    fn place_of(&self, p: DVec3, level: usize) -> Place {
+        ((p - self.origin) / self.cube_edge(level)).floor().to_array().map(|x| x as i32)
+    }
+
+    /// A place within a cube as [−1, 1]³.
+    fn within(&self, p: DVec3, place: Place, level: usize) -> DVec3 {
+        let middle = DVec3::from_array(place.map(|k| f64::from(k) + 0.5));
+        ((p - self.origin) / self.cube_edge(level) - middle) * 2.0
+    }
+
+    /// Deep enough that the cubes with terms hold few each.
+    fn choose_levels(&mut self) {
+        for depth in 0..=MOST_LEVELS {
+            self.levels.push(Level::new(1 << depth));
+            let mut places: Vec<Place> = self.terms.iter().map(|(c, _)| self.place_of(*c, depth)).collect();
+            places.sort_unstable();
+            places.dedup();
+            if depth >= 2 && self.terms.len() <= TERMS_A_CUBE * places.len() {
+                break;
+            }
+        }
+    }
+
+    /// Sorts the terms into the finest cubes, and carries them up to the larger ones.
+    fn gather_sources(&mut self) {
+        let finest = self.levels.len() - 1;
+        let mut keyed: Vec<(usize, usize)> = (0..self.terms.len())
+            .map(|i| (self.levels[finest].index(self.place_of(self.terms[i].0, finest)).unwrap_or(0), i))
+            .collect();
+        keyed.sort_unstable();
+        self.terms = keyed.iter().map(|&(_, i)| self.terms[i]).collect();
+        let mut start = 0;
+        for same in keyed.chunk_by(|a, b| a.0 == b.0) {
+            let range = [start, start + same.len()];
+            let place = self.place_of(self.terms[start].0, finest);
+            let mut nodal = [0.0; CUBE];
+            for &(c, w) in &self.terms[range[0]..range[1]] {
+                self.chebyshev.spread(&mut nodal, self.within(c, place, finest), w);
+            }
+            self.levels[finest].with_sources[same[0].0] = self.ranges.len() as u32;
+            self.levels[finest].sources.push(nodal);
+            self.ranges.push(range);
+            start = range[1];
+        }
+        for level in (2..finest).rev() {
+            self.gather_from_below(level);
+        }
+        for level in 2..=finest {
+            let edge = self.cube_edge(level);
+            self.levels[level].translations =
+                Some(Translations::new(self.field.table(), &self.chebyshev, edge));
+        }
+    }
+
+    fn gather_from_below(&mut self, level: usize) {
+        let (upper, lower) = self.levels.split_at_mut(level + 1);
+        let (here, below) = (&mut upper[level], &lower[0]);
+        for (at, &number) in below.with_sources.iter().enumerate().filter(|(_, number)| **number != NONE) {
+            let side = below.side as usize;
+            let place = [at % side, at / side % side, at / (side * side)];
+            let moved = self.chebyshev.to_whole(&below.sources[number as usize], place.map(|k| k % 2));
+            let Some(slot) = here.index(place.map(|k| (k / 2) as i32)) else { continue };
+            if here.with_sources[slot] == NONE {
+                here.with_sources[slot] = here.sources.len() as u32;
+                here.sources.push([0.0; CUBE]);
+            }
+            let sum = &mut here.sources[here.with_sources[slot] as usize];
+            sum.iter_mut().zip(moved).for_each(|(x, y)| *x += y);
+        }
+    }
+
+    /// The finest cube of `p`, its number, and where in it `p` is; `None` outside of all.
+    fn local(&mut self, p: DVec3) -> Option<(Place, usize, DVec3)> {
+        if self.direct {
+            return None;
+        }
+        let level = self.levels.len() - 1;
+        let place = self.place_of(p, level);
+        self.levels[level].index(place)?;
+        let number = self.fill(level, place);
+        Some((place, number, self.within(p, place, level)))
+    }
+
+    /// Makes what all far terms add up to in a cube, if it is not there yet. Returns its number.
+    fn fill(&mut self, level: usize, place: Place) -> usize {
+        let Some(slot) = self.levels[level].index(place) else { return 0 };
+        let number = self.levels[level].with_places[slot];
+        if number != NONE {
+            return number as usize;
+        }
+        let mut nodal = [0.0; CUBE];
+        if level > 2 {
+            let parent = self.fill(level - 1, place.map(|k| k / 2));
+            nodal = self
+                .chebyshev
+                .to_half(&self.levels[level - 1].places[parent], place.map(|k| (k % 2) as usize));
+        }
+        let here = &self.levels[level];
+        for offset in far_offsets(place) {
+            let from = [0, 1, 2].map(|axis| place[axis] + offset[axis]);
+            if let (Some(sources), Some(translations)) = (here.sources_at(from), &here.translations) {
+                translations.add(&self.turns, offset, &here.sources[sources], &mut nodal);
+            }
+        }
+        let number = here.places.len();
+        self.levels[level].with_places[slot] = number as u32;
+        self.levels[level].places.push(nodal);
+        number
+    }
+
+    /// The terms in the cubes around one, itself included.
+    fn near_terms(&self, cube: Place) -> impl Iterator<Item = &(DVec3, f64)> {
+        let level = self.finest();
+        let ranges =
+            around(cube).filter_map(|place| level.sources_at(place)).map(|number| self.ranges[number]);
+        ranges.flat_map(|[from, to]| &self.terms[from..to])
+    }
+}
+
+/// The cube and the 26 that touch it.
+fn around(cube: Place) -> impl Iterator<Item = Place> {
+    (0..27).map(move |k| [cube[0] + k % 3 - 1, cube[1] + k / 3 % 3 - 1, cube[2] + k / 9 - 1])
+}
+
+/// Where cubes lie that do not touch this one while those they are part of do.
+fn far_offsets(place: Place) -> impl Iterator<Item = Place> {
+    // Those next to the cube this one is part of span two cubes on its far sides and three on the others.
+    let lowest = place.map(|k| -2 - k.rem_euclid(2));
+    let all = (0..216).map(move |k| [lowest[0] + k % 6, lowest[1] + k / 6 % 6, lowest[2] + k / 36]);
+    all.filter(|offset| offset.iter().any(|d| d.abs() > 1))
+}

@@ -1,0 +1,78 @@
+//! Blocks of the matrix between far clusters as products of thin ones: adaptive cross approximation with partial
+//! pivoting (Bebendorf, *Approximation of boundary element matrices*, 2000).
+
+use super::vectors::{Number, dot};
+
+/// A block as Σ uₖ vₖᵀ.
+#[derive(Clone, Debug)]
+pub struct LowRank<T> {
+    /// uₖ one after the other, each as long as the block is high.
+    pub columns: Vec<T>,
+    /// vₖ one after the other, each as long as the block is wide.
+    pub rows: Vec<T>,
+}
+
+/// Rank at which a block is taken as it is, whatever its error: none between separated clusters comes near it.
+const MOST_RANK: usize = 64;
+
+/// The block of `height` by `width` whose rows and columns `row` and `column` write, to a relative error of about
+/// `tolerance`.
+pub fn cross_approximation<T: Number>(
+    [height, width]: [usize; 2],
+    tolerance: f64,
+    mut row: impl FnMut(usize, &mut [f64]),
+    mut column: impl FnMut(usize, &mut [f64]),
+) -> LowRank<T> {
+    let (mut us, mut vs): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
+    let mut row_used = vec![false; height];
+    let (mut pivot_row, mut norm_squared) = (0, 0.0);
+    let limit = MOST_RANK.min(height).min(width);
+    while us.len() < limit {
+        let mut v = vec![0.0; width];
+        row(pivot_row, &mut v);
+        subtract(&mut v, &vs, |k| us[k][pivot_row]);
+        row_used[pivot_row] = true;
+        let pivot_column = largest(&v, |_| true);
+        let pivot = v[pivot_column];
+        if pivot == 0.0 {
+            // All that is left of the row has underflowed, and with it that of its neighbours.
+            break;
+        }
+        v.iter_mut().for_each(|x| *x /= pivot);
+        let mut u = vec![0.0; height];
+        column(pivot_column, &mut u);
+        subtract(&mut u, &us, |k| vs[k][pivot_column]);
+        pivot_row = largest(&u, |i| !row_used[i]);
+        let added = dot(&u, &u) * dot(&v, &v);
+        let mixed: f64 = us.iter().zip(&vs).map(|(x, y)| dot(x, &u) * dot(y, &v)).sum();
+        norm_squared += added + 2.0 * mixed;
+        us.push(u);
+        vs.push(v);
+        if added <= tolerance * tolerance * norm_squared {
+            break;
+        }
+    }
+    LowRank { columns: narrowed(&us), rows: narrowed(&vs) }
+}
+
+/// Takes the part of the approximation so far from a row or column of the block.
+fn subtract(values: &mut [f64], parts: &[Vec<f64>], weight: impl Fn(usize) -> f64) {
+    for (k, part) in parts.iter().enumerate() {
+        let weight = weight(k);
+        values.iter_mut().zip(part).for_each(|(x, y)| *x -= weight * y);
+    }
+}
+
+fn largest(values: &[f64], allowed: impl Fn(usize) -> bool) -> usize {
+    let mut best = (0, -1.0);
+    for (i, x) in values.iter().enumerate() {
+        if x.abs() > best.1 && allowed(i) {
+            best = (i, x.abs());
+        }
+    }
+    best.0
+}
+
+fn narrowed<T: Number>(parts: &[Vec<f64>]) -> Vec<T> {
+    parts.iter().flatten().map(|&x| T::of(x)).collect()
+}

@@ -1,0 +1,156 @@
+//! Normals where none are given: planes through neighbours, turned the same way by walking from place to place (Hoppe,
+//! DeRose, Duchamp, McDonald & Stuetzle, *Surface reconstruction from unorganized points*, 1992).
+
+use crate::math::{DMat3, DVec3, Vec3, symmetric};
+use crate::spatial::PointGrid;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// Radii of the neighbourhoods that are tried, in mean spacings.
+const RADII: [f32; 7] = [3.0, 4.2, 6.0, 8.5, 12.0, 17.0, 24.0];
+/// A neighbourhood is a plane when it is at most so thick, in its width; its noise is then a tenth of its radius.
+const FLAT: f64 = 0.2;
+/// Places that the radius is chosen from.
+const TRIALS: usize = 200;
+/// Neighbours that a normal is passed on to.
+const LINKS: usize = 10;
+
+/// Unit normals at some places, and how noisy the points are there.
+pub struct Normals {
+    /// One a place, outwards as far as can be told.
+    pub directions: Vec<Vec3>,
+    /// Standard deviation of the points from their planes.
+    pub noise: f32,
+}
+
+/// Normals of the surface near `points`, of mean distance `spacing`, at the points `at`.
+///
+/// Within each part of the graph that joins neighbouring places, normals are turned like those before them, the pair that
+/// differs least first; then all of a part are turned so that it encloses a positive volume.
+pub fn estimated_normals(points: &[Vec3], at: &[u32], spacing: f32) -> Normals {
+    let grid = PointGrid::of(points, RADII[0] * spacing);
+    let places: Vec<Vec3> = at.iter().map(|&i| points[i as usize]).collect();
+    let (radius, noise) = flattest_radius(&grid, &places, spacing);
+    let mut directions: Vec<Vec3> = places.iter().map(|&p| Plane::around(&grid, p, radius).normal).collect();
+    let links = links(&places, radius);
+    let mut turned = vec![false; places.len()];
+    for part in parts(&links) {
+        propagate(part[0], &links, &mut directions, &mut turned);
+        if outflow(&places, &directions, &part) < 0.0 {
+            part.iter().for_each(|&i| directions[i as usize] = -directions[i as usize]);
+        }
+    }
+    Normals { directions, noise: noise as f32 }
+}
+
+/// The plane that points lie nearest to.
+struct Plane {
+    normal: Vec3,
+    /// Standard deviation across it.
+    thickness: f64,
+    /// Standard deviation within it, where it is least.
+    width: f64,
+}
+
+impl Plane {
+    fn around(grid: &PointGrid, p: Vec3, radius: f32) -> Self {
+        let (mut count, mut sum, mut squares) = (0.0, DVec3::ZERO, DMat3::ZERO);
+        grid.within(p, radius, |i, _| {
+            let d = (grid.points()[i as usize] - p).as_dvec3();
+            count += 1.0;
+            sum += d;
+            squares += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+            true
+        });
+        let mean = sum / count;
+        let spread = squares * (1.0 / count) - DMat3::from_cols(mean * mean.x, mean * mean.y, mean * mean.z);
+        let (values, vectors) = symmetric::eigen(spread);
+        let deviation = |x: f64| if x > 0.0 { x.sqrt() } else { 0.0 };
+        Self { normal: vectors.x_axis.as_vec3(), thickness: deviation(values.x), width: deviation(values.y) }
+    }
+
+    fn flatness(&self) -> f64 {
+        if self.width > 0.0 { self.thickness / self.width } else { 1.0 }
+    }
+}
+
+/// The least radius whose neighbourhoods are flat in the median, or the one where they are flattest; and how thick they are.
+fn flattest_radius(grid: &PointGrid, places: &[Vec3], spacing: f32) -> (f32, f64) {
+    let step = places.len().div_ceil(TRIALS);
+    let mut best = (f64::INFINITY, RADII[0] * spacing, 0.0);
+    for radius in RADII.map(|r| r * spacing) {
+        let planes = places.iter().step_by(step).map(|&p| Plane::around(grid, p, radius));
+        let mut found: Vec<(f64, f64)> = planes.map(|plane| (plane.flatness(), plane.thickness)).collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (flatness, thickness) = found[found.len() / 2];
+        if flatness < best.0 {
+            best = (flatness, radius, thickness);
+        }
+        if flatness < FLAT {
+            break;
+        }
+    }
+    (best.1, best.2)
+}
+
+/// The neighbour graph without direction.
+fn links(places: &[Vec3], radius: f32) -> Vec<Vec<u32>> {
+    let grid = PointGrid::of(places, radius);
+    let near = |&p: &Vec3| grid.nearest(p, LINKS + 1, radius).into_iter().map(|(_, i)| i);
+    let mut links: Vec<Vec<u32>> = places.iter().map(|p| near(p).collect()).collect();
+    for i in 0..places.len() {
+        for j in links[i].clone() {
+            links[j as usize].push(i as u32);
+        }
+    }
+    for ids in &mut links {
+        ids.sort_unstable();
+        ids.dedup();
+    }
+    links
+}
+
+fn parts(links: &[Vec<u32>]) -> Vec<Vec<u32>> {
+    let mut seen = vec![false; links.len()];
+    let mut found = Vec::new();
+    for start in 0..links.len() as u32 {
+        let (mut part, mut stack) = (Vec::new(), vec![start]);
+        while let Some(i) = stack.pop() {
+            if !std::mem::replace(&mut seen[i as usize], true) {
+                part.push(i);
+                stack.extend(&links[i as usize]);
+            }
+        }
+        if !part.is_empty() {
+            found.push(part);
+        }
+    }
+    found
+}
+
+/// Σ (p − middle)·n: where the places are spread evenly over a closed surface and all normals point outwards, its volume is
+/// in proportion to it (Gauss's theorem).
+fn outflow(places: &[Vec3], normals: &[Vec3], part: &[u32]) -> f64 {
+    let place = |i: u32| places[i as usize].as_dvec3();
+    let middle = part.iter().map(|&i| place(i)).sum::<DVec3>() / part.len() as f64;
+    part.iter().map(|&i| (place(i) - middle).dot(normals[i as usize].as_dvec3())).sum()
+}
+
+/// Prim's minimum spanning tree over the angle between normals, each turned like the one it is reached from.
+fn propagate(start: u32, links: &[Vec<u32>], normals: &mut [Vec3], turned: &mut [bool]) {
+    let mut waiting = BinaryHeap::from([Reverse((0_u32, start, start))]);
+    while let Some(Reverse((_, i, from))) = waiting.pop() {
+        if std::mem::replace(&mut turned[i as usize], true) {
+            continue;
+        }
+        if normals[i as usize].dot(normals[from as usize]) < 0.0 {
+            normals[i as usize] = -normals[i as usize];
+        }
+        let normal = normals[i as usize];
+        for &j in links[i as usize].iter().filter(|&&j| !turned[j as usize]) {
+            // Numbers of at least 0 have the order of their bits.
+            let turn = 1.0 - normal.dot(normals[j as usize]).abs();
+            waiting.push(Reverse(((if turn > 0.0 { turn } else { 0.0 }).to_bits(), j, i)));
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! Parameters of the implicit surface, their ranges and their words.
+
+use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, ParamSpec};
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the implicit surface. Lengths but `cell` are in units of the box, in which the longest side of the points'
+/// bounds is 2.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub struct ImplicitParams {
+    /// φ: the radial function.
+    pub kernel: KernelKind,
+    /// δ: first-order smoothness of the multi-order kernel.
+    pub delta: f64,
+    /// τ: third-order smoothness of the multi-order kernel.
+    pub tau: f64,
+    /// σ: width of the Gaussian.
+    pub sigma: f64,
+    /// λ of surface constraints.
+    pub lambda_surface: f64,
+    /// λ of exterior constraints.
+    pub lambda_exterior: f64,
+    /// Relative residual at which the solve ends.
+    pub tolerance: f64,
+    /// Edge of an extraction cell in the points' units; 0 takes it from the spacing of the points.
+    pub cell: f64,
+    /// The value of f that the surface is taken at.
+    pub level: Level,
+}
+
+/// The radial functions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum KernelKind {
+    /// First, second and third order smoothness at once.
+    MultiOrder,
+    /// |r|³.
+    ThinPlate,
+    /// −|r|.
+    Biharmonic,
+    /// exp(−r²/2σ²).
+    Gaussian,
+}
+
+/// The value of f that the surface is taken at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Level {
+    /// 0, as in the paper.
+    Zero,
+    /// The mean of f over the surface constraints, which is a little below 0.
+    Mean,
+}
+
+impl Default for ImplicitParams {
+    fn default() -> Self {
+        Self {
+            kernel: KernelKind::MultiOrder,
+            delta: 5.0,
+            tau: 0.025,
+            sigma: 0.07,
+            lambda_surface: 0.001,
+            lambda_exterior: 2.0,
+            tolerance: 1e-5,
+            cell: 0.0,
+            level: Level::Zero,
+        }
+    }
+}
+
+impl ImplicitParams {
+    /// Tests every value against its range.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] with the name of the first parameter out of range and what it accepts.
+    pub fn validate(&self) -> Result<(), MethodError> {
+        let numbers = [
+            self.delta,
+            self.tau,
+            self.sigma,
+            self.lambda_surface,
+            self.lambda_exterior,
+            self.tolerance,
+            self.cell,
+        ];
+        let specs = SPECS.iter().filter(|spec| spec.kind == ParamKind::Number);
+        specs.zip(numbers).try_for_each(|(spec, value)| spec.check(value))
+    }
+
+    /// These parameters with those of the extraction alone taken from `other`.
+    pub fn with_extraction_of(&self, other: &Self) -> Self {
+        Self { cell: other.cell, level: other.level, ..self.clone() }
+    }
+
+    /// What may go wrong with these values, in words, though they are accepted.
+    pub fn warning(&self) -> Option<&'static str> {
+        (self.kernel == KernelKind::MultiOrder && self.delta >= TIGHT).then_some(
+            "delta is 25 or more: where the points have large gaps the function falls to 0 inside, and the surface breaks up",
+        )
+    }
+}
+
+/// δ from which on surfaces with large gaps break up.
+const TIGHT: f64 = 25.0;
+
+/// The parameters of the implicit surface, in the order a page should show them.
+pub fn param_specs() -> Vec<ParamSpec> {
+    SPECS.to_vec()
+}
+
+const NUMBER: ParamSpec = ParamSpec {
+    name: "",
+    label: "",
+    help: "",
+    symbol: None,
+    kind: ParamKind::Number,
+    default: ParamDefault::Number(0.0),
+    min: None,
+    max: None,
+    step: None,
+    scale: Some(ParamScale::Linear),
+    unit: None,
+    choices: None,
+};
+
+const SPECS: [ParamSpec; 9] = [
+    ParamSpec {
+        name: "kernel",
+        label: "Kernel",
+        help: "The bump that the surface is built from: multi-order smooths in three ways at once, the others are for comparison.",
+        symbol: Some("φ"),
+        kind: ParamKind::Choice,
+        default: ParamDefault::Choice("multi-order"),
+        scale: None,
+        choices: Some(&["multi-order", "thin-plate", "biharmonic", "gaussian"]),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "delta",
+        label: "First-order smoothness",
+        help: "More of it pulls the surface tight around the points, like a membrane; from 25 on gaps tear it.",
+        symbol: Some("δ"),
+        default: ParamDefault::Number(5.0),
+        min: Some(0.1),
+        max: Some(100.0),
+        step: Some(0.1),
+        scale: Some(ParamScale::Log),
+        unit: Some("1/box"),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "tau",
+        label: "Third-order smoothness",
+        help: "More of it rounds off detail and makes curvature change slowly.",
+        symbol: Some("τ"),
+        default: ParamDefault::Number(0.025),
+        min: Some(0.001),
+        max: Some(1.0),
+        step: Some(0.001),
+        scale: Some(ParamScale::Log),
+        unit: Some("box"),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "sigma",
+        label: "Gaussian width",
+        help: "How far each bump of the Gaussian kernel reaches; the other kernels do not use it.",
+        symbol: Some("σ"),
+        default: ParamDefault::Number(0.07),
+        min: Some(0.005),
+        max: Some(1.0),
+        step: Some(0.001),
+        scale: Some(ParamScale::Log),
+        unit: Some("box"),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "lambdaSurface",
+        label: "Regularization, surface",
+        help: "0 passes through every point; more lets the surface leave noisy points aside and become smoother.",
+        symbol: Some("λs"),
+        default: ParamDefault::Number(0.001),
+        min: Some(0.0),
+        max: Some(10.0),
+        step: Some(0.0001),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "lambdaExterior",
+        label: "Regularization, exterior",
+        help: "How loosely the points outside bind: they only say which side is out, so they should not bind much.",
+        symbol: Some("λe"),
+        default: ParamDefault::Number(2.0),
+        min: Some(0.0),
+        max: Some(1000.0),
+        step: Some(0.1),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "tolerance",
+        label: "Residual",
+        help: "The solve ends when the equations hold to this share of their right side.",
+        default: ParamDefault::Number(1e-5),
+        min: Some(1e-12),
+        max: Some(0.01),
+        scale: Some(ParamScale::Log),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "cell",
+        label: "Cell",
+        help: "Edge of the cells that the surface is drawn with, in the points' units; 0 takes it from their spacing.",
+        min: Some(0.0),
+        max: Some(1e30),
+        scale: None,
+        unit: Some("points' units"),
+        ..NUMBER
+    },
+    ParamSpec {
+        name: "level",
+        label: "Level",
+        help: "Zero is the paper's surface; mean passes through the middle of the points, which lie a little outside of it.",
+        kind: ParamKind::Choice,
+        default: ParamDefault::Choice("zero"),
+        scale: None,
+        choices: Some(&["zero", "mean"]),
+        ..NUMBER
+    },
+];

@@ -1,0 +1,72 @@
+//! Centres grouped by place, in a binary tree.
+
+use crate::math::{Bounds, Vec3};
+
+/// Centres in a leaf at most. 32 doubles the blocks, 128 the numbers that are stored in full.
+const LEAF: usize = 64;
+
+/// A binary tree over points: each cluster is a range of [`ClusterTree::order`], each child about half of it.
+#[derive(Clone, Debug)]
+pub struct ClusterTree {
+    /// The points' indices, so that those of a cluster stand together.
+    pub order: Vec<u32>,
+    /// All clusters; the first is that of all points.
+    pub clusters: Vec<Cluster>,
+}
+
+/// Points that are near each other.
+#[derive(Clone, Debug)]
+pub struct Cluster {
+    /// First of its places in the order.
+    pub start: usize,
+    /// One beyond the last.
+    pub end: usize,
+    /// The smallest box around its points.
+    pub bounds: Bounds,
+    /// Its two halves; `None` for a leaf.
+    pub halves: Option<[usize; 2]>,
+}
+
+impl Cluster {
+    /// The number of points.
+    pub fn len(&self) -> usize {
+        self.end - self.start
+    }
+
+    /// Diagonal of the box.
+    pub fn diameter(&self) -> f32 {
+        self.bounds.min.distance(self.bounds.max)
+    }
+
+    /// Distance between the boxes.
+    pub fn distance(&self, other: &Self) -> f32 {
+        let gap = (self.bounds.min - other.bounds.max).max(other.bounds.min - self.bounds.max);
+        gap.max(Vec3::ZERO).length()
+    }
+}
+
+impl ClusterTree {
+    /// The tree of `points`.
+    pub fn new(points: &[Vec3]) -> Self {
+        let mut tree = Self { order: (0..points.len() as u32).collect(), clusters: Vec::new() };
+        let mut order = std::mem::take(&mut tree.order);
+        tree.split(points, &mut order, 0);
+        tree.order = order;
+        tree
+    }
+
+    fn split(&mut self, points: &[Vec3], order: &mut [u32], start: usize) -> usize {
+        let bounds = order.iter().fold(Bounds::EMPTY, |b, &i| b.joined(&Bounds::of(&[points[i as usize]])));
+        let at = self.clusters.len();
+        self.clusters.push(Cluster { start, end: start + order.len(), bounds, halves: None });
+        if order.len() > LEAF {
+            let (axis, middle) = (bounds.widest_axis(), order.len() / 2);
+            let along = |i: &u32| points[*i as usize][axis];
+            order.select_nth_unstable_by(middle, |i, j| along(i).total_cmp(&along(j)).then(i.cmp(j)));
+            let (low, high) = order.split_at_mut(middle);
+            let halves = [self.split(points, low, start), self.split(points, high, start + middle)];
+            self.clusters[at].halves = Some(halves);
+        }
+        at
+    }
+}

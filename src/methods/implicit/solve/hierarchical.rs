@@ -1,0 +1,161 @@
+//! The matrix Φ of the kernel between all centres, near blocks in full and far ones as low-rank products: its size and
+//! the time of a product grow like n log n.
+
+use super::clusters::{Cluster, ClusterTree};
+use crate::math::DVec3;
+use crate::methods::implicit::kernel::KernelTable;
+use crate::methods::implicit::low_rank::{LowRank, cross_approximation};
+use crate::methods::implicit::vectors::{Number, add, dot};
+
+/// Two clusters are far when the smaller one's diameter is at most so many times their distance. Above 2 ranks grow,
+/// below 1 more is stored in full.
+const SEPARATION: f32 = 3.0;
+
+/// A part of the matrix above the diagonal, which stands for its mirror image, too.
+#[derive(Clone, Debug)]
+struct Block<T> {
+    /// Cluster of the rows.
+    rows: usize,
+    /// Cluster of the columns.
+    columns: usize,
+    content: Content<T>,
+}
+
+#[derive(Clone, Debug)]
+enum Content<T> {
+    /// Row by row.
+    Full(Vec<T>),
+    Far(LowRank<T>),
+}
+
+/// A symmetric kernel matrix, in the order of its cluster tree, its numbers stored as `T`.
+#[derive(Clone, Debug)]
+pub struct HierarchicalMatrix<T> {
+    centres: Vec<DVec3>,
+    tree: ClusterTree,
+    tolerance: f64,
+    /// Pairs of clusters whose blocks are still to be made, the next one last.
+    waiting: Vec<(usize, usize, bool)>,
+    blocks: Vec<Block<T>>,
+}
+
+impl<T: Number> HierarchicalMatrix<T> {
+    /// The matrix between `centres`, which are in the order of `tree`; empty until [`Self::build`] has made all blocks, far
+    /// ones to a relative error of `tolerance`.
+    pub fn new(tree: ClusterTree, centres: Vec<DVec3>, tolerance: f64) -> Self {
+        let mut waiting = Vec::new();
+        divide(&tree.clusters, 0, 0, &mut waiting);
+        waiting.reverse();
+        Self { centres, tree, tolerance, waiting, blocks: Vec::new() }
+    }
+
+    /// Makes blocks until about `work` values of the kernel were asked for. Returns the share of blocks made, 1 at the end.
+    pub fn build(&mut self, table: &KernelTable, work: usize) -> f64 {
+        let mut done = 0;
+        while done < work
+            && let Some((rows, columns, far)) = self.waiting.pop()
+        {
+            let [a, b] = [rows, columns].map(|c| &self.tree.clusters[c]);
+            let content = if far {
+                let block = self.far_block(a, b, table);
+                done += 2 * (block.columns.len() + block.rows.len());
+                Content::Far(block)
+            } else {
+                done += a.len() * b.len();
+                Content::Full(self.full_block(a, b, table))
+            };
+            self.blocks.push(Block { rows, columns, content });
+        }
+        self.progress()
+    }
+
+    /// The share of blocks made.
+    pub fn progress(&self) -> f64 {
+        let made = self.blocks.len();
+        made as f64 / (made + self.waiting.len()) as f64
+    }
+
+    /// Bytes of all blocks.
+    pub fn bytes(&self) -> usize {
+        let numbers = self.blocks.iter().map(|block| match &block.content {
+            Content::Full(values) => values.len(),
+            Content::Far(block) => block.columns.len() + block.rows.len(),
+        });
+        size_of::<T>() * numbers.sum::<usize>()
+    }
+
+    fn full_block(&self, a: &Cluster, b: &Cluster, table: &KernelTable) -> Vec<T> {
+        let columns = &self.centres[b.start..b.end];
+        let rows = self.centres[a.start..a.end].iter();
+        rows.flat_map(|x| columns.iter().map(|y| T::of(table.value(x.distance_squared(*y))))).collect()
+    }
+
+    fn far_block(&self, a: &Cluster, b: &Cluster, table: &KernelTable) -> LowRank<T> {
+        let [rows, columns] = [a, b].map(|c| &self.centres[c.start..c.end]);
+        let fill = |from: DVec3, to: &[DVec3], out: &mut [f64]| {
+            out.iter_mut().zip(to).for_each(|(value, x)| *value = table.value(from.distance_squared(*x)));
+        };
+        cross_approximation(
+            [rows.len(), columns.len()],
+            self.tolerance,
+            |i, out| fill(rows[i], columns, out),
+            |j, out| fill(columns[j], rows, out),
+        )
+    }
+
+    /// Φx.
+    pub fn product(&self, x: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; x.len()];
+        for block in &self.blocks {
+            let [a, b] = [block.rows, block.columns].map(|c| &self.tree.clusters[c]);
+            match &block.content {
+                Content::Full(values) => full_product(values, [a, b], x, &mut out),
+                Content::Far(low_rank) => far_product(low_rank, [a, b], x, &mut out),
+            }
+        }
+        out
+    }
+}
+
+/// Finds the blocks between two clusters, the one of the lower index for the rows.
+fn divide(clusters: &[Cluster], a: usize, b: usize, out: &mut Vec<(usize, usize, bool)>) {
+    let [first, second] = [a, b].map(|c| &clusters[c]);
+    let [size, other] = [first, second].map(Cluster::diameter);
+    let smaller = if size < other { size } else { other };
+    let distance = first.distance(second);
+    if distance > 0.0 && smaller <= SEPARATION * distance {
+        out.push((a, b, true));
+        return;
+    }
+    match (first.halves, second.halves) {
+        (None, None) => out.push((a, b, false)),
+        (Some([low, high]), _) if a == b => {
+            divide(clusters, low, low, out);
+            divide(clusters, low, high, out);
+            divide(clusters, high, high, out);
+        }
+        (Some(halves), None) => halves.into_iter().for_each(|half| divide(clusters, half, b, out)),
+        (Some(halves), Some(_)) if size >= other => {
+            halves.into_iter().for_each(|half| divide(clusters, half, b, out));
+        }
+        (_, Some(halves)) => halves.into_iter().for_each(|half| divide(clusters, a, half, out)),
+    }
+}
+
+fn full_product<T: Number>(values: &[T], [a, b]: [&Cluster; 2], x: &[f64], out: &mut [f64]) {
+    let own = a.start == b.start;
+    for (i, row) in (a.start..a.end).zip(values.chunks_exact(b.len())) {
+        out[i] += dot(row, &x[b.start..b.end]);
+        if !own {
+            add(x[i], row, &mut out[b.start..b.end]);
+        }
+    }
+}
+
+fn far_product<T: Number>(block: &LowRank<T>, [a, b]: [&Cluster; 2], x: &[f64], out: &mut [f64]) {
+    for (u, v) in block.columns.chunks_exact(a.len()).zip(block.rows.chunks_exact(b.len())) {
+        let (from_rows, from_columns) = (dot(u, &x[a.start..a.end]), dot(v, &x[b.start..b.end]));
+        add(from_columns, u, &mut out[a.start..a.end]);
+        add(from_rows, v, &mut out[b.start..b.end]);
+    }
+}

@@ -1,0 +1,130 @@
+//! Points near a place, in a grid of cells that points are added to one by one.
+
+use crate::math::Vec3;
+
+/// No point.
+const NONE: u32 = u32::MAX;
+
+/// Points by the cell they are in. Cells share buckets by a hash, so empty space costs nothing.
+#[derive(Clone, Debug)]
+pub struct PointGrid {
+    cell: f32,
+    points: Vec<Vec3>,
+    /// By bucket, the point added last.
+    heads: Vec<u32>,
+    /// By point, the one added before to the same bucket.
+    next: Vec<u32>,
+}
+
+impl PointGrid {
+    /// An empty grid of cells of edge `cell`, with buckets enough for about `expected` points.
+    pub fn new(cell: f32, expected: usize) -> Self {
+        let buckets = (2 * expected).next_power_of_two().max(16);
+        Self { cell, points: Vec::new(), heads: vec![NONE; buckets], next: Vec::new() }
+    }
+
+    /// A grid of all `points`, which keep their order.
+    pub fn of(points: &[Vec3], cell: f32) -> Self {
+        let mut grid = Self::new(cell, points.len());
+        points.iter().for_each(|&p| grid.insert(p));
+        grid
+    }
+
+    /// Adds a finite point; it is known by how many there were before it.
+    pub fn insert(&mut self, p: Vec3) {
+        let bucket = self.bucket(self.cell_of(p));
+        self.next.push(self.heads[bucket]);
+        self.heads[bucket] = self.points.len() as u32;
+        self.points.push(p);
+    }
+
+    /// All points, in the order they were added in.
+    pub fn points(&self) -> &[Vec3] {
+        &self.points
+    }
+
+    /// Visits the points within `radius` of `p` with their squared distance, until `visit` gives back false. The order is
+    /// fixed, but says nothing.
+    pub fn within(&self, p: Vec3, radius: f32, mut visit: impl FnMut(u32, f32) -> bool) {
+        let [low, high] = [-radius, radius].map(|reach| self.cell_of(p + Vec3::splat(reach)));
+        for z in low[2]..=high[2] {
+            for y in low[1]..=high[1] {
+                for x in low[0]..=high[0] {
+                    if !self.visit_cell([x, y, z], p, radius * radius, &mut visit) {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether a point is within `radius` of `p`.
+    pub fn has_within(&self, p: Vec3, radius: f32) -> bool {
+        let mut found = false;
+        self.within(p, radius, |_, _| {
+            found = true;
+            false
+        });
+        found
+    }
+
+    /// The `count` points nearest to `p` with their squared distances, nearest first (of equal ones the lower index); all,
+    /// where there are fewer. Looks within `radius` first, then farther.
+    pub fn nearest(&self, p: Vec3, count: usize, radius: f32) -> Vec<(f32, u32)> {
+        let mut found = Vec::new();
+        let mut reach = radius;
+        loop {
+            found.clear();
+            self.within(p, reach, |i, squared| {
+                found.push((squared, i));
+                true
+            });
+            if found.len() >= count || found.len() == self.points.len() {
+                break;
+            }
+            reach *= 1.5;
+            if reach > 64.0 * self.cell {
+                found = self.points.iter().map(|q| q.distance_squared(p)).zip(0..).collect();
+                break;
+            }
+        }
+        let order = |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        if found.len() > count {
+            found.select_nth_unstable_by(count, order);
+            found.truncate(count);
+        }
+        found.sort_unstable_by(order);
+        found
+    }
+
+    fn visit_cell(
+        &self,
+        cell: [i32; 3],
+        p: Vec3,
+        most: f32,
+        visit: &mut impl FnMut(u32, f32) -> bool,
+    ) -> bool {
+        let mut at = self.heads[self.bucket(cell)];
+        while at != NONE {
+            let q = self.points[at as usize];
+            let squared = q.distance_squared(p);
+            // A bucket may hold points of other cells, which are visited with those.
+            if squared <= most && self.cell_of(q) == cell && !visit(at, squared) {
+                return false;
+            }
+            at = self.next[at as usize];
+        }
+        true
+    }
+
+    fn cell_of(&self, p: Vec3) -> [i32; 3] {
+        (p / self.cell).floor().to_array().map(|x| x as i32)
+    }
+
+    fn bucket(&self, [x, y, z]: [i32; 3]) -> usize {
+        let mixed = (x as u32).wrapping_mul(0x9E37_79B1)
+            ^ (y as u32).wrapping_mul(0x85EB_CA77)
+            ^ (z as u32).wrapping_mul(0xC2B2_AE3D);
+        (mixed ^ mixed >> 15) as usize & (self.heads.len() - 1)
+    }
+}
