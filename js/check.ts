@@ -107,3 +107,10 @@ export function list<T>(parameter: string, value: readonly T[]): readonly T[] {
   if (Array.isArray(value)) return value;
   throw invalid(parameter, `${shown(value)}; an array is needed`);
 }
+
+/** A copy of an object, so that getters and proxies run their own code here and not in the middle of a call into the module. */
+export function plain<T extends object>(parameter: string, value: T): T {
+  if (value === null || typeof value !== 'object' || Array.isArray(value))
+    throw invalid(parameter, 'an object is needed');
+  return { ...value };
+}

@@ -1,4 +1,4 @@
-import { finite, invalid, list, number, options, positive, typed, vec3, whole } from './check.js';
+import { finite, invalid, list, number, options, plain, positive, typed, vec3, whole } from './check.js';
 import { Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
@@ -228,13 +228,6 @@ function checked(given: DeformableOptions): Partial<DeformableOptions> {
   if (levels !== undefined) whole('levels', levels);
   if (edge !== undefined) positive('edge', edge);
   return known;
-}
-
-// A copy, so that getters and proxies run their own code here and not in the middle of a call into the module.
-function plain<T extends object>(parameter: string, value: T): T {
-  if (value === null || typeof value !== 'object' || Array.isArray(value))
-    throw invalid(parameter, 'an object is needed');
-  return { ...value };
 }
 
 // Made last, when nothing else can fail: whoever takes it frees it.

@@ -18,6 +18,14 @@ export {
 } from './deformable.js';
 export { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
 export {
+  type Camera,
+  type Fitness,
+  type ImplicitOptions,
+  type ImplicitParams,
+  ImplicitSurface,
+  parsePoints,
+} from './implicit.js';
+export {
   type CurvatureKind,
   Mesh,
   type MeshArrays,

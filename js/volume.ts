@@ -49,6 +49,8 @@ const ELEMENTS = [
 
 /** The handle of a volume; for the library's own modules. */
 export let volumeHandle: (parameter: string, volume: Volume) => Handle<RawVolume>;
+/** A volume of a raw one. For the library's own modules. */
+export let wrapVolume: (make: () => RawVolume) => Volume;
 
 /**
  * A regular grid of intensities, with one or several frames, and its place in the world.
@@ -59,6 +61,7 @@ export class Volume {
   readonly #handle: Handle<RawVolume>;
 
   static {
+    wrapVolume = wrap;
     volumeHandle = (parameter, volume) => {
       if (volume instanceof Volume) return volume.#handle;
       throw invalid(parameter, 'a Volume is needed');

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use js_sys::{Float32Array, Float64Array, Uint8Array};
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, doubles, merged, points, to_js};
+use super::convert::{bytes, doubles, merged, now, points, to_js};
 use super::error::Failure;
 use super::mesh::{Body, RawMesh};
 use super::volume::RawVolume;
@@ -14,12 +14,6 @@ use crate::math::DVec3;
 use crate::methods::deformable::{
     Attractor, DeformableModel, DeformableOptions, DeformableParams, Start, param_specs,
 };
-
-#[wasm_bindgen]
-extern "C" {
-    #[wasm_bindgen(js_namespace = performance)]
-    fn now() -> f64;
-}
 
 /// The first surface of a model.
 #[wasm_bindgen]
@@ -80,7 +74,7 @@ impl RawDeformable {
 
     /// The surface as a mesh that follows the model.
     pub fn mesh(&self) -> RawMesh {
-        RawMesh(Body::Live(Rc::clone(&self.0)))
+        RawMesh(Body::Live(Rc::<RefCell<DeformableModel>>::clone(&self.0)))
     }
 
     /// Iterations until the end or `iterations` of them; the report of the last, with the events of all.

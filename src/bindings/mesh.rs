@@ -14,6 +14,7 @@ use crate::io::{MeshFormat, parse_mesh, write_mesh};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::{Measures, Mesh, MeshReport, TriangleMesh, curvature, geodesic, measure, report};
 use crate::methods::deformable::DeformableModel;
+use crate::methods::implicit::ImplicitSurface;
 use crate::remesh::decimate;
 use crate::spatial::{SurfaceDistance, SurfacePoint, TriangleTree, cross_section, surface_distance};
 use crate::volume::marching_cubes_world;
@@ -25,7 +26,45 @@ pub(super) enum Body {
     /// As it was given: perhaps open, perhaps crossing itself.
     Triangles(Rc<TriangleMesh>),
     /// The surface of a model, as it is now.
-    Live(Rc<RefCell<DeformableModel>>),
+    Live(Rc<RefCell<dyn Live>>),
+}
+
+/// A method with a surface of its own.
+pub(super) trait Live {
+    /// The surface as it is now.
+    fn surface(&self) -> TriangleMesh;
+    /// Numbers of its vertices and triangles.
+    fn counts(&self) -> [usize; 2];
+    /// How often its connectivity changed, and how often a vertex moved.
+    fn versions(&self) -> [u32; 2];
+}
+
+impl Live for DeformableModel {
+    fn surface(&self) -> TriangleMesh {
+        self.surface()
+    }
+
+    fn counts(&self) -> [usize; 2] {
+        [self.mesh().vertex_count(), self.mesh().triangle_count()]
+    }
+
+    fn versions(&self) -> [u32; 2] {
+        [self.mesh().topology_version(), self.mesh().geometry_version()]
+    }
+}
+
+impl Live for ImplicitSurface {
+    fn surface(&self) -> TriangleMesh {
+        self.surface().clone()
+    }
+
+    fn counts(&self) -> [usize; 2] {
+        [self.surface().positions.len(), self.surface().triangles.len()]
+    }
+
+    fn versions(&self) -> [u32; 2] {
+        [self.version(); 2]
+    }
 }
 
 /// A mesh of any kind.
@@ -79,7 +118,7 @@ impl RawMesh {
         match &self.0 {
             Body::Surface(mesh) => mesh.vertex_count(),
             Body::Triangles(mesh) => mesh.positions.len(),
-            Body::Live(model) => model.borrow().mesh().vertex_count(),
+            Body::Live(model) => model.borrow().counts()[0],
         }
     }
 
@@ -89,7 +128,7 @@ impl RawMesh {
         match &self.0 {
             Body::Surface(mesh) => mesh.triangle_count(),
             Body::Triangles(mesh) => mesh.triangles.len(),
-            Body::Live(model) => model.borrow().mesh().triangle_count(),
+            Body::Live(model) => model.borrow().counts()[1],
         }
     }
 
@@ -99,7 +138,7 @@ impl RawMesh {
         match &self.0 {
             Body::Surface(mesh) => mesh.topology_version(),
             Body::Triangles(_) => 0,
-            Body::Live(model) => model.borrow().mesh().topology_version(),
+            Body::Live(model) => model.borrow().versions()[0],
         }
     }
 
@@ -109,7 +148,7 @@ impl RawMesh {
         match &self.0 {
             Body::Surface(mesh) => mesh.geometry_version(),
             Body::Triangles(_) => 0,
-            Body::Live(model) => model.borrow().mesh().geometry_version(),
+            Body::Live(model) => model.borrow().versions()[1],
         }
     }
 

@@ -6,6 +6,7 @@
 mod convert;
 mod deformable;
 mod error;
+mod implicit;
 mod mesh;
 mod volume;
 

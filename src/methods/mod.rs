@@ -3,6 +3,7 @@
 pub mod deformable;
 mod error;
 pub mod implicit;
+mod saved;
 mod spec;
 mod step;
 

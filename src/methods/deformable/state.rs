@@ -6,12 +6,12 @@ use super::schedule::Rest;
 use super::{Attractor, DeformableModel, DeformableParams, delta_at};
 use crate::mesh::{Mesh, VertexId};
 use crate::methods::MethodError;
+use crate::methods::saved::{Hash, Mark, opened, sealed};
 use crate::remesh::{Resolver, Waiting};
 use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
 
-/// Begins every saved state; the last byte counts versions of the layout. A checksum of the rest follows.
-const MAGIC: [u8; 8] = *b"VSCLDEF\x01";
+const MARK: Mark = *b"VSCLDEF\x01";
 
 /// More neighbours than any edit leaves a vertex, and few enough to check.
 const MOST_NEIGHBOURS: usize = 4096;
@@ -48,9 +48,7 @@ impl DeformableModel {
             energy: self.movement.energy,
             fastest: self.movement.fastest,
         };
-        // Serialising plain data into memory has no way to fail.
-        let body = postcard::to_allocvec(&state).unwrap_or_default();
-        [&MAGIC[..], &checksum(&body).to_le_bytes(), &body].concat()
+        sealed(&MARK, &state)
     }
 
     /// Goes on from bytes that [`Self::save`] gave, for a model of the same volume, frame and levels.
@@ -58,22 +56,10 @@ impl DeformableModel {
     /// # Errors
     /// [`MethodError::BadState`] where the bytes are none of those; the model is then as it was.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
-        let after = bytes.strip_prefix(&MAGIC).and_then(|rest| rest.split_first_chunk::<8>());
-        let Some((sum, body)) = after else {
-            return bad("header", "these bytes are no saved state of this version");
-        };
-        if u64::from_le_bytes(*sum) != checksum(body) {
-            return bad("contents", "the bytes are cut off or damaged");
-        }
-        let Ok((state, rest)) = postcard::take_from_bytes::<State>(body) else {
-            return bad("contents", "the bytes are cut off or damaged");
-        };
-        if !rest.is_empty() {
-            return bad("contents", "there are bytes after the end");
-        }
+        let state: State = opened(&MARK, bytes)?;
         if state.fingerprint != self.fingerprint {
-            return bad("volume", "the state belongs to another volume, frame or number of levels");
+            let problem = "the state belongs to another volume, frame or number of levels".into();
+            return Err(MethodError::BadState { field: "volume", problem });
         }
         self.check_state(&state)?;
         self.take_state(state)
@@ -132,26 +118,14 @@ impl DeformableModel {
     }
 }
 
-/// Where FNV-1a begins.
-const HASH_START: u64 = 0xcbf2_9ce4_8422_2325;
-
-/// A number that tells volumes, frames and pyramids apart (FNV-1a over shape, place and intensities).
+/// A number that tells volumes, frames and pyramids apart.
 pub(super) fn fingerprint(volume: &Volume, frame: usize, levels: usize) -> u64 {
-    let mut hash = HASH_START;
-    let mut mix = |word: u64| hash = mixed(hash, word);
-    volume.dims().into_iter().chain([frame, levels]).for_each(|n| mix(n as u64));
-    volume.affine().to_cols_array().into_iter().for_each(|x| mix(x.to_bits()));
-    volume.range().into_iter().for_each(|x| mix(x.to_bits()));
+    let mut hash = Hash::new();
+    volume.dims().into_iter().chain([frame, levels]).for_each(|n| hash.mix(n as u64));
+    volume.affine().to_cols_array().into_iter().for_each(|x| hash.mix(x.to_bits()));
+    volume.range().into_iter().for_each(|x| hash.mix(x.to_bits()));
     if let Ok(values) = volume.intensities(frame) {
-        values.into_iter().for_each(|x| mix(u64::from(x.to_bits())));
+        values.into_iter().for_each(|x| hash.mix(u64::from(x.to_bits())));
     }
-    hash
-}
-
-fn checksum(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(HASH_START, |hash, &byte| mixed(hash, u64::from(byte)))
-}
-
-fn mixed(hash: u64, word: u64) -> u64 {
-    (hash ^ word).wrapping_mul(0x100_0000_01b3)
+    hash.value()
 }

@@ -4,10 +4,11 @@
 //! −δ²Δf + Δ²f − τ²Δ³f = 0. (The paper prints δ and τ without the squares; its own equation 6 has them.)
 
 use super::params::{ImplicitParams, KernelKind};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// A radial function and its parameters, in units of the box.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Kernel {
     /// Equation 6. 1/(4πδ²r) far away, which is not small: it falls to a thousandth only a hundred units off.
     MultiOrder {

@@ -28,6 +28,7 @@ mod measure;
 pub mod normals;
 mod params;
 pub mod solve;
+mod state;
 mod vectors;
 
 pub use camera::Camera;
@@ -47,7 +48,7 @@ use extract::{Extraction, default_cell};
 use fast::FastField;
 use field::Field;
 use kernel::{Kernel, KernelTable};
-use solve::{Constraints, Solver};
+use solve::{Constraints, Solution, Solver};
 
 /// How an [`ImplicitSurface`] is set up, beside its points.
 #[derive(Clone, Debug)]
@@ -97,8 +98,12 @@ pub struct ImplicitSurface {
     samples: Option<Samples>,
     constraints: Constraints,
     stage: Stage,
+    /// Slices of work that the stage has had.
+    slices: u32,
     solved: Option<Solved>,
     mesh: TriangleMesh,
+    /// Counts the surfaces so far.
+    version: u32,
     components: u32,
     euler: i64,
     strays: usize,
@@ -118,8 +123,17 @@ struct Samples {
 #[derive(Clone, Debug)]
 struct Solved {
     field: Field,
+    solution: Solution,
+    kernel: Kernel,
     /// The mean of f over the surface constraints.
     mean: f64,
+}
+
+impl Solved {
+    fn new(kernel: Kernel, constraints: &Constraints, solution: Solution) -> Self {
+        let field = Field::new(KernelTable::new(kernel), &constraints.centres, &solution);
+        Self { field, kernel, mean: constraints.mean_on_surface(&solution), solution }
+    }
 }
 
 /// What is to be done next.
@@ -155,24 +169,30 @@ impl ImplicitSurface {
         let map = BoxMap::of(&cloud.points);
         let cloud = cloud.mapped(&map);
         cloud.check_span()?;
-        Ok(Self {
-            original,
-            cloud,
+        Ok(Self { original, cloud, params: options.params.clone(), options, ..Self::empty(map) })
+    }
+
+    fn empty(map: BoxMap) -> Self {
+        Self {
+            original: Vec::new(),
+            cloud: Cloud::default(),
             map,
-            params: options.params.clone(),
-            options,
+            params: ImplicitParams::default(),
+            options: ImplicitOptions::default(),
             samples: None,
             constraints: Constraints::default(),
             stage: Stage::Subsample,
+            slices: 0,
             solved: None,
             mesh: TriangleMesh::default(),
+            version: 0,
             components: 0,
             euler: 0,
             strays: 0,
             iteration: 0,
             residual: f64::NAN,
             clock: || 0.0,
-        })
+        }
     }
 
     /// Gives the model a clock for [`StepReport::times`], in milliseconds. The core has none of its own.
@@ -190,21 +210,28 @@ impl ImplicitSurface {
         let (phase, begun) = (self.stage.phase(), (self.clock)());
         if !matches!(self.stage, Stage::Done) {
             self.iteration += 1;
-            // A stage that fails leaves the last one that stood.
-            let fallback = self.fallback();
-            let stage = std::mem::replace(&mut self.stage, fallback);
-            self.stage = match stage {
-                Stage::Subsample => self.subsample()?,
-                Stage::Constrain => self.constrain()?,
-                Stage::Solve(solver) => self.solve(solver)?,
-                Stage::Extract(extraction) => self.extract(extraction)?,
-                Stage::Color(painting) => self.color(*painting),
-                Stage::Done => Stage::Done,
-            };
+            self.advance()?;
         }
         let mut times = Times::default();
         times.add(phase, (self.clock)() - begun);
         Ok(self.report(phase, times))
+    }
+
+    /// A slice of the stage. One that fails leaves what stood before.
+    fn advance(&mut self) -> Result<(), MethodError> {
+        let fallback = self.fallback();
+        let stage = std::mem::replace(&mut self.stage, fallback);
+        let (before, slices) = (stage.phase(), std::mem::take(&mut self.slices));
+        self.stage = match stage {
+            Stage::Subsample => self.subsample()?,
+            Stage::Constrain => self.constrain()?,
+            Stage::Solve(solver) => self.solve(solver)?,
+            Stage::Extract(extraction) => self.extract(extraction)?,
+            Stage::Color(painting) => self.color(*painting),
+            Stage::Done => Stage::Done,
+        };
+        self.slices = if self.stage.phase() == before { slices + 1 } else { 0 };
+        Ok(())
     }
 
     fn report(&self, phase: &str, times: Times) -> StepReport {
@@ -278,9 +305,7 @@ impl ImplicitSurface {
             return Ok(Stage::Solve(solver));
         };
         self.residual = solver.residual();
-        let mean = self.constraints.mean_on_surface(&solution);
-        let field = Field::new(KernelTable::new(solver.kernel()), &self.constraints.centres, &solution);
-        self.solved = Some(Solved { field, mean });
+        self.solved = Some(Solved::new(solver.kernel(), &self.constraints, solution));
         self.begin_extraction()
     }
 
@@ -330,6 +355,7 @@ impl ImplicitSurface {
         let measures = measure_mesh(&mesh);
         (self.components, self.euler) = (measures.components as u32, measures.euler);
         self.mesh = mesh;
+        self.version = self.version.wrapping_add(1);
     }
 
     /// The stage to go on from when the present one fails.
@@ -363,9 +389,9 @@ impl ImplicitSurface {
             return Ok(());
         }
         if only_extraction == *now && !matches!(self.stage, Stage::Solve(_)) {
-            self.stage = self.begin_extraction()?;
+            (self.stage, self.slices) = (self.begin_extraction()?, 0);
         } else if only_extraction != *now {
-            self.stage = self.begin_solve();
+            (self.stage, self.slices) = (self.begin_solve(), 0);
         }
         Ok(())
     }
@@ -374,6 +400,11 @@ impl ImplicitSurface {
     /// from the gradient, and colours where there are photographs or coloured points.
     pub fn surface(&self) -> &TriangleMesh {
         &self.mesh
+    }
+
+    /// Counts up when the surface becomes another, or gets other colours.
+    pub fn version(&self) -> u32 {
+        self.version
     }
 
     /// The surface that is being extracted, as far as it was followed, open where it goes on; empty in other stages.
@@ -497,6 +528,7 @@ impl ImplicitSurface {
         }
         if let Some(colors) = color::colors(&self.mesh, cameras) {
             self.mesh.colors = Some(colors);
+            self.version = self.version.wrapping_add(1);
         }
         Ok(())
     }

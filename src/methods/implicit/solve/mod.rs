@@ -19,6 +19,7 @@ use clusters::ClusterTree;
 use conjugate::{ConjugateGradients, Polynomials};
 use hierarchical::HierarchicalMatrix;
 use precondition::SparseInverse;
+use serde::{Deserialize, Serialize};
 
 /// What the function has to be where.
 #[derive(Clone, Debug, Default)]
@@ -84,7 +85,7 @@ impl Constraints {
 }
 
 /// The function that came out: f(x) = Σ wᵢ φ(|x − cᵢ|) + p(x).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Solution {
     /// w, in the order of the constraints.
     pub weights: Vec<f64>,

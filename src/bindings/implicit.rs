@@ -1,0 +1,232 @@
+//! The implicit surface, its cameras, and files of points.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use js_sys::{Float32Array, Uint8Array};
+use serde::Serialize;
+use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
+
+use super::convert::{bytes, floats, merged, now, packed, points, to_js};
+use super::error::Failure;
+use super::mesh::{Body, RawMesh};
+use super::volume::RawVolume;
+use crate::io::{PointCloud, parse_points};
+use crate::math::Vec3;
+use crate::methods::implicit::{
+    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, param_specs,
+};
+
+/// The points of a file.
+#[wasm_bindgen]
+pub struct RawPoints(PointCloud);
+
+#[wasm_bindgen]
+impl RawPoints {
+    /// From the bytes of a file.
+    pub fn parse(file: &Uint8Array) -> Result<RawPoints, JsValue> {
+        Ok(RawPoints(parse_points(&bytes(file)?).map_err(Failure::from)?))
+    }
+
+    /// Packed xyz.
+    pub fn points(&self) -> Vec<f32> {
+        packed(&self.0.points)
+    }
+
+    /// Packed xyz, where there are any.
+    pub fn normals(&self) -> Option<Vec<f32>> {
+        self.0.normals.as_deref().map(packed)
+    }
+
+    /// Packed rgb, where there are any.
+    pub fn colors(&self) -> Option<Vec<f32>> {
+        self.0.colors.as_deref().map(packed)
+    }
+}
+
+/// Cameras, collected.
+#[wasm_bindgen]
+#[derive(Default)]
+pub struct RawCameras(Vec<Camera>);
+
+#[wasm_bindgen]
+impl RawCameras {
+    /// None yet.
+    #[wasm_bindgen(constructor)]
+    pub fn new() -> RawCameras {
+        Self::default()
+    }
+
+    /// One more: twelve numbers row by row, and rgba bytes where there is a picture.
+    pub fn push(
+        &mut self,
+        projection: &[f64],
+        width: u32,
+        height: u32,
+        image: Option<Uint8Array>,
+    ) -> Result<(), JsValue> {
+        let projection: [f64; 12] =
+            projection.try_into().map_err(|_| Failure::invalid("projection", "12 numbers are needed"))?;
+        let image = image.as_ref().map(bytes).transpose()?;
+        self.0.push(Camera::new(projection, width, height, image).map_err(Failure::from)?);
+        Ok(())
+    }
+}
+
+/// An implicit surface, shared with its live mesh.
+#[wasm_bindgen]
+pub struct RawImplicit(Rc<RefCell<ImplicitSurface>>);
+
+#[wasm_bindgen]
+impl RawImplicit {
+    /// A surface of packed points; parameters are written over the defaults.
+    #[wasm_bindgen(constructor)]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "the face names them; an object would be taken apart again here"
+    )]
+    pub fn new(
+        positions: &Float32Array,
+        normals: Option<Float32Array>,
+        confidence: Option<Float32Array>,
+        colors: Option<Float32Array>,
+        exterior: Option<Float32Array>,
+        cameras: RawCameras,
+        max_points: Option<usize>,
+        keep_components: Option<usize>,
+        params: &JsValue,
+    ) -> Result<RawImplicit, JsValue> {
+        let cloud = Cloud {
+            points: points(positions)?,
+            normals: normals.as_ref().map(points).transpose()?,
+            confidence: confidence.as_ref().map(floats).transpose()?,
+            colors: colors.as_ref().map(points).transpose()?,
+        };
+        let defaults = ImplicitOptions::default();
+        let options = ImplicitOptions {
+            exterior: exterior.as_ref().map(points).transpose()?,
+            cameras: cameras.0,
+            max_points: max_points.unwrap_or(defaults.max_points),
+            keep_components,
+            params: merged(&ImplicitParams::default(), params)?,
+        };
+        let mut surface = ImplicitSurface::new(cloud, options).map_err(Failure::from)?;
+        surface.set_clock(now);
+        Ok(RawImplicit(Rc::new(RefCell::new(surface))))
+    }
+
+    /// The surface as a mesh that follows it.
+    pub fn mesh(&self) -> RawMesh {
+        RawMesh(Body::Live(Rc::<RefCell<ImplicitSurface>>::clone(&self.0)))
+    }
+
+    /// The surface that is being extracted, as far as it was followed.
+    pub fn preview(&self) -> Result<RawMesh, JsValue> {
+        let mesh = self.0.borrow().preview().map_err(Failure::from)?;
+        Ok(RawMesh(Body::Triangles(Rc::new(mesh))))
+    }
+
+    /// Slices until the end or `iterations` of them; the report of the last.
+    pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
+        let mut surface = self.0.borrow_mut();
+        let mut report = surface.step().map_err(Failure::from)?;
+        for _ in 1..iterations {
+            if report.done {
+                break;
+            }
+            report = surface.step().map_err(Failure::from)?;
+        }
+        Ok(to_js(&report)?)
+    }
+
+    /// All parameters.
+    pub fn params(&self) -> Result<JsValue, JsValue> {
+        Ok(to_js(self.0.borrow().params())?)
+    }
+
+    /// Some parameters, checked together with the others before any is taken.
+    #[wasm_bindgen(js_name = setParams)]
+    pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
+        let mut surface = self.0.borrow_mut();
+        let params = merged(surface.params(), params)?;
+        surface.set_params(params).map_err(Failure::from)?;
+        Ok(())
+    }
+
+    /// f at packed points.
+    pub fn evaluate(&self, at: &Float32Array) -> Result<Vec<f32>, JsValue> {
+        let values = self.0.borrow().evaluate(&points(at)?).map_err(Failure::from)?;
+        Ok(values.into_iter().map(|value| value as f32).collect())
+    }
+
+    /// ∇f at packed points, packed.
+    pub fn gradient(&self, at: &Float32Array) -> Result<Vec<f32>, JsValue> {
+        let gradients = self.0.borrow().gradient(&points(at)?).map_err(Failure::from)?;
+        Ok(gradients.into_iter().flat_map(|g| g.as_vec3().to_array()).collect())
+    }
+
+    /// The points that take part (0) or those outside (1), packed.
+    pub fn constraints(&self, which: usize) -> Vec<f32> {
+        self.0.borrow().constraints().get(which).map(|all: &Vec<Vec3>| packed(all)).unwrap_or_default()
+    }
+
+    /// How well the surface fits, as the contract has it.
+    pub fn fitness(&self) -> Result<JsValue, JsValue> {
+        let fitness = self.0.borrow().fitness().map_err(Failure::from)?;
+        Ok(to_js(&fitness)?)
+    }
+
+    /// f on a grid.
+    #[wasm_bindgen(js_name = toVolume)]
+    pub fn to_volume(&self, dims: &[u32]) -> Result<RawVolume, JsValue> {
+        let dims: [u32; 3] =
+            dims.try_into().map_err(|_| Failure::invalid("dims", "3 whole numbers are needed"))?;
+        let volume = self.0.borrow().to_volume(dims.map(|n| n as usize)).map_err(Failure::from)?;
+        Ok(RawVolume(volume))
+    }
+
+    /// Colours the surface from photographs.
+    pub fn colorize(&self, cameras: RawCameras) -> Result<(), JsValue> {
+        self.0.borrow_mut().colorize(&cameras.0).map_err(Failure::from)?;
+        Ok(())
+    }
+
+    /// What else there is to tell.
+    pub fn facts(&self) -> Result<JsValue, JsValue> {
+        let surface = self.0.borrow();
+        Ok(to_js(&Facts {
+            cell: surface.cell(),
+            spacing: surface.spacing(),
+            duplicates: surface.duplicates(),
+            strays: surface.strays(),
+            warning: surface.params().warning(),
+        })?)
+    }
+
+    /// The whole state.
+    pub fn save(&self) -> Vec<u8> {
+        self.0.borrow().save()
+    }
+
+    /// Back to a saved state.
+    pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
+        self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
+        Ok(())
+    }
+}
+
+#[derive(Serialize)]
+struct Facts {
+    cell: f64,
+    spacing: f64,
+    duplicates: usize,
+    strays: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    warning: Option<&'static str>,
+}
+
+/// What the surface's parameters are, for building controls.
+#[wasm_bindgen(js_name = implicitParamSpecs)]
+pub fn implicit_param_specs() -> Result<JsValue, JsValue> {
+    Ok(to_js(&param_specs())?)
+}
