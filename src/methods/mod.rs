@@ -2,6 +2,7 @@
 
 pub mod deformable;
 mod error;
+pub mod implicit;
 mod spec;
 mod step;
 

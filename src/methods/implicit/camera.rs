@@ -1,0 +1,325 @@
+//! The cameras that points were made from: where each stands, and what it saw (paper, sections VI-A and VII-C).
+
+use crate::math::{DAffine3, DMat3, DVec3, Vec3};
+use crate::methods::MethodError;
+
+/// Pixels a side that are accepted: more than any photograph has, and its bytes still fit memory.
+const MOST_PIXELS: u32 = 16384;
+
+/// How far from flat the left block of a projection has to be: the volume its rows span, once each has length 1.
+///
+/// Rows of a parallel projection span 1e-16 or so by rounding; with a focal length of one pixel in a picture of 16384 it
+/// is still 1e-8.
+const LEAST_SPAN: f64 = 1e-12;
+
+/// A perspective camera, with its picture where there is one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// From world space to (x·depth, y·depth, depth).
+    to_view: DAffine3,
+    /// Its inverse: moves the origin to the centre.
+    from_view: DAffine3,
+    width: u32,
+    height: u32,
+    image: Option<Vec<u8>>,
+}
+
+/// Where a camera sees a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Projected {
+    /// In pixels to the right of the centre of the first pixel.
+    pub x: f64,
+    /// In pixels down from there.
+    pub y: f64,
+    /// Distance from the camera along its axis, in units of the world; positive.
+    pub depth: f64,
+}
+
+impl Camera {
+    /// A camera that projects a world point p to the pixel (x, y) with (x·s, y·s, s) = P (p, 1), where `projection` is
+    /// the 3×4 matrix P row by row.
+    ///
+    /// The convention is that of OpenCV: x to the right, y down, the centre of the first pixel at (0, 0), that of the
+    /// last at (width − 1, height − 1). A factor does not change P, a negative one neither: in front is where s has the
+    /// sign of the determinant of the left 3×3 block, as it is where the axes right, down and ahead are right-handed.
+    ///
+    /// `image` holds red, green, blue and alpha of each pixel, row by row from the top. Where alpha is 0 nothing is
+    /// seen: so an object is cut out of its background.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] for entries that are not finite, a projection that has no centre, a side of 0 or
+    /// more than 16384 pixels, or an image of another length than 4·width·height.
+    pub fn new(
+        projection: [f64; 12],
+        width: u32,
+        height: u32,
+        image: Option<Vec<u8>>,
+    ) -> Result<Self, MethodError> {
+        let length = image.as_ref().map(Vec::len);
+        if let Some(problem) = problem(&projection, width, height, length) {
+            return Err(MethodError::invalid("cameras", problem));
+        }
+        let to_view = view(projection).ok_or_else(|| {
+            let problem = "the left 3×3 block of the projection is singular; a perspective camera is needed, which has \
+                           a centre";
+            MethodError::invalid("cameras", problem)
+        })?;
+        Ok(Self { to_view, from_view: to_view.inverse(), width, height, image })
+    }
+
+    /// The same camera for a world moved by `map`, which must have an inverse: it sees `map`(p) where it saw p.
+    #[must_use]
+    pub fn moved(self, map: &DAffine3) -> Self {
+        let to_view = scaled_to_depth(self.to_view * map.inverse());
+        Self { to_view, from_view: to_view.inverse(), ..self }
+    }
+
+    /// Where the camera stands, in world space.
+    pub fn centre(&self) -> DVec3 {
+        self.from_view.translation
+    }
+
+    /// Pixels of a row and number of rows.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
+    /// Whether there is a picture.
+    pub fn has_image(&self) -> bool {
+        self.image.is_some()
+    }
+
+    /// Where the camera sees `p`, also beside the picture; `None` behind it, and in the plane through its centre.
+    pub fn project(&self, p: DVec3) -> Option<Projected> {
+        let view = self.view(p);
+        let (x, y, depth) = (view.x / view.z, view.y / view.z, view.z);
+        (depth > 0.0 && x.is_finite() && y.is_finite()).then_some(Projected { x, y, depth })
+    }
+
+    /// Whether the picture covers (x, y): its pixels are squares about their centres.
+    pub fn covers(&self, x: f64, y: f64) -> bool {
+        let within = |at: f64, side: u32| at >= -0.5 && at <= f64::from(side) - 0.5;
+        within(x, self.width) && within(y, self.height)
+    }
+
+    /// Red, green and blue in 0..1 of the picture at (x, y), and alpha in 0..1, which is never 0. `None` where alpha is 0,
+    /// outside the picture, and where there is none.
+    ///
+    /// Bilinear between the centres of pixels; the colour counts each by its alpha, so that what a mask leaves out is not
+    /// mixed in.
+    pub fn color_at(&self, x: f64, y: f64) -> Option<(Vec3, f32)> {
+        let mut mix = Mix::default();
+        for (pixel, share) in self.around(x, y)? {
+            mix.add(self.pixel(pixel)?, share);
+        }
+        mix.color()
+    }
+
+    /// Column and row of the four pixels between whose centres (x, y) is, and the share of each in a bilinear mean;
+    /// `None` outside the picture.
+    pub(super) fn around(&self, x: f64, y: f64) -> Option<[([usize; 2], f32); 4]> {
+        let [columns, rows] = [between(x, self.width), between(y, self.height)];
+        let pixel = |i: usize, j: usize| ([columns[i].0, rows[j].0], columns[i].1 * rows[j].1);
+        self.covers(x, y).then(|| [pixel(0, 0), pixel(1, 0), pixel(0, 1), pixel(1, 1)])
+    }
+
+    /// Red, green, blue and alpha of a pixel, 0..=255; `None` where there is none.
+    pub(super) fn pixel(&self, [column, row]: [usize; 2]) -> Option<[u8; 4]> {
+        let image = self.image.as_ref()?;
+        image.as_chunks().0.get(row * self.width as usize + column).copied()
+    }
+
+    /// (x·depth, y·depth, depth) of a world point; see [`Projected`].
+    pub(super) fn view(&self, p: DVec3) -> DVec3 {
+        self.to_view.transform_point3(p)
+    }
+
+    /// How far a world point at depth 1 goes for one pixel to the right, and for one down.
+    pub(super) fn pixel_axes(&self) -> [DVec3; 2] {
+        [self.from_view.matrix3.x_axis, self.from_view.matrix3.y_axis]
+    }
+}
+
+/// The mean colour of pixels, each by its share and its alpha.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Mix {
+    sum: Vec3,
+    alpha: f32,
+}
+
+impl Mix {
+    pub(super) fn add(&mut self, pixel: [u8; 4], share: f32) {
+        let [r, g, b, a] = pixel.map(|c| f32::from(c) / 255.0);
+        self.sum += Vec3::new(r, g, b) * (share * a);
+        self.alpha += share * a;
+    }
+
+    /// The colour, and alpha, which is never 0: then there is no colour.
+    pub(super) fn color(self) -> Option<(Vec3, f32)> {
+        (self.alpha > 0.0).then(|| (self.sum / self.alpha, self.alpha))
+    }
+}
+
+/// What is wrong with the numbers of a camera, and what is accepted. `length` is that of the image in bytes.
+fn problem(projection: &[f64; 12], width: u32, height: u32, length: Option<usize>) -> Option<String> {
+    if let Some(i) = projection.iter().position(|entry| !entry.is_finite()) {
+        let (row, column, entry) = (i / 4 + 1, i % 4 + 1, projection[i]);
+        return Some(format!(
+            "row {row}, column {column} of the projection is {entry}; finite numbers are accepted"
+        ));
+    }
+    if [width, height].iter().any(|side| !(1..=MOST_PIXELS).contains(side)) {
+        return Some(format!("{width} × {height} pixels; 1 to {MOST_PIXELS} a side are accepted"));
+    }
+    let expected = 4 * width as usize * height as usize;
+    let found = length.filter(|&found| found != expected)?;
+    Some(format!(
+        "the image has {found} bytes; {expected}, four for each of {width} × {height} pixels, are accepted"
+    ))
+}
+
+/// The projection with the factor that makes its last coordinate the depth; `None` where it has no centre.
+fn view(projection: [f64; 12]) -> Option<DAffine3> {
+    // Its own size first, or products of extreme entries leave the range of numbers.
+    let size = projection.iter().fold(0.0, |size: f64, entry| size.max(entry.abs()));
+    let p = projection.map(|entry| entry / size);
+    let rows = [0, 4, 8].map(|i| DVec3::new(p[i], p[i + 1], p[i + 2]));
+    let [a, b, c] = rows.map(DVec3::normalize_or_zero);
+    if a.dot(b.cross(c)).abs() < LEAST_SPAN {
+        return None;
+    }
+    let matrix = DMat3::from_cols(rows[0], rows[1], rows[2]).transpose();
+    let ahead = matrix.determinant().signum();
+    let offset = DVec3::new(p[3], p[7], p[11]);
+    let to_view = scaled_to_depth(DAffine3 { matrix3: matrix * ahead, translation: offset * ahead });
+    to_view.inverse().is_finite().then_some(to_view)
+}
+
+/// The projection with a positive factor that makes its last row a unit vector (Hartley & Zisserman, *Multiple view
+/// geometry*, section 6.2.3).
+fn scaled_to_depth(to_view: DAffine3) -> DAffine3 {
+    let factor = to_view.matrix3.row(2).length().recip();
+    DAffine3 { matrix3: to_view.matrix3 * factor, translation: to_view.translation * factor }
+}
+
+/// The two pixels of `side` between whose centres `at` lies, the nearest at a border, and how much each counts.
+fn between(at: f64, side: u32) -> [(usize, f32); 2] {
+    let at = at.clamp(0.0, f64::from(side - 1));
+    let low = at as usize;
+    let share = (at - at.floor()) as f32;
+    [(low, 1.0 - share), ((low + 1).min(side as usize - 1), share)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Stands at (1, 2, −5) and looks along z, right along x, down along y: focal length 100, centre of the picture
+    /// (40, 30).
+    const AHEAD: [f64; 12] = [100.0, 0.0, 40.0, 100.0, 0.0, 100.0, 30.0, -50.0, 0.0, 0.0, 1.0, 5.0];
+
+    fn camera(projection: [f64; 12]) -> Camera {
+        Camera::new(projection, 81, 61, None).unwrap()
+    }
+
+    fn problem(projection: [f64; 12], width: u32, height: u32, image: Option<Vec<u8>>) -> String {
+        match Camera::new(projection, width, height, image).unwrap_err() {
+            MethodError::InvalidArgument { parameter: "cameras", problem } => problem,
+            other => panic!("{other}"),
+        }
+    }
+
+    fn near(found: Option<Projected>, [x, y, depth]: [f64; 3]) {
+        let found = found.unwrap();
+        let off = (DVec3::new(found.x, found.y, found.depth) - DVec3::new(x, y, depth)).length();
+        assert!(off < 1e-9, "{found:?} instead of {x}, {y}, {depth}");
+    }
+
+    #[test]
+    fn a_factor_changes_nothing() {
+        for factor in [1.0, -1.0, 1e-3, -250.0, 1e-200, -1e200] {
+            let camera = camera(AHEAD.map(|entry| entry * factor));
+            assert!((camera.centre() - DVec3::new(1.0, 2.0, -5.0)).length() < 1e-12);
+            near(camera.project(DVec3::new(1.0, 2.0, 0.0)), [40.0, 30.0, 5.0]);
+            near(camera.project(DVec3::new(1.5, 1.9, 5.0)), [45.0, 29.0, 10.0]);
+            assert_eq!(camera.project(DVec3::new(1.0, 2.0, -6.0)), None, "behind");
+            assert_eq!(camera.project(DVec3::new(3.0, 2.0, -5.0)), None, "beside");
+        }
+    }
+
+    #[test]
+    fn points_out_of_the_picture() {
+        let camera = camera(AHEAD);
+        let far = camera.project(DVec3::new(-4.0, 2.0, 0.0)).unwrap();
+        assert!((far.x + 60.0).abs() < 1e-9 && !camera.covers(far.x, far.y));
+        for (x, y, inside) in [(-0.5, 0.0, true), (-0.6, 0.0, false), (80.5, 60.5, true), (0.0, 60.6, false)]
+        {
+            assert_eq!(camera.covers(x, y), inside, "{x}, {y}");
+        }
+        assert!(!camera.covers(f64::NAN, 0.0));
+    }
+
+    #[test]
+    fn moved_sees_the_same() {
+        let turn = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.0);
+        let scaled = DAffine3::from_mat3_translation(turn * 0.01, DVec3::new(7.0, 8.0, 9.0));
+        let mirrored = DAffine3::from_scale(DVec3::new(-2.0, 2.0, 2.0));
+        for (map, size) in [(scaled, 0.01), (mirrored, 2.0)] {
+            let (before, after) = (camera(AHEAD), camera(AHEAD).moved(&map));
+            assert!((map.transform_point3(before.centre()) - after.centre()).length() < 1e-9);
+            for p in [DVec3::new(1.2, 2.3, 0.4), DVec3::new(0.0, 3.0, 4.0)] {
+                let Projected { x, y, depth } = before.project(p).unwrap();
+                near(after.project(map.transform_point3(p)), [x, y, depth * size]);
+            }
+            assert_eq!(after.project(map.transform_point3(DVec3::new(1.0, 2.0, -6.0))), None);
+        }
+    }
+
+    #[test]
+    fn colors_between_pixels() {
+        let image = vec![255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 0, 255, 255, 255, 51];
+        let camera = Camera::new(AHEAD, 2, 2, Some(image)).unwrap();
+        let (red, green, white) = (Vec3::X, Vec3::Y, Vec3::ONE);
+        for (x, y, expected) in [
+            (0.0, 0.0, Some((red, 1.0))),
+            (-0.5, -0.5, Some((red, 1.0))),
+            (0.75, 0.0, Some((red * 0.25 + green * 0.75, 1.0))),
+            (1.5, 1.5, Some((white, 0.2))),
+            (0.0, 0.5, Some((red, 0.5))),
+            (1.0, 0.5, Some(((green + white * 0.2) / 1.2, 0.6))),
+            (0.0, 1.0, None),
+            (1.6, 0.0, None),
+        ] {
+            let found = camera.color_at(x, y);
+            let close = match (found, expected) {
+                (Some((color, alpha)), Some((c, a))) => {
+                    (color - c).length() < 1e-6 && f32::abs(alpha - a) < 1e-6
+                }
+                (found, expected) => found == expected,
+            };
+            assert!(close, "{x}, {y}: {found:?}");
+        }
+        assert_eq!(self::camera(AHEAD).color_at(0.0, 0.0), None, "no picture");
+    }
+
+    #[test]
+    fn invalid_cameras() {
+        let mut missing = AHEAD;
+        missing[6] = f64::NAN;
+        assert!(problem(missing, 9, 9, None).starts_with("row 2, column 3 of the projection is NaN"));
+        let parallel = [100.0, 0.0, 0.0, 40.0, 0.0, 100.0, 0.0, 30.0, 0.0, 0.0, 0.0, 1.0];
+        let mut shifted = parallel;
+        // One third of each: rounding leaves a little of a determinant.
+        (0..4).for_each(|i| shifted[8 + i] += (parallel[i] + parallel[4 + i]) / 3.0);
+        for flat in [parallel, shifted, [0.0; 12], [1.0; 12]] {
+            assert!(problem(flat, 9, 9, None).contains("perspective camera"));
+        }
+        for [width, height] in [[0, 9], [9, 0], [16385, 9]] {
+            assert!(problem(AHEAD, width, height, None).contains("1 to 16384"));
+        }
+        let message = problem(AHEAD, 4, 3, Some(vec![0; 47]));
+        assert!(message.starts_with("the image has 47 bytes; 48, four for each of 4 × 3"), "{message}");
+    }
+}

@@ -1,0 +1,542 @@
+//! Colours of the surface from the pictures of the cameras (paper, section VII-C).
+//!
+//! Each camera that sees a place gives it the colour of its picture there, which counts by the cosine of the angle between
+//! normal and direction to the camera. The paper subdivides triangles until their footprint in the pictures is smaller
+//! than a pixel, and gives each one colour. Here each vertex has one and triangles blend those of their corners: as sharp
+//! as the pictures where edges are as short as a pixel is wide, and else as sharp as the mesh.
+//!
+//! A depth buffer for each camera tells what hides what. What a camera sees on the rim of a part, where the picture may
+//! show what is behind it, hardly counts. Vertices that no camera sees take the colours around them.
+
+use super::camera::{Camera, Mix, Projected};
+use crate::math::{DVec3, Vec3};
+use crate::mesh::TriangleMesh;
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// Pixels a side of the largest depth buffer: 16 MB. Finer than that no surface is drawn.
+const LARGEST_BUFFER: u32 = 2048;
+
+/// The cosine between normal and direction to the camera from where on the depth over a pixel is no longer taken to grow.
+/// With less, vertices on the far rim are seen through the surface; with more, vertices of a steep side hide each
+/// other. A camera that sees a place so flat counts next to nothing.
+const GRAZING: f64 = 0.1;
+
+/// How wide the rim of a part is, in pixels of the picture. The surface is never quite right, and where it is a little too
+/// large the picture shows what is behind it: on a painted ball too large by half a pixel, colours are off by 0.14 with 0
+/// and by 0.01 with 3. With 4, small parts in small pictures are nothing but rim, and it is 0.07.
+const RIM_WIDTH: f64 = 3.0;
+
+/// What a place on a rim counts against others: only where no camera sees better it has to do.
+const RIM: f32 = 0.01;
+
+/// The share of a pixel by which a triangle's reach is widened, against rounding: else single pixels on edges are missed.
+const BORDER: f64 = 1e-6;
+
+/// The colour of each vertex, red, green and blue in 0..1, from all cameras that have a picture; `None` where they see
+/// nothing of the surface. See [`Coloring`] for what the surface needs.
+pub fn colors(surface: &TriangleMesh, cameras: &[Camera]) -> Option<Vec<Vec3>> {
+    let mut coloring = Coloring::new(surface.positions.len());
+    cameras.iter().for_each(|camera| coloring.add(surface, camera));
+    coloring.finish(surface)
+}
+
+/// The colours of a surface while they are gathered, camera by camera.
+///
+/// All calls are given the same closed surface, counter-clockwise seen from outside, whose indices exist. Where it has no
+/// normals, those of [`TriangleMesh::vertex_normals`] are worked out for each camera.
+#[derive(Clone, Debug)]
+pub struct Coloring {
+    gathered: Vec<Gathered>,
+    depths: DepthBuffer,
+}
+
+/// What a vertex has of the cameras so far.
+#[derive(Clone, Copy, Debug, Default)]
+struct Gathered {
+    /// Sum of the colours, each times its weight.
+    color: Vec3,
+    weight: f32,
+}
+
+impl Coloring {
+    /// Nothing gathered yet, for so many vertices.
+    pub fn new(vertices: usize) -> Self {
+        Self { gathered: vec![Gathered::default(); vertices], depths: DepthBuffer::default() }
+    }
+
+    /// Gathers what `camera` sees of the surface; nothing where it has no picture.
+    pub fn add(&mut self, surface: &TriangleMesh, camera: &Camera) {
+        if !camera.has_image() {
+            return;
+        }
+        self.depths.draw(surface, camera);
+        let normals = match &surface.normals {
+            Some(normals) => Cow::Borrowed(normals),
+            None => Cow::Owned(surface.vertex_normals()),
+        };
+        for ((gathered, p), normal) in self.gathered.iter_mut().zip(&surface.positions).zip(normals.iter()) {
+            if let Some((color, weight)) = self.depths.look(camera, p.as_dvec3(), normal.as_dvec3()) {
+                gathered.color += color * weight;
+                gathered.weight += weight;
+            }
+        }
+    }
+
+    /// The colour of each vertex: the mean of those gathered. Unseen vertices take the mean of their neighbours, ring by
+    /// ring outwards from the seen ones; parts of which nothing is seen the mean of all seen vertices. `None` where no
+    /// vertex is seen.
+    pub fn finish(self, surface: &TriangleMesh) -> Option<Vec<Vec3>> {
+        let mean = |g: &Gathered| (g.weight > 0.0).then(|| g.color / g.weight);
+        let mut colors: Vec<Option<Vec3>> = self.gathered.iter().map(mean).collect();
+        let overall = mean_of(colors.iter().flatten().copied())?;
+        spread(&mut colors, &Neighbours::of(surface));
+        Some(colors.into_iter().map(|color| color.unwrap_or(overall)).collect())
+    }
+}
+
+/// `None` of nothing.
+fn mean_of(colors: impl Iterator<Item = Vec3>) -> Option<Vec3> {
+    let (sum, count) = colors.fold((DVec3::ZERO, 0.0), |(sum, count), c| (sum + c.as_dvec3(), count + 1.0));
+    (count > 0.0).then(|| (sum / count).as_vec3())
+}
+
+/// Colours the vertices without colour that are joined to one with, ring by ring.
+fn spread(colors: &mut [Option<Vec3>], neighbours: &Neighbours) {
+    let mut front: Vec<usize> = (0..colors.len()).filter(|&v| colors[v].is_some()).collect();
+    while !front.is_empty() {
+        let around = front.iter().flat_map(|&v| neighbours.around(v));
+        let mut ring: Vec<usize> = around.copied().filter(|&v| colors[v].is_none()).collect();
+        ring.sort_unstable();
+        ring.dedup();
+        let mean = |&v: &usize| mean_of(neighbours.around(v).iter().filter_map(|&n| colors[n]));
+        let means: Vec<Option<Vec3>> = ring.iter().map(mean).collect();
+        ring.iter().zip(means).for_each(|(&v, mean)| colors[v] = mean);
+        front = ring;
+    }
+}
+
+/// The neighbours of every vertex, each once for every triangle they share: as often as any other on a closed surface.
+struct Neighbours {
+    starts: Vec<usize>,
+    all: Vec<usize>,
+}
+
+impl Neighbours {
+    fn of(surface: &TriangleMesh) -> Self {
+        let sides = || {
+            let around = |t: &[u32; 3]| {
+                let [a, b, c] = t.map(|v| v as usize);
+                [(a, b), (b, a), (b, c), (c, b), (c, a), (a, c)]
+            };
+            surface.triangles.iter().flat_map(around)
+        };
+        let mut starts = vec![0; surface.positions.len() + 1];
+        sides().for_each(|(from, _)| starts[from + 1] += 1);
+        (1..starts.len()).for_each(|v| starts[v] += starts[v - 1]);
+        let mut next = starts.clone();
+        let mut all = vec![0; 6 * surface.triangles.len()];
+        for (from, to) in sides() {
+            all[next[from]] = to;
+            next[from] += 1;
+        }
+        Self { starts, all }
+    }
+
+    fn around(&self, v: usize) -> &[usize] {
+        &self.all[self.starts[v]..self.starts[v + 1]]
+    }
+}
+
+/// How near the surface is in each pixel of a camera.
+#[derive(Clone, Debug, Default)]
+struct DepthBuffer {
+    width: usize,
+    height: usize,
+    /// Pixels of the buffer for one of the picture.
+    scale: f64,
+    /// 1/depth at the centres of the pixels, row by row: unlike depth, it is linear over a triangle in the picture. 0
+    /// where there is nothing.
+    nearness: Vec<f32>,
+    /// The vertices in (x·depth, y·depth, depth), with x and y in pixels of the buffer.
+    view: Vec<DVec3>,
+}
+
+impl DepthBuffer {
+    /// Draws the surface as `camera` sees it.
+    fn draw(&mut self, surface: &TriangleMesh, camera: &Camera) {
+        let [width, height] = camera.size();
+        self.scale = (f64::from(LARGEST_BUFFER) / f64::from(width.max(height))).min(1.0);
+        [self.width, self.height] =
+            [width, height].map(|side| (f64::from(side) * self.scale).ceil() as usize);
+        self.nearness.clear();
+        self.nearness.resize(self.width * self.height, 0.0);
+        let mut view = std::mem::take(&mut self.view);
+        view.clear();
+        view.extend(surface.positions.iter().map(|p| {
+            let v = camera.view(p.as_dvec3());
+            DVec3::new(v.x * self.scale + v.z * self.shift(), v.y * self.scale + v.z * self.shift(), v.z)
+        }));
+        surface.triangles.iter().for_each(|t| self.draw_triangle(t.map(|v| view[v as usize])));
+        self.view = view;
+    }
+
+    /// Where the centre of the picture's first pixel is in the buffer: both begin at the same border.
+    fn shift(&self) -> f64 {
+        0.5 * self.scale - 0.5
+    }
+
+    /// Draws a triangle, from either side. A pixel's centre is in it where the ray through it is a sum of the corners with
+    /// no factor below 0, also where corners are behind the camera (Olano & Greer, *Triangle scan conversion using 2D
+    /// homogeneous coordinates*, 1997). The three factors are linear over the picture and sum to 1/depth.
+    fn draw_triangle(&mut self, corners: [DVec3; 3]) {
+        let [a, b, c] = corners;
+        let volume = a.dot(b.cross(c));
+        if volume == 0.0 {
+            return;
+        }
+        let factors = [b.cross(c), c.cross(a), a.cross(b)].map(|edge| edge * volume.signum());
+        let sum = (factors[0] + factors[1] + factors[2]) / volume.abs();
+        let (columns, rows) = self.reach(corners);
+        let limits = nearness_limits(corners);
+        for row in rows {
+            for column in columns.clone() {
+                let pixel = DVec3::new(column as f64, row as f64, 1.0);
+                // Of two triangles at an edge one has the centre, or both: their factors are exact opposites.
+                if factors.iter().all(|factor| factor.dot(pixel) >= 0.0) {
+                    let nearness = sum.dot(pixel).max(limits.start).min(limits.end) as f32;
+                    let there = &mut self.nearness[row * self.width + column];
+                    *there = there.max(nearness);
+                }
+            }
+        }
+    }
+
+    /// The columns and rows that the part of the triangle in front of the camera may reach.
+    fn reach(&self, corners: [DVec3; 3]) -> (Range<usize>, Range<usize>) {
+        // Nearer than this share of the depth nothing is drawn: the picture of an edge through the camera's plane has no end.
+        let near = 1e-6 * corners.iter().fold(0.0, |deepest: f64, p| deepest.max(p.z));
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let mut take = |p: DVec3| {
+            low = low.min(p / p.z);
+            high = high.max(p / p.z);
+        };
+        for (p, q) in [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (corners[i], corners[j])) {
+            if p.z > near {
+                take(p);
+            }
+            if near > 0.0 && (p.z > near) != (q.z > near) {
+                take(p.lerp(q, (near - p.z) / (q.z - p.z)));
+            }
+        }
+        // A cast from float saturates: below 0 is 0.
+        let pixels = |low: f64, high: f64, count: usize| {
+            (low - BORDER).ceil() as usize..((high + BORDER).floor() + 1.0).min(count as f64) as usize
+        };
+        (pixels(low.x, high.x, self.width), pixels(low.y, high.y, self.height))
+    }
+
+    /// The colour of a place on the surface in the camera's picture and what it counts: the cosine between normal and
+    /// direction to the camera, times alpha, on a rim times [`RIM`]. `None` where the camera does not see it.
+    ///
+    /// Only those of the four pixels around it are mixed that show the surface near the place. Where one shows something
+    /// nearer, the place counts as hidden.
+    fn look(&self, camera: &Camera, p: DVec3, normal: DVec3) -> Option<(Vec3, f32)> {
+        let to_camera = camera.centre() - p;
+        let distance = to_camera.length();
+        let cosine = normal.dot(to_camera) / distance;
+        if cosine.is_nan() || cosine <= 0.0 {
+            return None;
+        }
+        let at = camera.project(p)?;
+        let slope = normal / (cosine.max(GRAZING) * distance);
+        let margin = self.margin(camera, at.depth, slope);
+        let mut mix = Mix::default();
+        for (pixel, share) in camera.around(at.x, at.y)? {
+            let [nearest, farthest] = self.depths_at(pixel);
+            if nearest < at.depth - margin {
+                return None;
+            }
+            if farthest <= at.depth + margin {
+                mix.add(camera.pixel(pixel)?, share);
+            }
+        }
+        let (color, alpha) = mix.color()?;
+        let worth = if self.on_rim(camera, at, margin) { RIM } else { 1.0 };
+        Some((color, cosine as f32 * alpha * worth))
+    }
+
+    /// Whether a place has something farther, or nothing, beside it in the picture.
+    fn on_rim(&self, camera: &Camera, at: Projected, margin: f64) -> bool {
+        let [width, height] = camera.size().map(|side| side as usize);
+        let beyond = at.depth + (RIM_WIDTH + 1.0) * margin;
+        [(-RIM_WIDTH, 0.0), (RIM_WIDTH, 0.0), (0.0, -RIM_WIDTH), (0.0, RIM_WIDTH)].into_iter().any(
+            |(x, y)| {
+                let [column, row] = [at.x + x, at.y + y].map(|at| at.round() as usize);
+                let [_, farthest] = self.depths_at([column.min(width - 1), row.min(height - 1)]);
+                farthest > beyond
+            },
+        )
+    }
+
+    /// How much the depth of a surface differs at most between a place at `depth` and what the buffer holds for the pixels
+    /// around it: what its plane changes, and the width of the way for what is not plane. `slope` is the normal over its
+    /// product with the way to the camera.
+    fn margin(&self, camera: &Camera, depth: f64, slope: DVec3) -> f64 {
+        // One to the side and one down, and where those of the buffer are larger, one of them on top of it.
+        let pixels = if self.scale < 1.0 { 1.0 + 1.0 / self.scale } else { 1.0 };
+        let change = |axis: DVec3| depth * slope.dot(axis).abs() + 0.5 * axis.length();
+        pixels * depth * camera.pixel_axes().map(change).iter().sum::<f64>()
+    }
+
+    /// The least and the greatest depth in the pixels of the buffer around the centre of one of the picture: a single one
+    /// where they are of the same size. Infinite where there is nothing.
+    fn depths_at(&self, pixel: [usize; 2]) -> [f64; 2] {
+        let [column, row] = pixel.map(|at| at as f64 * self.scale + self.shift());
+        let (mut nearest, mut farthest) = (0.0, f32::INFINITY);
+        for row in [row.floor(), row.ceil()].map(|row| (row as usize).min(self.height - 1)) {
+            for column in [column.floor(), column.ceil()].map(|at| (at as usize).min(self.width - 1)) {
+                let nearness = self.nearness[row * self.width + column];
+                nearest = nearness.max(nearest);
+                farthest = nearness.min(farthest);
+            }
+        }
+        [nearest, farthest].map(|nearness| f64::from(nearness).recip())
+    }
+}
+
+/// 1/depth of the farthest corner and of the nearest, which no point of the triangle may leave by rounding.
+fn nearness_limits(corners: [DVec3; 3]) -> Range<f64> {
+    let depths = corners.map(|p| p.z);
+    let [low, high] =
+        [depths.into_iter().fold(f64::INFINITY, f64::min), depths.into_iter().fold(0.0, f64::max)];
+    high.recip()..if low > 0.0 { low.recip() } else { f64::INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Mesh;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// What a picture shows: the balls of the scene as its rays meet them, each painted by the direction from its centre.
+    struct Ball {
+        centre: DVec3,
+        radius: f64,
+        paint: fn(DVec3) -> [u8; 4],
+    }
+
+    impl Ball {
+        fn mesh(&self, edge: f32) -> TriangleMesh {
+            let mesh = Mesh::icosphere(self.centre.as_vec3(), self.radius as f32, edge).unwrap();
+            mesh.to_triangles()
+        }
+
+        /// How far away a ray of length 1 meets it, and the colour there.
+        fn hit(&self, from: DVec3, ray: DVec3) -> Option<(f64, [u8; 4])> {
+            let (along, off) = ((self.centre - from).dot(ray), from - self.centre);
+            let root = along * along - off.length_squared() + self.radius * self.radius;
+            let distance = along - root.max(0.0).sqrt();
+            let outward = (off + ray * distance) / self.radius;
+            (root >= 0.0 && distance > 0.0).then(|| (distance, (self.paint)(outward)))
+        }
+    }
+
+    const UNIT: Ball = Ball { centre: DVec3::ZERO, radius: 1.0, paint: by_direction };
+    const TEAL: [u8; 4] = [0, 128, 128, 255];
+    const RED: [u8; 4] = [255, 0, 0, 255];
+    const BLUE: [u8; 4] = [0, 0, 255, 255];
+    const BLACK: [u8; 4] = [0, 0, 0, 255];
+
+    fn by_direction(d: DVec3) -> [u8; 4] {
+        let [r, g, b] = (d * 102.0 + 127.5).to_array().map(|c| c.round() as u8);
+        [r, g, b, 255]
+    }
+
+    /// A camera that looks from `from` at `to`, with a picture of the balls before `background`.
+    fn camera(balls: &[&Ball], from: DVec3, to: DVec3, size: [u32; 2], background: [u8; 4]) -> Camera {
+        let ahead = (to - from).normalize();
+        let right = ahead.any_orthonormal_vector();
+        let down = ahead.cross(right);
+        let [width, height] = size.map(f64::from);
+        let (x, y, focal) = (0.5 * (width - 1.0), 0.5 * (height - 1.0), 1.6 * width.min(height));
+        let mut image = Vec::new();
+        for pixel in 0..size[0] * size[1] {
+            let (across, along) = (f64::from(pixel % size[0]) - x, f64::from(pixel / size[0]) - y);
+            let ray = (ahead * focal + right * across + down * along).normalize();
+            let hits = balls.iter().filter_map(|ball| ball.hit(from, ray));
+            let nearest = hits.min_by(|a, b| a.0.total_cmp(&b.0));
+            image.extend(nearest.map_or(background, |(_, color)| color));
+        }
+        let rows = [right * focal + ahead * x, down * focal + ahead * y, ahead];
+        let projection = rows.map(|row| [row.x, row.y, row.z, -row.dot(from)]).concat();
+        Camera::new(projection.try_into().unwrap(), size[0], size[1], Some(image)).unwrap()
+    }
+
+    fn six_sides(size: impl Fn(usize) -> [u32; 2]) -> Vec<Camera> {
+        let from = [DVec3::X, -DVec3::X, DVec3::Y, -DVec3::Y, DVec3::Z, -DVec3::Z];
+        let views = from.into_iter().enumerate();
+        views.map(|(i, from)| camera(&[&UNIT], from * 4.0, DVec3::ZERO, size(i), BLACK)).collect()
+    }
+
+    fn joined(meshes: [TriangleMesh; 2]) -> TriangleMesh {
+        let [mut all, other] = meshes;
+        let first = all.positions.len() as u32;
+        all.positions.extend(other.positions);
+        all.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + first)));
+        all.normals = Some(all.vertex_normals());
+        all
+    }
+
+    fn weights(surface: &TriangleMesh, camera: &Camera) -> Vec<f32> {
+        let mut coloring = Coloring::new(surface.positions.len());
+        coloring.add(surface, camera);
+        coloring.gathered.iter().map(|gathered| gathered.weight).collect()
+    }
+
+    /// How far the colours are from those the unit ball is painted with.
+    fn worst(surface: &TriangleMesh, colors: &[Vec3]) -> f32 {
+        let off = |(p, color): (&Vec3, &Vec3)| (*p * 0.4 + 0.5 - *color).abs().max_element();
+        surface.positions.iter().zip(colors).map(off).fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn a_painted_ball_comes_back() {
+        let ball = UNIT.mesh(0.06);
+        let cameras = six_sides(|_| [200, 200]);
+        let found = worst(&ball, &colors(&ball, &cameras).unwrap());
+        assert!(found < 0.01, "{found}");
+        let bare = TriangleMesh { normals: None, ..ball };
+        let found = worst(&bare, &colors(&bare, &cameras).unwrap());
+        assert!(found < 0.01, "{found} without normals");
+    }
+
+    #[test]
+    fn background_behind_a_surface_too_large_hardly_counts() {
+        for (radius, size) in [(1.005, 50), (1.01, 50), (1.01, 100), (1.02, 100), (1.01, 200)] {
+            let ball = Ball { radius, ..UNIT }.mesh(0.06);
+            let found = worst(&ball, &colors(&ball, &six_sides(|_| [size; 2])).unwrap());
+            assert!(found < 0.02, "{found} with radius {radius} and {size} pixels");
+        }
+    }
+
+    #[test]
+    fn pictures_of_any_size() {
+        let ball = UNIT.mesh(0.06);
+        let sizes = [[300, 200], [64, 48], [3000, 90], [80, 2500], [200, 100], [101, 103]];
+        let found = worst(&ball, &colors(&ball, &six_sides(|i| sizes[i])).unwrap());
+        assert!(found < 0.02, "{found}");
+    }
+
+    #[test]
+    fn hidden_places_take_no_color_of_what_hides_them() {
+        let big = Ball { paint: |_| TEAL, ..UNIT };
+        for (gap, size) in [(0.05, 250), (0.05, 1000), (0.3, 100), (1.0, 250)] {
+            let small = Ball { centre: DVec3::Z * (1.25 + gap), radius: 0.25, paint: |_| RED };
+            let surface = joined([big.mesh(0.05), small.mesh(0.03)]);
+            let camera = camera(&[&big, &small], DVec3::Z * 5.0, DVec3::ZERO, [size; 2], BLACK);
+            let colors = colors(&surface, &[camera]).unwrap();
+            let split = big.mesh(0.05).positions.len();
+            for (p, color) in surface.positions.iter().zip(&colors).take(split) {
+                assert!(color.x < 0.01, "gap {gap}, {size} pixels: {p} is {color}");
+            }
+            let front = |p: &Vec3| p.z - small.centre.z as f32 > 0.1;
+            for (p, color) in surface.positions.iter().zip(&colors).skip(split).filter(|(p, _)| front(p)) {
+                assert!(color.x > 0.99, "gap {gap}, {size} pixels: {p} is {color}");
+            }
+        }
+    }
+
+    #[test]
+    fn front_faces_are_seen_and_back_faces_not() {
+        for (edge, size) in [(0.04, 30), (0.04, 200), (0.04, 1000), (0.3, 200), (2.0, 1000)] {
+            let ball = UNIT.mesh(edge);
+            let from = DVec3::new(2.0, 1.0, 3.0);
+            let camera = camera(&[&UNIT], from, DVec3::ZERO, [size; 2], BLACK);
+            for (p, weight) in ball.positions.iter().zip(weights(&ball, &camera)) {
+                let cosine = p.dot((from.as_vec3() - *p).normalize());
+                let right = if cosine > 0.15 { weight > 0.0 } else { cosine > 0.0 || weight == 0.0 };
+                assert!(right, "edge {edge}, {size} pixels: cosine {cosine}, weight {weight}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_plate_hides_with_corners_behind_the_camera() {
+        let ball = Ball { centre: DVec3::new(4.0, 0.0, -2.0), ..UNIT }.mesh(0.2);
+        let corner = |x, y| Vec3::new(x, y, 0.0);
+        let plate = TriangleMesh {
+            positions: vec![
+                corner(-60.0, -50.0),
+                corner(60.0, -50.0),
+                corner(60.0, 50.0),
+                corner(-60.0, 50.0),
+            ],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..Default::default()
+        };
+        let view = || {
+            let (from, to) = (DVec3::new(0.0, 0.0, 1.0), DVec3::new(4.0, 0.0, -2.0));
+            camera(&[], from, to, [60, 60], TEAL)
+        };
+        assert!(weights(&ball, &view()).iter().any(|&weight| weight > 0.0));
+        let below = ball.positions.len();
+        let seen = weights(&joined([ball, plate]), &view());
+        assert!(seen[..below].iter().all(|&weight| weight == 0.0));
+    }
+
+    #[test]
+    fn unseen_places_take_the_colors_around_them() {
+        let halves = Ball { paint: |d| if d.x < 0.0 { RED } else { BLUE }, ..UNIT };
+        let aside = Ball { centre: DVec3::Z * 9.0, ..UNIT };
+        let surface = joined([halves.mesh(0.1), aside.mesh(0.3)]);
+        let camera = camera(&[&halves], DVec3::Z * 5.0, DVec3::ZERO, [300; 2], BLACK);
+        let seen = weights(&surface, &camera);
+        let colors = colors(&surface, &[camera]).unwrap();
+        let split = halves.mesh(0.1).positions.len();
+        for (p, color) in surface.positions.iter().zip(&colors).take(split).filter(|(p, _)| p.x.abs() > 0.5) {
+            let expected = if p.x < 0.0 { Vec3::X } else { Vec3::Z };
+            assert!((*color - expected).length() < 0.1, "{p} is {color}");
+        }
+        let overall = mean_of(colors.iter().zip(&seen).filter(|(_, w)| **w > 0.0).map(|(c, _)| *c)).unwrap();
+        assert!((overall - Vec3::new(0.5, 0.0, 0.5)).length() < 0.05, "{overall}");
+        assert!(colors[split..].iter().all(|color| *color == overall), "the ball behind the camera");
+    }
+
+    #[test]
+    fn masked_pixels_are_not_seen() {
+        let masked = Ball { paint: |d| if d.x < 0.0 { [255, 0, 0, 0] } else { BLUE }, ..UNIT };
+        let surface = masked.mesh(0.1);
+        let camera = camera(&[&masked], DVec3::Z * 5.0, DVec3::ZERO, [300; 2], [255, 0, 0, 0]);
+        for (p, weight) in surface.positions.iter().zip(weights(&surface, &camera)) {
+            assert!(p.x > -0.02 || weight == 0.0, "{p}");
+        }
+        assert!(colors(&surface, &[camera]).unwrap().iter().all(|color| (*color - Vec3::Z).length() < 1e-6));
+    }
+
+    #[test]
+    fn nothing_seen_is_no_color() {
+        let ball = UNIT.mesh(0.5);
+        let [front, ..] = &six_sides(|_| [20, 20])[..] else { panic!() };
+        let away = camera(&[&UNIT], DVec3::X * 4.0, DVec3::X * 9.0, [20, 20], TEAL);
+        let blank = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 9.0];
+        let blank = Camera::new(blank, 20, 20, None).unwrap();
+        assert_eq!(colors(&ball, &[]), None);
+        assert_eq!(colors(&ball, &[blank, away]), None);
+        assert_eq!(colors(&TriangleMesh::default(), std::slice::from_ref(front)), None);
+    }
+
+    #[test]
+    fn the_same_every_time() {
+        let ball = UNIT.mesh(0.1);
+        let cameras = six_sides(|_| [90, 90]);
+        let mut coloring = Coloring::new(ball.positions.len());
+        cameras[..2].iter().for_each(|camera| coloring.add(&ball, camera));
+        let mut resumed = coloring.clone();
+        cameras[2..].iter().for_each(|camera| resumed.add(&ball, camera));
+        let found = resumed.finish(&ball);
+        assert_eq!(found, colors(&ball, &cameras));
+        assert_eq!(found, colors(&ball, &cameras));
+    }
+}
