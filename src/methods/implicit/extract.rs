@@ -17,8 +17,8 @@ const CELL: f64 = 0.5;
 const MARGIN: f64 = 0.3;
 /// Cells between the lines on which pieces are looked for that no point is near.
 const SCAN: usize = 6;
-/// Evaluations a vertex is placed with.
-const STEPS: usize = 2;
+/// Evaluations a vertex is placed with: one parabola leaves less than the fast sums do.
+const STEPS: usize = 1;
 /// Values of the function in a slice: some ten milliseconds.
 const SLICE: usize = 3000;
 

@@ -15,7 +15,7 @@ use chebyshev::{CUBE, Chebyshev, Nodal};
 use translate::{Translations, Turns};
 
 /// Terms in a finest cube, about. More, and near terms take longer; fewer, and there are more cubes.
-const TERMS_A_CUBE: usize = 24;
+const TERMS_A_CUBE: usize = 12;
 /// Levels of cubes at most: tables of the finest have 8^this entries.
 const MOST_LEVELS: usize = 6;
 /// No cube, or none yet.
@@ -37,6 +37,16 @@ pub struct FastField {
     ranges: Vec<[usize; 2]>,
     /// Whether all is summed term by term.
     direct: bool,
+    /// The cube that was asked about last, and where the terms near it are: places often come in a row.
+    near: Near,
+}
+
+/// The terms around a cube.
+#[derive(Clone, Debug)]
+struct Near {
+    cube: Place,
+    number: usize,
+    ranges: Vec<[usize; 2]>,
 }
 
 /// The cubes of one size.
@@ -96,6 +106,7 @@ impl FastField {
             terms: terms.to_vec(),
             ranges: Vec::new(),
             direct: field.table().kernel().is_conditional(),
+            near: Near { cube: [-1; 3], number: 0, ranges: Vec::new() },
             field,
         };
         if !fast.direct {
@@ -108,26 +119,32 @@ impl FastField {
     /// f at each place.
     pub fn values(&mut self, places: &[DVec3], out: &mut [f64]) {
         for (p, value) in places.iter().zip(out) {
-            *value = match self.local(*p) {
-                Some((cube, number, at)) => {
-                    let far = self.chebyshev.value(&self.finest().places[number], at);
-                    far + self.near_terms(cube).map(|t| self.field.term(t, *p)).sum::<f64>()
-                        + self.field.polynomial(*p)
-                }
-                None => self.field.value(*p),
-            };
+            *value = self.value(*p);
         }
+    }
+
+    fn value(&mut self, p: DVec3) -> f64 {
+        let Some(at) = self.local(p) else { return self.field.value(p) };
+        let mut sum = self.chebyshev.value(&self.finest().places[self.near.number], at);
+        for &[from, to] in &self.near.ranges {
+            for term in &self.terms[from..to] {
+                sum += self.field.term(term, p);
+            }
+        }
+        sum + self.field.polynomial(p)
     }
 
     /// f and ∇f at `p`.
     pub fn value_and_gradient(&mut self, p: DVec3) -> (f64, DVec3) {
-        let Some((cube, number, at)) = self.local(p) else { return self.field.value_and_gradient(p) };
-        let (far, slope) = self.chebyshev.value_and_gradient(&self.finest().places[number], at);
-        let (mut sum, mut gradient) = (far, slope * (2.0 / self.cube_edge(self.levels.len() - 1)));
-        for term in self.near_terms(cube) {
-            let (value, slope) = self.field.term_and_gradient(term, p);
-            sum += value;
-            gradient += slope;
+        let Some(at) = self.local(p) else { return self.field.value_and_gradient(p) };
+        let (mut sum, slope) = self.chebyshev.value_and_gradient(&self.finest().places[self.near.number], at);
+        let mut gradient = slope * (2.0 / self.cube_edge(self.levels.len() - 1));
+        for &[from, to] in &self.near.ranges {
+            for term in &self.terms[from..to] {
+                let (value, slope) = self.field.term_and_gradient(term, p);
+                sum += value;
+                gradient += slope;
+            }
         }
         (sum + self.field.polynomial(p), gradient + self.field.slopes())
     }
@@ -211,16 +228,21 @@ impl FastField {
         }
     }
 
-    /// The finest cube of `p`, its number, and where in it `p` is; `None` outside of all.
-    fn local(&mut self, p: DVec3) -> Option<(Place, usize, DVec3)> {
+    /// Where `p` is in its finest cube, which becomes the near one; `None` outside of all.
+    fn local(&mut self, p: DVec3) -> Option<DVec3> {
         if self.direct {
             return None;
         }
         let level = self.levels.len() - 1;
-        let place = self.place_of(p, level);
-        self.levels[level].index(place)?;
-        let number = self.fill(level, place);
-        Some((place, number, self.within(p, place, level)))
+        let cube = self.place_of(p, level);
+        if cube != self.near.cube {
+            self.levels[level].index(cube)?;
+            let number = self.fill(level, cube);
+            let sources = around(cube).filter_map(|place| self.finest().sources_at(place));
+            let ranges = sources.map(|source| self.ranges[source]).collect();
+            self.near = Near { cube, number, ranges };
+        }
+        Some(self.within(p, cube, level))
     }
 
     /// Makes what all far terms add up to in a cube, if it is not there yet. Returns its number.
@@ -248,14 +270,6 @@ impl FastField {
         self.levels[level].with_places[slot] = number as u32;
         self.levels[level].places.push(nodal);
         number
-    }
-
-    /// The terms in the cubes around one, itself included.
-    fn near_terms(&self, cube: Place) -> impl Iterator<Item = &(DVec3, f64)> {
-        let level = self.finest();
-        let ranges =
-            around(cube).filter_map(|place| level.sources_at(place)).map(|number| self.ranges[number]);
-        ranges.flat_map(|[from, to]| &self.terms[from..to])
     }
 }
 

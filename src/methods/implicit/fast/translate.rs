@@ -67,14 +67,15 @@ impl Translations {
 /// Σ aᵢbᵢ as eight sums side by side.
 fn dot(a: &Nodal, b: &Nodal) -> f32 {
     let mut sums = [0.0; 8];
-    let (eights, _) = a.as_chunks::<8>();
-    let (other_eights, _) = b.as_chunks::<8>();
+    let (eights, rest) = a.as_chunks::<8>();
+    let (other_eights, other_rest) = b.as_chunks::<8>();
     for (a, b) in eights.iter().zip(other_eights) {
         for k in 0..8 {
             sums[k] += a[k] * b[k];
         }
     }
-    sums.iter().sum()
+    let tail: f32 = rest.iter().zip(other_rest).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f32>() + tail
 }
 
 /// How nodes change places when axes are mirrored and swapped.

@@ -105,7 +105,7 @@ const SLICE: usize = 2_000_000;
 /// Values of the kernel that take as long as one row of the sparse inverse.
 const ROW_WORK: usize = 4_000;
 /// Error of far blocks, of the tolerance: with it the residual found at the end is seldom above the tolerance.
-const FAR_ERROR: f64 = 0.3;
+const FAR_ERROR: f64 = 0.1;
 /// Error of far blocks where kernels are only conditionally positive definite: what is large in them cancels.
 const CONDITIONAL_ERROR: f64 = 1e-11;
 /// Constraints up to which the matrix is stored in double precision; beyond, memory matters more.
@@ -117,7 +117,7 @@ const MOST_ITERATIONS: u32 = 500;
 /// Rounds of iterations from a residual computed anew.
 const MOST_ROUNDS: u32 = 6;
 /// Rows that the true residual is taken from; all, where there are no more. Of a thousand, it is known to some 3 %.
-const CHECKED_ROWS: usize = 4096;
+const CHECKED_ROWS: usize = 1024;
 
 /// A system on its way to its solution.
 #[derive(Clone, Debug)]
@@ -171,7 +171,7 @@ impl Solver {
         let shuffled = Random::new(seed).order(places.len());
         let (surface, outside): (Vec<u32>, Vec<u32>) =
             shuffled.iter().partition(|&&i| values[i as usize] == 0.0);
-        let inverse = SparseInverse::new(&places, &surface, &outside);
+        let inverse = SparseInverse::new(&places, surface, outside);
         Self {
             table: KernelTable::new(kernel),
             polynomial_columns: polynomial_columns(kernel, &centres),

@@ -6,47 +6,47 @@ use crate::math::{DVec3, Vec3};
 use crate::methods::implicit::kernel::KernelTable;
 use crate::spatial::PointGrid;
 
-/// Earlier centres that each is predicted from. 16 double the iterations; 64 cost eight times as much to make.
-const NEIGHBOURS: usize = 32;
+/// Earlier centres that each is predicted from. 16 take half as many iterations again; 32 take twice as long to make.
+const NEIGHBOURS: usize = 24;
 
 /// (Φ + Λ)⁻¹ ≈ Σ gᵢ gᵢᵀ with a sparse gᵢ for each centre.
 #[derive(Clone, Debug)]
 pub struct SparseInverse {
     /// In which order centres are predicted, and from which earlier ones.
-    plan: Vec<(u32, Vec<u32>)>,
+    plan: Plan,
     /// For each place in the plan that was made so far, the weights of gᵢ: of the centre itself, then of its neighbours.
     weights: Vec<Vec<f64>>,
 }
 
 impl SparseInverse {
-    /// The plan for `centres`, of which those from `first_exterior` on come last; nothing is made yet.
-    pub fn new(centres: &[Vec3], interior: &[u32], exterior: &[u32]) -> Self {
-        let mut planner = Planner::default();
-        planner.add(centres, interior);
-        planner.add(centres, exterior);
-        Self { plan: planner.plan, weights: Vec::new() }
+    /// The inverse for `centres`, all of which are named once in `first` and `last`, which come in that order; nothing is
+    /// made yet.
+    pub fn new(centres: &[Vec3], first: Vec<u32>, last: Vec<u32>) -> Self {
+        Self { plan: Plan::new(centres, first, last), weights: Vec::new() }
     }
 
-    /// Makes up to `count` more rows. Returns whether all are made.
+    /// Plans or makes up to `count` more rows. Returns whether all are made.
     ///
     /// Where a local system is singular to rounding, its diagonal is raised: that costs iterations, never accuracy.
     pub fn build(&mut self, centres: &[DVec3], lambda: &[f64], table: &KernelTable, count: usize) -> bool {
-        let from = self.weights.len();
-        for (centre, neighbours) in self.plan.iter().skip(from).take(count) {
-            self.weights.push(row(*centre as usize, neighbours, centres, lambda, table));
+        if self.plan.extend(count) {
+            let rows = self.plan.rows.iter().skip(self.weights.len()).take(count);
+            let made: Vec<Vec<f64>> =
+                rows.map(|(centre, near)| row(*centre as usize, near, centres, lambda, table)).collect();
+            self.weights.extend(made);
         }
-        self.weights.len() == self.plan.len()
+        self.weights.len() == centres.len()
     }
 
-    /// The share of rows made.
+    /// The share of rows planned and made.
     pub fn progress(&self) -> f64 {
-        self.weights.len() as f64 / self.plan.len() as f64
+        0.5 * (self.plan.rows.len() + self.weights.len()) as f64 / self.plan.centres.len() as f64
     }
 
     /// The approximate inverse times `x`.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
-        for ((centre, neighbours), weights) in self.plan.iter().zip(&self.weights) {
+        for ((centre, neighbours), weights) in self.plan.rows.iter().zip(&self.weights) {
             let others = neighbours.iter().zip(&weights[1..]);
             let mut sum = weights[0] * x[*centre as usize];
             others.clone().for_each(|(&j, w)| sum += w * x[j as usize]);
@@ -129,47 +129,83 @@ fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// Puts centres in an order from coarse to fine: each is as far from those before it as those that follow let it, within a
-/// factor of √2.
-#[derive(Default)]
-struct Planner {
-    plan: Vec<(u32, Vec<u32>)>,
-}
-
 /// Distance between the first centres, in units of the box.
 const FIRST_SPACING: f32 = 2.0;
 /// Ratio of one round's distance to the one before.
 const RATIO: f32 = std::f32::consts::FRAC_1_SQRT_2;
 /// Distance below which centres are taken as they come.
 const LEAST_SPACING: f32 = 1e-6;
+/// Cells of the grid, and where neighbours are looked for first, in distances of the round.
+const CELL: f32 = 2.5;
+const REACH: f32 = 5.0;
 
-impl Planner {
-    fn add(&mut self, centres: &[Vec3], indices: &[u32]) {
-        let mut left = indices.to_vec();
-        let mut spacing = FIRST_SPACING;
-        while !left.is_empty() {
-            left = self.round(centres, &left, if spacing > LEAST_SPACING { spacing } else { 0.0 });
-            spacing *= RATIO;
+/// Centres in an order from coarse to fine, each with its nearest ones before it: each is as far from those before it as
+/// those that follow let it, within a factor of √2. In rounds: each takes the centres that are farther than some distance
+/// from all taken.
+#[derive(Clone, Debug)]
+struct Plan {
+    centres: Vec<Vec3>,
+    rows: Vec<(u32, Vec<u32>)>,
+    /// What was taken, in the same order.
+    grid: PointGrid,
+    spacing: f32,
+    /// Centres to be looked at in this round, the next one last, and those left for the next round.
+    waiting: Vec<u32>,
+    others: Vec<u32>,
+    /// Centres whose rounds come after those of all others.
+    last: Vec<u32>,
+}
+
+impl Plan {
+    fn new(centres: &[Vec3], mut first: Vec<u32>, last: Vec<u32>) -> Self {
+        first.reverse();
+        Self {
+            centres: centres.to_vec(),
+            rows: Vec::new(),
+            grid: PointGrid::new(CELL * FIRST_SPACING, centres.len()),
+            spacing: FIRST_SPACING,
+            waiting: first,
+            others: Vec::new(),
+            last,
         }
     }
 
-    /// Takes the centres that are farther than `spacing` from all that are taken. Returns the others.
-    fn round(&mut self, centres: &[Vec3], indices: &[u32], spacing: f32) -> Vec<u32> {
-        let expected = self.plan.len() + indices.len();
-        let mut grid = PointGrid::new((2.5 * spacing).max(LEAST_SPACING), expected);
-        self.plan.iter().for_each(|(i, _)| grid.insert(centres[*i as usize]));
-        let mut others = Vec::new();
-        for &i in indices {
-            let p = centres[i as usize];
-            if spacing > 0.0 && grid.has_within(p, spacing) {
-                others.push(i);
-                continue;
+    /// Looks at up to `count` centres. Returns whether all are taken.
+    fn extend(&mut self, count: usize) -> bool {
+        for _ in 0..count {
+            while self.waiting.is_empty() {
+                if self.others.is_empty() && self.last.is_empty() {
+                    return true;
+                }
+                self.begin_round();
             }
-            let near = grid.nearest(p, NEIGHBOURS, 5.0 * spacing);
-            let neighbours = near.into_iter().map(|(_, at)| self.plan[at as usize].0).collect();
-            self.plan.push((i, neighbours));
-            grid.insert(p);
+            if let Some(i) = self.waiting.pop() {
+                self.look_at(i);
+            }
         }
-        others
+        self.rows.len() == self.centres.len()
+    }
+
+    fn begin_round(&mut self) {
+        let of_others = !self.others.is_empty();
+        self.waiting = std::mem::take(if of_others { &mut self.others } else { &mut self.last });
+        self.waiting.reverse();
+        self.spacing = if of_others { self.spacing * RATIO } else { FIRST_SPACING };
+        let cell = if self.spacing > LEAST_SPACING { self.spacing } else { LEAST_SPACING };
+        let taken = self.rows.iter().map(|(i, _)| self.centres[*i as usize]);
+        let mut grid = PointGrid::new(CELL * cell, self.centres.len());
+        taken.for_each(|p| grid.insert(p));
+        self.grid = grid;
+    }
+
+    fn look_at(&mut self, i: u32) {
+        let p = self.centres[i as usize];
+        if self.spacing > LEAST_SPACING && self.grid.has_within(p, self.spacing) {
+            self.others.push(i);
+            return;
+        }
+        let near = self.grid.nearest(p, NEIGHBOURS, REACH * self.spacing);
+        self.rows.push((i, near.into_iter().map(|(_, at)| self.rows[at as usize].0).collect()));
+        self.grid.insert(p);
     }
 }
