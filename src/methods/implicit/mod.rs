@@ -167,7 +167,9 @@ impl ImplicitSurface {
         let cloud = points.distinct();
         cloud.check_count()?;
         let map = BoxMap::of(&cloud.points);
-        let cloud = cloud.mapped(&map);
+        // Rounding in the box may make equal what was not.
+        let cloud = cloud.mapped(&map).distinct();
+        cloud.check_count()?;
         cloud.check_span()?;
         Ok(Self { original, cloud, params: options.params.clone(), options, ..Self::empty(map) })
     }
