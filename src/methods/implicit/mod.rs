@@ -391,7 +391,13 @@ impl ImplicitSurface {
             return Ok(());
         }
         if only_extraction == *now && !matches!(self.stage, Stage::Solve(_)) {
-            (self.stage, self.slices) = (self.begin_extraction()?, 0);
+            match self.begin_extraction() {
+                Ok(stage) => (self.stage, self.slices) = (stage, 0),
+                Err(error) => {
+                    self.params = before;
+                    return Err(error);
+                }
+            }
         } else if only_extraction != *now {
             (self.stage, self.slices) = (self.begin_solve(), 0);
         }
