@@ -72,7 +72,8 @@ impl PointGrid {
     /// where there are fewer. Looks within `radius` first, then farther.
     pub fn nearest(&self, p: Vec3, count: usize, radius: f32) -> Vec<(f32, u32)> {
         let mut found = Vec::new();
-        let mut reach = radius;
+        // From 0 no factor leads anywhere.
+        let mut reach = if radius > 0.0 { radius } else { self.cell };
         loop {
             found.clear();
             self.within(p, reach, |i, squared| {

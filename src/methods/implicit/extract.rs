@@ -58,7 +58,7 @@ impl Extraction {
         let margin = DVec3::splat(MARGIN * 2.0 / map.scale());
         let low = bounds.min.as_dvec3() - margin;
         let high = bounds.max.as_dvec3() + margin;
-        let dims = ((high - low) / cell).to_array().map(|nodes| nodes.ceil() as usize + 1);
+        let dims = ((high - low) / cell).to_array().map(|nodes| (nodes.ceil() as usize).saturating_add(1));
         let mut follower = Follower::new(Lattice { origin: low, edge: cell, dims })
             .map_err(|error| MethodError::invalid("cell", error.to_string()))?;
         points.iter().for_each(|p| {

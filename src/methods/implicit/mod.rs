@@ -167,7 +167,9 @@ impl ImplicitSurface {
         let cloud = points.distinct();
         cloud.check_count()?;
         let map = BoxMap::of(&cloud.points);
-        let cloud = cloud.mapped(&map);
+        // Rounding in the box may make equal what was not.
+        let cloud = cloud.mapped(&map).distinct();
+        cloud.check_count()?;
         cloud.check_span()?;
         Ok(Self { original, cloud, params: options.params.clone(), options, ..Self::empty(map) })
     }
@@ -389,7 +391,13 @@ impl ImplicitSurface {
             return Ok(());
         }
         if only_extraction == *now && !matches!(self.stage, Stage::Solve(_)) {
-            (self.stage, self.slices) = (self.begin_extraction()?, 0);
+            match self.begin_extraction() {
+                Ok(stage) => (self.stage, self.slices) = (stage, 0),
+                Err(error) => {
+                    self.params = before;
+                    return Err(error);
+                }
+            }
         } else if only_extraction != *now {
             (self.stage, self.slices) = (self.begin_solve(), 0);
         }
