@@ -6,6 +6,7 @@ use crate::math::DVec3;
 use crate::methods::implicit::kernel::KernelTable;
 use crate::methods::implicit::low_rank::{LowRank, cross_approximation};
 use crate::methods::implicit::vectors::{Number, add, dot};
+use std::ops::Range;
 
 /// Two clusters are far when the smaller one's diameter is at most so many times their distance. Above 2 ranks grow,
 /// below 1 more is stored in full.
@@ -13,19 +14,61 @@ const SEPARATION: f32 = 3.0;
 
 /// A part of the matrix above the diagonal, which stands for its mirror image, too.
 #[derive(Clone, Debug)]
-struct Block<T> {
+struct Block {
     /// Cluster of the rows.
     rows: usize,
     /// Cluster of the columns.
     columns: usize,
-    content: Content<T>,
+    content: Content,
 }
 
 #[derive(Clone, Debug)]
-enum Content<T> {
+enum Content {
     /// Row by row.
-    Full(Vec<T>),
-    Far(LowRank<T>),
+    Full(Span),
+    /// Columns and rows of a low-rank product.
+    Far(Span, Span),
+}
+
+/// Where numbers are in the store.
+#[derive(Clone, Debug)]
+struct Span {
+    chunk: usize,
+    range: Range<usize>,
+}
+
+/// Numbers in a few large pieces. Thousands of small ones would let the memory of a wasm module grow page by page, which took
+/// longer than all the computing.
+#[derive(Clone, Debug)]
+struct Store<T> {
+    chunk_size: usize,
+    chunks: Vec<Vec<T>>,
+}
+
+/// Numbers in a chunk at most, but for longer spans.
+const CHUNK: usize = 1 << 20;
+
+impl<T: Copy> Store<T> {
+    /// For a matrix between `count` centres.
+    fn new(count: usize) -> Self {
+        let all = count.saturating_mul(count);
+        Self { chunk_size: if all < CHUNK { all } else { CHUNK }, chunks: Vec::new() }
+    }
+
+    fn push(&mut self, numbers: &[T]) -> Span {
+        let full = |chunk: &Vec<T>| chunk.capacity() - chunk.len() < numbers.len();
+        if self.chunks.last().is_none_or(full) {
+            self.chunks.push(Vec::with_capacity(self.chunk_size.max(numbers.len())));
+        }
+        let chunk = self.chunks.len() - 1;
+        let start = self.chunks[chunk].len();
+        self.chunks[chunk].extend_from_slice(numbers);
+        Span { chunk, range: start..start + numbers.len() }
+    }
+
+    fn get(&self, span: &Span) -> &[T] {
+        &self.chunks[span.chunk][span.range.clone()]
+    }
 }
 
 /// A symmetric kernel matrix, in the order of its cluster tree, its numbers stored as `T`.
@@ -36,7 +79,8 @@ pub struct HierarchicalMatrix<T> {
     tolerance: f64,
     /// Pairs of clusters whose blocks are still to be made, the next one last.
     waiting: Vec<(usize, usize, bool)>,
-    blocks: Vec<Block<T>>,
+    blocks: Vec<Block>,
+    store: Store<T>,
 }
 
 impl<T: Number> HierarchicalMatrix<T> {
@@ -46,7 +90,7 @@ impl<T: Number> HierarchicalMatrix<T> {
         let mut waiting = Vec::new();
         divide(&tree.clusters, 0, 0, &mut waiting);
         waiting.reverse();
-        Self { centres, tree, tolerance, waiting, blocks: Vec::new() }
+        Self { store: Store::new(centres.len()), centres, tree, tolerance, waiting, blocks: Vec::new() }
     }
 
     /// Makes blocks until about `work` values of the kernel were asked for. Returns the share of blocks made, 1 at the end.
@@ -59,10 +103,11 @@ impl<T: Number> HierarchicalMatrix<T> {
             let content = if far {
                 let block = self.far_block(a, b, table);
                 done += 2 * (block.columns.len() + block.rows.len());
-                Content::Far(block)
+                Content::Far(self.store.push(&block.columns), self.store.push(&block.rows))
             } else {
                 done += a.len() * b.len();
-                Content::Full(self.full_block(a, b, table))
+                let block = self.full_block(a, b, table);
+                Content::Full(self.store.push(&block))
             };
             self.blocks.push(Block { rows, columns, content });
         }
@@ -77,11 +122,7 @@ impl<T: Number> HierarchicalMatrix<T> {
 
     /// Bytes of all blocks.
     pub fn bytes(&self) -> usize {
-        let numbers = self.blocks.iter().map(|block| match &block.content {
-            Content::Full(values) => values.len(),
-            Content::Far(block) => block.columns.len() + block.rows.len(),
-        });
-        size_of::<T>() * numbers.sum::<usize>()
+        size_of::<T>() * self.store.chunks.iter().map(Vec::len).sum::<usize>()
     }
 
     fn full_block(&self, a: &Cluster, b: &Cluster, table: &KernelTable) -> Vec<T> {
@@ -109,8 +150,11 @@ impl<T: Number> HierarchicalMatrix<T> {
         for block in &self.blocks {
             let [a, b] = [block.rows, block.columns].map(|c| &self.tree.clusters[c]);
             match &block.content {
-                Content::Full(values) => full_product(values, [a, b], x, &mut out),
-                Content::Far(low_rank) => far_product(low_rank, [a, b], x, &mut out),
+                Content::Full(values) => full_product(self.store.get(values), [a, b], x, &mut out),
+                Content::Far(columns, rows) => {
+                    let low_rank = [columns, rows].map(|span| self.store.get(span));
+                    far_product(low_rank, [a, b], x, &mut out);
+                }
             }
         }
         out
@@ -152,8 +196,8 @@ fn full_product<T: Number>(values: &[T], [a, b]: [&Cluster; 2], x: &[f64], out: 
     }
 }
 
-fn far_product<T: Number>(block: &LowRank<T>, [a, b]: [&Cluster; 2], x: &[f64], out: &mut [f64]) {
-    for (u, v) in block.columns.chunks_exact(a.len()).zip(block.rows.chunks_exact(b.len())) {
+fn far_product<T: Number>([columns, rows]: [&[T]; 2], [a, b]: [&Cluster; 2], x: &[f64], out: &mut [f64]) {
+    for (u, v) in columns.chunks_exact(a.len()).zip(rows.chunks_exact(b.len())) {
         let (from_rows, from_columns) = (dot(u, &x[a.start..a.end]), dot(v, &x[b.start..b.end]));
         add(from_columns, u, &mut out[a.start..a.end]);
         add(from_rows, v, &mut out[b.start..b.end]);

@@ -14,15 +14,17 @@ const NEIGHBOURS: usize = 24;
 pub struct SparseInverse {
     /// In which order centres are predicted, and from which earlier ones.
     plan: Plan,
-    /// For each place in the plan that was made so far, the weights of gᵢ: of the centre itself, then of its neighbours.
-    weights: Vec<Vec<f64>>,
+    /// Rows that are made.
+    made: usize,
+    /// Of each row made, one after the other, the weights of gᵢ: of the centre itself, then of its neighbours.
+    weights: Vec<f64>,
 }
 
 impl SparseInverse {
     /// The inverse for `centres`, all of which are named once in `first` and `last`, which come in that order; nothing is
     /// made yet.
     pub fn new(centres: &[Vec3], first: Vec<u32>, last: Vec<u32>) -> Self {
-        Self { plan: Plan::new(centres, first, last), weights: Vec::new() }
+        Self { plan: Plan::new(centres, first, last), made: 0, weights: Vec::new() }
     }
 
     /// Plans or makes up to `count` more rows. Returns whether all are made.
@@ -30,27 +32,30 @@ impl SparseInverse {
     /// Where a local system is singular to rounding, its diagonal is raised: that costs iterations, never accuracy.
     pub fn build(&mut self, centres: &[DVec3], lambda: &[f64], table: &KernelTable, count: usize) -> bool {
         if self.plan.extend(count) {
-            let rows = self.plan.rows.iter().skip(self.weights.len()).take(count);
-            let made: Vec<Vec<f64>> =
-                rows.map(|(centre, near)| row(*centre as usize, near, centres, lambda, table)).collect();
-            self.weights.extend(made);
+            for (centre, near) in self.plan.rows().skip(self.made).take(count) {
+                row(centre as usize, near, centres, lambda, table, &mut self.weights);
+                self.made += 1;
+            }
         }
-        self.weights.len() == centres.len()
+        self.made == centres.len()
     }
 
     /// The share of rows planned and made.
     pub fn progress(&self) -> f64 {
-        0.5 * (self.plan.rows.len() + self.weights.len()) as f64 / self.plan.centres.len() as f64
+        0.5 * (self.plan.order.len() + self.made) as f64 / self.plan.centres.len() as f64
     }
 
     /// The approximate inverse times `x`.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
-        for ((centre, neighbours), weights) in self.plan.rows.iter().zip(&self.weights) {
+        let mut rest = &self.weights[..];
+        for (centre, neighbours) in self.plan.rows().take(self.made) {
+            let (weights, after) = rest.split_at(neighbours.len() + 1);
+            rest = after;
             let others = neighbours.iter().zip(&weights[1..]);
-            let mut sum = weights[0] * x[*centre as usize];
+            let mut sum = weights[0] * x[centre as usize];
             others.clone().for_each(|(&j, w)| sum += w * x[j as usize]);
-            out[*centre as usize] += weights[0] * sum;
+            out[centre as usize] += weights[0] * sum;
             others.for_each(|(&j, w)| out[j as usize] += w * sum);
         }
         out
@@ -58,14 +63,15 @@ impl SparseInverse {
 }
 
 /// The row of one centre: with A its neighbours' system and b its own entries there, c = A⁻¹b, the row is
-/// (1, −c)/√(φ(0) + λ − bᵀc).
+/// (1, −c)/√(φ(0) + λ − bᵀc), added to `out`.
 fn row(
     centre: usize,
     neighbours: &[u32],
     centres: &[DVec3],
     lambda: &[f64],
     table: &KernelTable,
-) -> Vec<f64> {
+    out: &mut Vec<f64>,
+) {
     let n = neighbours.len();
     let entry = |i: usize, j: usize| table.value(centres[i].distance_squared(centres[j]));
     let mut b: Vec<f64> = neighbours.iter().map(|&j| entry(centre, j as usize)).collect();
@@ -84,7 +90,8 @@ fn row(
     let variance = diagonal - b.iter().map(|x| x * x).sum::<f64>();
     backward(&factor, &mut b);
     let scale = 1.0 / larger(variance, LEAST_PIVOT * diagonal).sqrt();
-    std::iter::once(scale).chain(b.iter().map(|x| -x * scale)).collect()
+    out.push(scale);
+    out.extend(b.iter().map(|x| -x * scale));
 }
 
 /// A pivot below this share of its diagonal is rounding.
@@ -145,7 +152,11 @@ const REACH: f32 = 5.0;
 #[derive(Clone, Debug)]
 struct Plan {
     centres: Vec<Vec3>,
-    rows: Vec<(u32, Vec<u32>)>,
+    /// The centres taken so far.
+    order: Vec<u32>,
+    /// Their neighbours, one row after the other, and where each row ends.
+    neighbours: Vec<u32>,
+    ends: Vec<usize>,
     /// What was taken, in the same order.
     grid: PointGrid,
     spacing: f32,
@@ -161,13 +172,22 @@ impl Plan {
         first.reverse();
         Self {
             centres: centres.to_vec(),
-            rows: Vec::new(),
+            order: Vec::new(),
+            neighbours: Vec::new(),
+            ends: Vec::new(),
             grid: PointGrid::new(CELL * FIRST_SPACING, centres.len()),
             spacing: FIRST_SPACING,
             waiting: first,
             others: Vec::new(),
             last,
         }
+    }
+
+    /// Each centre taken, with its neighbours.
+    fn rows(&self) -> impl Iterator<Item = (u32, &[u32])> {
+        let starts = std::iter::once(&0).chain(&self.ends);
+        let ranges = starts.zip(&self.ends).map(|(&from, &to)| &self.neighbours[from..to]);
+        self.order.iter().copied().zip(ranges)
     }
 
     /// Looks at up to `count` centres. Returns whether all are taken.
@@ -183,7 +203,7 @@ impl Plan {
                 self.look_at(i);
             }
         }
-        self.rows.len() == self.centres.len()
+        self.order.len() == self.centres.len()
     }
 
     fn begin_round(&mut self) {
@@ -192,7 +212,7 @@ impl Plan {
         self.waiting.reverse();
         self.spacing = if of_others { self.spacing * RATIO } else { FIRST_SPACING };
         let cell = if self.spacing > LEAST_SPACING { self.spacing } else { LEAST_SPACING };
-        let taken = self.rows.iter().map(|(i, _)| self.centres[*i as usize]);
+        let taken = self.order.iter().map(|&i| self.centres[i as usize]);
         let mut grid = PointGrid::new(CELL * cell, self.centres.len());
         taken.for_each(|p| grid.insert(p));
         self.grid = grid;
@@ -205,7 +225,9 @@ impl Plan {
             return;
         }
         let near = self.grid.nearest(p, NEIGHBOURS, REACH * self.spacing);
-        self.rows.push((i, near.into_iter().map(|(_, at)| self.rows[at as usize].0).collect()));
+        self.neighbours.extend(near.into_iter().map(|(_, at)| self.order[at as usize]));
+        self.order.push(i);
+        self.ends.push(self.neighbours.len());
         self.grid.insert(p);
     }
 }
