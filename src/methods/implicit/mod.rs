@@ -326,12 +326,17 @@ impl ImplicitSurface {
         };
         let points: Vec<Vec3> =
             samples.cloud.points.iter().map(|p| self.map.from_box(p.as_dvec3()).as_vec3()).collect();
-        let level = match self.params.level {
-            Level::Zero => 0.0,
-            Level::Mean => solved.mean,
-        };
+        let level = self.level_of(solved);
         let extraction = Extraction::new(&solved.field, self.map, level, &points, self.cell())?;
         Ok(Stage::Extract(Box::new(extraction)))
+    }
+
+    /// The value of the function that counts as 0.
+    fn level_of(&self, solved: &Solved) -> f64 {
+        match self.params.level {
+            Level::Zero => 0.0,
+            Level::Mean => solved.mean,
+        }
     }
 
     fn extract(&mut self, mut extraction: Box<Extraction>) -> Result<Stage, MethodError> {
@@ -442,13 +447,14 @@ impl ImplicitSurface {
         self.samples.as_ref().map_or(0.0, |samples| samples.spacing)
     }
 
-    /// f at points in their own units: above 0 inside, below outside.
+    /// f at points in their own units, less the level: above 0 inside, 0 on the surface, below outside.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] before the system was solved.
     pub fn evaluate(&self, points: &[Vec3]) -> Result<Vec<f64>, MethodError> {
         let solved = self.solved("evaluate")?;
-        Ok(points.iter().map(|p| solved.field.value(self.map.to_box_exactly(p.as_dvec3()))).collect())
+        let level = self.level_of(solved);
+        Ok(points.iter().map(|p| solved.field.value(self.map.to_box_exactly(p.as_dvec3())) - level).collect())
     }
 
     /// ∇f at points in their own units, per unit; it points inwards.
@@ -482,7 +488,7 @@ impl ImplicitSurface {
         Fitness::of(&self.original, &self.mesh)
     }
 
-    /// f on a grid of `dims` voxels around the points, so that other methods can take over: above 0 inside.
+    /// f, less the level, on a grid of `dims` voxels around the points, so that other methods can take over: above 0 inside.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] before the system was solved, and for fewer than 2 voxels along an axis;
@@ -500,9 +506,11 @@ impl ImplicitSurface {
         let corner = |p: DVec3| self.map.to_box_exactly(map.transform_point3(p));
         let last = DVec3::from_array(dims.map(|n| (n - 1) as f64));
         let mut fast = FastField::new(solved.field.clone(), corner(DVec3::ZERO), corner(last));
+        let level = self.level_of(solved);
         let values = sampled(dims, |places, row| {
             let places: Vec<DVec3> = places.iter().map(|&p| corner(p)).collect();
             fast.values(&places, row);
+            row.iter_mut().for_each(|value| *value -= level);
         })?;
         Ok(Volume::new(VolumeInit {
             voxels: Voxels::F32(values),

@@ -32,7 +32,7 @@ pub fn estimated_normals(points: &[Vec3], at: &[u32], spacing: f32) -> Normals {
     let places: Vec<Vec3> = at.iter().map(|&i| points[i as usize]).collect();
     let (radius, noise) = flattest_radius(&grid, &places, spacing);
     let mut directions: Vec<Vec3> = places.iter().map(|&p| Plane::around(&grid, p, radius).normal).collect();
-    let links = links(&places, radius);
+    let links = links(&places, &directions, radius);
     let mut turned = vec![false; places.len()];
     for part in parts(&links) {
         propagate(part[0], &links, &mut directions, &mut turned);
@@ -93,14 +93,18 @@ fn flattest_radius(grid: &PointGrid, places: &[Vec3], spacing: f32) -> (f32, f64
     (best.1, best.2)
 }
 
-/// The neighbour graph without direction.
-fn links(places: &[Vec3], radius: f32) -> Vec<Vec<u32>> {
+/// The neighbour graph without direction: places along the surface from each other, not across a gap or a thin wall.
+fn links(places: &[Vec3], normals: &[Vec3], radius: f32) -> Vec<Vec<u32>> {
     let grid = PointGrid::of(places, radius);
-    let near = |&p: &Vec3| grid.nearest(p, LINKS + 1, radius).into_iter().map(|(_, i)| i);
-    let mut links: Vec<Vec<u32>> = places.iter().map(|p| near(p).collect()).collect();
-    for i in 0..places.len() {
-        for j in links[i].clone() {
-            links[j as usize].push(i as u32);
+    let near = |&p: &Vec3| grid.nearest(p, LINKS + 1, radius).into_iter().map(|(_, i)| i as usize);
+    let mut links: Vec<Vec<u32>> = vec![Vec::new(); places.len()];
+    for (i, p) in places.iter().enumerate() {
+        for j in near(p).filter(|&j| j != i) {
+            let way = (places[j] - *p).normalize_or_zero();
+            if way.dot(normals[i]).abs() < STEEP || way.dot(normals[j]).abs() < STEEP {
+                links[i].push(j as u32);
+                links[j].push(i as u32);
+            }
         }
     }
     for ids in &mut links {
@@ -109,6 +113,9 @@ fn links(places: &[Vec3], radius: f32) -> Vec<Vec<u32>> {
     }
     links
 }
+
+/// Cosine between a normal and the way to a neighbour from which on the neighbour is on another sheet.
+const STEEP: f32 = 0.7;
 
 fn parts(links: &[Vec<u32>]) -> Vec<Vec<u32>> {
     let mut seen = vec![false; links.len()];
