@@ -84,7 +84,9 @@ impl PointGrid {
                 break;
             }
             reach *= 1.5;
-            if reach > 64.0 * self.cell {
+            // So many cells take longer than all points.
+            let across = 2.0 * reach / self.cell;
+            if across * across * across > 8.0 * self.points.len() as f32 {
                 found = self.points.iter().map(|q| q.distance_squared(p)).zip(0..).collect();
                 break;
             }
