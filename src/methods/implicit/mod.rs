@@ -14,6 +14,23 @@
 //! # What it does not
 //! Where points say nothing, the surface closes smoothly, which need not be what was there. Detail finer than the points'
 //! spacing, and pieces smaller than the lines of the scan are apart, may be missing.
+//!
+//! # Example
+//! ```
+//! use vesicle::math::Vec3;
+//! use vesicle::methods::implicit::{Cloud, ImplicitOptions, ImplicitSurface};
+//!
+//! // A ball, as a spiral of 400 points.
+//! let on_ball = |i: usize| {
+//!     let (z, angle) = (1.0 - (2 * i + 1) as f32 / 400.0, 2.4 * i as f32);
+//!     Vec3::new(angle.cos(), angle.sin(), 0.0) * (1.0 - z * z).sqrt() + Vec3::Z * z
+//! };
+//! let points = Cloud { points: (0..400).map(on_ball).collect(), ..Cloud::default() };
+//! let mut ball = ImplicitSurface::new(points, ImplicitOptions::default())?;
+//! while !ball.step()?.done {}
+//! assert!(ball.surface().positions.iter().all(|p| (p.length() - 1.0).abs() < 0.02));
+//! # Ok::<(), vesicle::methods::MethodError>(())
+//! ```
 
 pub mod camera;
 pub mod cloud;
