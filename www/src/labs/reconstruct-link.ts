@@ -1,6 +1,7 @@
 /** The Reconstruct lab's settings as the part of an address after `#reconstruct?`, and back. */
 import type { ParamValues, Vec3 } from '../protocol';
 import { CLOUDS, type CloudExample } from '../reconstruct/examples';
+import { isCloudPreset } from '../reconstruct/presets';
 import type { Edits } from '../reconstruct/protocol';
 import type { CloudChoice } from '../ui/cloud-setup';
 import { differing, readValue } from './link';
@@ -16,7 +17,7 @@ export interface LinkedCloud extends Partial<CloudChoice> {
   params: ParamValues;
   edits: Edits;
   color?: string;
-  /** The photograph that the view looks through, from 1. */
+  /** The photograph that the view looks through, from 1; 0 for none. */
   photo?: number;
 }
 
@@ -43,8 +44,19 @@ export function linkOf(settings: CloudSettings): LinkedCloud {
     params: differing(params, { ...defaults, ...example?.params }),
     edits: fits(edits) ? edits : { added: [], removed: [], outside: [] },
     ...(color !== (example?.color ?? 'plain') && { color }),
-    ...(photo !== undefined && { photo: photo + 1 }),
+    ...(photo !== photoOf(example) && { photo: photo === undefined ? 0 : photo + 1 }),
   };
+}
+
+/** The photograph that an example opens with. */
+function photoOf(example: CloudExample | undefined): number | undefined {
+  return isCloudPreset(example) ? example.photo : undefined;
+}
+
+/** The photograph to look through; `photo` of a link counts from 1, and 0 is none. */
+export function photoFor(example: CloudExample | undefined, photo: number | undefined): number | undefined {
+  if (photo === undefined) return photoOf(example);
+  return photo > 0 ? photo - 1 : undefined;
 }
 
 /** Whether a link can hold what was changed by hand. */

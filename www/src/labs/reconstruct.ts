@@ -23,7 +23,7 @@ import type { Lab, PassOn } from './labs';
 import type { Photograph } from './photographs';
 import { editedBy, NO_EDITS, shownColors, shownPoints } from './picking';
 import { fromExample, fromFiles, type Opened } from './point-files';
-import { ADDRESS, fits, fromHash, type LinkedCloud, linkOf, toHash, withLink } from './reconstruct-link';
+import { ADDRESS, fits, fromHash, type LinkedCloud, linkOf, photoFor, toHash, withLink } from './reconstruct-link';
 import { fitValues } from './reconstruct-measures';
 import { ReconstructParts } from './reconstruct-parts';
 import { UndoStack } from './undo';
@@ -242,9 +242,8 @@ export class ReconstructLab implements Lab {
     const color = (linked?.color ??
       example?.color ??
       (pictured || cloud.colors ? 'own' : 'plain')) as CloudViewOptions['color'];
-    this.#ui.options.set({ color, ...(isCloudPreset(example) && example.view) });
-    const photo = linked?.photo === undefined ? (isCloudPreset(example) ? example.photo : undefined) : linked.photo - 1;
-    this.#ui.photos.choose(photo);
+    this.#ui.options.set({ color, points: true, constraints: false, ...(isCloudPreset(example) && example.view) });
+    this.#ui.photos.choose(photoFor(example, linked?.photo));
   }
 
   #openVariant(preset: CloudPreset, { name, params, maxPoints }: CloudVariant): void {
@@ -496,6 +495,17 @@ export class ReconstructLab implements Lab {
     this.#state.value = state;
     this.#showHistory();
     this.#ui.status.say(this.#describe(state));
+    if (state === 'done' && this.#history.reports.at(-1)?.vertices === 0) this.#showNothing();
+  }
+
+  /** What was shown belongs to other settings. */
+  #showNothing(): void {
+    this.#whole = false;
+    this.#ui.clearSurface();
+    this.#ui.banner.show(
+      'There is no surface.',
+      'f is below 0 everywhere: try a smaller λs, a smaller δ, or the level “mean”.',
+    );
   }
 
   #describe(state: LabState): string {

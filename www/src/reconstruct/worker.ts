@@ -127,7 +127,8 @@ class Session {
     try {
       await model.run({ signal, onStep: (report) => this.#stepped(report) });
     } catch (error) {
-      if (!signal.aborted) send({ event: 'failure', failure: toFailure(error) });
+      // After the state: the page shows the failure on top of it.
+      if (!signal.aborted) queueMicrotask(() => send({ event: 'failure', failure: toFailure(error) }));
     }
     this.#run = undefined;
     this.#standStill();

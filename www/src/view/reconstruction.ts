@@ -130,6 +130,8 @@ export class ReconstructionView {
   /** Looks through a camera, or freely again. */
   lookThrough(camera: PinholeCamera | undefined, index: number | undefined): void {
     this.#cameras.choose(index);
+    // Light is in the photographs already: beside one, colours are shown as they are.
+    this.#surface.lit = camera === undefined;
     this.#viewport.lookThrough(camera);
     this.#viewport.invalidate();
   }

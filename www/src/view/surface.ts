@@ -5,7 +5,9 @@ import {
   Group,
   LineBasicMaterial,
   LineSegments,
+  type Material,
   Mesh,
+  MeshBasicMaterial,
   MeshStandardMaterial,
   Sphere,
   Vector3,
@@ -33,9 +35,12 @@ export class SurfaceObject {
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
   });
+  /** Colours as they are, whatever the light. */
+  readonly #plainMaterial = new MeshBasicMaterial({ vertexColors: true });
+  #lit = true;
   readonly #edgeMaterial = new LineBasicMaterial({ transparent: true, opacity: 0.4 });
   /** With normals from the start: a shader that is made for a surface without them draws flat triangles for ever. */
-  readonly #mesh = new Mesh(allocate(1, 1), this.#material);
+  readonly #mesh: Mesh<BufferGeometry, Material> = new Mesh(allocate(1, 1), this.#material);
   readonly #edges = new LineSegments(new BufferGeometry(), this.#edgeMaterial);
   /** How much of the buffers is in use: vertices, and corners of triangles. */
   #vertices = 0;
@@ -90,6 +95,12 @@ export class SurfaceObject {
     this.#edgeMaterial.color.set(color);
   }
 
+  /** Whether colours of the surface's own are lit. */
+  set lit(lit: boolean) {
+    this.#lit = lit;
+    this.#fillColors();
+  }
+
   set solid(visible: boolean) {
     this.#mesh.visible = visible;
   }
@@ -105,6 +116,7 @@ export class SurfaceObject {
     this.#mesh.geometry.dispose();
     this.#edges.geometry.dispose();
     this.#material.dispose();
+    this.#plainMaterial.dispose();
     this.#edgeMaterial.dispose();
   }
 
@@ -136,6 +148,7 @@ export class SurfaceObject {
     const shaded = isShade(mode) && this.#values.length === this.#vertices;
     const own = mode === 'own' && this.#colors.length === 3 * this.#vertices;
     const on = shaded || own || mode === 'component';
+    this.#mesh.material = own && !this.#lit ? this.#plainMaterial : this.#material;
     if (this.#material.vertexColors !== on) {
       this.#material.vertexColors = on;
       this.#material.color.set(on ? '#ffffff' : BONE);
