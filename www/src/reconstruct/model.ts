@@ -46,8 +46,8 @@ function nearestOf(points: Float32Array, [x, y, z]: Vec3): number {
 }
 
 /**
- * A model of the points with the changes made by hand: for now always a new one. `exterior` are the exterior points the
- * method makes of the points as loaded; those made by hand come on top.
+ * A model of the points with the changes made by hand: for now always a new one. `exterior` are those that
+ * the method makes by itself, to which points outside by hand are added.
  */
 export function buildModel(cloud: Cloud, cameras: CameraView[], setup: Setup, exterior: Float32Array): ImplicitSurface {
   const { params, maxPoints, keepComponents, edits } = setup;
@@ -58,9 +58,10 @@ export function buildModel(cloud: Cloud, cameras: CameraView[], setup: Setup, ex
   return new ImplicitSurface(options);
 }
 
-/** The exterior points a model of the points as loaded makes by itself. */
+/** The exterior points that a model makes by itself; none where none by hand go with them, as it then will. */
 export function ownExterior(cloud: Cloud, cameras: CameraView[], setup: Setup): Float32Array {
-  const edits = { added: [], removed: [], outside: [] };
+  if (setup.edits.outside.length === 0) return new Float32Array(0);
+  const edits = { ...setup.edits, outside: [] };
   const model = buildModel(cloud, cameras, { ...setup, edits }, new Float32Array(0));
   try {
     while (model.constraints().exterior.length === 0) model.step(1);

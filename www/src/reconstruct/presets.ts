@@ -151,14 +151,14 @@ export const CLOUD_PRESETS: CloudPreset[] = [
         id: '4b',
         name: 'δ = 10, τ = 0.01',
         params: {},
-        came: 'Here the kernel falls to half its height within 0.037, but its tail is long, 2 % at 0.5; the torus comes out with genus 1 and 2 % too little volume.',
+        came: 'Here the kernel falls to half its height at 0.18, but its tail is long: 22 % are left at 0.5. The torus comes out with genus 1 and 2 % too little volume.',
         outcome: { components: 1, genus: 1, meanCurvature: 2.73 },
       },
       {
         id: '4c',
         name: 'δ = 10, τ = 0.025',
         params: { tau: 0.025 },
-        came: 'Here a larger τ rounds the tip of the kernel: the mean curvature falls from 2.7 to 2.1.',
+        came: 'Here a larger τ makes the tip of the kernel rounder, half its height at 0.22: the mean curvature of the torus falls from 2.7 to 2.1.',
         outcome: { components: 1, genus: 1, meanCurvature: 2.11 },
       },
       {

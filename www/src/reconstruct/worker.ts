@@ -36,8 +36,8 @@ class Session {
   #cameras: CameraView[] = [];
   #setup: Setup | undefined;
   #model: ImplicitSurface | undefined;
-  /** Exterior points of the present points, where some by hand go with them. */
-  #exterior: Float32Array = new Float32Array(0);
+  /** Exterior points that the method makes by itself, where some by hand go with them, and what they were made for. */
+  #exterior = { of: '', points: new Float32Array(0) as Float32Array };
   #shade: PointShade | undefined;
   /** Steps the page has not heard of yet. */
   #reports: StepReport[] = [];
@@ -77,19 +77,25 @@ class Session {
   async #load({ source, cameras, setup }: Requests['load']['body']): Promise<Loaded> {
     await this.#pause();
     const cloud = cloudFrom(source);
-    const model = buildModel(cloud, cameras, setup, new Float32Array(0));
+    const model = buildModel(cloud, cameras, setup, ownExterior(cloud, cameras, setup));
     this.#cloud = cloud;
     this.#cameras = cameras;
-    this.#exterior = new Float32Array(0);
+    this.#exterior = { of: '', points: new Float32Array(0) };
     return { ...this.#adopt(model, setup), cloud };
   }
 
   async #rebuild(setup: Setup): Promise<Ready> {
     await this.#pause();
     const cloud = this.#points();
-    if (setup.edits.outside.length > 0 && this.#exterior.length === 0)
-      this.#exterior = ownExterior(cloud, this.#cameras, setup);
-    return this.#adopt(buildModel(cloud, this.#cameras, setup, this.#exterior), setup);
+    return this.#adopt(buildModel(cloud, this.#cameras, setup, this.#exteriorFor(setup)), setup);
+  }
+
+  #exteriorFor(setup: Setup): Float32Array {
+    const { maxPoints, keepComponents, edits } = setup;
+    const of = JSON.stringify([maxPoints, keepComponents, edits.added, edits.removed]);
+    if (edits.outside.length > 0 && of !== this.#exterior.of)
+      this.#exterior = { of, points: ownExterior(this.#points(), this.#cameras, setup) };
+    return this.#exterior.points;
   }
 
   #adopt(model: ImplicitSurface, setup: Setup): Ready {
