@@ -1,10 +1,13 @@
-"""Makes the volumes that the app ships, in www/public/data.
+"""Makes the volumes, points and photographs that the app ships, in www/public/data.
 
-    pip install nibabel==5.4.2 pynrrd==1.1.3 numpy scipy
+    pip install nibabel==5.4.2 pynrrd==1.1.3 numpy scipy pillow==12.0.0
     python scripts/make_demo_data.py <folder of the source volumes> www/public/data
+    python scripts/make_demo_data.py --points <folder of points and photographs> www/public/data
 
 The source folder holds ct_head_visible_male/vismale_head_ct.nii.gz, ct_tooth/tooth.nhdr (with tooth.raw) and
-micro_ovule/ovule_raw.nrrd; www/public/data/README.md says where these come from.
+micro_ovule/ovule_raw.nrrd; that of the points holds points/spot_stereo_noisy.ply, points/spot_spacecarved.ply,
+points/angel_scan_points.ply and multiview/spot_rendered (cameras.json, its views and masks). www/public/data/README.md
+says where these come from.
 
 visible-human-head-full.nii.gz   all voxels of the CT head; air is set to 0 where it is more than MARGIN voxels away
                                  from anything of AIR or more, so that every surface of an intensity of AIR or more,
@@ -14,29 +17,36 @@ visible-human-head.nii.gz        the same with y and z halved: each voxel is the
 tooth.nrrd                       the CT of a tooth, as one gzipped file; intensities (0 to 1300) rounded to multiples
                                  of STEP, below the scan's own noise, which halves the file
 ovule.nrrd                       plant cells under the confocal microscope, recompressed only
+spot/stereo.ply, carved.ply      points as they are
+angel.ply                        points as they are
+spot/view00.png ...              the views with their masks as alpha; what is masked out is black
+spot/cameras.json                their projections, and no more
 """
 
 import gzip
+import json
+import shutil
 import sys
 from pathlib import Path
 
-import nibabel as nib
-import nrrd
 import numpy as np
-from scipy.ndimage import maximum_filter
 
-SOURCE, OUT = Path(sys.argv[1]), Path(sys.argv[2])
+SOURCE, OUT = Path(sys.argv[-2]), Path(sys.argv[-1])
 AIR = 20
 MARGIN = 2
 STEP = 8
 
 
 def without_air(voxels):
+    from scipy.ndimage import maximum_filter
+
     near = maximum_filter(voxels, size=2 * MARGIN + 1, mode="nearest") >= AIR
     return np.where(near, voxels, 0).astype(voxels.dtype)
 
 
 def write_nifti(voxels, affine, name):
+    import nibabel as nib
+
     image = nib.Nifti1Image(voxels, affine)
     image.set_sform(affine, 1)
     image.set_qform(affine, 1)
@@ -47,6 +57,8 @@ def write_nifti(voxels, affine, name):
 
 
 def write_heads():
+    import nibabel as nib
+
     image = nib.load(SOURCE / "ct_head_visible_male/vismale_head_ct.nii.gz")
     voxels = np.asarray(image.dataobj)
     write_nifti(without_air(voxels), image.affine, "visible-human-head-full.nii.gz")
@@ -60,6 +72,8 @@ def write_heads():
 
 
 def write_tooth():
+    import nrrd
+
     voxels, header = nrrd.read(str(SOURCE / "ct_tooth/tooth.nhdr"))
     fields = {"spacings": header["spacings"], "encoding": "gzip", "endian": "little", "content": "CT of a tooth"}
     rounded = (voxels.astype(int) + STEP // 2) // STEP * STEP
@@ -67,11 +81,41 @@ def write_tooth():
 
 
 def write_ovule():
+    import nrrd
+
     voxels, header = nrrd.read(str(SOURCE / "micro_ovule/ovule_raw.nrrd"))
     nrrd.write(str(OUT / "ovule.nrrd"), voxels, header, compression_level=9)
 
 
+def write_points():
+    (OUT / "spot").mkdir(exist_ok=True)
+    shutil.copyfile(SOURCE / "points/spot_stereo_noisy.ply", OUT / "spot/stereo.ply")
+    shutil.copyfile(SOURCE / "points/spot_spacecarved.ply", OUT / "spot/carved.ply")
+    shutil.copyfile(SOURCE / "points/angel_scan_points.ply", OUT / "angel.ply")
+
+
+def write_views():
+    from PIL import Image
+
+    folder = SOURCE / "multiview/spot_rendered"
+    given = json.loads((folder / "cameras.json").read_text())
+    cameras = []
+    for camera in given["cameras"]:
+        view = np.asarray(Image.open(folder / camera["image"]).convert("RGB"))
+        inside = np.asarray(Image.open(folder / camera["mask"]).convert("L")) > 127
+        rgba = np.dstack([view * inside[..., None], np.where(inside, 255, 0)]).astype(np.uint8)
+        Image.fromarray(rgba).save(OUT / "spot" / camera["image"], optimize=True)
+        cameras.append({"image": camera["image"], "P": [[float(f"{x:.9g}") for x in row] for row in camera["P"]]})
+    lines = ",\n".join(json.dumps(camera) for camera in cameras)
+    head = f'{{"width": {given["width"]}, "height": {given["height"]}, "cameras": [\n'
+    (OUT / "spot/cameras.json").write_text(f"{head}{lines}\n]}}\n")
+
+
 OUT.mkdir(parents=True, exist_ok=True)
-write_heads()
-write_tooth()
-write_ovule()
+if "--points" in sys.argv:
+    write_points()
+    write_views()
+else:
+    write_heads()
+    write_tooth()
+    write_ovule()

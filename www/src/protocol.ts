@@ -91,6 +91,8 @@ export interface Surface extends SurfaceBuffers {
   triangles: number;
   /** One number a vertex, where a shade was asked for. */
   values?: Float32Array;
+  /** rgb of each vertex, 0..1, where it has one of its own. */
+  colors?: Float32Array;
 }
 
 /** `report` is there when the surface was checked, which costs time and is done only when it stands still. */

@@ -9,7 +9,6 @@ import type {
   Plane,
   Ready,
   RequestKind,
-  RequestMessage,
   Requests,
   SavedRun,
   Setup,
@@ -22,6 +21,7 @@ import type {
 import { compare } from './worker/compare';
 import { buildModel, valuesFor } from './worker/models';
 import { Refusal, toFailure } from './worker/refusal';
+import { answer, buffersOf, stop, type Work } from './worker/serving';
 import { levelsOf, viewOf, volumeFrom } from './worker/volumes';
 
 /** Two sets: one being shown while the next is filled. With one the run waits for the page; more only add delay. */
@@ -56,8 +56,8 @@ class Session {
   /** Pyramid levels the model was built with. */
   #levels = 0;
   #measuredAt = 0;
-  #run: { abort: AbortController; ended: Promise<unknown> } | undefined;
-  #comparison: { abort: AbortController; ended: Promise<unknown> } | undefined;
+  #run: Work | undefined;
+  #comparison: Work | undefined;
 
   readonly handlers: Handlers = {
     hello: async () => {
@@ -280,28 +280,9 @@ class Session {
   }
 }
 
-/** Ends what is under way, where something is; how it ends is for whoever started it. */
-async function stop(work: { abort: AbortController; ended: Promise<unknown> } | undefined): Promise<undefined> {
-  work?.abort.abort();
-  await work?.ended.catch(() => undefined);
-}
-
-function buffersOf(arrays: (Float32Array | Uint32Array)[]): Transferable[] {
-  return arrays.map((array) => array.buffer as ArrayBuffer);
-}
-
 const session = new Session();
-
-async function answer({ id, kind, body }: RequestMessage): Promise<void> {
-  const handler = session.handlers[kind] as (body: unknown) => unknown;
-  try {
-    self.postMessage({ id, ok: true, body: await handler(body) });
-  } catch (error) {
-    self.postMessage({ id, ok: false, failure: toFailure(error) });
-  }
-}
 
 self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
   if (data.kind === 'return') session.takeBack(data.buffers);
-  else void answer(data);
+  else void answer(session.handlers, data);
 };

@@ -1,5 +1,5 @@
 import { Client, RequestError, toFailure } from '../client';
-import { EXAMPLES, type Example, exampleUrl } from '../examples';
+import { EXAMPLES, type Example, exampleUrl, type Unit } from '../examples';
 import { exampleById, isPreset, PRESETS, type Preset, startOf, type Variant, variantOf } from '../presets';
 import type {
   MeshFormat,
@@ -18,7 +18,7 @@ import type {
 import { type LabState, Observable } from '../state';
 import { ComparePanel } from '../ui/compare';
 import { h } from '../ui/dom';
-import { exercises } from '../ui/exercises';
+import { EXTRACT_EXERCISES, exercises } from '../ui/exercises';
 import { ExportButtons } from '../ui/exports';
 import { FigurePanel } from '../ui/figure';
 import { acceptDrops, fileChooser, readFiles } from '../ui/files';
@@ -28,9 +28,9 @@ import { History } from '../ui/history';
 import { EventLog } from '../ui/log';
 import { MeasurePanel } from '../ui/measures';
 import { ParamControls } from '../ui/params';
-import { Plots } from '../ui/plots';
+import { ENERGY_PLOTS, Plots } from '../ui/plots';
 import { PyramidPanel } from '../ui/pyramid';
-import { listenForShortcuts, type Shortcut, shortcutDialog } from '../ui/shortcuts';
+import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import { type StartChoice, StartControls } from '../ui/start';
 import { ErrorBanner, StatusLine } from '../ui/status';
 import { TimeTable } from '../ui/times';
@@ -39,6 +39,7 @@ import { ViewOptionControls, type ViewOptions } from '../ui/view-options';
 import { Stage } from '../view/stage';
 import { Attracting } from './attracting';
 import { DataPanel, folded, layOut } from './extract-page';
+import type { PassedOn } from './labs';
 import { ADDRESS, fromHash, type Linked, linkOf, toHash, withLink } from './link';
 import { type Moment, type PageState, Rewinder } from './rewinder';
 import { Saving } from './saving';
@@ -61,12 +62,16 @@ interface Source {
   example?: Example;
   /** What a link asks for beyond the example. */
   linked?: Linked;
+  /** Of lengths, where no example says. */
+  unit?: Unit;
 }
 
 /** The Extract lab: a deformable surface grows onto a volume. */
 export class ExtractLab {
   readonly #root: HTMLElement;
   readonly #state = new Observable<LabState>('loading');
+  /** Takes every listener of the page back when the lab is closed. */
+  readonly #closing = new AbortController();
   readonly #client = new Client((event) => this.#onEvent(event));
   readonly #history = new History();
   readonly #status = new StatusLine();
@@ -94,8 +99,11 @@ export class ExtractLab {
     },
     onPlacing: (placing) => this.#setPlacing(placing),
   });
-  readonly #saving = new Saving(this.#client, (text) => this.#status.say(text));
-  readonly #figure = new FigurePanel((preset, variant) => void this.#openVariant(preset, variant));
+  readonly #saving = new Saving(
+    (format) => this.#client.request('export', { format }),
+    (text) => this.#status.say(text),
+  );
+  readonly #figure = new FigurePanel<Variant, Preset>((preset, variant) => void this.#openVariant(preset, variant));
   readonly #compare = new ComparePanel({
     onStart: () => void this.#runComparison(),
     onCancel: () => this.#ask(this.#client.request('cancelCompare', undefined)),
@@ -114,7 +122,7 @@ export class ExtractLab {
   readonly #paramsHolder = h('div');
   readonly #measures = new MeasurePanel();
   readonly #exports = new ExportButtons((format, type) => void this.#export(format, type));
-  readonly #plots = new Plots(this.#history);
+  readonly #plots = new Plots(this.#history, ENERGY_PLOTS, true);
   readonly #times = new TimeTable();
   readonly #log = new EventLog();
   readonly #transport = new Transport({
@@ -170,28 +178,35 @@ export class ExtractLab {
     this.#stage.onMoved = () => this.#pyramid.redraw();
     this.#layOut(chooser);
     this.#state.follow((state) => this.#showState(state));
-    acceptDrops(this.#drop, (files) => void this.#openFiles(files));
-    const dialog = shortcutDialog(
-      [...this.#shortcuts, { key: '?', shown: '?', text: 'this list', act: () => undefined }],
-      help,
-    );
-    document.body.append(dialog);
-    listenForShortcuts([
-      ...this.#shortcuts,
-      { key: '?', shown: '?', text: 'this list', act: () => dialog.showModal() },
-    ]);
+    const { signal } = this.#closing;
+    acceptDrops(this.#drop, (files) => void this.#openFiles(files), signal);
+    offerShortcuts(this.#shortcuts, help, signal);
   }
 
-  /** Opens the built-in example and runs it. */
-  async start(): Promise<void> {
+  /** Gives everything back: the lab is not used again. */
+  close(): void {
+    this.#closing.abort();
+    // What is still being downloaded finds that something else was asked for.
+    this.#turn += 1;
+    this.#client.close();
+    cancelAnimationFrame(this.#framePending);
+    this.#stage.dispose();
+    this.#root.replaceChildren();
+  }
+
+  /** Opens what another lab passes on, or what the address says, or else the built-in example, and runs it. */
+  async start(passedOn?: PassedOn): Promise<void> {
     try {
       await this.#greet();
     } catch (error) {
       this.#fail('Vesicle could not start.', error);
       return;
     }
-    window.addEventListener('hashchange', () => void this.#openLink());
-    await this.#openLink(EXAMPLES[0]);
+    const { signal } = this.#closing;
+    if (signal.aborted) return;
+    window.addEventListener('hashchange', () => void this.#openLink(), { signal });
+    if (passedOn) await this.#openPassedOn(passedOn);
+    else await this.#openLink(EXAMPLES[0]);
   }
 
   #layOut(chooser: HTMLElement): void {
@@ -224,7 +239,7 @@ export class ExtractLab {
       times: this.#times.element,
       log: this.#log.element,
       compare: this.#compareHolder,
-      exercises: exercises((id) => this.#openById(id)),
+      exercises: exercises(EXTRACT_EXERCISES, (id) => this.#openById(id)),
     });
   }
 
@@ -253,6 +268,11 @@ export class ExtractLab {
     const name = files.map((file) => file.name).join(' + ');
     const linked = this.#awaiting;
     return this.#open({ name, volume: async () => ({ files: await readFiles(files) }), ...(linked && { linked }) });
+  }
+
+  #openPassedOn({ name, bytes, params }: PassedOn): Promise<void> {
+    const linked = { params, attractors: [] };
+    return this.#open({ name, volume: async () => ({ files: [{ name, bytes: bytes.slice() }] }), linked, unit: '' });
   }
 
   #openById(id: string): void {
@@ -309,7 +329,7 @@ export class ExtractLab {
       this.#start.show(choice);
       this.#rewinder.clear();
       this.#compare.clear();
-      this.#adoptVolume(loaded.volume, source.example);
+      this.#adoptVolume(loaded.volume, source);
       this.#attracting.show(body.setup.attractors);
       this.#attracting.radius = ATTRACTOR_PART * this.#smallestSide();
       if (source.linked?.color) this.#options.color = source.linked.color;
@@ -323,11 +343,11 @@ export class ExtractLab {
     }
   }
 
-  #adoptVolume(volume: VolumeView, example: Example | undefined): void {
+  #adoptVolume(volume: VolumeView, { example, unit = 'mm' }: Source): void {
     this.#volume = volume;
     this.#saving.name = volume.name;
-    this.#measures.unit = example?.unit ?? 'mm';
-    this.#stage.unit = example?.unit ?? 'mm';
+    this.#measures.unit = example?.unit ?? unit;
+    this.#stage.unit = example?.unit ?? unit;
     this.#histogram.setVolume(volume);
     this.#data.show(volume, example);
     this.#stage.setVolume(volume);

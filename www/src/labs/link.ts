@@ -58,7 +58,7 @@ export function linkOf(settings: LabSettings): Linked {
   };
 }
 
-function differing(values: ParamValues, usual: ParamValues): ParamValues {
+export function differing(values: ParamValues, usual: ParamValues): ParamValues {
   return Object.fromEntries(Object.entries(values).filter(([name, value]) => !Object.is(usual[name], value)));
 }
 
@@ -111,7 +111,7 @@ export function fromHash(hash: string): Linked | undefined {
   return linked;
 }
 
-function readValue(text: string): unknown {
+export function readValue(text: string): unknown {
   const value = Number(text);
   return text !== '' && Number.isFinite(value) ? value : text;
 }

@@ -1,4 +1,3 @@
-import type { Client } from '../client';
 import type { MeshFormat } from '../protocol';
 import { download } from '../ui/files';
 import type { History } from '../ui/history';
@@ -6,28 +5,31 @@ import { toCsv } from './csv';
 
 /** Saves what the lab has, under the name of what is open; `say` hears what was saved. */
 export class Saving {
-  readonly #client: Client;
+  readonly #fetch: (format: MeshFormat) => Promise<Uint8Array>;
   readonly #say: (text: string) => void;
   /** Of the volume or file that is open. */
   name = 'surface';
 
-  constructor(client: Client, say: (text: string) => void) {
-    this.#client = client;
+  /** `fetch` gives the surface in a format. */
+  constructor(fetch: (format: MeshFormat) => Promise<Uint8Array>, say: (text: string) => void) {
+    this.#fetch = fetch;
     this.#say = say;
   }
 
   /** The surface as it is now. */
   async mesh(format: MeshFormat, type: string): Promise<void> {
-    this.#save(format, await this.#client.request('export', { format }), type);
+    this.bytes(format, await this.#fetch(format), type);
   }
 
   /** What the plots show. */
-  plots(history: History): void {
-    this.#save('csv', new TextEncoder().encode(toCsv(history)), 'text/csv');
+  plots(history: History, residual?: string): void {
+    this.bytes('csv', new TextEncoder().encode(toCsv(history, residual)), 'text/csv');
   }
 
-  #save(extension: string, bytes: Uint8Array, type: string): void {
-    const stem = this.name.replace(/\.(nii|nrrd|nhdr|mha|mhd|gz)\b.*$/i, '').replaceAll(' ', '-');
+  bytes(extension: string, bytes: Uint8Array, type: string): void {
+    const stem = this.name
+      .replace(/\.(nii|nrrd|nhdr|mha|mhd|gz|ply|obj|xyz|pts|csv|txt)\b.*$/i, '')
+      .replaceAll(' ', '-');
     download(`${stem}.${extension}`, bytes, type);
     this.#say(`Saved ${stem}.${extension}.`);
   }

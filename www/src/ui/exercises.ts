@@ -1,6 +1,6 @@
 import { h } from './dom';
 
-interface Exercise {
+export interface Exercise {
   title: string;
   /** The example or figure to begin with. */
   example: string;
@@ -9,7 +9,8 @@ interface Exercise {
   handIn: string;
 }
 
-const EXERCISES: Exercise[] = [
+/** Of the Extract lab. */
+export const EXTRACT_EXERCISES: Exercise[] = [
   {
     title: '1. What does rigidity cost?',
     example: 'figure-23',
@@ -36,9 +37,25 @@ const EXERCISES: Exercise[] = [
   },
 ];
 
-/** Two exercises for a lab course, each with a button that opens what it begins with. */
-export function exercises(onOpen: (example: string) => void): HTMLElement {
-  return h('div', { class: 'exercises' }, ...EXERCISES.map((exercise) => exerciseOf(exercise, onOpen)));
+/** Of the Reconstruct lab. */
+export const RECONSTRUCT_EXERCISES: Exercise[] = [
+  {
+    title: 'How much may a surface smooth?',
+    example: 'spot-stereo',
+    steps: [
+      'Open the example and let it end. Note λs, mean distance, mean curvature, components and genus.',
+      'Set λs to 0, 0.0003, 0.003, 0.01 and 0.1; note the same each time.',
+      'Put λs back to 0.001 and do it again for δ = 1, 5, 10, 25 and for “Clusters kept” empty.',
+      'Colour the surface by its distance from the points: where did it have to be guessed?',
+    ],
+    look: 'Which of the two measures tells overfitting from oversmoothing? From which λs on does the surface give up detail that is real, such as the horns? What do stray points do when none are left out?',
+    handIn: 'A plot of mean distance against mean curvature, one dot a run; the run you would choose, and why.',
+  },
+];
+
+/** Exercises for a lab course, each with a button that opens what it begins with. */
+export function exercises(list: Exercise[], onOpen: (example: string) => void): HTMLElement {
+  return h('div', { class: 'exercises' }, ...list.map((exercise) => exerciseOf(exercise, onOpen)));
 }
 
 function exerciseOf({ title, example, steps, look, handIn }: Exercise, onOpen: (example: string) => void): HTMLElement {

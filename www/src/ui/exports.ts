@@ -10,6 +10,8 @@ const FORMATS: { format: MeshFormat; help: string; type: string }[] = [
   { format: 'stl', help: 'STL: triangles only, for 3D printing', type: 'model/stl' },
   { format: 'glb', help: 'GLB: for web viewers, Blender and game engines', type: 'model/gltf-binary' },
   { format: 'obj', help: 'OBJ: text, for nearly everything', type: 'model/obj' },
+  { format: 'vtp', help: 'VTP: for ParaView and vtk.js', type: 'application/xml' },
+  { format: 'mz3', help: 'MZ3: for Surfice and NiiVue', type: 'application/octet-stream' },
 ];
 
 /** Buttons that save the surface as it is now. */

@@ -1,8 +1,24 @@
-import type { Preset, Variant } from '../presets';
 import { h } from './dom';
 
+/** One of several pictures of a figure. */
+interface Picture {
+  /** As on a button. */
+  name: string;
+  /** What comes out here. */
+  came: string;
+}
+
+/** A figure of a paper. */
+interface Figure<One extends Picture> {
+  /** What the paper saw. */
+  saw: string;
+  variants: [One, ...One[]];
+  /** What to look at beside the surface. */
+  hint?: string;
+}
+
 /** Which figure of the paper is open: what the paper saw, what comes out here, and its other pictures. */
-export class FigurePanel {
+export class FigurePanel<Variant extends Picture, Preset extends Figure<Variant>> {
   readonly element = h('div', { class: 'figure', hidden: true });
   readonly #onVariant: (preset: Preset, variant: Variant) => void;
   #buttons: { variant: Variant; button: HTMLButtonElement }[] = [];

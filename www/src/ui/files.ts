@@ -3,10 +3,10 @@ import { h, uniqueId } from './dom';
 
 const ACCEPT = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw';
 
-/** A file chooser: one file, or a header and its data. */
-export function fileChooser(onFiles: (files: File[]) => void): HTMLElement {
+/** A file chooser: one file, or several that belong together. */
+export function fileChooser(onFiles: (files: File[]) => void, accept = ACCEPT): HTMLElement {
   const id = uniqueId('file');
-  const input = h('input', { type: 'file', id, multiple: true, accept: ACCEPT, class: 'visually-hidden' });
+  const input = h('input', { type: 'file', id, multiple: true, accept, class: 'visually-hidden' });
   input.addEventListener('change', () => {
     const files = [...(input.files ?? [])];
     // So that choosing the same file again is a change.
@@ -16,23 +16,35 @@ export function fileChooser(onFiles: (files: File[]) => void): HTMLElement {
   return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, 'Open file…'));
 }
 
-/** Lets files be dropped anywhere on the page, and shows that they can be. */
-export function acceptDrops(overlay: HTMLElement, onFiles: (files: File[]) => void): void {
+/** Lets files be dropped anywhere on the page, until aborted, and shows that they can be. */
+export function acceptDrops(overlay: HTMLElement, onFiles: (files: File[]) => void, signal: AbortSignal): void {
   const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false;
-  window.addEventListener('dragover', (event) => {
-    if (!hasFiles(event)) return;
-    event.preventDefault();
-    overlay.hidden = false;
-  });
-  window.addEventListener('dragleave', (event) => {
-    if (!event.relatedTarget) overlay.hidden = true;
-  });
-  window.addEventListener('drop', (event) => {
-    overlay.hidden = true;
-    if (!hasFiles(event)) return;
-    event.preventDefault();
-    onFiles([...(event.dataTransfer?.files ?? [])]);
-  });
+  window.addEventListener(
+    'dragover',
+    (event) => {
+      if (!hasFiles(event)) return;
+      event.preventDefault();
+      overlay.hidden = false;
+    },
+    { signal },
+  );
+  window.addEventListener(
+    'dragleave',
+    (event) => {
+      if (!event.relatedTarget) overlay.hidden = true;
+    },
+    { signal },
+  );
+  window.addEventListener(
+    'drop',
+    (event) => {
+      overlay.hidden = true;
+      if (!hasFiles(event)) return;
+      event.preventDefault();
+      onFiles([...(event.dataTransfer?.files ?? [])]);
+    },
+    { signal },
+  );
 }
 
 export async function readFiles(files: File[]): Promise<NamedBytes[]> {

@@ -8,6 +8,8 @@ export interface LegendText {
   title: string;
   below: string;
   above: string;
+  /** From 0 on, in the upper half of the colours. */
+  positive?: boolean;
 }
 
 /** A bar of the colours in use with the numbers at its ends and middle. */
@@ -16,6 +18,7 @@ export class Legend {
   readonly #title = h('span', { class: 'title' });
   readonly #ends = [h('span'), h('span'), h('span')] as const;
   readonly #words = [h('span'), h('span')] as const;
+  readonly #color: (t: number) => [number, number, number];
   readonly element = h(
     'div',
     { class: 'color-legend', role: 'group', 'aria-label': 'Meaning of the colours', hidden: true },
@@ -27,21 +30,27 @@ export class Legend {
 
   /** `color` gives sRGB for −1 to 1. */
   constructor(color: (t: number) => [number, number, number]) {
-    const context = this.#bar.getContext('2d');
-    for (let i = 0; i < STEPS; i++) {
-      if (!context) break;
-      context.fillStyle = `rgb(${color((2 * i) / (STEPS - 1) - 1).join(' ')})`;
-      context.fillRect(i, 0, 1, 1);
-    }
+    this.#color = color;
   }
 
-  show({ title, below, above }: LegendText, range: number): void {
+  show({ title, below, above, positive = false }: LegendText, range: number): void {
     this.element.hidden = false;
+    this.#draw(positive ? 0 : -1);
     this.#title.textContent = title;
     this.#words[0].textContent = below;
     this.#words[1].textContent = above;
-    const texts = [`−${figure(range)}`, '0', figure(range)];
+    const texts = positive ? ['0', figure(range / 2), figure(range)] : [`−${figure(range)}`, '0', figure(range)];
     for (const [i, end] of this.#ends.entries()) if (end.textContent !== texts[i]) end.textContent = texts[i] ?? '';
+  }
+
+  /** The colours from `low` to 1. */
+  #draw(low: number): void {
+    const context = this.#bar.getContext('2d');
+    for (let i = 0; i < STEPS; i++) {
+      if (!context) break;
+      context.fillStyle = `rgb(${this.#color(low + ((1 - low) * i) / (STEPS - 1)).join(' ')})`;
+      context.fillRect(i, 0, 1, 1);
+    }
   }
 
   hide(): void {

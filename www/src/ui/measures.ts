@@ -43,20 +43,54 @@ const ROWS: { name: Name; label: string; help: string }[] = [
   },
 ];
 
+/** A measure that only one lab has. */
+export interface MoreMeasure {
+  name: string;
+  label: string;
+  help: string;
+  text: (value: number) => string;
+}
+
 /** The measures of the surface. */
 export class MeasurePanel {
   readonly element: HTMLElement;
   readonly #cells = new Map<Name, HTMLElement>();
   #unit: Unit = 'mm';
   #values: Partial<MeasureValues> = {};
+  readonly #more: { measure: MoreMeasure; cell: HTMLElement }[];
+  #moreValues: Record<string, unknown> = {};
 
-  constructor() {
+  /** `more` follow the measures that every surface has. */
+  constructor(more: MoreMeasure[] = []) {
     this.element = h('dl', { class: 'measures', 'data-measures': '{}' });
-    for (const { name, label, help } of ROWS) {
-      const cell = h('dd', { 'data-measure': name }, '–');
-      this.#cells.set(name, cell);
-      this.element.append(h('div', { title: help }, h('dt', {}, label), cell));
+    for (const row of ROWS) this.#cells.set(row.name, this.#addRow(row));
+    this.#more = more.map((measure) => ({ measure, cell: this.#addRow(measure) }));
+  }
+
+  #addRow({ name, label, help }: { name: string; label: string; help: string }): HTMLElement {
+    const cell = h('dd', { 'data-measure': name }, '–');
+    this.element.append(h('div', { title: help }, h('dt', {}, label), cell));
+    return cell;
+  }
+
+  /** What goes with the measures of the surface; not every value has a row. */
+  showMore(values: Record<string, unknown>): void {
+    this.#moreValues = values;
+    for (const { measure, cell } of this.#more) {
+      const value = values[measure.name];
+      cell.textContent = typeof value === 'number' ? measure.text(value) : '–';
     }
+    this.#tell();
+  }
+
+  /** Nothing is known. */
+  clear(): void {
+    this.#show({});
+    this.showMore({});
+  }
+
+  #tell(): void {
+    this.element.dataset.measures = JSON.stringify({ ...this.#values, ...this.#moreValues });
   }
 
   /** Of lengths, for volume and area. */
@@ -93,7 +127,7 @@ export class MeasurePanel {
 
   #show(values: Partial<MeasureValues>): void {
     this.#values = values;
-    this.element.dataset.measures = JSON.stringify(values);
+    this.#tell();
     for (const [name, cell] of this.#cells) {
       const value = values[name];
       const text = value === undefined ? '–' : textOf(name, value, this.#unit);

@@ -45,6 +45,14 @@ export class ParamControls {
     }
   }
 
+  /** Leaves out what has no meaning now. */
+  hide(names: Record<string, boolean>): void {
+    for (const [name, hidden] of Object.entries(names)) {
+      const control = this.#controls.get(name);
+      if (control) control.element.hidden = hidden;
+    }
+  }
+
   /** Says beside a control why its value was refused. */
   complain(name: string, message: string): void {
     this.#controls.get(name)?.complain(message);

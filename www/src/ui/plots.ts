@@ -12,14 +12,14 @@ const MARK_ROOM = 16;
 /** Height of the ticks of one kind of event. */
 const MARK_LANE = 6;
 
-interface Curve {
+export interface Curve {
   label: string;
   color: string;
   dash?: number[];
   of: (report: StepReport) => number;
 }
 
-interface PlotKind {
+export interface PlotKind {
   title: string;
   log: boolean;
   curves: Curve[];
@@ -27,7 +27,8 @@ interface PlotKind {
   tell: (history: History) => string;
 }
 
-const PLOTS: PlotKind[] = [
+/** Of the deformable model. */
+export const ENERGY_PLOTS: PlotKind[] = [
   {
     title: 'Kinetic energy',
     log: true,
@@ -59,12 +60,19 @@ export class Plots {
   readonly #events = h('p', { class: 'help', 'data-plot-events': '' });
   #pending = 0;
 
-  constructor(history: History) {
+  /** `events`: topology may change, and what happened is told. */
+  constructor(history: History, kinds: PlotKind[], events: boolean) {
     this.#history = history;
-    this.#plots = PLOTS.map((kind) => new Plot(kind, history));
+    this.#plots = kinds.map((kind) => new Plot(kind, history));
+    this.element = h('div', { class: 'plots' }, ...this.#plots.map((plot) => plot.element));
+    if (events) this.element.append(this.#legend(), this.#events);
+    onSchemeChange(() => this.update());
+  }
+
+  #legend(): HTMLElement {
     const key = (name: string, text: string) =>
       h('span', {}, h('span', { class: `mark ${name}`, 'aria-hidden': 'true' }), text);
-    const legend = h(
+    return h(
       'p',
       { class: 'legend' },
       key('level', 'level change'),
@@ -72,8 +80,6 @@ export class Plots {
       key('annular', 'annular: a neck is cut'),
       key('vanished', 'a part vanishes'),
     );
-    this.element = h('div', { class: 'plots' }, ...this.#plots.map((plot) => plot.element), legend, this.#events);
-    onSchemeChange(() => this.update());
   }
 
   /** Redraws at the next animation frame. */

@@ -16,9 +16,17 @@ const VIEW_KEYS: [string, string][] = [
   ['Tab', 'to the next control; arrow keys move sliders'],
 ];
 
-/** Acts on keys anywhere on the page, except where the key already means something. */
-export function listenForShortcuts(shortcuts: Shortcut[]): () => void {
-  const typing = new Typing();
+/** Acts on keys and lists them when asked, by `?` or by a button, until aborted. */
+export function offerShortcuts(shortcuts: Shortcut[], opener: HTMLElement, signal: AbortSignal): void {
+  const list: Shortcut = { key: '?', shown: '?', text: 'this list', act: () => dialog.showModal() };
+  const dialog = shortcutDialog([...shortcuts, list], opener, signal);
+  document.body.append(dialog);
+  listenForShortcuts([...shortcuts, list], signal);
+}
+
+/** Acts on keys anywhere on the page, until aborted, except where the key already means something. */
+function listenForShortcuts(shortcuts: Shortcut[], signal: AbortSignal): void {
+  const typing = new Typing(signal);
   const onKey = (event: KeyboardEvent) => {
     if (event.altKey || event.repeat) return;
     const withCtrl = event.ctrlKey || event.metaKey;
@@ -28,26 +36,22 @@ export function listenForShortcuts(shortcuts: Shortcut[]): () => void {
     event.preventDefault();
     shortcut.act();
   };
-  window.addEventListener('keydown', onKey);
-  return () => window.removeEventListener('keydown', onKey);
+  window.addEventListener('keydown', onKey, { signal });
 }
 
 /** Knows the field in which something was typed and not taken yet: there Ctrl+Z undoes the typing. */
 class Typing {
   #field: EventTarget | null = null;
 
-  constructor() {
-    window.addEventListener('input', ({ target }) => {
+  constructor(signal: AbortSignal) {
+    const begin = ({ target }: Event) => {
       this.#field = target;
-    });
-    for (const end of ['change', 'blur'])
-      window.addEventListener(
-        end,
-        () => {
-          this.#field = null;
-        },
-        true,
-      );
+    };
+    const forget = () => {
+      this.#field = null;
+    };
+    window.addEventListener('input', begin, { signal });
+    for (const end of ['change', 'blur']) window.addEventListener(end, forget, { capture: true, signal });
   }
 
   isIn(target: EventTarget | null): boolean {
@@ -66,8 +70,8 @@ function isTakenBy({ target, key }: KeyboardEvent): boolean {
   return key === ' ' && target.closest('button, summary, a, label.button') !== null;
 }
 
-/** The list of shortcuts, opened by a button or by `?`. */
-export function shortcutDialog(shortcuts: Shortcut[], opener: HTMLElement): HTMLDialogElement {
+/** The list of shortcuts, opened by a button or by `?`; gone when aborted. */
+function shortcutDialog(shortcuts: Shortcut[], opener: HTMLElement, signal: AbortSignal): HTMLDialogElement {
   const rows = [...shortcuts.map(({ shown, text }) => [shown, text]), ...VIEW_KEYS];
   const list = h(
     'dl',
@@ -82,6 +86,7 @@ export function shortcutDialog(shortcuts: Shortcut[], opener: HTMLElement): HTML
     list,
     form,
   );
-  opener.addEventListener('click', () => dialog.showModal());
+  opener.addEventListener('click', () => dialog.showModal(), { signal });
+  signal.addEventListener('abort', () => dialog.remove());
   return dialog;
 }

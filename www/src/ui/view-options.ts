@@ -75,7 +75,8 @@ export class ViewOptionControls {
   }
 }
 
-function choice<Value extends string>(
+/** A labelled list to choose from. */
+export function choice<Value extends string>(
   label: string,
   name: string,
   choices: { value: Value; label: string }[],

@@ -1,6 +1,9 @@
 /** Colours for numbers on the surface: a diverging map, blue below zero, red above, light at zero (ColorBrewer RdBu). */
 import type { Shade } from '../protocol';
 
+/** Numbers at the vertices that have colours of their own. */
+export type ValueShade = Shade | 'distance';
+
 type Rgb = readonly [number, number, number];
 
 /** At −1, −½, 0, ½ and 1. */
@@ -20,26 +23,42 @@ const SAMPLES = 4096;
 const TABLE = 256;
 
 /** What the legend says of each shade. */
-export const SHADES: Record<Shade, ShadeText> = {
+export const SHADES: Record<ValueShade, ShadeText> = {
   speed: { title: 'Speed along the normal, δ per iteration', below: 'inwards', above: 'outwards', least: 1e-4 },
   'mean curvature': { title: 'Mean curvature', power: 1, below: 'hollow', above: 'bulging', least: 1e-6 },
   'gaussian curvature': { title: 'Gaussian curvature', power: 2, below: 'saddle', above: 'dome or cup', least: 1e-9 },
+  distance: {
+    title: 'Distance to the nearest point',
+    power: -1,
+    below: 'at a point',
+    above: 'far',
+    least: 1e-9,
+    positive: true,
+  },
 };
 
 interface ShadeText {
   title: string;
-  /** Of the length it is one over. */
-  power?: 1 | 2;
+  /** Of the length it is one over; −1 for a length. */
+  power?: 1 | 2 | -1;
   below: string;
   above: string;
   /** Smaller ranges than this are not shown. */
   least: number;
+  /** Never below 0: only the upper half of the colours is used. */
+  positive?: boolean;
+}
+
+/** Whether colours tell numbers. */
+export function isShade(color: string): color is ValueShade {
+  return color in SHADES;
 }
 
 /** The title with the unit that goes with lengths in `unit`. */
-export function shadeTitle(shade: Shade, unit: string): string {
+export function shadeTitle(shade: ValueShade, unit: string): string {
   const { title, power } = SHADES[shade];
   if (!power) return title;
+  if (power === -1) return unit ? `${title}, ${unit}` : title;
   return `${title}, 1/${unit || 'unit'}${power === 2 ? '²' : ''}`;
 }
 
@@ -84,4 +103,9 @@ export function shadeColors(values: Float32Array, range: number, out: Float32Arr
     out[3 * vertex + 1] = LINEAR[entry + 1] ?? 1;
     out[3 * vertex + 2] = LINEAR[entry + 2] ?? 1;
   }
+}
+
+/** sRGB of each vertex, 0..1, as linear rgb into `out`. */
+export function linearColors(colors: Float32Array, out: Float32Array): void {
+  for (let i = 0; i < colors.length; i++) out[i] = Math.max(0, colors[i] ?? 0) ** 2.2;
 }

@@ -153,6 +153,13 @@ export class Stage {
     return this.#scene ? toWorld(this.#scene.volume.affine, this.#crosshair) : [0, 0, 0];
   }
 
+  /** Gives everything back; the stage is not used again. */
+  dispose(): void {
+    this.#clear();
+    this.#surface.dispose();
+    this.#viewport.dispose();
+  }
+
   #moveSlice(axis: 0 | 1 | 2, index: number): void {
     const at: Vec3 = [...this.#crosshair];
     at[axis] = index;

@@ -5,7 +5,9 @@ import {
   Group,
   LineBasicMaterial,
   LineSegments,
+  type Material,
   Mesh,
+  MeshBasicMaterial,
   MeshStandardMaterial,
   Sphere,
   Vector3,
@@ -13,11 +15,14 @@ import {
 import type { Surface } from '../protocol';
 import type { ColorMode } from '../ui/view-options';
 import { componentColors } from './components';
-import { robustRange, SHADES, shadeColors } from './shading';
+import { isShade, linearColors, robustRange, SHADES, shadeColors, type ValueShade } from './shading';
 
 /** Room beyond what is needed now, so that a growing surface gets new GPU buffers only now and then. */
 const SPARE = 1.5;
 const BONE: ColorRepresentation = '#e9dcc3';
+
+/** What the colour of a surface tells; 'own' are the colours that its vertices came with. */
+export type SurfaceColor = ColorMode | ValueShade | 'own';
 
 /** A surface whose vertices and triangles change every frame: over-allocated GPU buffers, drawn as far as they are filled. */
 export class SurfaceObject {
@@ -30,16 +35,21 @@ export class SurfaceObject {
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
   });
+  /** Colours as they are, whatever the light. */
+  readonly #plainMaterial = new MeshBasicMaterial({ vertexColors: true });
+  #lit = true;
   readonly #edgeMaterial = new LineBasicMaterial({ transparent: true, opacity: 0.4 });
   /** With normals from the start: a shader that is made for a surface without them draws flat triangles for ever. */
-  readonly #mesh = new Mesh(allocate(1, 1), this.#material);
+  readonly #mesh: Mesh<BufferGeometry, Material> = new Mesh(allocate(1, 1), this.#material);
   readonly #edges = new LineSegments(new BufferGeometry(), this.#edgeMaterial);
   /** How much of the buffers is in use: vertices, and corners of triangles. */
   #vertices = 0;
   #corners = 0;
-  #color: ColorMode = 'plain';
+  #color: SurfaceColor = 'plain';
   /** The numbers at the vertices, where the surface came with some. */
   #values: Float32Array = new Float32Array(0);
+  /** rgb of the vertices, where the surface came with them. */
+  #colors: Float32Array = new Float32Array(0);
   /** The number at the ends of the colours; 0 where no numbers are shown. */
   #range = 0;
 
@@ -62,6 +72,7 @@ export class SurfaceObject {
     fillIndex(geometry, surface.indices, this.#corners);
     if (this.#edges.visible) this.#fillEdges();
     this.#values = surface.values ?? new Float32Array(0);
+    this.#colors = surface.colors ?? new Float32Array(0);
     this.#fillColors();
   }
 
@@ -84,11 +95,17 @@ export class SurfaceObject {
     this.#edgeMaterial.color.set(color);
   }
 
+  /** Whether colours of the surface's own are lit. */
+  set lit(lit: boolean) {
+    this.#lit = lit;
+    this.#fillColors();
+  }
+
   set solid(visible: boolean) {
     this.#mesh.visible = visible;
   }
 
-  set color(mode: ColorMode) {
+  set color(mode: SurfaceColor) {
     if (mode === this.#color) return;
     this.#color = mode;
     this.#values = new Float32Array(0);
@@ -99,6 +116,7 @@ export class SurfaceObject {
     this.#mesh.geometry.dispose();
     this.#edges.geometry.dispose();
     this.#material.dispose();
+    this.#plainMaterial.dispose();
     this.#edgeMaterial.dispose();
   }
 
@@ -127,8 +145,10 @@ export class SurfaceObject {
   /** A shade whose numbers have not come yet is plain. */
   #fillColors(): void {
     const mode = this.#color;
-    const shaded = mode !== 'plain' && mode !== 'component' && this.#values.length === this.#vertices;
-    const on = shaded || mode === 'component';
+    const shaded = isShade(mode) && this.#values.length === this.#vertices;
+    const own = mode === 'own' && this.#colors.length === 3 * this.#vertices;
+    const on = shaded || own || mode === 'component';
+    this.#mesh.material = own && !this.#lit ? this.#plainMaterial : this.#material;
     if (this.#material.vertexColors !== on) {
       this.#material.vertexColors = on;
       this.#material.color.set(on ? '#ffffff' : BONE);
@@ -140,6 +160,7 @@ export class SurfaceObject {
     const colors = geometry.getAttribute('color') as BufferAttribute;
     const out = colors.array as Float32Array;
     if (shaded) shadeColors(this.#values, this.#range, out);
+    else if (own) linearColors(this.#colors, out);
     else componentColors(geometry.index.array as Uint32Array, this.#corners, this.#vertices, out);
     upload(colors, 3 * this.#vertices);
   }

@@ -1,6 +1,7 @@
 import {
   Box3,
   DirectionalLight,
+  Group,
   HemisphereLight,
   Matrix4,
   type Object3D,
@@ -14,6 +15,7 @@ import {
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { anatomicalSigns, type Grid } from './anatomy';
+import { type PinholeCamera, placeEye } from './eye';
 
 const FIELD_OF_VIEW = 30;
 /** Radians the arrow keys turn the view, and the factor + and - zoom it by. */
@@ -27,7 +29,13 @@ export class Viewport {
   readonly canvas: HTMLCanvasElement;
   readonly #renderer: WebGLRenderer;
   readonly #scene = new Scene();
+  /** All that is shown, turned so that its upward axis is the scene's z. */
+  readonly #world = new Group();
   readonly #camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 1, 1000);
+  /** Stands where a photograph was taken from. */
+  readonly #eye = new PerspectiveCamera();
+  /** Light that comes with whoever looks. */
+  readonly #lamp = new Group();
   readonly #controls: OrbitControls;
   readonly #observer = new ResizeObserver(() => this.#resize());
   readonly #spherical = new Spherical();
@@ -35,6 +43,12 @@ export class Viewport {
   onDraw: (viewer: Vector3) => void = () => undefined;
   /** Called with the ray through the place that was clicked. */
   onClick: (ray: Raycaster) => void = () => undefined;
+  /** Called when the view is no longer that of a photograph. */
+  onLeave: () => void = () => undefined;
+  #through: PinholeCamera | undefined;
+  /** Pointer or wheel is at it: what moves now was meant to. */
+  #dragged = false;
+  #disposed = false;
   #pending = 0;
   #home = { position: new Vector3(), target: new Vector3() };
   /** Width by height of the view, at most 1: in a narrow view the camera stands farther off. */
@@ -45,7 +59,12 @@ export class Viewport {
     this.#renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.#camera.up.set(0, 0, 1);
     this.#controls = new OrbitControls(this.#camera, canvas);
-    this.#controls.addEventListener('change', () => this.invalidate());
+    this.#controls.addEventListener('change', () => this.#moved());
+    this.#controls.addEventListener('start', () => this.#setDragged(true));
+    this.#controls.addEventListener('end', () => this.#setDragged(false));
+    this.#eye.matrixAutoUpdate = false;
+    this.#lamp.matrixAutoUpdate = false;
+    this.#scene.add(this.#world);
     canvas.addEventListener('keydown', (event) => this.#onKey(event));
     this.#followClicks();
     this.#light();
@@ -53,15 +72,40 @@ export class Viewport {
   }
 
   add(object: Object3D): void {
-    this.#scene.add(object);
+    this.#world.add(object);
   }
 
   remove(object: Object3D): void {
-    this.#scene.remove(object);
+    this.#world.remove(object);
+  }
+
+  /** Which axis of what is shown points upwards. */
+  set up(axis: 'y' | 'z') {
+    this.#world.rotation.x = axis === 'y' ? Math.PI / 2 : 0;
+    this.#world.updateMatrixWorld();
+  }
+
+  /** A place a ray has hit, in the coordinates of what is shown. */
+  toWorld(point: Vector3): Vector3 {
+    return this.#world.worldToLocal(point.clone());
+  }
+
+  /** Where a place in the coordinates of what is shown lies in the scene. */
+  fromWorld(point: Vector3): Vector3 {
+    return this.#world.localToWorld(point.clone());
+  }
+
+  /** Looks exactly as a camera did, until the view is turned. */
+  lookThrough(camera: PinholeCamera | undefined): void {
+    if (camera === this.#through) return;
+    this.#through = camera;
+    if (!camera) this.onLeave();
+    this.invalidate();
   }
 
   /** Draws at the next animation frame; calling it more often costs nothing. */
   invalidate(): void {
+    if (this.#disposed) return;
     this.#pending ||= requestAnimationFrame(() => {
       this.#pending = 0;
       this.#draw();
@@ -70,11 +114,22 @@ export class Viewport {
 
   /** Looks at the whole of a volume, from before and a little to the patient's left and above. */
   frame(grid: Grid): void {
-    const box = worldBox(grid);
+    const [x, y, z] = anatomicalSigns(grid.space);
+    this.#frame(worldBox(grid), new Vector3(-0.55 * x, 1 * y, 0.32 * z));
+  }
+
+  /**
+   * Looks at the whole of a box in the coordinates of what is shown, a little from above and from the side. `front`: the
+   * side that is seen, along the horizontal axis towards the viewer.
+   */
+  frameBox(box: Box3, front: 1 | -1): void {
+    this.#frame(box.clone().applyMatrix4(this.#world.matrixWorld), new Vector3(-0.7 * front, -front, 0.32));
+  }
+
+  #frame(box: Box3, towards: Vector3): void {
     const target = box.getCenter(new Vector3());
     const radius = box.getSize(new Vector3()).length() / 2;
-    const [x, y, z] = anatomicalSigns(grid.space);
-    const direction = new Vector3(-0.55 * x, 1 * y, 0.32 * z).normalize();
+    const direction = towards.normalize();
     const distance = (0.97 * radius) / Math.sin((FIELD_OF_VIEW * Math.PI) / 360) / this.#narrowness;
     this.#home = { position: target.clone().addScaledVector(direction, distance), target };
     this.#camera.near = radius / 50;
@@ -84,17 +139,21 @@ export class Viewport {
   }
 
   goHome(): void {
+    this.lookThrough(undefined);
     this.#camera.position.copy(this.#home.position);
     this.#controls.target.copy(this.#home.target);
     this.#controls.update();
     this.invalidate();
   }
 
+  /** Gives the GPU's memory back; browsers allow a page only so many contexts. */
   dispose(): void {
+    this.#disposed = true;
     cancelAnimationFrame(this.#pending);
     this.#observer.disconnect();
     this.#controls.dispose();
     this.#renderer.dispose();
+    this.#renderer.forceContextLoss();
   }
 
   #light(): void {
@@ -104,8 +163,17 @@ export class Viewport {
     key.position.set(-0.6, 0.9, 1);
     const fill = new DirectionalLight('#cfe2ff', 0.5);
     fill.position.set(1, -0.2, 0.4);
-    this.#camera.add(key, fill, key.target, fill.target);
-    this.#scene.add(sky, this.#camera);
+    this.#lamp.add(key, fill, key.target, fill.target);
+    this.#scene.add(sky, this.#lamp, this.#camera);
+  }
+
+  #setDragged(dragged: boolean): void {
+    this.#dragged = dragged;
+  }
+
+  #moved(): void {
+    if (this.#dragged) this.lookThrough(undefined);
+    this.invalidate();
   }
 
   #followClicks(): void {
@@ -116,10 +184,25 @@ export class Viewport {
     this.canvas.addEventListener('pointerup', ({ offsetX: x, offsetY: y, button }) => {
       if (button !== 0 || Math.hypot(x - down.x, y - down.y) > CLICK_SLACK) return;
       const { clientWidth, clientHeight } = this.canvas;
-      const ray = new Raycaster();
-      ray.setFromCamera(new Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.#camera);
-      this.onClick(ray);
+      this.#click((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight);
     });
+  }
+
+  /** At a place of the view, −1 to 1 each way. */
+  #click(x: number, y: number): void {
+    const ray = new Raycaster();
+    ray.setFromCamera(new Vector2(x, y), this.#viewer());
+    this.onClick(ray);
+  }
+
+  /** The camera in use. */
+  #viewer(): PerspectiveCamera {
+    const { clientWidth, clientHeight } = this.canvas;
+    if (!this.#through || clientHeight === 0) return this.#camera;
+    const { near, far } = this.#camera;
+    placeEye(this.#eye, this.#through, this.#world.matrixWorld, clientWidth / clientHeight, [near, far]);
+    this.#eye.updateMatrixWorld();
+    return this.#eye;
   }
 
   #resize(): void {
@@ -146,7 +229,11 @@ export class Viewport {
 
   #draw(): void {
     this.onDraw(this.#camera.position);
-    this.#renderer.render(this.#scene, this.#camera);
+    const viewer = this.#viewer();
+    // The eye's is up to date; the other's is brought so before its light is placed.
+    if (viewer === this.#camera) viewer.updateMatrixWorld();
+    this.#lamp.matrix.copy(viewer.matrixWorld);
+    this.#renderer.render(this.#scene, viewer);
   }
 
   #onKey(event: KeyboardEvent): void {
@@ -160,10 +247,12 @@ export class Viewport {
       '=': () => this.#zoom(1 / KEY_ZOOM),
       '-': () => this.#zoom(KEY_ZOOM),
       Home: () => this.goHome(),
+      Enter: () => this.#click(0, 0),
     };
     const move = moves[event.key];
     if (!move) return;
     event.preventDefault();
+    if (event.key !== 'Enter') this.lookThrough(undefined);
     move();
   }
 

@@ -1,0 +1,347 @@
+/** The Reconstruct lab: points in, a closed surface out. */
+import { readFile } from 'node:fs/promises';
+import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
+import init, { Mesh, Volume } from '../../pkg/index.js';
+import { at } from '../../scripts/shell.mjs';
+import { computedCloud } from '../../www/src/reconstruct/clouds';
+import { type App, drop, iteration, openApp, reach, recordStates } from './browser';
+
+let app: App;
+
+beforeAll(async () => {
+  await init();
+  app = await openApp();
+});
+afterAll(() => app.close());
+afterEach(() => {
+  expect(app.complaints.splice(0)).toEqual([]);
+});
+
+async function openAt(hash: string, ...states: string[]): Promise<void> {
+  await app.page.goto('about:blank');
+  await app.page.goto(app.address + hash);
+  await reach(app.page, ...states);
+}
+
+/** Measures of the surface, and of the fit. */
+async function measured(): Promise<Record<string, number | boolean>> {
+  return JSON.parse((await app.page.getAttribute('[data-measures]', 'data-measures')) ?? '{}');
+}
+
+const text = (selector: string) => app.page.locator(selector).first().textContent();
+
+async function setParam(name: string, value: string): Promise<void> {
+  const field = app.page.locator(`[data-param=${name}] input[type=number]`);
+  await field.fill(value);
+  await field.press('Enter');
+}
+
+/** Points of a shape as text, one a line. */
+function asText(shape: Parameters<typeof computedCloud>[0]): Uint8Array {
+  const { points } = computedCloud(shape);
+  const lines: string[] = [];
+  for (let i = 0; i < points.length; i += 3) lines.push(points.subarray(i, i + 3).join(' '));
+  return new TextEncoder().encode(`${lines.join('\n')}\n`);
+}
+
+/** Waits for a run that a change has begun, to its end. */
+async function afterRun(change: () => Promise<unknown>): Promise<void> {
+  const states = await recordStates(app.page);
+  await change();
+  await expect.poll(async () => (await states()).join(' ')).toMatch(/running.* done$|^running done$/);
+}
+
+describe('the built-in example', () => {
+  test('runs to the end by itself: one closed surface without crossings, in the colours of the photographs', async () => {
+    await openAt('#reconstruct', 'done');
+    expect(await measured()).toMatchObject({ components: 1, genus: 0, closed: true, oriented: true, crossings: 0 });
+    const { fitMean, surfaceConstraints, exteriorConstraints, residual } = await measured();
+    expect(fitMean).toBeLessThan(0.03);
+    expect(surfaceConstraints).toBeGreaterThan(7000);
+    expect(exteriorConstraints).toBeGreaterThan(500);
+    expect(residual).toBeLessThan(1e-5);
+    expect(await app.page.title()).toBe('Vesicle: Reconstruct');
+    expect(await app.page.getAttribute('[data-lab=reconstruct]', 'aria-current')).toBe('page');
+  });
+
+  test('is drawn with white and black and brown', async () => {
+    await app.page.uncheck('[data-view=points]');
+    const png = await app.page.locator('.scene > canvas').screenshot();
+    const shares = await app.page.evaluate(async (base64) => {
+      const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
+      const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+      const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+      context?.drawImage(image, 0, 0);
+      const { data } = context?.getImageData(0, 0, image.width, image.height) ?? { data: [] };
+      const counts = { dark: 0, brown: 0 };
+      for (let i = 0; i < data.length; i += 4) {
+        const [r = 0, g = 0, b = 0] = [data[i], data[i + 1], data[i + 2]];
+        if (r < 70 && g < 70 && b < 70) counts.dark += 1;
+        if (r > b + 60) counts.brown += 1;
+      }
+      return counts;
+    }, png.toString('base64'));
+    expect(shares.dark).toBeGreaterThan(500);
+    expect(shares.brown).toBeGreaterThan(100);
+    await app.page.check('[data-view=points]');
+  });
+
+  test('tells how long each phase took, and in words what the plots show', async () => {
+    const times = await app.page.locator('.phases .time').allTextContents();
+    expect(times).toHaveLength(5);
+    for (const time of times) expect(time).toMatch(/^[\d.,]+ m?s$/);
+    const captions = await app.page.locator('.plots figcaption, [data-plot=kernel]').allTextContents();
+    expect(captions[0]).toMatch(/^After \d+ steps of the solve the residual is .* below the tolerance of/);
+    expect(captions[1]).toMatch(/^Falls to half at r = 0\.\d+; at 0\.5, [\d.]+ % are left/);
+  });
+
+  test.each(['ply', 'stl', 'glb', 'obj'])('exports %s that reads back closed', async (format) => {
+    const [download] = await Promise.all([
+      app.page.waitForEvent('download'),
+      app.page.click(`[data-export=${format}]`),
+    ]);
+    const mesh = Mesh.parse(await readFile(await download.path()));
+    const { triangles } = await measured();
+    expect(mesh.triangleCount).toBe(triangles);
+    expect(mesh.check()).toMatchObject({ closed: true, oriented: true });
+    mesh.free();
+  });
+
+  test.each([
+    ['vtp', '<?xml'],
+    ['mz3', 'MZ'],
+  ])('exports %s', async (format, start) => {
+    const [download] = await Promise.all([
+      app.page.waitForEvent('download'),
+      app.page.click(`[data-export=${format}]`),
+    ]);
+    expect((await readFile(await download.path())).toString('latin1', 0, start.length)).toBe(start);
+  });
+
+  test('a photograph stands beside the view of its camera, until the view is turned', async () => {
+    const view = app.page.locator('.scene > canvas');
+    await app.page.click('[data-photo="3"]');
+    expect(await app.page.locator('.photograph').isVisible()).toBe(true);
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?photo=4');
+    await view.press('ArrowLeft');
+    await expect.poll(() => app.page.locator('.photograph').isVisible()).toBe(false);
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct');
+  });
+});
+
+describe('running', () => {
+  beforeAll(() => openAt('#reconstruct?example=torus', 'done'));
+
+  test('another smoothness solves again, and the surface stays until the new one is there', async () => {
+    const before = await measured();
+    const seen = await app.page.evaluateHandle(() => {
+      const list: string[] = [];
+      const element = document.querySelector<HTMLElement>('[data-measures]');
+      const note = () => list.push(element?.dataset.measures ?? '');
+      if (element) new MutationObserver(note).observe(element, { attributeFilter: ['data-measures'] });
+      return list;
+    });
+    await afterRun(() => setParam('lambdaSurface', '0.01'));
+    const after = await measured();
+    expect(after).toMatchObject({ components: 1, genus: 1, closed: true });
+    expect(after.meanCurvature).toBeLessThan(Number(before.meanCurvature));
+    for (const values of await seen.jsonValue()) expect(JSON.parse(values).vertices).toBeGreaterThan(0);
+    expect(await app.page.evaluate(() => location.hash)).toContain('p.lambdaSurface=0.01');
+  });
+
+  test('undo brings the former value and surface back, redo the later', async () => {
+    const field = app.page.locator('[data-param=lambdaSurface] input[type=number]');
+    const later = await measured();
+    await afterRun(() => app.page.click('[data-transport=undo]'));
+    expect(await field.inputValue()).toBe('0.001');
+    expect((await measured()).meanCurvature).toBeGreaterThan(Number(later.meanCurvature));
+    await afterRun(() => app.page.click('[data-transport=redo]'));
+    expect(await field.inputValue()).toBe('0.01');
+    expect((await measured()).vertices).toBe(later.vertices);
+  });
+
+  test('reset, step, ten steps, play and pause by keyboard', async () => {
+    await app.page.locator('.scene > canvas').focus();
+    await app.page.keyboard.press('r');
+    await reach(app.page, 'paused');
+    expect(await iteration(app.page)).toBe(0);
+    expect(await measured()).toEqual({});
+    await app.page.keyboard.press('s');
+    await expect.poll(() => iteration(app.page)).toBe(1);
+    await app.page.keyboard.press('d');
+    await expect.poll(() => iteration(app.page)).toBe(11);
+    await app.page.keyboard.press(' ');
+    await reach(app.page, 'running');
+    await app.page.keyboard.press(' ');
+    expect(await reach(app.page, 'paused', 'done')).toBe('paused');
+    expect(await iteration(app.page)).toBeGreaterThan(10);
+    await app.page.keyboard.press(' ');
+    await reach(app.page, 'done');
+  });
+
+  test('the width of the Gaussian is there only for the Gaussian', async () => {
+    const shown = (name: string) => app.page.locator(`[data-param=${name}]`).isVisible();
+    expect([await shown('sigma'), await shown('delta')]).toEqual([false, true]);
+    await afterRun(() => app.page.selectOption('[data-param=kernel] select', 'gaussian'));
+    expect([await shown('sigma'), await shown('delta')]).toEqual([true, false]);
+    await afterRun(() => app.page.selectOption('[data-param=kernel] select', 'multi-order'));
+  });
+
+  test('a parameter out of range is refused beside it, and the former stays', async () => {
+    await setParam('tau', '-1');
+    await expect.poll(() => text('[data-param=tau] .field-error')).toMatch(/\w/);
+    expect(await app.page.inputValue('[data-param=tau] input[type=number]')).toBe('0.025');
+  });
+
+  test('fewer points at most take part', async () => {
+    await afterRun(() => setParam('maxPoints', '500'));
+    const { surfaceConstraints, components, genus } = await measured();
+    expect(surfaceConstraints).toBeLessThanOrEqual(500);
+    expect({ components, genus }).toEqual({ components: 1, genus: 1 });
+  });
+});
+
+describe('points by hand', () => {
+  beforeAll(() => openAt('#reconstruct?example=two-balls', 'done'));
+
+  test('a point added in the middle of the view is one more constraint; taken back, it is not', async () => {
+    const before = await measured();
+    await app.page.check('[data-tool=add]');
+    await afterRun(() => app.page.locator('.scene > canvas').press('Enter'));
+    expect((await measured()).surfaceConstraints).toBe(Number(before.surfaceConstraints) + 1);
+    expect(await app.page.evaluate(() => location.hash)).toMatch(/add=[-\d.e]+,[-\d.e]+,[-\d.e]+/);
+    await afterRun(() => app.page.click('[data-edit=clear]'));
+    expect(await measured()).toMatchObject({
+      surfaceConstraints: before.surfaceConstraints,
+      vertices: before.vertices,
+    });
+  });
+
+  test('a click removes the points around it, and one puts a point outside', async () => {
+    const before = await measured();
+    const view = app.page.locator('.scene > canvas');
+    const { width = 0, height = 0 } = (await view.boundingBox()) ?? {};
+    // Right of the middle lies a ball.
+    const position = { x: 0.68 * width, y: 0.5 * height };
+    await app.page.check('[data-tool=remove]');
+    await afterRun(() => view.click({ position }));
+    const { surfaceConstraints } = await measured();
+    expect(surfaceConstraints).toBeLessThan(Number(before.surfaceConstraints));
+    await app.page.check('[data-tool=outside]');
+    const { exteriorConstraints } = await measured();
+    await afterRun(() => view.click({ position }));
+    expect((await measured()).exteriorConstraints).toBe(Number(exteriorConstraints) + 1);
+    expect(await measured()).toMatchObject({ components: 2, closed: true });
+    await app.page.check('[data-tool=none]');
+  });
+});
+
+describe('files', () => {
+  test('dropped points replace the example', async () => {
+    await openAt('#reconstruct?example=torus', 'done');
+    await afterRun(() => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
+    expect(await measured()).toMatchObject({ components: 2, genus: 0, closed: true });
+    expect(await text('.facts')).toContain('balls.xyz');
+  });
+
+  test.each([
+    ['notes.txt', 'no points at all'],
+    ['few.xyz', '0 0 0\n1 0 0\n0 1 0\n'],
+    ['broken.ply', 'ply\nformat ascii 1.0\nelement vertex 5\n'],
+  ])('%s is refused with a message, and nothing is lost', async (name, content) => {
+    const before = await measured();
+    await drop(app.page, [{ name, bytes: new TextEncoder().encode(content) }]);
+    await reach(app.page, 'error');
+    expect(await text('.banner')).toContain(`${name} could not be opened`);
+    expect((await text('[data-error]'))?.length).toBeGreaterThan(20);
+    expect(await measured()).toEqual(before);
+    await app.page.click('.banner button');
+    await reach(app.page, 'done');
+    expect(await text('.facts')).toContain('balls.xyz');
+  });
+
+  test('photographs with a cameras.json colour points of one’s own', async () => {
+    const folder = at('www/public/data/spot');
+    const list = JSON.parse(await readFile(`${folder}/cameras.json`, 'utf8'));
+    const two = { ...list, cameras: [list.cameras[3], list.cameras[8]] };
+    const files = await Promise.all(
+      ['carved.ply', 'view03.png', 'view08.png'].map(async (name) => ({
+        name,
+        bytes: new Uint8Array(await readFile(`${folder}/${name}`)),
+      })),
+    );
+    files.push({ name: 'cameras.json', bytes: new TextEncoder().encode(JSON.stringify(two)) });
+    await afterRun(() => drop(app.page, files));
+    expect(await measured()).toMatchObject({ components: 1, genus: 0, closed: true });
+    expect(await app.page.locator('.strip button').count()).toBe(2);
+    expect(await app.page.inputValue('[data-view=color]')).toBe('own');
+  });
+});
+
+describe('on to Extract', () => {
+  test('the volume saved as NIfTI is above the level inside', async () => {
+    await openAt('#reconstruct?example=torus', 'done');
+    const [download] = await Promise.all([app.page.waitForEvent('download'), app.page.click('[data-action=volume]')]);
+    const volume = Volume.parse(await readFile(await download.path()));
+    expect(Math.max(...volume.dims)).toBe(96);
+    expect(volume.sample([1, 0, 0])).toBeGreaterThan(0);
+    expect(volume.sample([0, 0, 0])).toBeLessThan(0);
+    volume.free();
+  });
+
+  test('the volume is passed on within the page, and the way back leads to the same points', async () => {
+    const { volume: inside } = await measured();
+    await app.page.click('[data-action=extract]');
+    await expect.poll(() => app.page.title()).toBe('Vesicle: Extract');
+    await reach(app.page, 'done');
+    const found = await measured();
+    expect(found).toMatchObject({ components: 1, genus: 1, closed: true });
+    expect(Math.abs(Number(found.volume) / Number(inside) - 1)).toBeLessThan(0.03);
+    await app.page.click('[data-lab=reconstruct]');
+    await expect.poll(() => app.page.title()).toBe('Vesicle: Reconstruct');
+    await reach(app.page, 'done');
+    expect(await measured()).toMatchObject({ components: 1, genus: 1 });
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=torus');
+  });
+});
+
+describe('the timing curve', () => {
+  test('is measured point by point, can be cancelled, and the surface stays', async () => {
+    await openAt('#reconstruct?example=two-balls', 'done');
+    const before = await measured();
+    await app.page.click('summary:has-text("Time against number of constraints")');
+    await app.page.click('[data-timing=start]');
+    const timings = async () => JSON.parse((await app.page.getAttribute('[data-timings]', 'data-timings')) ?? '[]');
+    await expect.poll(async () => (await timings()).length).toBeGreaterThanOrEqual(2);
+    await app.page.click('[data-timing=cancel]');
+    await expect.poll(() => app.page.locator('[data-timing=start]').isVisible()).toBe(true);
+    const [first, second] = await timings();
+    expect([first.kernel, second.kernel]).toEqual(['multi-order', 'thin-plate']);
+    expect(first.milliseconds).toBeGreaterThan(0);
+    expect(await measured()).toEqual(before);
+    await reach(app.page, 'done');
+  });
+});
+
+describe('the page', () => {
+  test.each([
+    [390, 844],
+    [1024, 768],
+    [1440, 900],
+  ])('nothing is wider than a page of %i by %i', async (width, height) => {
+    await app.page.setViewportSize({ width, height });
+    const overflow = await app.page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    expect(overflow).toBeLessThanOrEqual(0);
+  });
+
+  test('every control has a name', async () => {
+    const unnamed = await app.page.evaluate(() => {
+      const controls = document.querySelectorAll<HTMLInputElement>('input, select, button, canvas, progress');
+      const named = (control: HTMLInputElement) =>
+        control.getAttribute('aria-label') || control.textContent?.trim() || control.labels?.[0]?.textContent?.trim();
+      const hidden = (control: Element) => control.closest('[aria-hidden=true], [hidden]') !== null;
+      return [...controls].filter((one) => !hidden(one) && !named(one)).map((one) => one.outerHTML);
+    });
+    expect(unnamed).toEqual([]);
+  });
+});

@@ -1,0 +1,88 @@
+/** Photographs with their cameras: read, decoded, and masked. */
+import type { CameraView } from '../reconstruct/protocol';
+
+/** A camera, and its picture where there is one, for the page and for the worker. */
+export interface Photograph {
+  name: string;
+  view: CameraView;
+  picture?: ImageBitmap;
+}
+
+/** One camera of a cameras.json: `P` is its 3 × 4 projection, nested or flat. */
+interface CameraEntry {
+  image?: string;
+  mask?: string;
+  P?: number[] | number[][];
+  width?: number;
+  height?: number;
+}
+
+interface CameraFile {
+  width?: number;
+  height?: number;
+  cameras: CameraEntry[];
+}
+
+/** A file by the name the list of cameras gives it; undefined where there is none. */
+export type FileByName = (name: string) => Promise<Blob | undefined>;
+
+/** Alpha below this is no part of the thing. */
+const MASKED = 128;
+
+/** All cameras of a list, with the pictures that are there. */
+export async function readPhotographs(text: string, fileOf: FileByName): Promise<Photograph[]> {
+  const file = parseCameras(text);
+  return Promise.all(file.cameras.map((entry, i) => readOne(entry, i, file, fileOf)));
+}
+
+function parseCameras(text: string): CameraFile {
+  let file: Partial<CameraFile>;
+  try {
+    file = JSON.parse(text) as Partial<CameraFile>;
+  } catch {
+    throw new Error('The list of cameras is no JSON.');
+  }
+  if (!Array.isArray(file?.cameras)) throw new Error('The list of cameras needs an array “cameras”.');
+  return file as CameraFile;
+}
+
+async function readOne(entry: CameraEntry, i: number, file: CameraFile, fileOf: FileByName): Promise<Photograph> {
+  const projection = (entry.P ?? []).flat();
+  if (projection.length !== 12 || !projection.every(Number.isFinite))
+    throw new Error(`Camera ${i + 1} needs “P”, three rows of four numbers.`);
+  const name = entry.image ?? `camera ${i + 1}`;
+  const blob = entry.image ? await fileOf(entry.image) : undefined;
+  const mask = entry.mask ? await fileOf(entry.mask) : undefined;
+  const picture = blob && (await decode(blob, name));
+  const width = entry.width ?? file.width ?? picture?.width ?? 0;
+  const height = entry.height ?? file.height ?? picture?.height ?? 0;
+  if (picture && (picture.width !== width || picture.height !== height))
+    throw new Error(`${name} has ${picture.width} × ${picture.height} pixels, its camera ${width} × ${height}.`);
+  if (!(width > 0 && height > 0)) throw new Error(`Camera ${i + 1} has neither a picture nor a width and height.`);
+  const view: CameraView = { projection, width, height };
+  if (!picture) return { name, view };
+  const pixels = pixelsOf(picture);
+  if (mask) applyMask(pixels, pixelsOf(await decode(mask, entry.mask ?? '')));
+  return { name, view: { ...view, image: pixels.data as Uint8ClampedArray<ArrayBuffer> }, picture };
+}
+
+async function decode(blob: Blob, name: string): Promise<ImageBitmap> {
+  try {
+    return await createImageBitmap(blob, { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
+  } catch {
+    throw new Error(`${name} could not be read as a picture.`);
+  }
+}
+
+function pixelsOf(picture: ImageBitmap): ImageData {
+  const context = new OffscreenCanvas(picture.width, picture.height).getContext('2d', { willReadFrequently: true });
+  if (!context) throw new Error('This browser cannot read the pixels of a picture.');
+  context.drawImage(picture, 0, 0);
+  return context.getImageData(0, 0, picture.width, picture.height);
+}
+
+/** Leaves out what is dark in the mask. */
+function applyMask(pixels: ImageData, mask: ImageData): void {
+  if (mask.data.length !== pixels.data.length) return;
+  for (let i = 0; i < pixels.data.length; i += 4) if ((mask.data[i] ?? 0) < MASKED) pixels.data[i + 3] = 0;
+}

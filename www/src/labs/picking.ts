@@ -1,0 +1,68 @@
+/** What clicks in the view do to the points. */
+import type { Vec3 } from '../protocol';
+import type { Edits } from '../reconstruct/protocol';
+import type { EditTool } from '../ui/edit-tools';
+import type { Hit } from '../view/reconstruction';
+
+export const NO_EDITS: Edits = { added: [], removed: [], outside: [] };
+
+/** What a click changes: nothing where it changes nothing. `distance` is a length in world units. */
+export function editedBy(
+  tool: EditTool,
+  { point, normal }: Hit,
+  distance: number,
+  edits: Edits,
+  points: Float32Array,
+): Edits | undefined {
+  const before = normal ? (point.map((x, axis) => x + distance * (normal[axis] ?? 0)) as Vec3) : point;
+  switch (tool) {
+    case 'add':
+      return { ...edits, added: [...edits.added, before] };
+    case 'outside':
+      return { ...edits, outside: [...edits.outside, before] };
+    case 'remove':
+      return without(point, Math.abs(distance), edits, points);
+    default:
+      return undefined;
+  }
+}
+
+/** Without all points near a place, those added by hand, too. */
+function without(place: Vec3, reach: number, edits: Edits, points: Float32Array): Edits | undefined {
+  const near = (x = 0, y = 0, z = 0) => Math.hypot(x - place[0], y - place[1], z - place[2]) <= reach;
+  const gone = new Set(edits.removed);
+  const found: number[] = [];
+  for (let i = 0; i < points.length / 3; i++) {
+    if (!gone.has(i) && near(points[3 * i], points[3 * i + 1], points[3 * i + 2])) found.push(i);
+  }
+  const added = edits.added.filter((point) => !near(...point));
+  if (found.length === 0 && added.length === edits.added.length) return undefined;
+  return { ...edits, added, removed: [...edits.removed, ...found] };
+}
+
+/** The points as they take part, to be shown. */
+export function shownPoints(points: Float32Array, { added, removed }: Edits): Float32Array {
+  return joined(points, removed, added.flat());
+}
+
+/** Their colours: those added by hand stand out. */
+export function shownColors(colors: Float32Array | undefined, { added, removed }: Edits): Float32Array | undefined {
+  const red = [0.9, 0.1, 0.5];
+  return (
+    colors &&
+    joined(
+      colors,
+      removed,
+      added.flatMap(() => red),
+    )
+  );
+}
+
+function joined(values: Float32Array, removed: number[], more: number[]): Float32Array {
+  const gone = new Set(removed);
+  const kept = gone.size > 0 ? values.filter((_, i) => !gone.has(Math.floor(i / 3))) : values;
+  const out = new Float32Array(kept.length + more.length);
+  out.set(kept);
+  out.set(more, kept.length);
+  return out;
+}

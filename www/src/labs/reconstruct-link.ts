@@ -1,0 +1,118 @@
+/** The Reconstruct lab's settings as the part of an address after `#reconstruct?`, and back. */
+import type { ParamValues, Vec3 } from '../protocol';
+import { CLOUDS, type CloudExample } from '../reconstruct/examples';
+import { isCloudPreset } from '../reconstruct/presets';
+import type { Edits } from '../reconstruct/protocol';
+import type { CloudChoice } from '../ui/cloud-setup';
+import { differing, readValue } from './link';
+
+export const ADDRESS = '#reconstruct';
+/** More points by hand than this do not go into a link: some programs cut long addresses. */
+export const MOST_EDITS = 200;
+
+export interface LinkedCloud extends Partial<CloudChoice> {
+  example?: string;
+  /** The name of a file of one's own: it is not in the link. */
+  file?: string;
+  params: ParamValues;
+  edits: Edits;
+  color?: string;
+  /** The photograph that the view looks through, from 1; 0 for none. */
+  photo?: number;
+}
+
+export interface CloudSettings {
+  example: CloudExample | undefined;
+  file: string;
+  choice: CloudChoice;
+  params: ParamValues;
+  defaults: ParamValues;
+  edits: Edits;
+  color: string;
+  photo: number | undefined;
+}
+
+/** Only what differs from what the example, or else the method, brings along. 0 stands for the method's own choice. */
+export function linkOf(settings: CloudSettings): LinkedCloud {
+  const { example, file, choice, params, defaults, edits, color, photo } = settings;
+  const { maxPoints, keepComponents } = choice;
+  return {
+    ...(!example && { file }),
+    ...(example && example !== CLOUDS[0] && { example: example.id }),
+    ...(maxPoints !== example?.maxPoints && { maxPoints: maxPoints ?? 0 }),
+    ...(keepComponents !== example?.keepComponents && { keepComponents: keepComponents ?? 0 }),
+    params: differing(params, { ...defaults, ...example?.params }),
+    edits: fits(edits) ? edits : { added: [], removed: [], outside: [] },
+    ...(color !== (example?.color ?? 'plain') && { color }),
+    ...(photo !== photoOf(example) && { photo: photo === undefined ? 0 : photo + 1 }),
+  };
+}
+
+/** The photograph that an example opens with. */
+function photoOf(example: CloudExample | undefined): number | undefined {
+  return isCloudPreset(example) ? example.photo : undefined;
+}
+
+/** The photograph to look through; `photo` of a link counts from 1, and 0 is none. */
+export function photoFor(example: CloudExample | undefined, photo: number | undefined): number | undefined {
+  if (photo === undefined) return photoOf(example);
+  return photo > 0 ? photo - 1 : undefined;
+}
+
+/** Whether a link can hold what was changed by hand. */
+export function fits({ added, removed, outside }: Edits): boolean {
+  return added.length + removed.length + outside.length <= MOST_EDITS;
+}
+
+/** The choice as a link wants it. */
+export function withLink(choice: CloudChoice, { maxPoints, keepComponents }: Partial<CloudChoice>): CloudChoice {
+  return {
+    maxPoints: maxPoints === undefined ? choice.maxPoints : maxPoints || undefined,
+    keepComponents: keepComponents === undefined ? choice.keepComponents : keepComponents || undefined,
+  };
+}
+
+const packed = (point: Vec3) => point.map((value) => Number(value.toPrecision(6))).join(',');
+
+export function toHash(linked: LinkedCloud): string {
+  const query = new URLSearchParams();
+  for (const name of ['example', 'file', 'maxPoints', 'keepComponents', 'color', 'photo'] as const) {
+    const value = linked[name];
+    if (value !== undefined) query.set(name, String(value));
+  }
+  for (const [name, value] of Object.entries(linked.params)) query.set(`p.${name}`, String(value));
+  for (const point of linked.edits.added) query.append('add', packed(point));
+  for (const point of linked.edits.outside) query.append('outside', packed(point));
+  if (linked.edits.removed.length > 0) query.set('remove', linked.edits.removed.join(','));
+  const text = query.toString().replaceAll('%2C', ',');
+  return text ? `${ADDRESS}?${text}` : ADDRESS;
+}
+
+/** Undefined where the address is not one of this lab with something to say. */
+export function fromHash(hash: string): LinkedCloud | undefined {
+  const [address = '', text] = hash.split(/\?(.*)/s);
+  if (address !== ADDRESS || !text) return undefined;
+  const query = new URLSearchParams(text);
+  const removed = (query.get('remove') ?? '').split(',').filter(Boolean).map(Number);
+  const edits = {
+    added: pointsOf(query, 'add'),
+    outside: pointsOf(query, 'outside'),
+    removed: removed.filter((index) => Number.isInteger(index) && index >= 0),
+  };
+  const linked: LinkedCloud = { params: {}, edits };
+  for (const name of ['example', 'file', 'color'] as const) {
+    const value = query.get(name);
+    if (value) linked[name] = value;
+  }
+  for (const name of ['maxPoints', 'keepComponents', 'photo'] as const) {
+    const value = Number(query.get(name) ?? Number.NaN);
+    if (Number.isFinite(value)) linked[name] = value;
+  }
+  for (const [name, value] of query) if (name.startsWith('p.')) linked.params[name.slice(2)] = readValue(value);
+  return linked;
+}
+
+function pointsOf(query: URLSearchParams, name: string): Vec3[] {
+  const lists = query.getAll(name).map((text) => text.split(',').map(Number));
+  return lists.filter((list) => list.length === 3 && list.every(Number.isFinite)) as Vec3[];
+}

@@ -1,0 +1,138 @@
+import type { CloudExample } from '../reconstruct/examples';
+import { h, section, uniqueId } from '../ui/dom';
+import { count } from '../ui/format';
+import { folded } from './extract-page';
+
+/** The parts the page is put together from. */
+export interface Parts {
+  data: HTMLElement;
+  figure: HTMLElement;
+  setup: HTMLElement;
+  params: HTMLElement;
+  tools: HTMLElement;
+  transport: HTMLElement;
+  options: HTMLElement;
+  legend: HTMLElement;
+  banner: HTMLElement;
+  status: HTMLElement;
+  canvas: HTMLElement;
+  photograph: HTMLElement;
+  photos: HTMLElement;
+  drop: HTMLElement;
+  phases: HTMLElement;
+  measures: HTMLElement;
+  warning: HTMLElement;
+  exports: HTMLElement;
+  volume: HTMLElement;
+  extract: HTMLElement;
+  link: HTMLElement;
+  plots: HTMLElement;
+  kernel: HTMLElement;
+  csv: HTMLElement;
+  timing: HTMLElement;
+  exercises: HTMLElement;
+}
+
+/** Lays the lab out: set-up on one side, the view in the middle, what comes of it on the other side. */
+export function layOut(root: HTMLElement, parts: Parts): void {
+  root.className = 'lab reconstruct';
+  const view = h(
+    'div',
+    { class: 'view beside' },
+    h('div', { class: 'scene' }, parts.canvas),
+    parts.photograph,
+    parts.options,
+    parts.legend,
+    parts.banner,
+    parts.drop,
+  );
+  const params = folded('Parameters', parts.params);
+  params.open = matchMedia('(min-width: 700px)').matches;
+  root.replaceChildren(
+    h('div', { class: 'stage' }, view, parts.transport, parts.status, parts.photos),
+    h(
+      'div',
+      { class: 'column setup' },
+      section('Points', parts.data, parts.figure, parts.setup),
+      params,
+      section('Points by hand', parts.tools),
+    ),
+    h(
+      'div',
+      { class: 'column results' },
+      section('Progress', parts.phases),
+      section('Surface', parts.measures, parts.warning),
+      section('Save', parts.exports, parts.volume, parts.extract, parts.link),
+      section('Plots', parts.plots, parts.kernel, parts.csv),
+      folded('Time against number of constraints', parts.timing),
+      folded('Exercise', parts.exercises),
+    ),
+  );
+}
+
+/** What is told of points, so that its place is there before some are open. */
+const FACTS = ['File', 'Points', 'Colours', 'Cameras'];
+
+/** Which points are open, and how to open others. */
+export class CloudPanel {
+  readonly element: HTMLElement;
+  readonly #examples: HTMLSelectElement;
+  readonly #own = h('option', { value: '', hidden: true }, 'Your file');
+  readonly #facts = h('dl', { class: 'facts' });
+  readonly #credit = h('p', { class: 'help credit' });
+
+  /** `figures` are listed apart from the other examples. */
+  constructor(
+    examples: CloudExample[],
+    figures: CloudExample[],
+    chooser: HTMLElement,
+    onExample: (example: CloudExample) => void,
+  ) {
+    const id = uniqueId('example');
+    const group = (label: string, list: CloudExample[]) =>
+      h('optgroup', { label }, ...list.map((example) => h('option', { value: example.id }, example.name)));
+    const groups = [group('Points', examples), group('Figures of the paper', figures)];
+    this.#examples = h('select', { id }, this.#own, ...groups);
+    this.#examples.addEventListener('change', () => {
+      const example = [...examples, ...figures].find((one) => one.id === this.#examples.value);
+      if (example) onExample(example);
+    });
+    this.show(undefined, undefined);
+    this.element = h(
+      'div',
+      { class: 'data' },
+      h('div', { class: 'row' }, h('label', { for: id }, 'Example'), h('span', { class: 'value' }, this.#examples)),
+      h('div', { class: 'row' }, chooser),
+      h(
+        'p',
+        { class: 'help' },
+        'Or drop PLY, OBJ, XYZ, PTS or CSV anywhere on the page; photographs together with a cameras.json. It stays on this machine.',
+      ),
+      this.#facts,
+      this.#credit,
+    );
+  }
+
+  /** Shows in the list which example is open, or that a file is. */
+  choose(example: CloudExample | undefined): void {
+    this.#own.hidden = example !== undefined;
+    this.#examples.value = example?.id ?? '';
+  }
+
+  show(
+    facts: { name: string; points: number; colors: boolean; normals: boolean; cameras: number } | undefined,
+    example: CloudExample | undefined,
+  ): void {
+    this.choose(example);
+    const known = facts && [
+      facts.name,
+      count(facts.points),
+      facts.colors ? 'yes' : 'no',
+      facts.cameras > 0 ? count(facts.cameras) : 'none',
+    ];
+    const rows = FACTS.map((name, i) => h('div', {}, h('dt', {}, name), h('dd', {}, known?.[i] ?? '–')));
+    if (facts?.normals) rows.push(h('div', {}, h('dt', {}, 'Normals'), h('dd', {}, 'yes')));
+    this.#facts.replaceChildren(...rows);
+    this.#credit.textContent = example?.credit ?? '';
+  }
+}

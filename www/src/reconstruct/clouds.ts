@@ -1,0 +1,86 @@
+/** Points that are computed: the same on every machine, from a seed. */
+import type { Vec3 } from '../protocol';
+import type { Cloud } from './protocol';
+
+export type PointShape = 'torus' | 'two balls' | 'cube corner' | 'uneven ball';
+
+/** How far points lie off their surface, as a standard deviation. */
+const NOISE = 0.02;
+
+/** Numbers from 0 to 1 that look random: mulberry32. */
+export function seeded(seed: number): () => number {
+  let state = seed;
+  return () => {
+    state = (state + 0x6d2b79f5) | 0;
+    let mixed = Math.imul(state ^ (state >>> 15), 1 | state);
+    mixed = (mixed + Math.imul(mixed ^ (mixed >>> 7), 61 | mixed)) ^ mixed;
+    return ((mixed ^ (mixed >>> 14)) >>> 0) / 2 ** 32;
+  };
+}
+
+/** Normally distributed, standard deviation 1 (Box and Muller). */
+function gauss(random: () => number): number {
+  return Math.sqrt(-2 * Math.log(1 - random())) * Math.cos(2 * Math.PI * random());
+}
+
+const SHAPES: Record<PointShape, { seed: number; count: number; point: (random: () => number) => Vec3 | undefined }> = {
+  torus: { seed: 1, count: 3000, point: onTorus },
+  'two balls': { seed: 2, count: 1600, point: onTwoBalls },
+  'cube corner': { seed: 3, count: 1500, point: onCorner },
+  'uneven ball': { seed: 4, count: 1200, point: onUnevenBall },
+};
+
+export function computedCloud(shape: PointShape): Cloud {
+  const { seed, count, point } = SHAPES[shape];
+  const random = seeded(seed);
+  const points = new Float32Array(3 * count);
+  for (let i = 0; i < count; ) {
+    const at = point(random);
+    if (!at) continue;
+    points.set(at, 3 * i);
+    i += 1;
+  }
+  return { points };
+}
+
+/** Radius 1, thickness 0.35 to each side; rejection makes it even over the area. */
+function onTorus(random: () => number): Vec3 | undefined {
+  const [around, across] = [2 * Math.PI * random(), 2 * Math.PI * random()];
+  const [big, small] = [1, 0.35];
+  if (random() > (big + small * Math.cos(across)) / (big + small)) return undefined;
+  const thick = small + NOISE * gauss(random);
+  const out = big + thick * Math.cos(across);
+  return [out * Math.cos(around), out * Math.sin(around), thick * Math.sin(across)];
+}
+
+function onTwoBalls(random: () => number): Vec3 {
+  const [x, y, z] = direction(random);
+  const radius = 0.6 + 0.5 * NOISE * gauss(random);
+  return [radius * x + (random() < 0.5 ? -0.8 : 0.8), radius * y, radius * z];
+}
+
+function direction(random: () => number): Vec3 {
+  const z = 2 * random() - 1;
+  const angle = 2 * Math.PI * random();
+  const flat = Math.sqrt(1 - z * z);
+  return [flat * Math.cos(angle), flat * Math.sin(angle), z];
+}
+
+/** Three faces of a cube around one corner, as a scanner in front of that corner sees them, with noise along its rays. */
+function onCorner(random: () => number): Vec3 {
+  const [u, v, face] = [random(), random(), Math.floor(3 * random())];
+  const at: Vec3 = [0, 0, 0];
+  at[face] = 1;
+  at[(face + 1) % 3] = u;
+  at[(face + 2) % 3] = v;
+  const along = (NOISE / 2) * gauss(random);
+  return at.map((x) => x + along / Math.sqrt(3)) as Vec3;
+}
+
+/** Dense on one side, sparse on the other, and none at the top and the bottom. */
+function onUnevenBall(random: () => number): Vec3 | undefined {
+  const [x, y, z] = direction(random);
+  if (Math.abs(z) > 0.8 || random() > 0.12 + 0.88 * (0.5 + 0.5 * x) ** 2) return undefined;
+  const radius = 1 + 0.3 * NOISE * gauss(random);
+  return [radius * x, radius * y, radius * z];
+}

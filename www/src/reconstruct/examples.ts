@@ -1,0 +1,83 @@
+import type { SurfaceColor } from '../view/surface';
+import type { PointShape } from './clouds';
+import type { ParamValues } from './protocol';
+
+/** Points that come with the page, the settings that suit them, and whom to thank. */
+export interface CloudExample {
+  id: string;
+  name: string;
+  /** A file beside the page, or points to compute. */
+  source: { file: string } | { shape: PointShape };
+  /** A folder with the photographs that the points were made from, and their cameras. */
+  photographs?: string;
+  up: 'y' | 'z';
+  /** −1 to look at it from behind at first; see the view. */
+  front?: -1;
+  maxPoints?: number;
+  keepComponents?: number;
+  params: ParamValues;
+  color: SurfaceColor;
+  credit: string;
+}
+
+const SPOT = 'Spot by Keenan Crane, public domain; rendered and turned into points for this page.';
+
+/** The first is shown when the lab opens. */
+export const CLOUDS: [CloudExample, ...CloudExample[]] = [
+  {
+    id: 'spot-stereo',
+    name: 'Cow, stereo from 24 photographs',
+    source: { file: 'spot/stereo.ply' },
+    photographs: 'spot',
+    up: 'y',
+    front: -1,
+    keepComponents: 1,
+    params: {},
+    color: 'own',
+    credit: `${SPOT} As stereo gives them: distances in steps, 4 % strays, nothing from below.`,
+  },
+  {
+    id: 'spot-carved',
+    name: 'Cow, carved out of silhouettes',
+    source: { file: 'spot/carved.ply' },
+    photographs: 'spot',
+    up: 'y',
+    front: -1,
+    params: {},
+    color: 'own',
+    credit: `${SPOT} The voxels that are left when everything outside the 24 silhouettes is taken away.`,
+  },
+  {
+    id: 'angel',
+    name: 'Angel, laser scan',
+    source: { file: 'angel.ply' },
+    up: 'z',
+    params: {},
+    color: 'plain',
+    credit:
+      'Angel statue: scan by Ivan Nikolov (GGG-BenchmarkSfM), CC BY 4.0; decimated, triangles dropped, points shuffled. Its base is open.',
+  },
+  {
+    id: 'torus',
+    name: 'Torus with noise',
+    source: { shape: 'torus' },
+    up: 'z',
+    params: {},
+    color: 'plain',
+    credit: 'Computed: 3,000 points, noise of 0.02 where the ring has a radius of 1.',
+  },
+  {
+    id: 'two-balls',
+    name: 'Two balls',
+    source: { shape: 'two balls' },
+    up: 'z',
+    params: {},
+    color: 'plain',
+    credit: 'Computed: 1,600 points on two balls. One function, two components.',
+  },
+];
+
+/** Where a file that comes with the page lies. */
+export function dataUrl(file: string): string {
+  return new URL(`data/${file}`, document.baseURI).href;
+}

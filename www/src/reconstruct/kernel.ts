@@ -1,0 +1,55 @@
+/** The radial functions, to draw them. The solver has its own. */
+import type { ParamValues } from '../protocol';
+
+export interface KernelParams {
+  kernel: string;
+  delta: number;
+  tau: number;
+  sigma: number;
+}
+
+/** Below this r the closed form loses its digits, and φ(0) is as good. */
+const NEAR = 1e-4;
+
+export function kernelParams(params: ParamValues): KernelParams {
+  const number = (name: string, otherwise: number) => (typeof params[name] === 'number' ? params[name] : otherwise);
+  return {
+    kernel: String(params.kernel ?? 'multi-order'),
+    delta: number('delta', 5),
+    tau: number('tau', 0.025),
+    sigma: number('sigma', 0.07),
+  };
+}
+
+/** φ(r). */
+export function phi({ kernel, delta, tau, sigma }: KernelParams, r: number): number {
+  switch (kernel) {
+    case 'thin-plate':
+      return r ** 3;
+    case 'biharmonic':
+      return -r;
+    case 'gaussian':
+      return Math.exp(-((r / sigma) ** 2) / 2);
+    default:
+      return multiOrder(delta, tau, r);
+  }
+}
+
+/** Equation 6 of the paper in real form, with δ and τ squared in the energy. */
+function multiOrder(delta: number, tau: number, r: number): number {
+  if (r < NEAR * tau) return 1 / (4 * Math.PI * delta * Math.sqrt(1 + 2 * delta * tau));
+  const a = Math.sqrt(1 + 2 * delta * tau) / (2 * tau);
+  const [even, odd] = damped((1 - 2 * delta * tau) / (4 * tau * tau), a, r);
+  return (1 - (even + (r * odd) / (4 * a * tau * tau))) / (4 * Math.PI * delta * delta * r);
+}
+
+/** e^(−ar) times cosh(br) and sinh(br)/(br), or cos and sin where b² is negative. */
+function damped(square: number, a: number, r: number): [number, number] {
+  const b = Math.sqrt(Math.abs(square));
+  const fall = Math.exp(-a * r);
+  if (b * r < 1e-6) return [fall, fall];
+  if (square < 0) return [fall * Math.cos(b * r), (fall * Math.sin(b * r)) / (b * r)];
+  // Both together: cosh alone would overflow. a is larger than b.
+  const [slow, fast] = [Math.exp((b - a) * r), Math.exp(-(a + b) * r)];
+  return [(slow + fast) / 2, (slow - fast) / (2 * b * r)];
+}

@@ -1,0 +1,132 @@
+/** How far places lie from the nearest of many points. */
+
+/** Points a cell holds in the mean: fewer make empty cells, more make long searches. */
+const PER_CELL = 4;
+/** Cells along a side at most. */
+const MOST_CELLS = 96;
+
+/** Points sorted into the cells of a grid. */
+class PointGrid {
+  readonly #points: Float32Array;
+  readonly #low = [0, 0, 0];
+  readonly #dims = [1, 1, 1];
+  readonly #cell: number;
+  /** Where the points of each cell begin in the list. */
+  readonly #begin: Uint32Array;
+  readonly #list: Uint32Array;
+
+  constructor(points: Float32Array) {
+    this.#points = points;
+    const high = [0, 0, 0];
+    for (let axis = 0; axis < 3; axis++) [this.#low[axis], high[axis]] = span(points, axis);
+    const sides = high.map((value, axis) => value - (this.#low[axis] ?? 0));
+    const longest = Math.max(...sides, 1e-30);
+    // Points lie on a surface: their number grows with the square of the cells along a side.
+    const across = Math.min(MOST_CELLS, Math.max(1, Math.sqrt(points.length / 3 / PER_CELL)));
+    this.#cell = longest / across;
+    for (let axis = 0; axis < 3; axis++) this.#dims[axis] = Math.floor((sides[axis] ?? 0) / this.#cell) + 1;
+    const count = points.length / 3;
+    const cells = Uint32Array.from({ length: count }, (_, i) => this.#cellOf(points, 3 * i));
+    this.#begin = new Uint32Array(this.#dims.reduce((a, b) => a * b) + 1);
+    for (const cell of cells) this.#begin[cell + 1] = (this.#begin[cell + 1] ?? 0) + 1;
+    for (let i = 1; i < this.#begin.length; i++) this.#begin[i] = (this.#begin[i] ?? 0) + (this.#begin[i - 1] ?? 0);
+    const next = this.#begin.slice();
+    this.#list = new Uint32Array(count);
+    cells.forEach((cell, i) => {
+      const at = next[cell] ?? 0;
+      next[cell] = at + 1;
+      this.#list[at] = i;
+    });
+  }
+
+  /** Shell by shell around the cell of a place, until no nearer point can follow. */
+  distance(places: Float32Array, offset: number): number {
+    const centre = [0, 1, 2].map((axis) => this.#index(places[offset + axis] ?? 0, axis));
+    // A place beyond the grid is farther from its nearest cell than shells tell.
+    const beyond = this.#beyond(places, offset);
+    let best = Number.POSITIVE_INFINITY;
+    const last = Math.max(...this.#dims);
+    for (let shell = 0; shell <= last; shell++) {
+      const near = Math.max(beyond, (shell - 1) * this.#cell);
+      if (near * near >= best) break;
+      best = this.#searchShell(centre, shell, places, offset, best);
+    }
+    return Math.sqrt(best);
+  }
+
+  #searchShell(centre: number[], shell: number, places: Float32Array, offset: number, found: number): number {
+    let best = found;
+    const [cx = 0, cy = 0, cz = 0] = centre;
+    for (let z = cz - shell; z <= cz + shell; z++) {
+      for (let y = cy - shell; y <= cy + shell; y++) {
+        const full = Math.abs(z - cz) === shell || Math.abs(y - cy) === shell;
+        const step = full || shell === 0 ? 1 : 2 * shell;
+        for (let x = cx - shell; x <= cx + shell; x += step) {
+          if (this.#has(x, y, z)) best = this.#searchCell(x, y, z, places, offset, best);
+        }
+      }
+    }
+    return best;
+  }
+
+  #searchCell(x: number, y: number, z: number, places: Float32Array, offset: number, found: number): number {
+    let best = found;
+    const [nx = 1, ny = 1] = this.#dims;
+    const cell = x + nx * (y + ny * z);
+    for (let i = this.#begin[cell] ?? 0; i < (this.#begin[cell + 1] ?? 0); i++) {
+      best = Math.min(best, squared(this.#points, 3 * (this.#list[i] ?? 0), places, offset));
+    }
+    return best;
+  }
+
+  #has(x: number, y: number, z: number): boolean {
+    const [nx = 1, ny = 1, nz = 1] = this.#dims;
+    return x >= 0 && y >= 0 && z >= 0 && x < nx && y < ny && z < nz;
+  }
+
+  #beyond(places: Float32Array, offset: number): number {
+    let most = 0;
+    for (let axis = 0; axis < 3; axis++) {
+      const from = (places[offset + axis] ?? 0) - (this.#low[axis] ?? 0);
+      most = Math.max(most, -from, from - (this.#dims[axis] ?? 1) * this.#cell);
+    }
+    return most;
+  }
+
+  #index(value: number, axis: number): number {
+    const at = Math.floor((value - (this.#low[axis] ?? 0)) / this.#cell);
+    return Math.min((this.#dims[axis] ?? 1) - 1, Math.max(0, at));
+  }
+
+  #cellOf(points: Float32Array, offset: number): number {
+    const [x = 0, y = 0, z = 0] = [0, 1, 2].map((axis) => this.#index(points[offset + axis] ?? 0, axis));
+    const [nx = 1, ny = 1] = this.#dims;
+    return x + nx * (y + ny * z);
+  }
+}
+
+/** Smallest and largest coordinate of packed points along an axis. */
+export function span(points: Float32Array, axis: number): [number, number] {
+  let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
+  for (let i = axis; i < points.length; i += 3) {
+    low = Math.min(low, points[i] ?? 0);
+    high = Math.max(high, points[i] ?? 0);
+  }
+  return [low, high];
+}
+
+function squared(a: Float32Array, i: number, b: Float32Array, j: number): number {
+  const x = (a[i] ?? 0) - (b[j] ?? 0);
+  const y = (a[i + 1] ?? 0) - (b[j + 1] ?? 0);
+  const z = (a[i + 2] ?? 0) - (b[j + 2] ?? 0);
+  return x * x + y * y + z * z;
+}
+
+/** Of each place the distance to the nearest point; both packed xyz. Infinite where there is no point. */
+export function distances(places: Float32Array, points: Float32Array): Float32Array {
+  const out = new Float32Array(places.length / 3).fill(Number.POSITIVE_INFINITY);
+  if (points.length === 0) return out;
+  const grid = new PointGrid(points);
+  for (let i = 0; i < out.length; i++) out[i] = grid.distance(places, 3 * i);
+  return out;
+}

@@ -1,0 +1,66 @@
+/** How long the solve takes for growing numbers of constraints (figure 4d of the paper). Used by the worker only. */
+import { ImplicitSurface } from 'vesicle';
+import type { CameraView, Cloud, Requests, Setup, Timing } from './protocol';
+
+type Asked = Requests['timing']['body'];
+
+/** Undefined when the signal aborts it. */
+export async function timeSolves(
+  cloud: Cloud,
+  cameras: CameraView[],
+  setup: Setup,
+  { sizes, kernels }: Asked,
+  signal: AbortSignal,
+  tell: (timing: Timing) => void,
+): Promise<Timing[] | undefined> {
+  const timings: Timing[] = [];
+  for (const size of sizes) {
+    for (const kernel of kernels) {
+      const timing = await timeOne(
+        cloud,
+        cameras,
+        { ...setup, params: { ...setup.params, kernel }, maxPoints: size },
+        signal,
+      );
+      if (!timing) return undefined;
+      timings.push(timing);
+      tell(timing);
+    }
+  }
+  return timings;
+}
+
+async function timeOne(
+  { points }: Cloud,
+  cameras: CameraView[],
+  { params, maxPoints = 20_000 }: Setup,
+  signal: AbortSignal,
+): Promise<Timing | undefined> {
+  const withoutImages = cameras.map(({ image: _, ...camera }) => camera);
+  const model = new ImplicitSurface({ points, cameras: withoutImages, maxPoints, params });
+  try {
+    const milliseconds = await solveTime(model, signal);
+    const { surface, exterior } = model.constraints();
+    const constraints = (surface.length + exterior.length) / 3;
+    return milliseconds === undefined ? undefined : { kernel: String(params.kernel), constraints, milliseconds };
+  } finally {
+    model.free();
+  }
+}
+
+/** Stops when the solve is through. */
+async function solveTime(model: ImplicitSurface, signal: AbortSignal): Promise<number | undefined> {
+  const solved = new AbortController();
+  let milliseconds = 0;
+  const onStep = ({ phase, times }: { phase: string; times: Record<string, number> }) => {
+    milliseconds += times.solve ?? 0;
+    if (phase === 'extract') solved.abort();
+  };
+  try {
+    await model.run({ signal: AbortSignal.any([signal, solved.signal]), onStep });
+  } catch (error) {
+    if (signal.aborted) return undefined;
+    if (!solved.signal.aborted) throw error;
+  }
+  return milliseconds;
+}

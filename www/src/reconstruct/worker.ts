@@ -1,0 +1,277 @@
+/** The worker of the Reconstruct lab: it holds points, cameras and one model of them, and does what the page asks. */
+import init, { type ImplicitSurface, paramSpecs, type StepReport, version } from 'vesicle';
+import type { Surface } from '../protocol';
+import { Refusal, toFailure } from '../worker/refusal';
+import { answer, buffersOf, stop, type Work } from '../worker/serving';
+import { buildModel, cloudFrom, cubicDims, fitOf, levelOf, ownExterior, valuesFor } from './model';
+import type {
+  CameraView,
+  Cloud,
+  Loaded,
+  ParamValues,
+  PointShade,
+  Ready,
+  RequestKind,
+  Requests,
+  Setup,
+  ToWorker,
+  WorkerEvent,
+} from './protocol';
+import { timeSolves } from './timing';
+
+/** Milliseconds between two looks at a surface that is being extracted, and between two lists of reports. */
+const PREVIEW_EVERY = 100;
+const TELL_EVERY = 50;
+
+type Handlers = {
+  [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
+};
+
+function send(event: WorkerEvent, transfer: Transferable[] = []): void {
+  self.postMessage(event, { transfer });
+}
+
+class Session {
+  #cloud: Cloud | undefined;
+  #cameras: CameraView[] = [];
+  #setup: Setup | undefined;
+  #model: ImplicitSurface | undefined;
+  /** Exterior points that the method makes by itself, where some by hand go with them, and what they were made for. */
+  #exterior = { of: '', points: new Float32Array(0) as Float32Array };
+  #shade: PointShade | undefined;
+  /** Steps the page has not heard of yet. */
+  #reports: StepReport[] = [];
+  #toldAt = 0;
+  #previewedAt = 0;
+  /** The page has drawn what it was sent. */
+  #shown = true;
+  /** The mesh that was sent last, by its version. */
+  #sent = '';
+  #constraintsSent = false;
+  #last: StepReport | undefined;
+  #run: Work | undefined;
+  #timing: Work | undefined;
+
+  readonly handlers: Handlers = {
+    hello: async () => {
+      await init();
+      return { version: version(), specs: paramSpecs('implicit') };
+    },
+    load: (body) => this.#load(body),
+    rebuild: (setup) => this.#rebuild(setup),
+    play: () => this.#play(),
+    pause: () => this.#pause(),
+    step: ({ count }) => this.#step(count),
+    setParams: (params) => this.#setParams(params),
+    export: ({ format }) => this.#current().mesh.toBytes(format),
+    volume: ({ size }) => this.#volume(size),
+    shade: (shade) => this.#setShade(shade),
+    timing: (body) => this.#time(body),
+    cancelTiming: () => stop(this.#timing),
+  };
+
+  shown(): void {
+    this.#shown = true;
+  }
+
+  async #load({ source, cameras, setup }: Requests['load']['body']): Promise<Loaded> {
+    await this.#pause();
+    const cloud = cloudFrom(source);
+    const model = buildModel(cloud, cameras, setup, ownExterior(cloud, cameras, setup));
+    this.#cloud = cloud;
+    this.#cameras = cameras;
+    this.#exterior = { of: '', points: new Float32Array(0) };
+    return { ...this.#adopt(model, setup), cloud };
+  }
+
+  async #rebuild(setup: Setup): Promise<Ready> {
+    await this.#pause();
+    const cloud = this.#points();
+    return this.#adopt(buildModel(cloud, this.#cameras, setup, this.#exteriorFor(setup)), setup);
+  }
+
+  #exteriorFor(setup: Setup): Float32Array {
+    const { maxPoints, keepComponents, edits } = setup;
+    const of = JSON.stringify([maxPoints, keepComponents, edits.added, edits.removed]);
+    if (edits.outside.length > 0 && of !== this.#exterior.of)
+      this.#exterior = { of, points: ownExterior(this.#points(), this.#cameras, setup) };
+    return this.#exterior.points;
+  }
+
+  #adopt(model: ImplicitSurface, setup: Setup): Ready {
+    this.#model?.free();
+    this.#model = model;
+    this.#setup = setup;
+    this.#reports = [];
+    this.#last = undefined;
+    this.#sent = '';
+    this.#constraintsSent = false;
+    this.#shown = true;
+    return { params: { ...model.params } };
+  }
+
+  #points(): Cloud {
+    if (!this.#cloud) throw new Refusal('invalid-argument', 'no points are loaded: open some first');
+    return this.#cloud;
+  }
+
+  #current(): ImplicitSurface {
+    if (!this.#model) throw new Refusal('invalid-argument', 'no points are loaded: open some first');
+    return this.#model;
+  }
+
+  async #play(): Promise<undefined> {
+    await stop(this.#timing);
+    const model = this.#current();
+    if (this.#run) return;
+    const abort = new AbortController();
+    this.#run = { abort, ended: this.#runToEnd(model, abort.signal) };
+    send({ event: 'state', state: 'running' });
+  }
+
+  async #runToEnd(model: ImplicitSurface, signal: AbortSignal): Promise<void> {
+    try {
+      await model.run({ signal, onStep: (report) => this.#stepped(report) });
+    } catch (error) {
+      // After the state: the page shows the failure on top of it.
+      if (!signal.aborted) queueMicrotask(() => send({ event: 'failure', failure: toFailure(error) }));
+    }
+    this.#run = undefined;
+    this.#standStill();
+  }
+
+  #stepped(report: StepReport): void {
+    this.#last = report;
+    this.#reports.push(report);
+    const now = performance.now();
+    if (now - this.#toldAt > TELL_EVERY) this.#tell();
+    this.#showConstraints();
+    if (report.phase === 'extract' && now - this.#previewedAt > PREVIEW_EVERY) this.#preview();
+  }
+
+  #tell(): void {
+    if (this.#reports.length > 0) send({ event: 'progress', reports: this.#reports });
+    this.#reports = [];
+    this.#toldAt = performance.now();
+  }
+
+  #showConstraints(): void {
+    if (this.#constraintsSent) return;
+    const { surface, exterior } = this.#current().constraints();
+    if (exterior.length === 0) return;
+    this.#constraintsSent = true;
+    send({ event: 'constraints', surface, exterior }, buffersOf([surface, exterior]));
+    send({ event: 'measured', fit: fitOf(this.#current(), Number.NaN, false) });
+  }
+
+  async #pause(): Promise<undefined> {
+    await stop(this.#timing);
+    await stop(this.#run);
+  }
+
+  async #step(count: number): Promise<undefined> {
+    await this.#pause();
+    const model = this.#current();
+    for (let i = 0; i < count && !this.#last?.done; i++) this.#stepped(model.step(1));
+    this.#previewedAt = 0;
+    if (this.#last?.phase === 'extract') this.#preview();
+    this.#standStill();
+  }
+
+  #standStill(): void {
+    this.#tell();
+    this.#showSurface();
+    this.#measure();
+    send({ event: 'state', state: this.#last?.done ? 'done' : 'paused' });
+  }
+
+  #setParams(params: ParamValues): ParamValues {
+    const model = this.#current();
+    model.setParams(params);
+    if (this.#setup) this.#setup = { ...this.#setup, params: { ...model.params } };
+    this.#last = undefined;
+    return { ...model.params };
+  }
+
+  #setShade(shade: PointShade | undefined): undefined {
+    this.#shade = shade;
+    this.#sent = '';
+    if (!this.#run) this.#showSurface();
+  }
+
+  /** Only as fast as the page draws. */
+  #preview(): void {
+    if (!this.#shown) return;
+    const mesh = this.#current().preview();
+    try {
+      if (mesh.vertexCount > 0) this.#sendSurface({ ...mesh.arrays(), ...countsOf(mesh) }, true);
+    } finally {
+      mesh.free();
+      this.#previewedAt = performance.now();
+    }
+  }
+
+  /** The surface as it stands, where the page does not have it yet. */
+  #showSurface(): void {
+    const model = this.#model;
+    if (!model || model.mesh.vertexCount === 0) return;
+    const { mesh } = model;
+    const version = `${mesh.topologyVersion} ${mesh.geometryVersion} ${this.#last?.done}`;
+    if (version === this.#sent) return;
+    this.#sent = version;
+    const values = this.#shade && valuesFor(model, this.#points(), this.#shade);
+    this.#sendSurface({ ...mesh.arrays(), ...countsOf(mesh), ...(values && { values }) }, false);
+  }
+
+  #sendSurface(surface: Surface, preview: boolean): void {
+    this.#shown = false;
+    const { positions, normals, indices, values, colors } = surface;
+    const arrays = [positions, normals, indices, ...(values ? [values] : []), ...(colors ? [colors] : [])];
+    send({ event: 'surface', surface, preview }, buffersOf(arrays));
+  }
+
+  #measure(): void {
+    const model = this.#current();
+    const whole = model.mesh.vertexCount > 0;
+    const fit = fitOf(model, this.#last?.residual ?? Number.NaN, whole);
+    const measures = whole ? { info: model.mesh.info(), report: model.mesh.check() } : undefined;
+    send({ event: 'measured', fit, ...(measures && { measures }) });
+  }
+
+  #volume(size: number): Requests['volume']['reply'] {
+    const model = this.#current();
+    const volume = model.toVolume(cubicDims(this.#points().points, size));
+    try {
+      return { bytes: volume.toNifti(), level: levelOf(model) };
+    } finally {
+      volume.free();
+    }
+  }
+
+  async #time(body: Requests['timing']['body']): Promise<Requests['timing']['reply']> {
+    await this.#pause();
+    const { params } = this.#current();
+    const abort = new AbortController();
+    const setup = { ...this.#setup, params } as Setup;
+    const result = timeSolves(this.#points(), this.#cameras, setup, body, abort.signal, (timing) =>
+      send({ event: 'timed', timing }),
+    );
+    this.#timing = { abort, ended: result };
+    try {
+      return await result;
+    } finally {
+      this.#timing = undefined;
+    }
+  }
+}
+
+function countsOf({ vertexCount: vertices, triangleCount: triangles }: { vertexCount: number; triangleCount: number }) {
+  return { vertices, triangles };
+}
+
+const session = new Session();
+
+self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
+  if (data.kind === 'shown') session.shown();
+  else void answer(session.handlers, data);
+};

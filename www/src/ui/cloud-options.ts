@@ -1,0 +1,80 @@
+import type { CloudViewOptions } from '../view/reconstruction';
+import type { SurfaceColor } from '../view/surface';
+import { h } from './dom';
+import { choice } from './view-options';
+
+type Switch = 'surface' | 'edges' | 'points' | 'constraints' | 'cameras';
+
+const SWITCHES: { name: Switch; label: string }[] = [
+  { name: 'surface', label: 'Surface' },
+  { name: 'edges', label: 'Wireframe' },
+  { name: 'points', label: 'Points' },
+  { name: 'constraints', label: 'Constraints' },
+  { name: 'cameras', label: 'Cameras' },
+];
+
+export const CLOUD_COLORS: { value: SurfaceColor; label: string }[] = [
+  { value: 'own', label: 'photographs or points' },
+  { value: 'plain', label: 'plain' },
+  { value: 'component', label: 'component' },
+  { value: 'mean curvature', label: 'mean curvature' },
+  { value: 'distance', label: 'distance from the points' },
+];
+
+/** What the view of the Reconstruct lab shows. */
+export class CloudOptionControls {
+  readonly element: HTMLElement;
+  readonly #boxes = new Map<Switch, HTMLInputElement>();
+  readonly #color: HTMLSelectElement;
+  readonly #key = h(
+    'p',
+    { class: 'legend' },
+    h('span', {}, h('span', { class: 'dot point', 'aria-hidden': 'true' }), 'surface'),
+    h('span', {}, h('span', { class: 'dot exterior', 'aria-hidden': 'true' }), 'exterior'),
+  );
+  readonly #value: CloudViewOptions;
+  readonly #onChange: (options: CloudViewOptions) => void;
+
+  constructor(initial: CloudViewOptions, onChange: (options: CloudViewOptions) => void) {
+    this.#value = { ...initial };
+    this.#onChange = onChange;
+    const switches = SWITCHES.map(({ name, label }) => {
+      const box = h('input', { type: 'checkbox', checked: initial[name], 'data-view': name });
+      box.addEventListener('change', () => this.set({ [name]: box.checked }));
+      this.#boxes.set(name, box);
+      return h('label', {}, box, label);
+    });
+    const color = choice('Colour', 'color', CLOUD_COLORS, initial.color, (color) => this.set({ color }));
+    this.#color = color.select;
+    this.#key.hidden = !initial.constraints;
+    this.element = h(
+      'div',
+      { class: 'view-options', role: 'group', 'aria-label': 'What the view shows' },
+      ...switches,
+      this.#key,
+      color.element,
+    );
+  }
+
+  get value(): CloudViewOptions {
+    return this.#value;
+  }
+
+  /** Shows what is asked for and tells; a colour that is none counts as plain. */
+  set(changed: Partial<CloudViewOptions>): void {
+    Object.assign(this.#value, changed);
+    if (!CLOUD_COLORS.some(({ value }) => value === this.#value.color)) this.#value.color = 'plain';
+    for (const [name, box] of this.#boxes) box.checked = this.#value[name];
+    this.#color.value = this.#value.color;
+    this.#key.hidden = !this.#value.constraints;
+    this.#onChange({ ...this.#value });
+  }
+
+  /** Whether there are cameras to show. */
+  set hasCameras(has: boolean) {
+    const box = this.#boxes.get('cameras');
+    const label = box?.closest('label');
+    if (label) label.hidden = !has;
+    if (!has && this.#value.cameras) this.set({ cameras: false });
+  }
+}

@@ -1,0 +1,76 @@
+import { h, uniqueId } from './dom';
+
+const MOST = 20_000;
+
+/** What a model is made with beside its parameters. */
+export interface CloudChoice {
+  maxPoints: number | undefined;
+  keepComponents: number | undefined;
+}
+
+interface Field {
+  element: HTMLElement;
+  input: HTMLInputElement;
+  error: HTMLElement;
+}
+
+/** How many points take part, and which. */
+export class CloudSetup {
+  readonly element: HTMLElement;
+  readonly #most: Field;
+  readonly #keep: Field;
+  #inForce: CloudChoice = { maxPoints: undefined, keepComponents: undefined };
+
+  constructor(onChange: (choice: CloudChoice, what: string) => void) {
+    this.#most = numberField('Points at most', 'maxPoints', { min: 4, max: 100_000, placeholder: String(MOST) }, [
+      'Above this an even subsample is taken. Empty: 20,000.',
+    ]);
+    this.#keep = numberField('Clusters kept', 'keepComponents', { min: 1, max: 10_000, placeholder: 'all' }, [
+      'Points that lie together; with 1 only the largest cluster stays and strays go. Empty: all.',
+    ]);
+    const fields: [Field, string][] = [
+      [this.#most, 'number of points'],
+      [this.#keep, 'clusters kept'],
+    ];
+    for (const [field, what] of fields)
+      field.input.addEventListener('change', () => this.#changed(field, what, onChange));
+    this.element = h('div', { class: 'params' }, this.#most.element, this.#keep.element);
+  }
+
+  get value(): CloudChoice {
+    return this.#inForce;
+  }
+
+  show(choice: CloudChoice): void {
+    this.#inForce = choice;
+    this.#most.input.value = choice.maxPoints === undefined ? '' : String(choice.maxPoints);
+    this.#keep.input.value = choice.keepComponents === undefined ? '' : String(choice.keepComponents);
+    for (const { error } of [this.#most, this.#keep]) error.textContent = '';
+  }
+
+  #changed({ input, error }: Field, what: string, onChange: (choice: CloudChoice, what: string) => void): void {
+    error.textContent = '';
+    if (!input.checkValidity()) {
+      this.show(this.#inForce);
+      error.textContent = `A whole number from ${input.min} to ${Number(input.max).toLocaleString('en')} is needed, or nothing.`;
+      return;
+    }
+    const number = (one: HTMLInputElement) => (one.value === '' ? undefined : one.valueAsNumber);
+    onChange({ maxPoints: number(this.#most.input), keepComponents: number(this.#keep.input) }, what);
+  }
+}
+
+function numberField(label: string, name: string, range: Record<string, unknown>, [help = '']: string[]): Field {
+  const id = uniqueId(name);
+  const input = h('input', { type: 'number', id, step: 1, 'aria-describedby': `${id}-help ${id}-error`, ...range });
+  const error = h('p', { class: 'field-error', id: `${id}-error`, role: 'alert' });
+  const element = h(
+    'div',
+    { class: 'param', 'data-param': name },
+    h('label', { for: id }, label),
+    h('span', { class: 'value' }, input),
+    h('p', { class: 'help', id: `${id}-help` }, help),
+    error,
+  );
+  return { element, input, error };
+}

@@ -1,0 +1,90 @@
+import { h, uniqueId } from './dom';
+import { plural } from './format';
+
+/** What a click in the view does to the points. */
+export type EditTool = 'none' | 'add' | 'remove' | 'outside';
+
+const TOOLS: { tool: EditTool; label: string; help: string }[] = [
+  { tool: 'none', label: 'Only look', help: 'Clicks do nothing. Choose what they should do.' },
+  {
+    tool: 'add',
+    label: 'Add a point',
+    help: 'A click puts a point before the surface, so far away as the distance says; below 0 behind it. The surface follows.',
+  },
+  {
+    tool: 'remove',
+    label: 'Remove points',
+    help: 'A click removes all points within the distance of the place, and leaves a gap.',
+  },
+  {
+    tool: 'outside',
+    label: 'Add a point outside',
+    help: 'A click says that this place, so far before the surface, is outside. It binds as much as λe lets it.',
+  },
+];
+
+/** Tools that change the points by clicking in the 3D view. */
+export class EditTools {
+  readonly element: HTMLElement;
+  readonly #help = h('p', { class: 'help' });
+  readonly #counts = h('p', { class: 'help', role: 'status' });
+  readonly #clear: HTMLButtonElement;
+  readonly #distance: HTMLInputElement;
+  #tool: EditTool = 'none';
+
+  constructor(onTool: (tool: EditTool) => void, onClear: () => void) {
+    const name = uniqueId('tool');
+    const radios = TOOLS.map(({ tool, label }) => {
+      const radio = h('input', { type: 'radio', name, value: tool, checked: tool === 'none', 'data-tool': tool });
+      radio.addEventListener('change', () => {
+        this.#choose(tool);
+        onTool(tool);
+      });
+      return h('label', { class: 'check' }, radio, label);
+    });
+    const id = uniqueId('distance');
+    this.#distance = h('input', { type: 'number', id, value: 5, min: -50, max: 50, step: 'any', required: true });
+    this.#clear = h('button', { type: 'button', onclick: onClear, 'data-edit': 'clear' }, 'Take all back');
+    this.element = h(
+      'div',
+      { class: 'edit-tools' },
+      h('div', { class: 'tools', role: 'radiogroup', 'aria-label': 'What a click in the view does' }, ...radios),
+      h(
+        'div',
+        { class: 'row' },
+        h('label', { for: id }, 'Distance'),
+        h('span', { class: 'value' }, this.#distance, h('span', { class: 'unit' }, '% of size')),
+      ),
+      this.#help,
+      h('p', { class: 'help' }, 'By keyboard: Enter in the view is a click in its middle.'),
+      this.#counts,
+      this.#clear,
+    );
+    this.#choose('none');
+    this.show({ added: [], removed: [], outside: [] });
+  }
+
+  get tool(): EditTool {
+    return this.#tool;
+  }
+
+  /** As a part of the size of the points; nothing that is no number. */
+  get distance(): number {
+    return this.#distance.checkValidity() ? this.#distance.valueAsNumber / 100 : 0.05;
+  }
+
+  show({ added, removed, outside }: { added: unknown[]; removed: unknown[]; outside: unknown[] }): void {
+    const parts = [
+      ...(added.length > 0 ? [`${plural(added.length, 'point')} added`] : []),
+      ...(removed.length > 0 ? [`${plural(removed.length, 'point')} removed`] : []),
+      ...(outside.length > 0 ? [`${plural(outside.length, 'point')} put outside`] : []),
+    ];
+    this.#counts.textContent = parts.length > 0 ? `${parts.join(', ')}.` : 'Nothing was changed by hand.';
+    this.#clear.disabled = parts.length === 0;
+  }
+
+  #choose(tool: EditTool): void {
+    this.#tool = tool;
+    this.#help.textContent = TOOLS.find((one) => one.tool === tool)?.help ?? '';
+  }
+}

@@ -1,0 +1,86 @@
+import uPlot from 'uplot';
+import type { ParamValues } from '../protocol';
+import { kernelParams, phi } from '../reconstruct/kernel';
+import { h, onSchemeChange, token } from './dom';
+import { figure } from './format';
+
+const HEIGHT = 132;
+/** Of distances, up to the side of the box. */
+const SAMPLES = 201;
+const FARTHEST = 2;
+
+/** The kernel in force as a curve, each to its own height, since only its shape matters. */
+export class KernelPlot {
+  readonly element: HTMLElement;
+  readonly #plot: uPlot;
+  readonly #caption = h('figcaption', { 'data-plot': 'kernel' });
+  #params: ParamValues = {};
+
+  constructor() {
+    const holder = h('div', { class: 'plot kernel', 'aria-hidden': 'true' });
+    this.element = h('figure', {}, h('h3', {}, 'Kernel φ(r)'), holder, this.#caption);
+    this.#plot = new uPlot(options(), [[], []], holder);
+    new ResizeObserver(() => {
+      if (holder.clientWidth > 0) this.#plot.setSize({ width: holder.clientWidth, height: HEIGHT });
+    }).observe(holder);
+    onSchemeChange(() => this.show(this.#params));
+  }
+
+  show(params: ParamValues): void {
+    this.#params = params;
+    const kernel = kernelParams(params);
+    const distances = Array.from({ length: SAMPLES }, (_, i) => (FARTHEST * i) / (SAMPLES - 1));
+    const values = distances.map((r) => phi(kernel, r));
+    const most = Math.max(...values.map(Math.abs));
+    this.#plot.setData([distances, values.map((value) => value / most)]);
+    this.#caption.textContent = tell(kernel.kernel, (r) => phi(kernel, r));
+  }
+}
+
+function tell(kernel: string, value: (r: number) => number): string {
+  const unit = 'r in units of the box, whose longest side is 2; heights are relative.';
+  if (kernel === 'thin-plate' || kernel === 'biharmonic')
+    return `Grows without end in size: far points matter most, and the whole must balance. ${cap(unit)}`;
+  const half = bisect((r) => value(r) - value(0) / 2);
+  const left = value(0.5) / value(0);
+  return `Falls to half at r = ${figure(Number(half.toPrecision(2)))}; at 0.5, ${figure(Number((100 * left).toPrecision(2)))} % are left. ${cap(unit)}`;
+}
+
+const cap = (text: string) => `${text[0]?.toUpperCase()}${text.slice(1)}`;
+
+/** Where a falling function passes 0. */
+function bisect(f: (r: number) => number): number {
+  let [low, high] = [0, 100];
+  for (let i = 0; i < 60; i++) {
+    const middle = (low + high) / 2;
+    if (f(middle) > 0) low = middle;
+    else high = middle;
+  }
+  return low;
+}
+
+function options(): uPlot.Options {
+  const axis: uPlot.Axis = {
+    stroke: () => token('--muted'),
+    grid: { stroke: () => token('--line'), width: 1 },
+    ticks: { show: false },
+    font: '11px system-ui, sans-serif',
+  };
+  const range = (_: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax => [
+    Math.min(0, low ?? 0),
+    Math.max(0, high ?? 1),
+  ];
+  return {
+    width: 280,
+    height: HEIGHT,
+    legend: { show: false },
+    cursor: { y: false, drag: { x: false, y: false } },
+    padding: [8, 8, 0, 0],
+    scales: { x: { time: false, range: [0, FARTHEST] }, y: { range } },
+    axes: [
+      { ...axis, size: 24 },
+      { ...axis, size: 36 },
+    ],
+    series: [{}, { label: 'φ', stroke: () => token('--curve'), width: 1.5, points: { show: false } }],
+  };
+}

@@ -1,0 +1,63 @@
+import type { StepReport } from '../protocol';
+import { h } from './dom';
+import { milliseconds } from './format';
+import type { History } from './history';
+
+/** The stages of the method, in the order they come. */
+const PHASES = [
+  { name: 'subsample', text: 'Clean and thin out the points' },
+  { name: 'constraints', text: 'Find points outside' },
+  { name: 'solve', text: 'Solve for the weights' },
+  { name: 'extract', text: 'Follow the surface' },
+  { name: 'colour', text: 'Take colours' },
+] as const;
+
+/** The stages with how far each is and how long it took. */
+export class PhaseList {
+  readonly element = h('ol', { class: 'phases' });
+  readonly #rows: { item: HTMLElement; bar: HTMLProgressElement; time: HTMLElement }[];
+
+  constructor() {
+    this.#rows = PHASES.map(({ name, text }) => {
+      const bar = h('progress', { max: 1, value: 0, 'aria-label': text });
+      const time = h('span', { class: 'time' });
+      const item = h('li', { 'data-phase': name }, h('span', {}, text), time, bar);
+      return { item, bar, time };
+    });
+    this.element.append(...this.#rows.map(({ item }) => item));
+  }
+
+  /** After each list of reports. `going`: the run is under way. */
+  update(history: History, going: boolean): void {
+    const last = history.reports.at(-1);
+    const at = last ? PHASES.findIndex(({ name }) => name === last.phase) : -1;
+    for (const [i, { item, bar, time }] of this.#rows.entries()) {
+      const phase = PHASES[i]?.name ?? '';
+      const over = last !== undefined && (last.done || i < at);
+      const now = i === at && !over;
+      item.classList.toggle('over', over);
+      item.classList.toggle('now', now);
+      if (now) item.setAttribute('aria-current', 'step');
+      else item.removeAttribute('aria-current');
+      showBar(bar, over ? 1 : now ? (last?.progress ?? 0) : 0, now && going);
+      const spent = history.times.get(phase);
+      time.textContent = spent ? milliseconds([...spent.values()].reduce((a, b) => a + b, 0)) : '';
+    }
+  }
+}
+
+/** A bar without a value moves by itself; one that stands still should not. */
+function showBar(bar: HTMLProgressElement, part: number, going: boolean): void {
+  if (Number.isFinite(part)) bar.value = part;
+  else if (going) bar.removeAttribute('value');
+  else bar.value = 0.5;
+}
+
+/** How far the whole run is, 0 to 1: each stage counts by the share of time it usually takes. */
+export function overallProgress({ phase, progress, done }: StepReport): number {
+  if (done) return 1;
+  const shares = [0.05, 0.1, 0.45, 0.35, 0.05];
+  const at = PHASES.findIndex(({ name }) => name === phase);
+  const before = shares.slice(0, at).reduce((a, b) => a + b, 0);
+  return before + (shares[at] ?? 0) * (Number.isFinite(progress) ? progress : 0.5);
+}

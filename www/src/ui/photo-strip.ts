@@ -1,0 +1,79 @@
+import type { Photograph } from '../labs/photographs';
+import { h } from './dom';
+
+const THUMBNAIL = 72;
+
+/** All photographs as small pictures to choose from; the chosen one stands large beside the view of the same camera. */
+export class PhotoStrip {
+  readonly element = h('div', { class: 'photos', role: 'group', 'aria-label': 'Photographs', hidden: true });
+  /** Beside the view. */
+  readonly large: HTMLElement;
+  readonly #canvas = h('canvas', { role: 'img' });
+  readonly #caption = h('figcaption');
+  readonly #onChoose: (index: number | undefined) => void;
+  #photographs: readonly Photograph[] = [];
+  #buttons: HTMLButtonElement[] = [];
+  #chosen: number | undefined;
+
+  constructor(onChoose: (index: number | undefined) => void) {
+    this.#onChoose = onChoose;
+    const close = h(
+      'button',
+      { type: 'button', class: 'quiet', onclick: () => this.choose(undefined) },
+      'Close photograph',
+    );
+    this.large = h('figure', { class: 'photograph', hidden: true }, this.#canvas, h('div', {}, this.#caption, close));
+  }
+
+  show(photographs: readonly Photograph[]): void {
+    this.choose(undefined);
+    for (const { picture } of this.#photographs)
+      if (!photographs.some((one) => one.picture === picture)) picture?.close();
+    this.#photographs = photographs;
+    const pictured = photographs.filter(({ picture }) => picture);
+    this.element.hidden = pictured.length === 0;
+    this.#buttons = photographs.map((photograph, i) => this.#button(photograph, i));
+    this.element.replaceChildren(
+      h('p', { class: 'help' }, 'Photographs: choose one to look through its camera.'),
+      h('div', { class: 'strip' }, ...this.#buttons),
+    );
+  }
+
+  get chosen(): number | undefined {
+    return this.#chosen;
+  }
+
+  /** Shows a photograph beside the view, or none. */
+  choose(index: number | undefined): void {
+    const photograph = index === undefined ? undefined : this.#photographs[index];
+    const changed = index !== this.#chosen;
+    this.#chosen = photograph ? index : undefined;
+    for (const [i, button] of this.#buttons.entries()) button.setAttribute('aria-pressed', String(i === this.#chosen));
+    this.large.hidden = !photograph?.picture;
+    if (photograph?.picture) {
+      draw(this.#canvas, photograph.picture, photograph.picture.width);
+      this.#canvas.setAttribute('aria-label', `Photograph ${(index ?? 0) + 1}, ${photograph.name}`);
+      this.#caption.textContent = `Photograph ${(index ?? 0) + 1} of ${this.#photographs.length}; the surface beside it is seen through the same camera.`;
+    }
+    if (changed) this.#onChoose(this.#chosen);
+  }
+
+  #button({ name, picture }: Photograph, index: number): HTMLButtonElement {
+    const canvas = h('canvas', { 'aria-hidden': 'true' });
+    if (picture) draw(canvas, picture, THUMBNAIL);
+    const label = `Photograph ${index + 1}: look through its camera`;
+    const act = () => this.choose(this.#chosen === index ? undefined : index);
+    return h(
+      'button',
+      { type: 'button', title: name, 'aria-label': label, 'aria-pressed': 'false', 'data-photo': index, onclick: act },
+      canvas,
+      h('span', {}, String(index + 1)),
+    );
+  }
+}
+
+function draw(canvas: HTMLCanvasElement, picture: ImageBitmap, width: number): void {
+  canvas.width = width;
+  canvas.height = Math.round((width * picture.height) / picture.width);
+  canvas.getContext('2d')?.drawImage(picture, 0, 0, canvas.width, canvas.height);
+}

@@ -1,0 +1,66 @@
+import { Vector3 } from 'three';
+import { type PinholeCamera, poseOf } from './eye';
+import { Lines } from './lines';
+
+/** Cameras as small pyramids: the tip is where the camera stands, the base its picture, the mark on it its upper side. */
+export class CameraMarks {
+  readonly #all = new Lines('#888');
+  readonly #chosen = new Lines('#888');
+  readonly object = this.#all.object;
+  readonly chosenObject = this.#chosen.object;
+  #cameras: readonly PinholeCamera[] = [];
+  #depth = 1;
+  #visible = false;
+
+  set colors({ all, chosen }: { all: string; chosen: string }) {
+    this.#all.object.material.color.set(all);
+    this.#chosen.object.material.color.set(chosen);
+  }
+
+  /** `depth`: how long the pyramids are, world units. */
+  show(cameras: readonly PinholeCamera[], depth: number): void {
+    this.#cameras = cameras;
+    this.#depth = depth;
+    this.choose(undefined);
+    this.visible = this.#visible;
+  }
+
+  set visible(visible: boolean) {
+    this.#visible = visible;
+    this.#all.show(new Float32Array(visible ? this.#cameras.flatMap((camera) => pyramid(camera, this.#depth)) : []));
+    this.#chosen.object.visible &&= visible;
+  }
+
+  choose(index: number | undefined): void {
+    const camera = index === undefined ? undefined : this.#cameras[index];
+    this.#chosen.show(new Float32Array(camera && this.#visible ? pyramid(camera, this.#depth) : []));
+  }
+
+  /** Where the cameras stand. */
+  get centres(): Vector3[] {
+    return this.#cameras.map((camera) => poseOf(camera).centre);
+  }
+
+  dispose(): void {
+    this.#all.dispose();
+    this.#chosen.dispose();
+  }
+}
+
+/** Its edges as pairs of points, packed. */
+function pyramid(camera: PinholeCamera, depth: number): number[] {
+  const { centre, right, down, forward, focal, middle } = poseOf(camera);
+  const at = (x: number, y: number) =>
+    new Vector3()
+      .copy(centre)
+      .addScaledVector(forward, depth)
+      .addScaledVector(right, (depth * (x - middle[0])) / focal[0])
+      .addScaledVector(down, (depth * (y - middle[1])) / focal[1]);
+  const { width, height } = camera;
+  const corners = [at(0, 0), at(width, 0), at(width, height), at(0, height)];
+  const mark = [at(0.35 * width, 0), at(0.5 * width, -0.2 * height), at(0.65 * width, 0)];
+  const [a, b, c] = mark;
+  const lines = corners.flatMap((corner, i) => [centre, corner, corner, corners[(i + 1) % 4] ?? corner]);
+  if (a && b && c) lines.push(a, b, b, c);
+  return lines.flatMap((point) => point.toArray());
+}

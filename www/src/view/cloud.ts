@@ -1,0 +1,62 @@
+import { BufferAttribute, BufferGeometry, CanvasTexture, Points, PointsMaterial } from 'three';
+import { linearColors } from './shading';
+
+/** Points as small discs that face the viewer, in one colour or each in its own. */
+export class PointCloud {
+  readonly #material = new PointsMaterial({ map: disc(), alphaTest: 0.5, sizeAttenuation: true });
+  readonly object = new Points(new BufferGeometry(), this.#material);
+  #color = '#000000';
+
+  constructor() {
+    this.object.frustumCulled = false;
+  }
+
+  set color(color: string) {
+    this.#color = color;
+    this.#paint();
+  }
+
+  /** Diameter in world units. */
+  set size(size: number) {
+    this.#material.size = size;
+  }
+
+  /** Packed points; `colors` are rgb, 0..1. */
+  show(points: Float32Array, colors?: Float32Array): void {
+    this.object.geometry.dispose();
+    const geometry = new BufferGeometry();
+    geometry.setAttribute('position', new BufferAttribute(points, 3));
+    if (colors) {
+      const linear = new Float32Array(colors.length);
+      linearColors(colors, linear);
+      geometry.setAttribute('color', new BufferAttribute(linear, 3));
+    }
+    this.object.geometry = geometry;
+    this.#material.vertexColors = colors !== undefined;
+    this.#material.needsUpdate = true;
+    this.#paint();
+  }
+
+  dispose(): void {
+    this.object.geometry.dispose();
+    this.#material.map?.dispose();
+    this.#material.dispose();
+  }
+
+  #paint(): void {
+    this.#material.color.set(this.#material.vertexColors ? '#ffffff' : this.#color);
+  }
+}
+
+function disc(): CanvasTexture {
+  const canvas = document.createElement('canvas');
+  canvas.width = 64;
+  canvas.height = 64;
+  const context = canvas.getContext('2d');
+  if (context) {
+    context.fillStyle = '#fff';
+    context.arc(32, 32, 31, 0, 2 * Math.PI);
+    context.fill();
+  }
+  return new CanvasTexture(canvas);
+}

@@ -1,0 +1,202 @@
+import { Box3, Plane, type Raycaster, Vector3 } from 'three';
+import type { Surface, Vec3 } from '../protocol';
+import { onSchemeChange, token } from '../ui/dom';
+import { Legend } from '../ui/legend';
+import { CameraMarks } from './cameras';
+import { PointCloud } from './cloud';
+import type { PinholeCamera } from './eye';
+import { diverging, isShade, SHADES, shadeTitle } from './shading';
+import { type SurfaceColor, SurfaceObject } from './surface';
+import { Viewport } from './viewport';
+
+/** Points that lie farther out than this share of them on each side do not count for what the view shows. */
+const STRAY = 0.02;
+/** Of a point's disc, as a part of the diagonal of the box. */
+const DISC = 0.006;
+const CAMERA_LENGTH = 0.12;
+
+export interface CloudViewOptions {
+  surface: boolean;
+  edges: boolean;
+  points: boolean;
+  constraints: boolean;
+  cameras: boolean;
+  color: SurfaceColor;
+}
+
+/** Points to show, and how they stand. */
+export interface ShownCloud {
+  points: Float32Array;
+  /** rgb of each, 0..1. */
+  colors?: Float32Array | undefined;
+  cameras: readonly PinholeCamera[];
+  up: 'y' | 'z';
+  /** The side to look at: 1 where things face along −y, or along z where y is up; −1 from behind. */
+  front: 1 | -1;
+}
+
+/** What a click has hit. */
+export interface Hit {
+  point: Vec3;
+  /** Outwards, where it is on the surface. */
+  normal?: Vec3;
+}
+
+/** The 3D view of the Reconstruct lab: points, constraints, cameras and the surface. */
+export class ReconstructionView {
+  readonly #viewport: Viewport;
+  readonly #surface = new SurfaceObject();
+  readonly #points = new PointCloud();
+  readonly #inside = new PointCloud();
+  readonly #outside = new PointCloud();
+  readonly #cameras = new CameraMarks();
+  readonly legend = new Legend(diverging);
+  /** Called with the place that was clicked. */
+  onPick: ((hit: Hit) => void) | undefined;
+  #options: CloudViewOptions;
+  #box = new Box3();
+  #hasSurface = false;
+  #front: 1 | -1 = 1;
+
+  constructor(canvas: HTMLCanvasElement, options: CloudViewOptions) {
+    this.#viewport = new Viewport(canvas);
+    this.#options = options;
+    for (const { object } of [this.#surface, this.#points, this.#inside, this.#outside, this.#cameras])
+      this.#viewport.add(object);
+    this.#viewport.add(this.#cameras.chosenObject);
+    this.#viewport.onClick = (ray) => this.#pick(ray);
+    this.#recolor();
+    onSchemeChange(() => this.#recolor());
+  }
+
+  /** Called when the view is no longer that of a photograph. */
+  set onLeave(callback: () => void) {
+    this.#viewport.onLeave = callback;
+  }
+
+  /** Other points: everything of the former is gone. */
+  setCloud({ points, colors, cameras, up, front }: ShownCloud): void {
+    this.#box = middleBox(points);
+    const length = this.#box.getSize(new Vector3()).length();
+    for (const cloud of [this.#points, this.#inside, this.#outside]) cloud.size = DISC * length;
+    this.#outside.size = 1.6 * DISC * length;
+    this.#cameras.show(cameras, CAMERA_LENGTH * length);
+    this.#viewport.up = up;
+    this.#front = front;
+    this.showPoints(points, colors);
+    this.showConstraints(new Float32Array(0), new Float32Array(0));
+    this.clearSurface();
+    this.#frame();
+  }
+
+  showPoints(points: Float32Array, colors: Float32Array | undefined): void {
+    this.#points.show(points, colors);
+    this.#viewport.invalidate();
+  }
+
+  showConstraints(surface: Float32Array, exterior: Float32Array): void {
+    this.#inside.show(surface);
+    this.#outside.show(exterior);
+    this.#viewport.invalidate();
+  }
+
+  showSurface(surface: Surface): void {
+    this.#hasSurface = true;
+    this.#surface.show(surface);
+    this.setOptions(this.#options);
+  }
+
+  clearSurface(): void {
+    this.#hasSurface = false;
+    this.setOptions(this.#options);
+  }
+
+  setOptions(options: CloudViewOptions): void {
+    const reframe = options.cameras !== this.#options.cameras;
+    this.#options = { ...options };
+    this.#surface.solid = options.surface && this.#hasSurface;
+    this.#surface.edges = options.edges && this.#hasSurface;
+    this.#surface.color = options.color;
+    // Constraints tell apart what colours of the points' own would hide.
+    this.#points.object.visible = options.points && !options.constraints;
+    this.#inside.object.visible = options.constraints;
+    this.#outside.object.visible = options.constraints;
+    this.#cameras.visible = options.cameras;
+    this.#showLegend();
+    if (reframe) this.#frame();
+    this.#viewport.invalidate();
+  }
+
+  /** Looks through a camera, or freely again. */
+  lookThrough(camera: PinholeCamera | undefined, index: number | undefined): void {
+    this.#cameras.choose(index);
+    // Light is in the photographs already: beside one, colours are shown as they are.
+    this.#surface.lit = camera === undefined;
+    this.#viewport.lookThrough(camera);
+    this.#viewport.invalidate();
+  }
+
+  /** Diagonal of the box that most points lie in. */
+  get size(): number {
+    return this.#box.getSize(new Vector3()).length();
+  }
+
+  dispose(): void {
+    for (const part of [this.#surface, this.#points, this.#inside, this.#outside, this.#cameras]) part.dispose();
+    this.#viewport.dispose();
+  }
+
+  #frame(): void {
+    const box = this.#box.clone();
+    if (this.#options.cameras) for (const centre of this.#cameras.centres) box.expandByPoint(centre);
+    if (!box.isEmpty()) this.#viewport.frameBox(box, this.#front);
+  }
+
+  /** The surface where the ray meets it; else the plane through the middle that faces the viewer. */
+  #pick(ray: Raycaster): void {
+    if (!this.onPick) return;
+    const [hit] = this.#hasSurface ? ray.intersectObject(this.#surface.target, false) : [];
+    const point = hit?.point ?? this.#onMiddle(ray);
+    if (!point) return;
+    const normal = hit?.face?.normal.toArray();
+    this.onPick({ point: this.#viewport.toWorld(point).toArray(), ...(normal && { normal }) });
+  }
+
+  #onMiddle({ ray }: Raycaster): Vector3 | null {
+    const middle = this.#viewport.fromWorld(this.#box.getCenter(new Vector3()));
+    return ray.intersectPlane(new Plane().setFromNormalAndCoplanarPoint(ray.direction, middle), new Vector3());
+  }
+
+  #showLegend(): void {
+    const { color, surface } = this.#options;
+    const { range } = this.#surface;
+    if (surface && range > 0 && isShade(color))
+      this.legend.show({ ...SHADES[color], title: shadeTitle(color, '') }, range);
+    else this.legend.hide();
+  }
+
+  #recolor(): void {
+    this.#surface.edgeColor = token('--wire');
+    this.#points.color = token('--point');
+    this.#inside.color = token('--point');
+    this.#outside.color = token('--exterior');
+    this.#cameras.colors = { all: token('--muted'), chosen: token('--outline') };
+    this.#viewport.invalidate();
+  }
+}
+
+/** The box of all but the outermost points. */
+function middleBox(points: Float32Array): Box3 {
+  const box = new Box3();
+  const count = points.length / 3;
+  const [low, high] = [new Vector3(), new Vector3()];
+  for (let axis = 0; axis < 3; axis++) {
+    const sorted = Float32Array.from({ length: count }, (_, i) => points[3 * i + axis] ?? 0).sort();
+    const [first, last] = [Math.floor(STRAY * (count - 1)), Math.ceil((1 - STRAY) * (count - 1))];
+    low.setComponent(axis, sorted[first] ?? 0);
+    high.setComponent(axis, sorted[last] ?? 0);
+  }
+  box.set(low, high);
+  // What was left out at the ends of a clean set of points.
+  return box.expandByScalar(0.03 * box.getSize(new Vector3()).length());
+}
