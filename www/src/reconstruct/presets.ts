@@ -124,8 +124,8 @@ export const CLOUD_PRESETS: CloudPreset[] = [
         id: '3c',
         name: 'c: thin-plate',
         params: { kernel: 'thin-plate' },
-        came: 'Here thin-plate with λ = 0.001 leaves two pieces with 7 handles, and a third less volume than multi-order.',
-        outcome: { components: 2, genus: 7, meanCurvature: 4.18 },
+        came: 'Here thin-plate with λ = 0.001 leaves three pieces with six handles, and a third less volume than multi-order.',
+        outcome: { components: 3, genus: 6, meanCurvature: 4.18 },
       },
       {
         id: '3d',
