@@ -131,3 +131,80 @@ impl PointGrid {
         (mixed ^ mixed >> 15) as usize & (self.heads.len() - 1)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn points(count: usize) -> Vec<Vec3> {
+        let mut random = Random::new(4);
+        let mut unit = || random.bits() as f32 / 4_294_967_296.0;
+        // Even, then in a clump far away, then some equal ones.
+        let mut all: Vec<Vec3> = (0..count).map(|_| Vec3::new(unit(), unit(), unit()) * 2.0 - 1.0).collect();
+        all.extend((0..count / 4).map(|_| Vec3::new(9.0 + 1e-4 * unit(), -3.0, 1e-4 * unit())));
+        all.extend_from_within(..3);
+        all
+    }
+
+    #[test]
+    fn within_a_radius_are_all_and_no_others() {
+        let all = points(300);
+        for cell in [0.05, 0.3, 5.0] {
+            let grid = PointGrid::of(&all, cell);
+            assert_eq!(grid.points(), all);
+            for &p in all.iter().step_by(7) {
+                for radius in [0.0, 1e-5, 0.1, 0.6] {
+                    let mut found = Vec::new();
+                    grid.within(p, radius, |i, squared| {
+                        assert_eq!(squared, all[i as usize].distance_squared(p));
+                        found.push(i);
+                        true
+                    });
+                    found.sort_unstable();
+                    let expected: Vec<u32> = (0..all.len() as u32)
+                        .filter(|&i| all[i as usize].distance_squared(p) <= radius * radius)
+                        .collect();
+                    assert_eq!(found, expected, "cell {cell}, radius {radius}");
+                    assert!(grid.has_within(p, radius));
+                }
+            }
+            assert!(!grid.has_within(Vec3::splat(4.0), 1.0));
+        }
+    }
+
+    #[test]
+    fn the_nearest_are_those_of_all_pairs() {
+        let all = points(200);
+        for (cell, radius) in [(0.05, 0.1), (0.3, 0.01), (2.0, 9.0), (1e-6, 0.0), (1e-6, 1e-6)] {
+            let grid = PointGrid::of(&all, cell);
+            for &p in all.iter().step_by(5).chain(&[Vec3::splat(1000.0), Vec3::splat(-3.0)]) {
+                for count in [1, 5, 32, 1000] {
+                    let mut expected: Vec<(f32, u32)> =
+                        all.iter().map(|q| q.distance_squared(p)).zip(0..).collect();
+                    expected.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                    expected.truncate(count);
+                    assert_eq!(
+                        grid.nearest(p, count, radius),
+                        expected,
+                        "cell {cell}, {count} from {radius}"
+                    );
+                }
+            }
+        }
+        assert!(PointGrid::new(0.1, 0).nearest(Vec3::ZERO, 3, 0.1).is_empty());
+    }
+
+    #[test]
+    fn a_visit_can_be_ended() {
+        let grid = PointGrid::of(&points(100), 0.5);
+        let mut seen = 0;
+        grid.within(Vec3::ZERO, 2.0, |_, _| {
+            seen += 1;
+            seen < 3
+        });
+        assert_eq!(seen, 3);
+    }
+}

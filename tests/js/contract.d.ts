@@ -212,7 +212,7 @@ export interface ParamSpec {
   unit?: string;
   choices?: string[];
 }
-export function paramSpecs(method: 'deformable'): ParamSpec[];
+export function paramSpecs(method: 'deformable' | 'implicit'): ParamSpec[];
 
 // ── 1. deformable model with automatic topology changes ──────────────────
 export interface DeformableParams {
@@ -261,6 +261,63 @@ export class DeformableModel implements Stepper {
   step(iterations?: number): StepReport;
   run(options?: RunOptions): Promise<StepReport>;
   setParams(params: DeformableParams): void;
+  save(): Uint8Array;
+  restore(state: Uint8Array): void;
+  free(): void;
+  [Symbol.dispose](): void;
+}
+
+// ── 2. implicit surface from points ──────────────────────────────────────
+export interface Camera {
+  /** 3x4 world -> pixel, row-major. */
+  projection: ArrayLike<number>;
+  width: number;
+  height: number;
+  /** rgba8, for colouring the mesh; may be left out. */
+  image?: Uint8ClampedArray;
+}
+/** ply, obj, xyz, pts, csv: detected from the bytes. Colours are rgb, 0..1. */
+export function parsePoints(bytes: Uint8Array): { points: Float32Array; normals?: Float32Array; colors?: Float32Array };
+export interface ImplicitParams {
+  kernel?: 'multi-order' | 'thin-plate' | 'biharmonic' | 'gaussian';
+  delta?: number; // δ first-order smoothness, in the 2x2x2 box
+  tau?: number; // τ third-order smoothness
+  sigma?: number; // gaussian width
+  lambdaSurface?: number;
+  lambdaExterior?: number;
+  tolerance?: number; // relative residual of the solve
+  cell?: number; // edge of an extraction cell, in points' units; default from the sampling
+  level?: 'zero' | 'mean';
+}
+export class ImplicitSurface implements Stepper {
+  constructor(options: {
+    points: Float32Array;
+    normals?: Float32Array;
+    /** Per point; scales lambda: unsure points bind less. */
+    confidence?: Float32Array;
+    /** Points known to be outside. Else made from cameras, normals or the bounding sphere. */
+    exterior?: Float32Array;
+    cameras?: Camera[];
+    maxPoints?: number; // Poisson-disc subsample above this
+    keepComponents?: number; // outliers: keep the n largest connected clusters; default all
+    params?: ImplicitParams;
+  });
+  /** Steps: subsample, constraints, solve, extract, colour. */
+  step(iterations?: number): StepReport;
+  run(options?: RunOptions): Promise<StepReport>;
+  readonly mesh: Mesh;
+  readonly params: Required<ImplicitParams>;
+  setParams(params: ImplicitParams): void;
+  /** f > 0 inside, 0 on the surface, < 0 outside. */
+  evaluate(points: Float32Array): Float32Array;
+  gradient(points: Float32Array): Float32Array;
+  /** The points that took part, and the exterior ones, for display. */
+  constraints(): { surface: Float32Array; exterior: Float32Array };
+  /** Distances from all the original points to the surface. */
+  fitness(): { mean: number; rms: number; max: number; meanCurvature: number };
+  /** f sampled on a grid around the object, so that the deformable model can take over. */
+  toVolume(dims: Vec3): Volume;
+  colorize(cameras: Camera[]): void;
   save(): Uint8Array;
   restore(state: Uint8Array): void;
   free(): void;

@@ -22,6 +22,8 @@ same<Same<built.RunOptions, contract.RunOptions>>(true);
 same<Same<built.ParamSpec, contract.ParamSpec>>(true);
 same<Same<built.DeformableParams, contract.DeformableParams>>(true);
 same<Same<built.Attractor, contract.Attractor>>(true);
+same<Same<built.Camera, contract.Camera>>(true);
+same<Same<built.ImplicitParams, contract.ImplicitParams>>(true);
 
 /** The functions of a class itself, without its constructor. */
 type Statics<C> = Omit<C, 'prototype'>;
@@ -37,6 +39,9 @@ export const mesh = (mesh: built.Mesh): contract.Mesh => mesh;
 export const stepper = (stepper: built.Stepper): contract.Stepper => stepper;
 export const model = (model: built.DeformableModel): contract.DeformableModel & built.Stepper => model;
 
+export const parsePoints: typeof contract.parsePoints = built.parsePoints;
+export const implicit = (surface: built.ImplicitSurface): contract.ImplicitSurface & built.Stepper => surface;
+
 export const Volume: Statics<typeof contract.Volume> = built.Volume;
 export const Mesh: Statics<typeof contract.Mesh> = built.Mesh;
 
@@ -48,3 +53,6 @@ type ModelOptions = ConstructorParameters<typeof contract.DeformableModel>[0];
 type Own<T> = { [K in keyof T]: Swap<T[K]> };
 type Swap<T> = T extends contract.Volume ? built.Volume : T extends contract.Mesh ? built.Mesh : T;
 export const newModel = (options: Own<ModelOptions>) => new built.DeformableModel(options);
+
+type SurfaceOptions = ConstructorParameters<typeof contract.ImplicitSurface>[0];
+export const newSurface = (options: SurfaceOptions) => new built.ImplicitSurface(options);

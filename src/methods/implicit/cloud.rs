@@ -293,3 +293,140 @@ pub fn subsampled(points: &[Vec3], most: usize, seed: u64) -> Vec<u32> {
 const ROUNDS: usize = 16;
 /// The share of the points wanted that is near enough.
 const NEARLY: f64 = 0.97;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn unit(random: &mut Random) -> f32 {
+        random.bits() as f32 / 2_147_483_648.0 - 1.0
+    }
+
+    fn on_ball(count: usize) -> Vec<Vec3> {
+        let mut random = Random::new(7);
+        let mut place =
+            || Vec3::new(unit(&mut random), unit(&mut random), unit(&mut random)).normalize_or(Vec3::X);
+        (0..count).map(|_| place()).collect()
+    }
+
+    #[test]
+    fn into_the_box_and_back() {
+        for (scale, shift) in
+            [(1.0_f32, 0.0_f32), (1e-6, 0.0), (1e6, 3e6), (1e-30, 0.0), (1e38, 0.0), (1.0, 1000.0)]
+        {
+            let points: Vec<Vec3> = on_ball(100)
+                .iter()
+                .map(|p| *p * Vec3::new(1.0, 0.5, 0.2) * scale + Vec3::splat(shift))
+                .collect();
+            let map = BoxMap::of(&points);
+            let inside: Vec<Vec3> = points.iter().map(|&p| map.to_box(p)).collect();
+            let bounds = Bounds::of(&inside);
+            assert!((bounds.max - bounds.min).max_element() <= 2.0 + 1e-6 && bounds.max.x >= 1.0 - 1e-6);
+            for (p, q) in points.iter().zip(&inside) {
+                let back = map.from_box(map.to_box_exactly(p.as_dvec3()));
+                assert!(back.distance(p.as_dvec3()) <= 1e-12 / map.scale() + 1e-14 * f64::from(shift));
+                assert!(map.affine().transform_point3(p.as_dvec3()).distance(q.as_dvec3()) < 1e-6);
+            }
+        }
+        let widest = BoxMap::of(&[Vec3::splat(f32::MIN), Vec3::splat(f32::MAX)]);
+        assert_eq!(widest.to_box(Vec3::splat(f32::MAX)), Vec3::ONE);
+    }
+
+    #[test]
+    fn of_equal_points_the_first_stays_with_all_that_belongs_to_it() {
+        let (a, b, c) = (Vec3::X, Vec3::Y, Vec3::Z);
+        let cloud = Cloud {
+            points: vec![a, b, Vec3::ZERO, a, c, -Vec3::ZERO, b],
+            normals: Some((0..7).map(|i| Vec3::splat(i as f32)).collect()),
+            confidence: Some(vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]),
+            colors: None,
+        };
+        let found = cloud.distinct();
+        assert_eq!(found.points, [a, b, Vec3::ZERO, c]);
+        assert_eq!(found.normals.as_deref().unwrap()[3], Vec3::splat(4.0));
+        assert_eq!(found.confidence.as_deref().unwrap(), [0.1, 0.2, 0.3, 0.5]);
+        assert_eq!(found.distinct(), found);
+    }
+
+    #[test]
+    fn thinned_points_keep_their_distance_and_leave_no_gap() {
+        let points = on_ball(4000);
+        let order = Random::new(1).order(points.len());
+        for radius in [0.02_f32, 0.1, 0.5] {
+            let kept = thinned(&points, &order, radius);
+            for (k, &i) in kept.iter().enumerate() {
+                assert!(kept[..k].iter().all(|&j| points[i as usize].distance(points[j as usize]) > radius));
+            }
+            let reached =
+                |p: &Vec3| kept.iter().any(|&j| points[j as usize].distance_squared(*p) <= radius * radius);
+            assert!(points.iter().all(reached));
+        }
+    }
+
+    #[test]
+    fn nearly_as_many_as_asked_for() {
+        let mut uneven = on_ball(3000);
+        // Most of them on a fifth of the ball.
+        uneven.extend(on_ball(30_000).into_iter().filter(|p| p.z > 0.6));
+        for points in [on_ball(5000), uneven] {
+            for most in [4, 30, 300, 2000, 4999] {
+                let kept = subsampled(&points, most, 1);
+                let least = if most < 100 { 0.6 } else { 0.9 };
+                assert!(
+                    kept.len() <= most && kept.len() as f64 >= least * most as f64,
+                    "{} of {most}",
+                    kept.len()
+                );
+                let mut sorted = kept.clone();
+                sorted.sort_unstable();
+                sorted.dedup();
+                assert_eq!(sorted.len(), kept.len());
+                assert_eq!(kept, subsampled(&points, most, 1));
+            }
+            assert_eq!(subsampled(&points, points.len(), 1).len(), points.len());
+        }
+    }
+
+    #[test]
+    fn clusters_by_size() {
+        let ball = on_ball(500);
+        let mut points: Vec<Vec3> = ball[..100].iter().map(|p| *p * 0.1 + Vec3::X * 3.0).collect();
+        points.extend(&ball);
+        points.push(Vec3::Y * 5.0);
+        let cell = (2.0 * mean_spacing(&points)) as f32 * 3.0;
+        let ball_alone: Vec<u32> = (100..600).collect();
+        assert_eq!(largest_clusters(&points, cell, 1), ball_alone);
+        assert_eq!(largest_clusters(&points, cell, 2), (0..600).collect::<Vec<u32>>());
+        assert_eq!(largest_clusters(&points, cell, 9).len(), 601);
+        assert_eq!(largest_clusters(&points, 100.0, 1).len(), 601);
+    }
+
+    #[test]
+    fn the_mean_spacing_of_a_grid() {
+        let grid: Vec<Vec3> = (0..5000)
+            .map(|k| Vec3::new((k % 10) as f32, (k / 10 % 10) as f32, (k / 100) as f32) * 0.1)
+            .collect();
+        assert!((mean_spacing(&grid) - 0.1).abs() < 1e-5);
+        assert!((mean_spacing(&grid[..2]) - 0.1).abs() < 1e-5);
+    }
+
+    #[test]
+    fn planes_and_lines_span_nothing() {
+        let ball = on_ball(100);
+        let of = |f: fn(&Vec3) -> Vec3| {
+            Cloud { points: ball.iter().map(f).collect(), ..Cloud::default() }.check_span()
+        };
+        assert!(of(|p| *p).is_ok());
+        assert!(of(|p| *p * Vec3::new(1.0, 1.0, 1e-4)).is_ok());
+        for flat in [
+            of(|p| *p * Vec3::new(1.0, 1.0, 0.0)),
+            of(|p| Vec3::new(p.x, p.y, 0.3 * p.x - 0.7 * p.y)),
+            of(|p| Vec3::new(1.0, 0.2, -0.5) * p.x),
+            of(|_| Vec3::ONE),
+        ] {
+            assert!(matches!(flat, Err(MethodError::InvalidArgument { parameter: "points", .. })));
+        }
+    }
+}

@@ -161,3 +161,99 @@ impl Voxels {
         true
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    use crate::methods::implicit::cloud::mean_spacing;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn torus(count: usize) -> Cloud {
+        let mut random = Random::new(12);
+        let mut unit = || f64::from(random.bits()) / 4_294_967_296.0;
+        let (mut points, mut normals) = (Vec::new(), Vec::new());
+        while points.len() < count {
+            let (a, b) = (std::f64::consts::TAU * unit(), std::f64::consts::TAU * unit());
+            let out = DVec3::new(libm::cos(a), libm::sin(a), 0.0);
+            if 0.3 * libm::cos(b) + 0.7 > unit() {
+                let n = out * libm::cos(b) + DVec3::Z * libm::sin(b);
+                points.push((out * 0.7 + n * 0.3).as_vec3());
+                normals.push(n.as_vec3());
+            }
+        }
+        Cloud { points, normals: Some(normals), ..Cloud::default() }
+    }
+
+    fn distance(p: Vec3) -> f32 {
+        let ring = (p.x * p.x + p.y * p.y).sqrt() - 0.7;
+        (ring * ring + p.z * p.z).sqrt() - 0.3
+    }
+
+    /// Looks at the origin from `from`, which is not on the y axis.
+    fn camera(from: DVec3) -> Camera {
+        let ahead = -from.normalize();
+        let right = ahead.cross(DVec3::Y).normalize();
+        let rows = [right * 50.0 + ahead * 50.0, ahead.cross(right) * 50.0 + ahead * 50.0, ahead];
+        let row = |r: DVec3| [r.x, r.y, r.z, -r.dot(from)];
+        Camera::new(rows.map(row).concat().try_into().unwrap(), 100, 100, None).unwrap()
+    }
+
+    #[test]
+    fn outside_with_cameras_normals_and_without() {
+        let known = torus(2000);
+        let unknown = Cloud { normals: None, ..known.clone() };
+        let spacing = mean_spacing(&known.points) as f32;
+        let around: Vec<Camera> =
+            [DVec3::X, DVec3::Z, -DVec3::X, -DVec3::Z, DVec3::new(0.3, 1.0, 0.0), DVec3::new(0.3, -1.0, 0.0)]
+                .map(|d| camera(d * 6.0))
+                .to_vec();
+        for (name, cloud, cameras) in [
+            ("normals", &known, &[][..]),
+            ("cameras", &unknown, &around),
+            ("both", &known, &around),
+            ("none", &unknown, &[]),
+        ] {
+            let found = exterior_points(cloud, cameras, spacing, 1);
+            let (near, sphere) = found.split_at(found.len() - ON_SPHERE);
+            println!(
+                "{name}: {} points, nearest {}",
+                near.len(),
+                near.iter().map(|&p| distance(p)).fold(9.0, f32::min)
+            );
+            assert!((100..=200).contains(&near.len()), "{name}: {}", near.len());
+            for &p in near {
+                assert!(distance(p) > 0.02 && distance(p) < 0.3, "{name}: {p} is {} outside", distance(p));
+            }
+            assert!(sphere.iter().all(|p| p.length() > 1.05));
+            assert_eq!(found, exterior_points(cloud, cameras, spacing, 1));
+        }
+    }
+
+    #[test]
+    fn around_everything_evenly() {
+        let points = [Vec3::new(-1.0, -0.2, 3.0), Vec3::new(1.0, 0.1, 3.4)];
+        let sphere = sphere_around(&points);
+        let middle = 0.5 * (points[0] + points[1]);
+        let radius = 0.6 * points[0].distance(points[1]);
+        assert_eq!(sphere.len(), ON_SPHERE);
+        assert!(sphere.iter().all(|p| (p.distance(middle) - radius).abs() < 1e-5));
+        let nearest =
+            |p: &Vec3| sphere.iter().filter(|q| *q != p).map(|q| q.distance(*p)).fold(9.0, f32::min);
+        assert!(sphere.iter().all(|p| nearest(p) > 0.5 * radius));
+        assert!(((sphere.iter().copied().sum::<Vec3>() / 16.0) - middle).length() < 0.05 * radius);
+    }
+
+    #[test]
+    fn voxels_hide_what_is_behind_them() {
+        let cloud = torus(4000);
+        let voxels = Voxels::new(&cloud.points, 3.5 * mean_spacing(&cloud.points) as f32);
+        let right = Vec3::X;
+        assert!(voxels.is_free(right, Vec3::X * 9.0));
+        assert!(!voxels.is_free(right, Vec3::X * -9.0));
+        // Through the hole.
+        assert!(voxels.is_free(Vec3::new(0.0, 0.0, -2.0), Vec3::Z * 9.0));
+        assert!(voxels.is_free(right, right));
+    }
+}

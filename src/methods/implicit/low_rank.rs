@@ -76,3 +76,48 @@ fn largest(values: &[f64], allowed: impl Fn(usize) -> bool) -> usize {
 fn narrowed<T: Number>(parts: &[Vec<f64>]) -> Vec<T> {
     parts.iter().flatten().map(|&x| T::of(x)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn error(found: &LowRank<f64>, [height, width]: [usize; 2], entry: impl Fn(usize, usize) -> f64) -> f64 {
+        let (mut off, mut size) = (0.0, 0.0);
+        for i in 0..height {
+            for j in 0..width {
+                let parts = found.columns.chunks(height).zip(found.rows.chunks(width));
+                let sum: f64 = parts.map(|(u, v)| u[i] * v[j]).sum();
+                off += (sum - entry(i, j)) * (sum - entry(i, j));
+                size += entry(i, j) * entry(i, j);
+            }
+        }
+        if size > 0.0 { (off / size).sqrt() } else { off }
+    }
+
+    #[test]
+    fn as_near_as_asked_for() {
+        // Two stretches of a line, apart; a product; nothing; a single row.
+        let far = |i: usize, j: usize| 1.0 / (3.0 + i as f64 * 0.02 + j as f64 * 0.03);
+        let product = |i: usize, j: usize| (1.0 + i as f64) * (j as f64 - 4.5);
+        type Block<'a> = ([usize; 2], &'a dyn Fn(usize, usize) -> f64);
+        let blocks: [Block; 4] =
+            [([60, 40], &far), ([30, 50], &product), ([9, 7], &|_, _| 0.0), ([1, 40], &far)];
+        for (size, entry) in blocks {
+            for tolerance in [1e-3, 1e-6, 1e-10] {
+                let fill = |out: &mut [f64], at: &dyn Fn(usize) -> f64| {
+                    out.iter_mut().enumerate().for_each(|(k, x)| *x = at(k));
+                };
+                let found = cross_approximation::<f64>(
+                    size,
+                    tolerance,
+                    |i, out| fill(out, &|j| entry(i, j)),
+                    |j, out| fill(out, &|i| entry(i, j)),
+                );
+                assert!(error(&found, size, entry) <= 3.0 * tolerance, "{size:?}, {tolerance}");
+                assert!(found.columns.len() <= 12 * size[0], "{} numbers", found.columns.len());
+            }
+        }
+    }
+}

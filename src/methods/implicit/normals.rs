@@ -161,3 +161,101 @@ fn propagate(start: u32, links: &[Vec<u32>], normals: &mut [Vec3], turned: &mut 
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    use crate::methods::implicit::cloud::mean_spacing;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn unit(random: &mut Random) -> f64 {
+        f64::from(random.bits()) / 4_294_967_296.0
+    }
+
+    /// About normally distributed, of deviation 1.
+    fn noise(random: &mut Random) -> f64 {
+        2.0 * ((0..3).map(|_| unit(random)).sum::<f64>() - 1.5)
+    }
+
+    type Surface = fn(&mut Random) -> (DVec3, DVec3);
+
+    fn ball(random: &mut Random) -> (DVec3, DVec3) {
+        let n = DVec3::new(noise(random), noise(random), noise(random)).normalize_or(DVec3::X);
+        (n, n)
+    }
+
+    fn torus(random: &mut Random) -> (DVec3, DVec3) {
+        loop {
+            let [a, b] = [0; 2].map(|_| std::f64::consts::TAU * unit(random));
+            let out = DVec3::new(libm::cos(a), libm::sin(a), 0.0);
+            // As many to an area everywhere.
+            if 0.3 * libm::cos(b) + 0.7 > unit(random) {
+                let n = out * libm::cos(b) + DVec3::Z * libm::sin(b);
+                return (out * 0.7 + n * 0.3, n);
+            }
+        }
+    }
+
+    fn two_balls(random: &mut Random) -> (DVec3, DVec3) {
+        let (_, n) = ball(random);
+        if unit(random) < 0.7 { (n * 0.5 - DVec3::X * 0.5, n) } else { (n * 0.3 + DVec3::X * 0.7, n) }
+    }
+
+    #[test]
+    fn nearly_all_point_outwards() {
+        let shapes: [(&str, Surface); 3] = [("ball", ball), ("torus", torus), ("two balls", two_balls)];
+        for (name, shape) in shapes {
+            for deviation in [0.0, 0.01] {
+                for count in [1500, 3000] {
+                    let mut random = Random::new(11);
+                    let (exact, outwards): (Vec<DVec3>, Vec<DVec3>) =
+                        (0..count).map(|_| shape(&mut random)).unzip();
+                    let mut moved = |p: &DVec3| {
+                        let by = DVec3::new(noise(&mut random), noise(&mut random), noise(&mut random));
+                        (*p + by * deviation).as_vec3()
+                    };
+                    let points: Vec<Vec3> = exact.iter().map(&mut moved).collect();
+                    let at: Vec<u32> = (0..count).step_by(8).collect();
+                    let found = estimated_normals(&points, &at, mean_spacing(&points) as f32);
+                    let right = |(i, n): &(&u32, &Vec3)| outwards[**i as usize].dot(n.as_dvec3()) > 0.5;
+                    let share =
+                        at.iter().zip(&found.directions).filter(right).count() as f64 / at.len() as f64;
+                    println!(
+                        "{name}, noise {deviation}, {count}: {:.2} %, noise found {:.4}",
+                        100.0 * share,
+                        found.noise
+                    );
+                    assert!(share >= 0.98, "{name}, noise {deviation}, {count} points: {share}");
+                    if deviation > 0.0 {
+                        assert!(
+                            (0.5..2.0).contains(&(f64::from(found.noise) / deviation)),
+                            "{name}: {}",
+                            found.noise
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    /// A wrong start, and all of a part with it, is turned by the sign of its volume.
+    #[test]
+    fn turned_from_any_start() {
+        let mut random = Random::new(5);
+        let places: Vec<Vec3> = (0..400).map(|_| ball(&mut random).0.as_vec3()).collect();
+        let links = links(&places, 0.3);
+        let all = parts(&links);
+        assert_eq!(all.len(), 1);
+        for start in [0, 7, 399] {
+            // Half of them wrong, the start too.
+            let mut normals: Vec<Vec3> =
+                places.iter().zip(0..).map(|(p, i)| *p * [1.0, -1.0][i % 2]).collect();
+            normals[start as usize] = -places[start as usize];
+            propagate(start, &links, &mut normals, &mut vec![false; places.len()]);
+            assert!(places.iter().zip(&normals).all(|(p, n)| p.dot(*n) < 0.0));
+            assert!(outflow(&places, &normals, &all[0]) < 0.0);
+        }
+    }
+}

@@ -285,3 +285,108 @@ fn far_offsets(place: Place) -> impl Iterator<Item = Place> {
     let all = (0..216).map(move |k| [lowest[0] + k % 6, lowest[1] + k / 6 % 6, lowest[2] + k / 36]);
     all.filter(|offset| offset.iter().any(|d| d.abs() > 1))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Random, Vec3};
+    use crate::methods::implicit::kernel::{Kernel, KernelTable};
+    use crate::methods::implicit::solve::Solution;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn unit(random: &mut Random) -> f64 {
+        f64::from(random.bits()) / 2_147_483_648.0 - 1.0
+    }
+
+    fn direction(random: &mut Random) -> DVec3 {
+        DVec3::new(unit(random), unit(random), unit(random)).normalize_or(DVec3::X)
+    }
+
+    /// Terms around a ball, of both signs, that cancel as those of a solution do.
+    fn field(kernel: Kernel) -> Field {
+        let mut random = Random::new(1);
+        let mut centres: Vec<Vec3> = (0..2000).map(|_| direction(&mut random).as_vec3()).collect();
+        centres.extend((0..16).map(|_| (direction(&mut random) * 2.0).as_vec3()));
+        let mut weights: Vec<f64> = centres.iter().map(|_| unit(&mut random)).collect();
+        let mean = weights.iter().sum::<f64>() / weights.len() as f64;
+        weights.iter_mut().for_each(|w| *w -= mean);
+        let coefficients = if kernel.polynomials() == 4 { vec![0.3, 0.1, -0.2, 0.4] } else { vec![0.3] };
+        Field::new(KernelTable::new(kernel), &centres, &Solution { weights, coefficients })
+    }
+
+    /// On the surface, near it, within, at the rim, and beyond the box.
+    fn places(count: usize) -> Vec<DVec3> {
+        let mut random = Random::new(2);
+        (0..count)
+            .map(|k| direction(&mut random) * [1.0, 1.001, 1.1, 0.3, 1.9, 6.0, 60.0][k % 7])
+            .chain([DVec3::ZERO, DVec3::splat(2.0), DVec3::splat(-2.0)])
+            .collect()
+    }
+
+    #[test]
+    fn it_is_the_function_and_its_gradient() {
+        for kernel in [
+            Kernel::MultiOrder { delta: 5.0, tau: 0.025 },
+            Kernel::MultiOrder { delta: 40.0, tau: 0.025 },
+            Kernel::MultiOrder { delta: 10.0, tau: 0.01 },
+            Kernel::Gaussian { sigma: 0.07 },
+            Kernel::ThinPlate { radius: 2.0 },
+            Kernel::Biharmonic { radius: 2.0 },
+        ] {
+            let exact = field(kernel);
+            // What grows with the distance cancels far away.
+            let rounding = if kernel.is_conditional() { 1e-6 } else { 1e-12 };
+            let mut fast = FastField::new(exact.clone(), DVec3::splat(-1.5), DVec3::splat(1.5));
+            let at = places(700);
+            let mut values = vec![0.0; at.len()];
+            fast.values(&at, &mut values);
+            let expected: Vec<(f64, DVec3)> = at.iter().map(|&p| exact.value_and_gradient(p)).collect();
+            let size = expected.iter().map(|(f, _)| (f - 0.3).abs()).fold(0.0, f64::max);
+            let steep = expected.iter().map(|(_, g)| g.length()).fold(0.0, f64::max);
+            let (mut worst, mut worst_slope): (f64, f64) = (0.0, 0.0);
+            for ((p, value), (f, g)) in at.iter().zip(&values).zip(&expected) {
+                assert!((exact.value(*p) - f).abs() <= rounding * size);
+                let (same, slope) = fast.value_and_gradient(*p);
+                assert!((same - value).abs() <= rounding * size, "{kernel:?} at {p}: {same}, {value}");
+                worst = worst.max((value - f).abs() / size);
+                worst_slope = worst_slope.max(slope.distance(*g) / steep);
+            }
+            println!("{kernel:?}: {worst:e}, gradients {worst_slope:e}");
+            assert!(worst < 2e-3 && worst_slope < 1e-2, "{kernel:?}: {worst:e}, gradients {worst_slope:e}");
+            assert!(!kernel.is_conditional() || worst < rounding);
+        }
+    }
+
+    #[test]
+    fn the_same_bits_in_any_order_of_asking() {
+        let exact = field(Kernel::MultiOrder { delta: 5.0, tau: 0.025 });
+        let new = || FastField::new(exact.clone(), DVec3::splat(-1.5), DVec3::splat(1.5));
+        let at = places(300);
+        let (mut values, mut backwards) = (vec![0.0; at.len()], vec![0.0; at.len()]);
+        new().values(&at, &mut values);
+        let mut other = new();
+        for i in (0..at.len()).rev() {
+            other.value_and_gradient(at[i]);
+            other.values(&at[i..=i], &mut backwards[i..=i]);
+        }
+        assert!(values.iter().zip(&backwards).all(|(a, b)| a.to_bits() == b.to_bits()));
+    }
+
+    #[test]
+    fn few_terms_and_terms_in_one_place() {
+        let kernel = Kernel::MultiOrder { delta: 5.0, tau: 0.025 };
+        for centres in [vec![Vec3::ZERO], (0..200).map(|k| Vec3::X + Vec3::Y * (k as f32 * 1e-6)).collect()] {
+            let weights = vec![1.0; centres.len()];
+            let solution = Solution { weights, coefficients: vec![0.0] };
+            let exact = Field::new(KernelTable::new(kernel), &centres, &solution);
+            let mut fast = FastField::new(exact.clone(), DVec3::splat(-1.0), DVec3::splat(1.0));
+            let at = places(70);
+            let mut values = vec![0.0; at.len()];
+            fast.values(&at, &mut values);
+            for (p, value) in at.iter().zip(&values) {
+                assert!((value / exact.value(*p) - 1.0).abs() < 1e-3, "{p}: {value}, {}", exact.value(*p));
+            }
+        }
+    }
+}

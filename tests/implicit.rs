@@ -1,0 +1,666 @@
+//! The implicit surface against shapes with a known answer, and its promises: a sound mesh, the same bits every time and
+//! after every restore, clear refusals.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails by panicking, and says its figures"
+)]
+mod common;
+#[path = "common/points.rs"]
+mod points;
+
+use common::{Random, euler_of_parts};
+use points::{Shape, blend, distance, noisy, pair, sphere, surface_points, torus};
+use vesicle::math::{DVec3, Vec3};
+use vesicle::mesh::{TriangleMesh, curvature, measure, report};
+use vesicle::methods::implicit::{
+    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, KernelKind, Level, param_specs,
+};
+use vesicle::methods::{MethodError, StepReport};
+use vesicle::volume::marching_cubes_world;
+#[cfg(target_arch = "wasm32")]
+use wasm_bindgen_test::wasm_bindgen_test as test;
+
+/// The number of points of most scenes.
+const MANY: usize = if cfg!(target_arch = "wasm32") { 1000 } else { 3000 };
+
+fn finish(surface: &mut ImplicitSurface) -> StepReport {
+    for _ in 0..100_000 {
+        let report = surface.step().unwrap();
+        assert!(report.progress.is_nan() || (0.0..=1.0).contains(&report.progress), "{report:?}");
+        if report.done {
+            return report;
+        }
+    }
+    panic!("no end")
+}
+
+fn of_points(points: Vec<Vec3>) -> Cloud {
+    Cloud { points, ..Cloud::default() }
+}
+
+fn begun(points: Vec<Vec3>, params: ImplicitParams) -> ImplicitSurface {
+    ImplicitSurface::new(of_points(points), ImplicitOptions { params, ..ImplicitOptions::default() }).unwrap()
+}
+
+fn finished(points: Vec<Vec3>, params: ImplicitParams) -> ImplicitSurface {
+    let mut surface = begun(points, params);
+    finish(&mut surface);
+    surface
+}
+
+fn sound(mesh: &TriangleMesh) {
+    let found = report(mesh).unwrap();
+    assert!(found.is_healthy() && !mesh.triangles.is_empty(), "{found:?}");
+    let normals = mesh.normals.as_ref().unwrap();
+    assert_eq!(normals.len(), mesh.positions.len());
+    // Those of the triangles agree with those of the gradient.
+    let wrong = mesh.vertex_normals().iter().zip(normals).filter(|(a, b)| a.dot(**b) < 0.5).count();
+    assert!(wrong * 100 <= normals.len(), "{wrong} of {} normals", normals.len());
+    assert!(measure(mesh).volume > 0.0);
+}
+
+/// Mean and largest distance of the vertices from the true surface.
+fn errors(shape: Shape, mesh: &TriangleMesh) -> [f64; 2] {
+    let all: Vec<f64> = mesh.positions.iter().map(|p| distance(shape, p.as_dvec3()).abs()).collect();
+    [all.iter().sum::<f64>() / all.len() as f64, all.iter().copied().fold(0.0, f64::max)]
+}
+
+fn error(result: Result<impl Sized, MethodError>) -> MethodError {
+    match result {
+        Ok(_) => panic!("no error"),
+        Err(error) => error,
+    }
+}
+
+/// The name of what an error is about.
+fn refused(result: Result<impl Sized, MethodError>) -> &'static str {
+    match error(result) {
+        MethodError::InvalidArgument { parameter, problem } => {
+            assert!(problem.len() > 10, "{parameter}: {problem}");
+            parameter
+        }
+        error => panic!("{error}"),
+    }
+}
+
+/// Bounds are some times what was measured, as fewer points take part in wasm.
+fn comes_out(shape: Shape, euler: &[i64], noise: f64, mean: f64, largest: f64) {
+    let surface = finished(noisy(shape, MANY, noise, 7), ImplicitParams::default());
+    sound(surface.surface());
+    let found = errors(shape, surface.surface());
+    println!(
+        "χ {:?}, noise {noise}: mean {:.5}, largest {:.5}",
+        euler_of_parts(surface.surface()),
+        found[0],
+        found[1]
+    );
+    assert_eq!(euler_of_parts(surface.surface()), euler);
+    assert_eq!(surface.strays(), 0);
+    assert!(found[0] < mean && found[1] < largest, "{found:?}");
+}
+
+#[test]
+fn a_ball() {
+    comes_out(sphere, &[2], 0.0, 0.003, 0.01);
+    comes_out(sphere, &[2], 0.01, 0.008, 0.04);
+}
+
+#[test]
+fn a_torus() {
+    comes_out(torus, &[0], 0.0, 0.003, 0.01);
+    comes_out(torus, &[0], 0.01, 0.008, 0.04);
+}
+
+#[test]
+fn bodies_grown_together_keep_their_hole() {
+    comes_out(blend, &[0], 0.0, 0.003, 0.02);
+    comes_out(blend, &[0], 0.01, 0.008, 0.06);
+}
+
+#[test]
+fn two_parts_stay_two() {
+    comes_out(pair, &[2, 2], 0.0, 0.003, 0.01);
+    comes_out(pair, &[2, 2], 0.01, 0.008, 0.04);
+}
+
+#[cfg(not(target_arch = "wasm32"))]
+#[test]
+fn twenty_thousand_noisy_points_of_a_torus() {
+    let surface = finished(noisy(torus, 20_000, 0.01, 7), ImplicitParams::default());
+    sound(surface.surface());
+    let found = errors(torus, surface.surface());
+    println!("mean {:.5}, largest {:.5}", found[0], found[1]);
+    assert_eq!(euler_of_parts(surface.surface()), [0]);
+    assert!(found[0] < 0.006, "{found:?}");
+}
+
+#[test]
+fn without_regularization_it_passes_through_the_points() {
+    let points = noisy(blend, 800, 0.0, 3);
+    let params = ImplicitParams { lambda_surface: 0.0, tolerance: 1e-8, ..ImplicitParams::default() };
+    let surface = finished(points.clone(), params);
+    let values = surface.evaluate(&points).unwrap();
+    let most = values.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
+    let outside = surface.evaluate(&surface.constraints()[1]).unwrap();
+    let range = outside.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
+    println!("{most:e} of {range}, {:?}, cell {}", surface.fitness(), surface.cell());
+    assert!(most <= 1e-4 * range, "{most} of {range}");
+    // Triangles cut corners, most of all where two bodies meet.
+    let fitness = surface.fitness().unwrap();
+    assert!(fitness.max < 2.0 * surface.cell() && fitness.mean < 0.1 * surface.cell());
+}
+
+#[test]
+fn more_regularization_makes_noisy_points_smoother() {
+    let points = noisy(sphere, 1000, 0.01, 5);
+    let mut surface = begun(points, ImplicitParams::default());
+    let mut curvatures = Vec::new();
+    for lambda_surface in [0.0, 0.001, 0.01, 0.1] {
+        surface
+            .set_params(ImplicitParams { lambda_surface, level: Level::Mean, ..ImplicitParams::default() })
+            .unwrap();
+        finish(&mut surface);
+        sound(surface.surface());
+        let found = surface.fitness().unwrap();
+        println!("{lambda_surface}: {found:?}");
+        curvatures.push(found.mean_curvature);
+    }
+    // With the last the ball has shrunk, and what is left of 1 is that.
+    let [free, usual, more, most] = curvatures[..] else { panic!("{curvatures:?}") };
+    assert!(free > 1.4 * usual && usual > 1.08 * more && usual > 1.05 * most, "{curvatures:?}");
+}
+
+#[test]
+fn a_gap_is_closed() {
+    let mut points = noisy(sphere, 2 * MANY / 3, 0.0, 9);
+    points.retain(|p| p.z < 0.75);
+    let surface = finished(points, ImplicitParams::default());
+    sound(surface.surface());
+    assert_eq!(euler_of_parts(surface.surface()), [2]);
+    let found = errors(sphere, surface.surface());
+    println!("{found:?}");
+    assert!(found[0] < 0.03 && found[1] < 0.25, "{found:?}");
+}
+
+#[test]
+fn the_mean_level_passes_nearer_to_the_points() {
+    let mut surface = finished(noisy(sphere, 1000, 0.0, 1), ImplicitParams::default());
+    let (zero, volume) = (surface.fitness().unwrap().mean, measure(surface.surface()).volume);
+    surface.set_params(ImplicitParams { level: Level::Mean, ..ImplicitParams::default() }).unwrap();
+    finish(&mut surface);
+    println!("{zero} and {}", surface.fitness().unwrap().mean);
+    assert!(surface.fitness().unwrap().mean < zero);
+    assert!(measure(surface.surface()).volume > volume);
+}
+
+#[test]
+fn other_parameters_give_what_a_fresh_surface_has() {
+    let points = noisy(torus, 500, 0.005, 2);
+    let changes = [
+        ImplicitParams { delta: 10.0, tau: 0.01, ..ImplicitParams::default() },
+        ImplicitParams { delta: 10.0, tau: 0.01, cell: 0.03, ..ImplicitParams::default() },
+        ImplicitParams { lambda_surface: 0.0, lambda_exterior: 0.5, cell: 0.03, ..ImplicitParams::default() },
+        ImplicitParams { kernel: KernelKind::ThinPlate, level: Level::Mean, ..ImplicitParams::default() },
+        ImplicitParams { kernel: KernelKind::Biharmonic, tolerance: 1e-8, ..ImplicitParams::default() },
+        ImplicitParams { kernel: KernelKind::Gaussian, sigma: 0.2, ..ImplicitParams::default() },
+    ];
+    let mut surface = finished(points.clone(), ImplicitParams::default());
+    for (k, params) in changes.into_iter().enumerate() {
+        surface.set_params(params.clone()).unwrap();
+        assert_eq!(*surface.params(), params);
+        // Also when they change again on the way.
+        (0..3 * k).for_each(|_| drop(surface.step().unwrap()));
+        let other = ImplicitParams { delta: 7.0, ..params.clone() };
+        surface.set_params(other).unwrap();
+        (0..k).for_each(|_| drop(surface.step().unwrap()));
+        surface.set_params(params.clone()).unwrap();
+        finish(&mut surface);
+        let fresh = finished(points.clone(), params);
+        assert!(surface.surface() == fresh.surface(), "change {k}");
+        assert!(surface.evaluate(&points) == fresh.evaluate(&points), "change {k}");
+    }
+}
+
+#[test]
+fn only_what_depends_on_a_parameter_is_done_again() {
+    let mut surface = finished(noisy(sphere, 400, 0.0, 4), ImplicitParams::default());
+    for change in [
+        ImplicitParams { cell: 0.05, ..ImplicitParams::default() },
+        ImplicitParams { cell: 0.05, level: Level::Mean, ..ImplicitParams::default() },
+    ] {
+        let before = surface.surface().clone();
+        surface.set_params(change.clone()).unwrap();
+        let report = surface.step().unwrap();
+        assert!(report.phase == "extract" && !report.done, "{report:?}");
+        assert!(*surface.surface() == before);
+        finish(&mut surface);
+        assert!(*surface.surface() != before);
+        let report = surface.step().unwrap();
+        surface.set_params(change).unwrap();
+        assert_eq!(surface.step().unwrap().iteration, report.iteration, "nothing to do");
+    }
+    surface.set_params(ImplicitParams { lambda_surface: 0.002, ..ImplicitParams::default() }).unwrap();
+    assert_eq!(surface.step().unwrap().phase, "solve");
+}
+
+#[test]
+fn a_failure_keeps_the_surface_and_other_parameters_go_on() {
+    let points = noisy(sphere, 400, 0.0, 4);
+    let mut surface = finished(points, ImplicitParams::default());
+    let (before, params) = (surface.surface().clone(), surface.params().clone());
+    for (name, wrong) in [
+        ("cell", ImplicitParams { cell: 1e-9, ..params.clone() }),
+        ("cell", ImplicitParams { cell: 1e-29, ..params.clone() }),
+        ("delta", ImplicitParams { delta: 0.0, ..params.clone() }),
+        ("tau", ImplicitParams { tau: f64::NAN, cell: 0.1, ..params.clone() }),
+    ] {
+        assert_eq!(refused(surface.set_params(wrong)), name);
+        assert_eq!(*surface.params(), params);
+        assert!(surface.step().unwrap().done);
+        assert!(*surface.surface() == before);
+    }
+    // Found only when the extraction begins.
+    surface.set_params(ImplicitParams { cell: 1e-9, delta: 6.0, ..params.clone() }).unwrap();
+    let failed = (0..10_000).find_map(|_| surface.step().err());
+    assert!(matches!(failed, Some(MethodError::InvalidArgument { parameter: "cell", .. })), "{failed:?}");
+    assert!(*surface.surface() == before);
+    surface.set_params(params).unwrap();
+    assert!(finish(&mut surface).done);
+    assert!(*surface.surface() == before);
+}
+
+#[test]
+fn a_system_that_cannot_be_solved_says_so() {
+    let mut points = noisy(sphere, 300, 0.0, 4);
+    let twins: Vec<Vec3> = points.iter().map(|p| *p + Vec3::new(1e-7, 0.0, -1e-7)).collect();
+    points.extend(twins);
+    let wide = ImplicitParams {
+        kernel: KernelKind::Gaussian,
+        sigma: 1.0,
+        lambda_surface: 0.0,
+        lambda_exterior: 0.0,
+        tolerance: 1e-12,
+        ..ImplicitParams::default()
+    };
+    let mut surface = begun(points, wide);
+    let failed = (0..100_000).find_map(|_| match surface.step() {
+        Ok(report) => report.done.then(|| panic!("solved")),
+        Err(error) => Some(error),
+    });
+    let Some(MethodError::Singular { constraints, cause }) = failed else { panic!("{failed:?}") };
+    assert!(constraints > 300 && cause.contains("lambdaSurface"), "{constraints}: {cause}");
+    assert!(surface.surface().triangles.is_empty());
+    surface.set_params(ImplicitParams::default()).unwrap();
+    finish(&mut surface);
+    sound(surface.surface());
+}
+
+#[test]
+fn a_restored_run_goes_on_bit_for_bit() {
+    let mut random = Random(3);
+    let (exact, normals) = surface_points(blend, 500, &mut random);
+    let cloud = Cloud {
+        colors: Some(normals.iter().map(|n| (n.as_vec3() + Vec3::ONE) * 0.5).collect()),
+        confidence: Some(exact.iter().map(|_| random.within(0.1, 1.0) as f32).collect()),
+        ..of_points(exact.iter().map(|p| p.as_vec3()).collect())
+    };
+    let options = ImplicitOptions { cameras: cameras(2, 64), max_points: 400, ..ImplicitOptions::default() };
+    let begun = || ImplicitSurface::new(cloud.clone(), options.clone()).unwrap();
+    let mut whole = begun();
+    let last = finish(&mut whole);
+    let mut running = begun();
+    let mut phases = Vec::new();
+    loop {
+        let report = running.step().unwrap();
+        phases.push(report.phase.clone());
+        // Every slice of the short phases, and some of the long ones.
+        let count = phases.iter().filter(|phase| **phase == report.phase).count();
+        if count < 4 || count % 16 == 0 {
+            let mut resumed = begun();
+            resumed.restore(&running.save()).unwrap();
+            let end = finish(&mut resumed);
+            assert_eq!((end.iteration, end.residual.to_bits()), (last.iteration, last.residual.to_bits()));
+            assert!(resumed.surface() == whole.surface(), "{report:?}");
+        }
+        if report.done {
+            break;
+        }
+    }
+    for phase in ["subsample", "constraints", "solve", "extract", "colour"] {
+        assert!(phases.iter().any(|found| found == phase), "{phase} of {phases:?}");
+    }
+    // While another solution is on its way the last surface stays, and is restored with it.
+    whole.set_params(ImplicitParams { delta: 8.0, ..ImplicitParams::default() }).unwrap();
+    (0..3).for_each(|_| drop(whole.step().unwrap()));
+    let mut resumed = begun();
+    resumed.restore(&whole.save()).unwrap();
+    assert!(resumed.surface() == whole.surface());
+    assert_eq!(resumed.params(), whole.params());
+    assert_eq!(finish(&mut resumed).iteration, finish(&mut whole).iteration);
+    assert!(resumed.surface() == whole.surface());
+}
+
+#[test]
+fn states_that_are_none_change_nothing() {
+    let points = noisy(sphere, 200, 0.0, 4);
+    let mut surface = finished(points.clone(), ImplicitParams::default());
+    let (state, before) = (surface.save(), surface.surface().clone());
+    let mut broken =
+        vec![Vec::new(), state[..20].to_vec(), state[..state.len() - 1].to_vec(), vec![7; state.len()]];
+    for at in (0..state.len()).step_by(state.len() / 50) {
+        broken.push(state.clone());
+        *broken.last_mut().unwrap().get_mut(at).unwrap() ^= 0x40;
+    }
+    for bytes in broken {
+        assert!(matches!(error(surface.restore(&bytes)), MethodError::BadState { .. }));
+    }
+    let mut others = points;
+    others[7].x += 0.001;
+    let foreign = begun(others, ImplicitParams::default()).save();
+    assert!(matches!(error(surface.restore(&foreign)), MethodError::BadState { field: "points", .. }));
+    assert!(*surface.surface() == before);
+}
+
+#[test]
+fn sampled_as_a_volume_it_is_the_same_shape() {
+    let surface = finished(noisy(torus, 800, 0.0, 8), ImplicitParams::default());
+    let volume = surface.to_volume([70, 70, 40]).unwrap();
+    let sampled = marching_cubes_world(&volume, 0.0, 0).unwrap();
+    let [found, expected] = [&sampled, surface.surface()].map(measure);
+    assert_eq!((found.components, found.genus), (1, 1));
+    println!("{} for {}", found.volume, expected.volume);
+    assert!((found.volume / expected.volume - 1.0).abs() < 0.02);
+    assert!(found.centroid.distance(expected.centroid) < 0.01);
+    for dims in [[1, 9, 9], [9, 0, 9]] {
+        assert_eq!(refused(surface.to_volume(dims)), "dims");
+    }
+}
+
+#[test]
+fn fitness_of_a_ball() {
+    let surface = finished(noisy(sphere, MANY, 0.0, 1), ImplicitParams::default());
+    let found = surface.fitness().unwrap();
+    let off = errors(sphere, surface.surface())[0];
+    println!("{found:?}, off by {off}");
+    assert!((found.mean_curvature - 1.0).abs() < 0.3);
+    assert!(found.mean <= found.rms && found.rms <= found.max);
+    assert!((found.mean - off).abs() < 0.002);
+    // Points that are left out count, too.
+    let mut points = noisy(sphere, 600, 0.0, 1);
+    points.push(Vec3::new(0.0, 0.0, 3.0));
+    let options = ImplicitOptions { keep_components: Some(1), ..ImplicitOptions::default() };
+    let mut surface = ImplicitSurface::new(of_points(points), options).unwrap();
+    finish(&mut surface);
+    assert_eq!(surface.constraints()[0].len(), 600);
+    assert!((surface.fitness().unwrap().max - 2.0).abs() < 0.05);
+}
+
+#[test]
+fn values_and_slopes_of_the_function() {
+    let surface = finished(noisy(sphere, 500, 0.0, 1), ImplicitParams::default());
+    assert!(surface.evaluate(&[Vec3::ZERO]).unwrap()[0] > 0.0);
+    assert!(surface.evaluate(&[Vec3::new(1.2, 0.0, 0.0)]).unwrap()[0] < 0.0);
+    for p in [Vec3::new(0.9, 0.2, 0.1), Vec3::new(0.0, -1.1, 0.3)] {
+        let slope = surface.gradient(&[p]).unwrap()[0];
+        assert!(slope.dot(p.as_dvec3()) < 0.0, "inwards: {slope}");
+        let h = 1.0 / 1024.0;
+        for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+            let ends = surface.evaluate(&[p + axis * h, p - axis * h]).unwrap();
+            let along = (ends[0] - ends[1]) / f64::from(2.0 * h);
+            assert!((along - slope.dot(axis.as_dvec3())).abs() < 1e-3 * slope.length(), "{slope}, {along}");
+        }
+    }
+}
+
+#[test]
+fn colours_of_points_come_through() {
+    let points = noisy(sphere, 600, 0.0, 1);
+    let color = |p: Vec3| if p.z > 0.0 { Vec3::X } else { Vec3::Y };
+    let cloud = Cloud { colors: Some(points.iter().map(|&p| color(p)).collect()), ..of_points(points) };
+    let mut surface = ImplicitSurface::new(cloud, ImplicitOptions::default()).unwrap();
+    finish(&mut surface);
+    let mesh = surface.surface();
+    let colors = mesh.colors.as_ref().unwrap();
+    assert_eq!(colors.len(), mesh.positions.len());
+    let away = mesh.positions.iter().zip(colors).filter(|(p, _)| p.z.abs() > 0.3);
+    let off = away.map(|(&p, c)| c.distance(color(p))).fold(0.0, f32::max);
+    assert!(off < 1e-3, "{off}");
+    assert_eq!(finished(noisy(sphere, 50, 0.0, 1), ImplicitParams::default()).surface().colors, None);
+}
+
+/// Cameras around the z axis, five away, that look at the origin; each with a picture of one colour.
+fn cameras(count: u8, size: u32) -> Vec<Camera> {
+    let camera = |k: u8| {
+        let (x, y) = ([1.0, -1.0, 0.0, 0.0][usize::from(k % 4)], [0.0, 0.0, 1.0, -1.0][usize::from(k % 4)]);
+        let ahead = DVec3::new(-x, -y, 0.0);
+        let (down, focal, middle) = (-DVec3::Z, 2.0 * f64::from(size), 0.5 * f64::from(size));
+        let right = down.cross(ahead);
+        let row = |axis: DVec3, at: f64| {
+            let mixed = axis * focal + ahead * at;
+            [mixed.x, mixed.y, mixed.z, 5.0 * at]
+        };
+        let rows = [row(right, middle), row(down, middle), [ahead.x, ahead.y, ahead.z, 5.0]];
+        let pixel = [200, 40 * k, 20, 255];
+        let image = pixel.repeat((size * size) as usize);
+        Camera::new(rows.concat().try_into().unwrap(), size, size, Some(image)).unwrap()
+    };
+    (0..count).map(camera).collect()
+}
+
+#[test]
+fn cameras_tell_what_is_outside_and_colour_it() {
+    let options = ImplicitOptions { cameras: cameras(4, 100), ..ImplicitOptions::default() };
+    let mut surface = ImplicitSurface::new(of_points(noisy(torus, 1000, 0.003, 6)), options).unwrap();
+    finish(&mut surface);
+    sound(surface.surface());
+    assert_eq!(euler_of_parts(surface.surface()), [0]);
+    assert!(surface.constraints()[1].iter().all(|p| torus(p.as_dvec3()) > 0.0));
+    let colors = surface.surface().colors.clone().unwrap();
+    assert!(colors.iter().all(|c| (c.x - 200.0 / 255.0).abs() < 0.01 && (c.z - 20.0 / 255.0).abs() < 0.01));
+    // Other photographs, later.
+    let before = surface.version();
+    surface.colorize(&cameras(1, 60)).unwrap();
+    assert!(surface.version() > before);
+    assert!(surface.surface().colors != Some(colors));
+    assert_eq!(refused(surface.colorize(&[])), "cameras");
+}
+
+#[test]
+fn exterior_points_may_be_given() {
+    let outside = [Vec3::X * 1.5, Vec3::ZERO, Vec3::new(0.0, 0.0, 0.9)];
+    let options = ImplicitOptions { exterior: Some(outside.to_vec()), ..ImplicitOptions::default() };
+    let mut surface = ImplicitSurface::new(of_points(noisy(torus, 1000, 0.0, 6)), options.clone()).unwrap();
+    finish(&mut surface);
+    sound(surface.surface());
+    let found = &surface.constraints()[1];
+    assert_eq!(found.len(), 3 + 16);
+    for p in outside {
+        assert!(found.iter().any(|q| q.distance(p) < 1e-5));
+        assert!(surface.evaluate(&[p]).unwrap()[0] < 0.0);
+    }
+    // One on the surface.
+    let mut points = noisy(torus, 100, 0.0, 6);
+    points.push(outside[0]);
+    let mut surface = ImplicitSurface::new(of_points(points), options).unwrap();
+    let failed = (0..10).find_map(|_| surface.step().err()).unwrap();
+    assert!(matches!(failed, MethodError::InvalidArgument { parameter: "exterior", .. }), "{failed}");
+}
+
+#[test]
+fn any_scale_gives_the_same_shape() {
+    let points = noisy(torus, 800, 0.0, 6);
+    let usual = finished(points.clone(), ImplicitParams::default());
+    let expected = measure(usual.surface());
+    for (scale, shift) in [(1e-6_f32, 0.0), (1e6, 0.0), (1e-15, 0.0), (1e15, 0.0), (1.0, 20.0), (1e3, -5e3)] {
+        let placed = points.iter().map(|p| *p * scale + Vec3::splat(shift)).collect();
+        let surface = finished(placed, ImplicitParams::default());
+        sound(surface.surface());
+        let found = measure(surface.surface());
+        let unit = f64::from(scale);
+        assert_eq!((found.components, found.genus), (1, 1), "{scale}");
+        let volume = found.volume / (unit * unit * unit);
+        assert!((volume / expected.volume - 1.0).abs() < 0.01, "{scale}, {shift}: {volume}");
+        let middle = (found.centroid - DVec3::splat(f64::from(shift))) / unit;
+        assert!(middle.distance(expected.centroid) < 0.01, "{scale}, {shift}: {middle}");
+    }
+}
+
+#[test]
+fn bad_points_and_options_are_named() {
+    let points = noisy(sphere, 50, 0.0, 4);
+    let options = ImplicitOptions::default;
+    let new = |cloud: Cloud, options: ImplicitOptions| ImplicitSurface::new(cloud, options);
+    let mut missing = points.clone();
+    missing[3].y = f32::NAN;
+    let mut far = points.clone();
+    far[3].y = f32::INFINITY;
+    let flat: Vec<Vec3> = points.iter().map(|p| Vec3::new(p.x, p.y, 0.5 * p.x - 0.3 * p.y)).collect();
+    let line: Vec<Vec3> = points.iter().map(|p| Vec3::ONE * p.x).collect();
+    for bad in [Vec::new(), points[..3].to_vec(), vec![points[0]; 9], missing, far, flat, line] {
+        assert_eq!(refused(new(of_points(bad), options())), "points");
+    }
+    let cloud = || of_points(points.clone());
+    for confidence in [0.0, -0.5, 1.5, f32::NAN, f32::INFINITY] {
+        let mut all = vec![1.0; points.len()];
+        all[9] = confidence;
+        assert_eq!(refused(new(Cloud { confidence: Some(all), ..cloud() }, options())), "confidence");
+    }
+    let short = vec![Vec3::X; points.len() - 1];
+    assert_eq!(refused(new(Cloud { normals: Some(short.clone()), ..cloud() }, options())), "normals");
+    assert_eq!(refused(new(Cloud { colors: Some(short), ..cloud() }, options())), "colors");
+    assert_eq!(refused(new(Cloud { confidence: Some(vec![1.0]), ..cloud() }, options())), "confidence");
+    let wrong = vec![Vec3::NAN; points.len()];
+    assert_eq!(refused(new(Cloud { normals: Some(wrong.clone()), ..cloud() }, options())), "normals");
+    assert_eq!(refused(new(Cloud { colors: Some(wrong.clone()), ..cloud() }, options())), "colors");
+    assert_eq!(refused(new(cloud(), ImplicitOptions { exterior: Some(wrong), ..options() })), "exterior");
+    for max_points in [0, 3, 100_001] {
+        assert_eq!(refused(new(cloud(), ImplicitOptions { max_points, ..options() })), "maxPoints");
+    }
+    let none = ImplicitOptions { keep_components: Some(0), ..options() };
+    assert_eq!(refused(new(cloud(), none)), "keepComponents");
+}
+
+#[test]
+fn bad_parameters_are_named() {
+    let usual = ImplicitParams::default;
+    let all = [
+        ("delta", ImplicitParams { delta: 0.0, ..usual() }),
+        ("delta", ImplicitParams { delta: -5.0, ..usual() }),
+        ("delta", ImplicitParams { delta: f64::INFINITY, ..usual() }),
+        ("tau", ImplicitParams { tau: 0.0, ..usual() }),
+        ("tau", ImplicitParams { tau: -0.025, ..usual() }),
+        ("tau", ImplicitParams { tau: f64::NAN, ..usual() }),
+        ("sigma", ImplicitParams { sigma: 0.0, ..usual() }),
+        ("lambdaSurface", ImplicitParams { lambda_surface: -1e-9, ..usual() }),
+        ("lambdaSurface", ImplicitParams { lambda_surface: f64::NAN, ..usual() }),
+        ("lambdaExterior", ImplicitParams { lambda_exterior: -2.0, ..usual() }),
+        ("tolerance", ImplicitParams { tolerance: 0.0, ..usual() }),
+        ("tolerance", ImplicitParams { tolerance: 0.5, ..usual() }),
+        ("cell", ImplicitParams { cell: -0.1, ..usual() }),
+        ("cell", ImplicitParams { cell: f64::INFINITY, ..usual() }),
+    ];
+    let points = noisy(sphere, 50, 0.0, 4);
+    let mut surface = begun(points.clone(), usual());
+    for (name, params) in all {
+        let options = ImplicitOptions { params: params.clone(), ..ImplicitOptions::default() };
+        assert_eq!(refused(ImplicitSurface::new(of_points(points.clone()), options)), name);
+        assert_eq!(refused(surface.set_params(params)), name);
+        assert_eq!(*surface.params(), usual());
+    }
+    assert_eq!(param_specs().len(), 9);
+    for delta in [24.9, 25.0, 40.0] {
+        assert_eq!(ImplicitParams { delta, ..usual() }.warning().is_some(), delta >= 25.0);
+    }
+    assert_eq!(ImplicitParams { delta: 40.0, kernel: KernelKind::Gaussian, ..usual() }.warning(), None);
+}
+
+#[test]
+fn what_is_asked_too_early_is_refused() {
+    let mut surface = begun(noisy(sphere, 50, 0.0, 4), ImplicitParams::default());
+    assert_eq!(refused(surface.evaluate(&[Vec3::ZERO])), "evaluate");
+    assert_eq!(refused(surface.gradient(&[Vec3::ZERO])), "gradient");
+    assert_eq!(refused(surface.to_volume([9; 3])), "toVolume");
+    assert!(matches!(surface.fitness(), Err(MethodError::InvalidArgument { .. } | MethodError::Mesh(_))));
+    assert_eq!(refused(surface.colorize(&cameras(1, 8))), "colorize");
+    assert!(surface.constraints().iter().all(Vec::is_empty));
+    assert_eq!((surface.cell(), surface.spacing(), surface.version()), (0.0, 0.0, 0));
+    assert!(surface.preview().unwrap().triangles.is_empty());
+}
+
+#[test]
+fn equal_points_are_merged_and_counted() {
+    let mut points = noisy(sphere, 300, 0.0, 4);
+    let once = finished(points.clone(), ImplicitParams::default());
+    points.extend_from_within(10..30);
+    let twice = finished(points, ImplicitParams::default());
+    assert_eq!((once.duplicates(), twice.duplicates()), (0, 20));
+    assert!(once.surface() == twice.surface());
+    assert_eq!(once.fitness().unwrap().max, twice.fitness().unwrap().max);
+}
+
+/// A ball by degrees of longitude and latitude: at each pole are many points that differ by rounding. Those were refused as
+/// exterior points on the surface, or hung the solver, by where the ball was.
+#[test]
+fn points_that_differ_by_rounding_alone() {
+    for shift in [Vec3::ZERO, Vec3::new(0.3, 0.1, 0.7)] {
+        let place = |i: u32| {
+            let (turn, height) = ((i % 24) as f32 / 24.0, (i / 24) as f32 / 12.0);
+            let [around, up] = [turn * std::f32::consts::TAU, height * std::f32::consts::PI];
+            let flat = libm::sinf(up);
+            Vec3::new(flat * libm::cosf(around), flat * libm::sinf(around), libm::cosf(up)) + shift
+        };
+        let surface = finished((0..24 * 13).map(place).collect(), ImplicitParams::default());
+        sound(surface.surface());
+        assert_eq!(euler_of_parts(surface.surface()), [2]);
+    }
+    // Apart in their own units, together in the box.
+    let mut points = noisy(sphere, 100, 0.0, 4);
+    points.iter_mut().for_each(|p| *p += Vec3::X);
+    points.extend([Vec3::ZERO, Vec3::X * 1e-20]);
+    let surface = finished(points, ImplicitParams::default());
+    assert_eq!(surface.duplicates(), 1);
+}
+
+/// Its bits natively, in wasm, and through the package: the fingerprint that the package's tests have, too.
+#[test]
+fn the_same_bits_everywhere() {
+    let (mut state, mut points) = (1_u32, Vec::new());
+    let mut unit = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state >> 8) / f64::from(1 << 24) * 2.0 - 1.0
+    };
+    while points.len() < 400 {
+        let p = [unit(), unit(), unit()];
+        let length = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
+        if length > 0.5 && length < 1.0 {
+            // An ellipsoid with a bump at each corner.
+            let [x, y, z] = p.map(|c| c / length);
+            let radius = 1.0 + 2.0 * x * x * y * y * z * z;
+            points.push(Vec3::new((x * radius) as f32, (0.8 * y * radius) as f32, (0.7 * z * radius) as f32));
+        }
+    }
+    let surface = finished(points, ImplicitParams { cell: 0.05, ..ImplicitParams::default() });
+    let bytes = surface.surface().positions.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes);
+    let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    assert_eq!(format!("{hash:016x}"), BUMPS_BITS);
+}
+
+/// After a change of the core that is meant, take what the test finds, here and in `tests/js/bumps.ts`.
+const BUMPS_BITS: &str = "8605d02b08ba60ab";
+
+#[test]
+fn previews_grow_while_the_surface_is_followed() {
+    let mut surface = begun(noisy(sphere, 300, 0.0, 4), ImplicitParams::default());
+    let mut seen = 0;
+    while !surface.step().unwrap().done {
+        let now = surface.preview().unwrap().triangles.len();
+        assert!(now >= seen || now == 0, "{now} after {seen}");
+        seen = now;
+    }
+    assert!(curvature(surface.surface()).mean.iter().all(|h| h.is_finite()));
+}

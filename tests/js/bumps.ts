@@ -1,0 +1,31 @@
+// A bumpy ellipsoid from 400 points, as a number over the bits of its positions. The function names nothing outside itself, so
+// that it can be sent into a browser.
+import type * as Package from '../../pkg/index.js';
+
+/** FNV-1a over all positions: what the core gives natively (`tests/implicit.rs`). */
+export const BUMPS_BITS = '8605d02b08ba60ab';
+
+export function bumpsBits({ ImplicitSurface }: typeof Package): string {
+  let state = 1;
+  const unit = () => {
+    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+    return ((state >>> 8) / 2 ** 24) * 2 - 1;
+  };
+  const points: number[] = [];
+  while (points.length < 3 * 400) {
+    const p: [number, number, number] = [unit(), unit(), unit()];
+    const length = Math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+    if (!(length > 0.5 && length < 1)) continue;
+    const [x, y, z] = [p[0] / length, p[1] / length, p[2] / length];
+    const radius = 1 + 2 * x * x * y * y * z * z;
+    points.push(x * radius, 0.8 * y * radius, 0.7 * z * radius);
+  }
+  const surface = new ImplicitSurface({ points: Float32Array.from(points), params: { cell: 0.05 } });
+  while (!surface.step().done);
+  const { positions } = surface.mesh.arrays();
+  let hash = 0xcbf29ce484222325n;
+  for (const byte of new Uint8Array(positions.buffer, positions.byteOffset, positions.byteLength)) {
+    hash = ((hash ^ BigInt(byte)) * 0x100000001b3n) & 0xffffffffffffffffn;
+  }
+  return hash.toString(16).padStart(16, '0');
+}

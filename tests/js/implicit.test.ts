@@ -1,0 +1,302 @@
+import { expect, test } from 'vitest';
+import * as vesicle from '../../pkg/index.js';
+import { type Camera, DeformableModel, ImplicitSurface, paramSpecs, parsePoints } from '../../pkg/index.js';
+import { BUMPS_BITS, bumpsBits } from './bumps.js';
+import { failure, rejection, wrong } from './helpers.js';
+
+type Options = ConstructorParameters<typeof ImplicitSurface>[0];
+
+/** Points of the unit ball, on a spiral. */
+function ball(count: number): Float32Array {
+  const golden = Math.PI * (3 - Math.sqrt(5));
+  return Float32Array.from({ length: 3 * count }, (_, at) => {
+    const i = Math.floor(at / 3);
+    const z = 1 - (2 * i + 1) / count;
+    const across = Math.sqrt(1 - z * z);
+    return [across * Math.cos(golden * i), across * Math.sin(golden * i), z][at % 3] as number;
+  });
+}
+
+const points = ball(300);
+const surface = (options: Partial<Options> = {}) => new ImplicitSurface({ points, ...options });
+const finished = (options: Partial<Options> = {}) => {
+  const whole = surface(options);
+  while (!whole.step(100).done);
+  return whole;
+};
+const bytesOf = ({ mesh }: ImplicitSurface) => Buffer.from(mesh.arrays().positions);
+
+/** From +z, looking down on the ball; a picture of one colour. */
+const above = (color = [255, 0, 0, 255]): Camera => ({
+  projection: [100, 0, -50, 250, 0, -100, -50, 250, 0, 0, -1, 5],
+  width: 101,
+  height: 101,
+  image: Uint8ClampedArray.from({ length: 4 * 101 * 101 }, (_, i) => color[i % 4] as number),
+});
+
+test('a ball is found', async () => {
+  const found = surface();
+  const phases = new Set<string>();
+  const report = await found.run({ onStep: ({ phase }) => phases.add(phase) });
+  expect(report).toMatchObject({ done: true, progress: 1, components: 1, euler: 2 });
+  expect(report.residual).toBeLessThanOrEqual(report.tolerance);
+  expect([...phases]).toEqual(['subsample', 'constraints', 'solve', 'extract', 'colour']);
+  expect(found.mesh.check()).toEqual({
+    closed: true,
+    oriented: true,
+    nonManifoldEdges: 0,
+    nonManifoldVertices: 0,
+    degenerateTriangles: 0,
+    selfIntersections: 0,
+  });
+  const { volume } = found.mesh.info();
+  expect(volume / ((4 / 3) * Math.PI)).toBeGreaterThan(0.97);
+  expect(volume / ((4 / 3) * Math.PI)).toBeLessThan(1.01);
+  const { mean, rms, max } = found.fitness();
+  expect(mean).toBeLessThan(0.01);
+  expect(rms).toBeGreaterThanOrEqual(mean);
+  expect(max).toBeGreaterThanOrEqual(rms);
+  expect([found.duplicates, found.strays, found.warning]).toEqual([0, 0, undefined]);
+  expect(found.spacing).toBeGreaterThan(0);
+  expect(found.cell).toBeGreaterThan(0);
+});
+
+test('the function and its slope', () => {
+  const found = finished();
+  const [inside, outside] = found.evaluate(Float32Array.of(0, 0, 0, 1.3, 0, 0));
+  expect(inside).toBeGreaterThan(0);
+  expect(outside).toBeLessThan(0);
+  const slope = found.gradient(Float32Array.of(1, 0, 0));
+  expect(slope).toHaveLength(3);
+  expect(slope[0]).toBeLessThan(0);
+  const { surface: near, exterior } = found.constraints();
+  expect(near).toHaveLength(points.length);
+  expect(exterior.length).toBeGreaterThan(3 * 16);
+});
+
+test('the live mesh is one object, empty before the first surface is there', () => {
+  const found = surface();
+  const { mesh } = found;
+  expect(mesh.vertexCount).toBe(0);
+  const before = mesh.geometryVersion;
+  while (!found.step().done);
+  expect(found.mesh).toBe(mesh);
+  expect(mesh.vertexCount).toBeGreaterThan(100);
+  expect(mesh.geometryVersion).toBeGreaterThan(before);
+});
+
+test('run, step and step by step end in the same bits', async () => {
+  const [run, atOnce, each] = [surface(), surface(), surface()];
+  const last = await run.run({ budgetMs: 0.01 });
+  expect(atOnce.step(100_000).iteration).toBe(last.iteration);
+  while (!each.step().done);
+  expect(bytesOf(run).equals(bytesOf(atOnce))).toBe(true);
+  expect(bytesOf(run).equals(bytesOf(each))).toBe(true);
+});
+
+test('restore(save()) goes on bit for bit in every phase', () => {
+  const whole = finished();
+  const running = surface();
+  for (const steps of [1, 1, 1, 2, 2, 5]) {
+    running.step(steps);
+    const resumed = surface();
+    resumed.restore(running.save());
+    expect(resumed.step(100_000).iteration).toBe(whole.step().iteration);
+    expect(bytesOf(resumed).equals(bytesOf(whole))).toBe(true);
+  }
+});
+
+test('states that are none are refused', () => {
+  const found = finished();
+  const state = found.save();
+  for (const bytes of [
+    new Uint8Array(),
+    state.slice(0, 20),
+    state.slice(0, -1),
+    new Uint8Array(state.length).fill(7),
+  ]) {
+    expect(failure(() => found.restore(bytes)).code).toBe('bad-file');
+  }
+  expect(failure(() => surface({ points: ball(299) }).restore(state)).code).toBe('bad-file');
+  expect(failure(() => found.restore(wrong([]))).code).toBe('invalid-argument');
+  expect(found.step().done).toBe(true);
+});
+
+test('as a volume the deformable model takes it over', async () => {
+  const volume = finished().toVolume([32, 32, 32]);
+  expect(volume.dims).toEqual([32, 32, 32]);
+  const model = new DeformableModel({ volume, params: { iso: 0 } });
+  const report = await model.run({ maxIterations: 400 });
+  expect(report).toMatchObject({ components: 1, euler: 2 });
+  expect(model.mesh.info().volume / ((4 / 3) * Math.PI)).toBeGreaterThan(0.9);
+});
+
+test('colours from pictures and from points', () => {
+  const found = finished();
+  expect(found.mesh.arrays().colors).toBeUndefined();
+  found.colorize([above()]);
+  const { colors, positions } = found.mesh.arrays();
+  expect(colors).toHaveLength(positions.length);
+  expect([...(colors as Float32Array).slice(0, 3)].map((c) => Math.round(c))).toEqual([1, 0, 0]);
+  const own = finished({ colors: new Float32Array(points.length).fill(0.25) });
+  for (const c of own.mesh.arrays().colors as Float32Array) expect(c).toBeCloseTo(0.25, 5);
+  const { image: _, ...blind } = above();
+  for (const cameras of [[], [blind]]) {
+    const error = failure(() => found.colorize(cameras));
+    expect(error.code).toBe('invalid-argument');
+    expect(error.message).toContain('cameras');
+  }
+});
+
+test('parameters: any subset, all or nothing', () => {
+  const found = finished();
+  const before = found.params;
+  found.setParams({ delta: 30 });
+  expect(found.params).toEqual({ ...before, delta: 30 });
+  expect(found.warning).toContain('25');
+  const refused: [string, object][] = [
+    ['delta', { tau: 0.02, delta: 0 }],
+    ['tau', { delta: 4, tau: Number.NaN }],
+    ['lambdaSurface', { delta: 4, lambdaSurface: -1 }],
+    ['kernel', { delta: 4, kernel: 'cubic' }],
+    ['level', { delta: 4, level: 1 }],
+    ['lamda', { delta: 4, lamda: 1 }],
+  ];
+  for (const [name, params] of refused) {
+    const error = failure(() => found.setParams(params));
+    expect(error.code).toBe('invalid-argument');
+    expect(error.message).toContain(name);
+    expect(found.params.delta).toBe(30);
+  }
+  expect(failure(() => found.setParams(wrong([]))).code).toBe('invalid-argument');
+});
+
+test('specs describe every parameter, with its default', () => {
+  const specs = paramSpecs('implicit');
+  const defaults: Record<string, unknown> = surface().params;
+  expect(specs.map(({ name }) => name).sort()).toEqual(Object.keys(defaults).sort());
+  for (const spec of specs) {
+    expect(spec.help.length, spec.name).toBeGreaterThan(10);
+    expect(defaults[spec.name], spec.name).toEqual(spec.default);
+  }
+});
+
+const flat = points.map((value, i) => (i % 3 === 2 ? 0 : value));
+const holed = points.with(7, Number.NaN);
+const REFUSED: [string, string, () => unknown][] = [
+  ['no options', 'points', () => new ImplicitSurface(wrong(undefined))],
+  ['no points', 'points', () => surface({ points: new Float32Array() })],
+  ['three points', 'points', () => surface({ points: points.slice(0, 9) })],
+  ['a part of a point', 'points', () => surface({ points: points.slice(0, 100) })],
+  ['a list', 'points', () => surface({ points: wrong([0, 0, 0]) })],
+  ['all in one plane', 'points', () => surface({ points: flat })],
+  ['a point nowhere', 'points', () => surface({ points: holed })],
+  ['too few normals', 'normals', () => surface({ normals: points.slice(3) })],
+  ['a normal nowhere', 'normals', () => surface({ normals: holed })],
+  ['confidence 0', 'confidence', () => surface({ confidence: new Float32Array(300) })],
+  ['too much confidence', 'confidence', () => surface({ confidence: new Float32Array(300).fill(2) })],
+  ['too few colours', 'colors', () => surface({ colors: points.slice(3) })],
+  ['an exterior point nowhere', 'exterior', () => surface({ exterior: Float32Array.of(2, 2, Number.NaN) })],
+  ['no room', 'maxPoints', () => surface({ maxPoints: 3 })],
+  ['too much room', 'maxPoints', () => surface({ maxPoints: 100_001 })],
+  ['no part', 'keepComponents', () => surface({ keepComponents: 0 })],
+  ['half a part', 'keepComponents', () => surface({ keepComponents: 0.5 })],
+  ['a misspelled option', 'maxpoints', () => surface(wrong({ maxpoints: 9 }))],
+  ['a parameter out of range', 'delta', () => surface({ params: { delta: -1 } })],
+  [
+    'a camera without centre',
+    'cameras',
+    () => surface({ cameras: [{ ...above(), projection: new Float64Array(12) }] }),
+  ],
+  ['too few numbers', 'projection', () => surface({ cameras: [{ ...above(), projection: [1, 2] }] })],
+  ['a picture of another size', 'cameras', () => surface({ cameras: [{ ...above(), width: 100 }] })],
+  ['half a step', 'iterations', () => surface().step(0.5)],
+  ['f before it is solved', 'evaluate', () => surface().evaluate(points)],
+  ['a slope before it is solved', 'gradient', () => surface().gradient(points)],
+  ['a volume before it is solved', 'toVolume', () => surface().toVolume([9, 9, 9])],
+  ['fitness before there is a surface', 'surface', () => surface().fitness()],
+  ['colours before there is a surface', 'colorize', () => surface().colorize([above()])],
+  ['a flat volume', 'dims', () => finished().toVolume([1, 9, 9])],
+];
+
+test.each(REFUSED)('%s is refused, naming %s', (_, word, work) => {
+  const error = failure(work);
+  expect(error.code).toBe('invalid-argument');
+  expect(error.message).toContain(word);
+});
+
+test('a system without solution says so, and other parameters go on', () => {
+  const twins = Float32Array.from([...points, ...points.map((value) => value + 1e-7)]);
+  const params = { kernel: 'gaussian', sigma: 1, lambdaSurface: 0, lambdaExterior: 0, tolerance: 1e-12 } as const;
+  const found = surface({ points: twins, params });
+  const error = failure(() => found.step(100_000));
+  expect(error.code).toBe('singular-system');
+  expect(error.message).toContain('lambdaSurface');
+  found.setParams({ kernel: 'multi-order', lambdaSurface: 0.001, lambdaExterior: 2, tolerance: 1e-5 });
+  expect(found.step(100_000).done).toBe(true);
+});
+
+test('an aborted run rejects with the reason, and goes on later', async () => {
+  const found = surface();
+  const [abort, reason] = [new AbortController(), new Error('enough')];
+  const stopped = found.run({
+    signal: abort.signal,
+    onStep: ({ iteration }) => {
+      if (iteration === 4) abort.abort(reason);
+    },
+  });
+  await expect(stopped).rejects.toBe(reason);
+  expect(found.step().iteration).toBe(5);
+  await expect(found.run({ signal: AbortSignal.abort(reason) })).rejects.toBe(reason);
+  expect((await found.run()).done).toBe(true);
+});
+
+test('one run at a time; a surface freed during it ends it', async () => {
+  const found = surface();
+  const running = found.run({ budgetMs: 0.01 });
+  expect((await rejection(found.run())).code).toBe('invalid-argument');
+  expect(failure(() => found.step()).message).toContain('under way');
+  expect(failure(() => found.restore(found.save())).message).toContain('under way');
+  found.free();
+  expect((await rejection(running)).code).toBe('freed');
+});
+
+test('a freed surface is gone', () => {
+  const found = finished();
+  const { mesh } = found;
+  found.free();
+  const uses = [
+    () => found.step(),
+    () => found.params,
+    () => found.setParams({}),
+    () => found.evaluate(points),
+    () => found.gradient(points),
+    () => found.constraints(),
+    () => found.fitness(),
+    () => found.preview(),
+    () => found.toVolume([9, 9, 9]),
+    () => found.colorize([above()]),
+    () => found.save(),
+    () => found.cell,
+    () => mesh.info(),
+  ];
+  for (const use of uses) expect(failure(use).code).toBe('freed');
+});
+
+test('points of files', () => {
+  const bytes = (text: string) => new TextEncoder().encode(text);
+  const { points: found, normals, colors } = parsePoints(bytes('0 0 1\n1 0 0\n0 1 0\n0 0 0\n'));
+  expect([...found]).toEqual([0, 0, 1, 1, 0, 0, 0, 1, 0, 0, 0, 0]);
+  expect([normals, colors]).toEqual([undefined, undefined]);
+  const lines = ['ply', 'format ascii 1.0', 'element vertex 1', ...['x', 'y', 'z'].map((k) => `property float ${k}`)];
+  const ply = bytes([...lines, 'end_header', '1 2 3', ''].join('\n'));
+  expect([...parsePoints(ply).points]).toEqual([1, 2, 3]);
+  for (const bad of [bytes(''), bytes('solid'), ply.slice(0, -7), Uint8Array.of(0, 1, 2, 255)]) {
+    expect(failure(() => parsePoints(bad)).code).toBe('bad-file');
+  }
+  expect(failure(() => parsePoints(wrong('0 0 1'))).code).toBe('invalid-argument');
+});
+
+test('the same bits as natively', () => {
+  expect(bumpsBits(vesicle)).toBe(BUMPS_BITS);
+});
