@@ -323,6 +323,33 @@ describe('the timing curve', () => {
   });
 });
 
+describe('a link', () => {
+  test('restores example, parameters, points by hand and colour', async () => {
+    const hash = '#reconstruct?example=two-balls&maxPoints=800&color=distance&p.delta=8&add=1.6,0,0';
+    await openAt(hash, 'done');
+    expect(await app.page.evaluate(() => location.hash)).toBe(hash);
+    expect(await app.page.inputValue('[data-param=delta] input[type=number]')).toBe('8');
+    expect(await app.page.inputValue('[data-view=color]')).toBe('distance');
+    expect(await text('.color-legend .title')).toBe('Distance to the nearest point');
+    expect(await text('.edit-tools')).toContain('1 point added.');
+    expect((await measured()).surfaceConstraints).toBeLessThanOrEqual(800);
+  });
+
+  test('to a figure says what the paper saw; another of its pictures solves again', async () => {
+    await openAt('#reconstruct?example=figure-7', 'done');
+    expect(await text('.figure')).toMatch(/Paper: 477 of 3,173 points.*Here all 6,930 points/);
+    await afterRun(() => app.page.click('.figure button:has-text("a subset")'));
+    expect(await text('[data-figure=came]')).toContain('812');
+    expect(await measured()).toMatchObject({ surfaceConstraints: 812, components: 1, genus: 0 });
+  });
+
+  test('that cannot be followed says so, and the first example opens', async () => {
+    await openAt('#reconstruct?example=nowhere', 'done');
+    expect(await text('.banner')).toContain('no example “nowhere”');
+    expect(await measured()).toMatchObject({ components: 1, genus: 0 });
+  });
+});
+
 describe('the page', () => {
   test.each([
     [390, 844],

@@ -28,6 +28,7 @@ export const FIT_ROWS: MoreMeasure[] = [
     help: 'To the nearest other point that takes part; the box is 2 long',
     text: figure,
   },
+  { name: 'cell', label: 'Cell', help: 'Edge of the cells that the surface is drawn with', text: figure },
   { name: 'duplicates', label: 'Duplicates', help: 'Points equal to others, left out', text: count },
   { name: 'strays', label: 'Stray pieces', help: 'Pieces of the surface that no point is near', text: count },
   { name: 'residual', label: 'Residual', help: 'Of the solve, relative to its right side', text: figure },

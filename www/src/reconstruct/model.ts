@@ -101,11 +101,12 @@ export function cubicDims(points: Float32Array, size: number): Vec3 {
 /** What there is to tell of the fit; `whole` where there is a surface to measure. */
 export function fitOf(model: ImplicitSurface, residual: number, whole: boolean): Fit {
   const { surface, exterior } = model.constraints();
-  const { spacing, duplicates, strays, warning } = model;
+  const { cell, spacing, duplicates, strays, warning } = model;
   return {
     ...(whole && { fitness: model.fitness() }),
     surfaceConstraints: surface.length / 3,
     exteriorConstraints: exterior.length / 3,
+    cell,
     spacing,
     duplicates,
     strays,

@@ -78,6 +78,8 @@ export interface Fit {
   fitness?: Fitness;
   surfaceConstraints: number;
   exteriorConstraints: number;
+  /** Edge of an extraction cell, in the points' units; 0 until it is known. */
+  cell: number;
   /** In units of the box. */
   spacing: number;
   duplicates: number;

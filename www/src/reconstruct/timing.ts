@@ -2,6 +2,9 @@
 import { ImplicitSurface } from 'vesicle';
 import type { CameraView, Cloud, Requests, Setup, Timing } from './protocol';
 
+/** Milliseconds up to which a solve is timed twice, and the shorter counts. */
+const QUICK = 2000;
+
 type Asked = Requests['timing']['body'];
 
 /** Undefined when the signal aborts it. */
@@ -39,7 +42,11 @@ async function timeOne(
   const withoutImages = cameras.map(({ image: _, ...camera }) => camera);
   const model = new ImplicitSurface({ points, cameras: withoutImages, maxPoints, params });
   try {
-    const milliseconds = await solveTime(model, signal);
+    const first = await solveTime(model, signal);
+    // Again, as other work of the machine only ever adds; a change of tolerance is the least that makes a new solve.
+    model.setParams({ tolerance: 1.0001 * model.params.tolerance });
+    const second = first === undefined || first > QUICK ? first : await solveTime(model, signal);
+    const milliseconds = first !== undefined && second !== undefined ? Math.min(first, second) : undefined;
     const { surface, exterior } = model.constraints();
     const constraints = (surface.length + exterior.length) / 3;
     return milliseconds === undefined ? undefined : { kernel: String(params.kernel), constraints, milliseconds };

@@ -38,15 +38,13 @@ export class KernelPlot {
 }
 
 function tell(kernel: string, value: (r: number) => number): string {
-  const unit = 'r in units of the box, whose longest side is 2; heights are relative.';
+  const unit = 'The box is 2 long; heights are relative.';
   if (kernel === 'thin-plate' || kernel === 'biharmonic')
-    return `Grows without end in size: far points matter most, and the whole must balance. ${cap(unit)}`;
+    return `Grows without end in size: far points matter most, and the whole must balance. ${unit}`;
   const half = bisect((r) => value(r) - value(0) / 2);
   const left = value(0.5) / value(0);
-  return `Falls to half at r = ${figure(Number(half.toPrecision(2)))}; at 0.5, ${figure(Number((100 * left).toPrecision(2)))} % are left. ${cap(unit)}`;
+  return `Falls to half at r = ${figure(Number(half.toPrecision(2)))}; at 0.5, ${figure(Number((100 * left).toPrecision(2)))} % are left. ${unit}`;
 }
-
-const cap = (text: string) => `${text[0]?.toUpperCase()}${text.slice(1)}`;
 
 /** Where a falling function passes 0. */
 function bisect(f: (r: number) => number): number {

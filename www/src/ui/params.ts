@@ -4,6 +4,11 @@ import { figure } from './format';
 
 /** Slider positions of a parameter with a logarithmic scale. */
 const LOG_STEPS = 200;
+/** A range up to here or beyond is none that a slider could show. */
+const ENDLESS = 1e9;
+/** Where the usual value is below this share of the range, most of the slider is for small values: the power says how much. */
+const SMALL_SHARE = 0.01;
+const SMALL_POWER = 4;
 /** What is chosen in the list of a parameter that takes a number as well as its named choices. */
 const NUMBER = 'number';
 
@@ -146,7 +151,7 @@ function withNumber({ main, show }: Input, spec: ParamSpec, onChange: (value: un
 function numberInput(spec: ParamSpec, id: string, onChange: (value: unknown) => void): Input {
   const { min, max } = spec;
   const main = h('input', { type: 'number', ...describedBy(id), min, max, step: 'any', inputmode: 'decimal' });
-  const slider = min !== undefined && max !== undefined ? new Slider(spec, min, max) : undefined;
+  const slider = min !== undefined && max !== undefined && max < ENDLESS ? new Slider(spec, min, max) : undefined;
   const show = (value: unknown) => {
     main.value = typeof value === 'number' ? typed(value) : String(value);
     if (typeof value === 'number') slider?.show(value);
@@ -166,32 +171,48 @@ function typed(value: number): string {
   return short !== 0 && Math.abs(short) < 1e-3 ? short.toExponential() : String(short);
 }
 
-/** A range input that can be logarithmic. The number input beside it carries the label. */
+/** A range input that can be logarithmic, or favour small values. The number input beside it carries the label. */
 class Slider {
   readonly element: HTMLInputElement;
-  readonly #log: boolean;
+  readonly #scale: 'linear' | 'log' | 'small';
   readonly #min: number;
   readonly #max: number;
 
   constructor(spec: ParamSpec, min: number, max: number) {
-    this.#log = spec.scale === 'log' && min > 0;
+    this.#scale = scaleOf(spec, min, max);
     this.#min = min;
     this.#max = max;
     const step = spec.step ?? (spec.type === 'integer' ? 1 : (max - min) / LOG_STEPS);
-    const range = this.#log ? { min: 0, max: LOG_STEPS, step: 1 } : { min, max, step };
+    const range = this.#scale === 'linear' ? { min, max, step } : { min: 0, max: LOG_STEPS, step: 1 };
     this.element = h('input', { type: 'range', 'aria-label': `${spec.label}, slider`, ...range });
   }
 
   get value(): number {
     const position = this.element.valueAsNumber;
-    const value = this.#log ? this.#min * (this.#max / this.#min) ** (position / LOG_STEPS) : position;
-    return Number(value.toPrecision(4));
+    const part = position / LOG_STEPS;
+    if (this.#scale === 'linear') return rounded(position);
+    if (this.#scale === 'small') return rounded(this.#max * part ** SMALL_POWER);
+    return rounded(this.#min * (this.#max / this.#min) ** part);
   }
 
   show(value: number): void {
-    const position = this.#log ? (LOG_STEPS * Math.log(value / this.#min)) / Math.log(this.#max / this.#min) : value;
-    this.element.value = String(position);
-    // Where the position is a logarithm it says nothing.
+    this.element.value = String(this.#position(value));
+    // Where the position is no value it says nothing.
     this.element.setAttribute('aria-valuetext', figure(value));
   }
+
+  #position(value: number): number {
+    if (this.#scale === 'linear') return value;
+    if (this.#scale === 'small') return LOG_STEPS * Math.max(0, value / this.#max) ** (1 / SMALL_POWER);
+    return (LOG_STEPS * Math.log(value / this.#min)) / Math.log(this.#max / this.#min);
+  }
+}
+
+const rounded = (value: number) => Number(value.toPrecision(4));
+
+function scaleOf(spec: ParamSpec, min: number, max: number): 'linear' | 'log' | 'small' {
+  if (spec.scale === 'log' && min > 0) return 'log';
+  const { default: usual } = spec;
+  const small = min === 0 && typeof usual === 'number' && usual > 0 && usual < SMALL_SHARE * max;
+  return small && spec.type === 'number' ? 'small' : 'linear';
 }
