@@ -176,7 +176,7 @@ impl BoxMap {
     }
 }
 
-/// The mean distance from a point to the one nearest to it, over at most [`SPACING_SAMPLE`] of them.
+/// The mean distance from a point to the one nearest to it, over at most 4000 of them.
 pub fn mean_spacing(points: &[Vec3]) -> f64 {
     let tree =
         crate::math::BoxTree::new(&points.iter().map(|&p| Bounds { min: p, max: p }).collect::<Vec<_>>());

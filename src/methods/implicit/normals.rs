@@ -245,7 +245,7 @@ mod tests {
     fn turned_from_any_start() {
         let mut random = Random::new(5);
         let places: Vec<Vec3> = (0..400).map(|_| ball(&mut random).0.as_vec3()).collect();
-        let links = links(&places, 0.3);
+        let links = links(&places, &places, 0.3);
         let all = parts(&links);
         assert_eq!(all.len(), 1);
         for start in [0, 7, 399] {

@@ -1,6 +1,6 @@
 //! The linear system of the weights (paper, section IV; equation 3 with λ on the diagonal), for tens of thousands of
-//! constraints: conjugate gradients ([`conjugate`]) with a hierarchical matrix ([`hierarchical`]) and a sparse
-//! approximate inverse ([`precondition`]).
+//! constraints: conjugate gradients (`conjugate`) with a hierarchical matrix (`hierarchical`) and a sparse
+//! approximate inverse (`precondition`).
 //!
 //! Work comes in slices of some milliseconds, always the same, so that a caller can show progress and stop. At the end
 //! the residual is computed anew from the kernel itself, not from the approximated matrix; where it is not small enough,
@@ -50,7 +50,7 @@ impl Constraints {
         }
     }
 
-    /// Sets λ: of surface constraints by their confidence, and from [`USUAL_POINTS`] on by their number, so that more points
+    /// Sets λ: of surface constraints by their confidence, and from 3,000 on by their number, so that more points
     /// mean a better surface and not a rougher one.
     pub fn regularize(&mut self, surface: f64, outside: f64) {
         let crowd = self.surface as f64 / USUAL_POINTS;
