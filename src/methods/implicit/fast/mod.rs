@@ -20,6 +20,8 @@ const TERMS_A_CUBE: usize = 12;
 const MOST_LEVELS: usize = 6;
 /// No cube, or none yet.
 const NONE: u32 = u32::MAX;
+/// No place: those outside of all cubes are nearer.
+const NOWHERE: Place = [i32::MIN; 3];
 
 /// A function with a fast way to many of its values.
 #[derive(Clone, Debug)]
@@ -106,7 +108,7 @@ impl FastField {
             terms: terms.to_vec(),
             ranges: Vec::new(),
             direct: field.table().kernel().is_conditional(),
-            near: Near { cube: [-1; 3], number: 0, ranges: Vec::new() },
+            near: Near { cube: NOWHERE, number: 0, ranges: Vec::new() },
             field,
         };
         if !fast.direct {
@@ -235,8 +237,8 @@ impl FastField {
         }
         let level = self.levels.len() - 1;
         let cube = self.place_of(p, level);
+        self.levels[level].index(cube)?;
         if cube != self.near.cube {
-            self.levels[level].index(cube)?;
             let number = self.fill(level, cube);
             let sources = around(cube).filter_map(|place| self.finest().sources_at(place));
             let ranges = sources.map(|source| self.ranges[source]).collect();
