@@ -16,6 +16,13 @@ pub struct PointGrid {
     next: Vec<u32>,
 }
 
+impl Default for PointGrid {
+    /// Empty, for a few points about 1 apart.
+    fn default() -> Self {
+        Self::new(1.0, 0)
+    }
+}
+
 impl PointGrid {
     /// An empty grid of cells of edge `cell`, with buckets enough for about `expected` points.
     pub fn new(cell: f32, expected: usize) -> Self {

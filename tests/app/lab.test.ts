@@ -259,7 +259,10 @@ describe('undo', () => {
   test('goes back over a reset to the surface, the plots and the state that were there, and forth again', async () => {
     await openAt('#extract?example=figure-7');
     const before = await measures(app.page);
-    const told = await app.page.locator('figcaption').allTextContents();
+    const captions = () => app.page.locator('figcaption').allTextContents();
+    // They follow at the next frame, which a busy machine draws late.
+    await expect.poll(async () => (await captions())[0]).toContain('After 80 iterations');
+    const told = await captions();
     await app.page.click('text=Reset');
     await reach(app.page, 'paused');
     expect(await app.page.getAttribute('[data-transport=undo]', 'title')).toBe('Undo: Reset');
@@ -267,7 +270,7 @@ describe('undo', () => {
     await reach(app.page, 'done');
     expect(await measures(app.page)).toEqual(before);
     expect(await iteration(app.page)).toBe(80);
-    await expect.poll(() => app.page.locator('figcaption').allTextContents()).toEqual(told);
+    await expect.poll(captions).toEqual(told);
     await redo();
     await reach(app.page, 'paused');
     expect(await iteration(app.page)).toBe(0);

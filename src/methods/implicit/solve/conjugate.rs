@@ -22,6 +22,20 @@ impl Polynomials {
         Some(Self { columns, images, inverse })
     }
 
+    /// `weights` with as little taken away, as the inverse measures it, as makes them orthogonal to the polynomials.
+    pub fn orthogonal(&self, mut weights: Vec<f64>) -> Vec<f64> {
+        let moments: Vec<f64> = self.columns.iter().map(|column| dot(column, &weights)).collect();
+        for (row, image) in self.inverse.chunks_exact(moments.len()).zip(&self.images) {
+            add(-dot(row, &moments), image, &mut weights);
+        }
+        weights
+    }
+
+    /// The polynomial of these coefficients at a centre.
+    pub fn value(&self, centre: usize, coefficients: &[f64]) -> f64 {
+        self.columns.iter().zip(coefficients).map(|(column, c)| c * column[centre]).sum()
+    }
+
     /// The coefficients c for which r − Bc is least as the approximate inverse measures it; `image` is that inverse times r.
     fn coefficients(&self, image: &[f64]) -> Vec<f64> {
         let moments: Vec<f64> = self.columns.iter().map(|column| dot(column, image)).collect();

@@ -1,88 +1,26 @@
 //! The linear system of the weights (paper, section IV; equation 3 with λ on the diagonal), for tens of thousands of
-//! constraints: conjugate gradients (`conjugate`) with a hierarchical matrix (`hierarchical`) and a sparse
+//! constraints: conjugate gradients (`conjugate`) on a hierarchical matrix (`system`, `hierarchical`) with a sparse
 //! approximate inverse (`precondition`).
 //!
 //! Work comes in slices of some milliseconds, always the same, so that a caller can show progress and stop. At the end
 //! the residual is computed anew from the kernel itself, not from the approximated matrix; where it is not small enough,
-//! iterations go on from that.
+//! iterations go on from that. A few constraints may be added or taken away afterwards: what was made for the others serves
+//! again, and iterations start from their weights.
 
 mod clusters;
 mod conjugate;
+mod constraints;
 mod hierarchical;
 mod precondition;
+mod system;
 
-use super::cloud::Cloud;
-use super::kernel::{Kernel, KernelTable};
+pub use constraints::{ByPlace, Constraints};
+
+use super::kernel::Kernel;
 use super::vectors::norm;
-use crate::math::{Bounds, DVec3, Random, Vec3};
-use clusters::ClusterTree;
 use conjugate::{ConjugateGradients, Polynomials};
-use hierarchical::HierarchicalMatrix;
-use precondition::SparseInverse;
 use serde::{Deserialize, Serialize};
-
-/// What the function has to be where.
-#[derive(Clone, Debug, Default)]
-pub struct Constraints {
-    /// Where, in units of the box; no two are equal.
-    pub centres: Vec<Vec3>,
-    /// Wanted values: 0 on the surface, −1 outside.
-    pub values: Vec<f64>,
-    /// λ of each, at least 0.
-    pub lambda: Vec<f64>,
-    /// How many of them, the first ones, are on the surface.
-    pub surface: usize,
-    /// Of those on the surface, where it is known.
-    pub confidence: Option<Vec<f32>>,
-}
-
-impl Constraints {
-    /// 0 at the points of `surface`, −1 at those `outside`; λ is 0 until [`Self::regularize`].
-    pub fn new(surface: &Cloud, outside: &[Vec3]) -> Self {
-        let count = surface.len() + outside.len();
-        let value = |i: usize| if i < surface.len() { 0.0 } else { -1.0 };
-        Self {
-            centres: surface.points.iter().chain(outside).copied().collect(),
-            values: (0..count).map(value).collect(),
-            lambda: vec![0.0; count],
-            surface: surface.len(),
-            confidence: surface.confidence.clone(),
-        }
-    }
-
-    /// Sets λ: of surface constraints by their confidence, and from 3,000 on by their number, so that more points
-    /// mean a better surface and not a rougher one.
-    pub fn regularize(&mut self, surface: f64, outside: f64) {
-        let crowd = self.surface as f64 / USUAL_POINTS;
-        let surface = if crowd > 1.0 { surface * crowd } else { surface };
-        for (i, lambda) in self.lambda.iter_mut().enumerate() {
-            let sure = self.confidence.as_ref().and_then(|all| all.get(i)).map_or(1.0, |&c| f64::from(c));
-            *lambda = if i < self.surface { surface / sure } else { outside };
-        }
-    }
-
-    /// A centre that two constraints share, if any do.
-    pub fn shared_centre(&self) -> Option<Vec3> {
-        let mut bits: Vec<[u32; 3]> =
-            self.centres.iter().map(|p| p.to_array().map(|x| (x + 0.0).to_bits())).collect();
-        bits.sort_unstable();
-        bits.windows(2)
-            .find(|pair| pair[0] == pair[1])
-            .map(|pair| Vec3::from_array(pair[0].map(f32::from_bits)))
-    }
-
-    /// Radius of a ball that holds all centres.
-    pub fn radius(&self) -> f64 {
-        let bounds = Bounds::of(&self.centres);
-        0.5 * f64::from(bounds.max.distance(bounds.min))
-    }
-
-    /// The mean of the function over the surface constraints: at each it is y − λw.
-    pub fn mean_on_surface(&self, solution: &Solution) -> f64 {
-        let terms = self.lambda.iter().zip(&solution.weights).take(self.surface);
-        -terms.map(|(lambda, w)| lambda * w).sum::<f64>() / self.surface as f64
-    }
-}
+use system::{System, WORK};
 
 /// The function that came out: f(x) = Σ wᵢ φ(|x − cᵢ|) + p(x).
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -97,19 +35,6 @@ pub struct Solution {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Singular;
 
-/// Surface constraints that the usual values of λ are for (paper, section VI-B).
-const USUAL_POINTS: f64 = 3000.0;
-
-/// Values of the kernel, or as much work of another kind, in a slice: about ten milliseconds.
-const SLICE: usize = 2_000_000;
-/// Values of the kernel that take as long as one row of the sparse inverse.
-const ROW_WORK: usize = 4_000;
-/// Error of far blocks, of the tolerance: with it the residual found at the end is seldom above the tolerance.
-const FAR_ERROR: f64 = 0.1;
-/// Error of far blocks where kernels are only conditionally positive definite: what is large in them cancels.
-const CONDITIONAL_ERROR: f64 = 1e-11;
-/// Constraints up to which the matrix is stored in double precision; beyond, memory matters more.
-const DOUBLE_BELOW: usize = 6000;
 /// Iterations stop at this share of the tolerance, since the true residual is a little larger than theirs.
 const ITERATE_TO: f64 = 0.5;
 /// Iterations in a round. With a system that can be solved, a few dozen do.
@@ -119,38 +44,24 @@ const MOST_ROUNDS: u32 = 6;
 /// Rows that the true residual is taken from; all, where there are no more. Of a thousand, it is known to some 3 %.
 const CHECKED_ROWS: usize = 1024;
 
-/// A system on its way to its solution.
+/// A system on its way to its solution. Vectors are in the order of the system's places.
 #[derive(Clone, Debug)]
 pub struct Solver {
-    table: KernelTable,
-    /// In the order of the matrix, like all vectors here.
-    centres: Vec<DVec3>,
-    values: Vec<f64>,
-    lambda: Vec<f64>,
-    /// For each place, the constraint.
-    order: Vec<u32>,
-    polynomial_columns: Vec<Vec<f64>>,
+    system: System,
     tolerance: f64,
-    inverse: SparseInverse,
-    matrix: Matrix,
+    /// What the system is to be changed to before it is solved, and the weights to start from, in that order.
+    revision: Option<(Constraints, Vec<f64>)>,
     stage: Stage,
+    /// Slices since the present system was there, or since the first one was begun.
+    slices: u32,
     iterations: u32,
     rounds: u32,
     residual: f64,
 }
 
 #[derive(Clone, Debug)]
-enum Matrix {
-    Single(HierarchicalMatrix<f32>),
-    Double(HierarchicalMatrix<f64>),
-}
-
-#[derive(Clone, Debug)]
 enum Stage {
-    /// Making the sparse inverse.
-    Inverse,
-    /// Making the matrix.
-    Matrix,
+    Build,
     Iterate(Box<Polynomials>, ConjugateGradients),
     /// Computing the residual of some rows anew: of those done so far.
     Check(Box<Polynomials>, ConjugateGradients, Vec<f64>),
@@ -162,31 +73,29 @@ enum Stage {
 impl Solver {
     /// The system of `constraints`, to be solved to a relative residual of `tolerance`.
     pub fn new(constraints: &Constraints, kernel: Kernel, tolerance: f64, seed: u64) -> Self {
-        let tree = ClusterTree::new(&constraints.centres);
-        let order = tree.order.clone();
-        let by_place = |all: &[f64]| -> Vec<f64> { order.iter().map(|&i| all[i as usize]).collect() };
-        let places: Vec<Vec3> = order.iter().map(|&i| constraints.centres[i as usize]).collect();
-        let centres: Vec<DVec3> = places.iter().map(|p| p.as_dvec3()).collect();
-        let (values, lambda) = (by_place(&constraints.values), by_place(&constraints.lambda));
-        let shuffled = Random::new(seed).order(places.len());
-        let (surface, outside): (Vec<u32>, Vec<u32>) =
-            shuffled.iter().partition(|&&i| values[i as usize] == 0.0);
-        let inverse = SparseInverse::new(&places, surface, outside);
         Self {
-            table: KernelTable::new(kernel),
-            polynomial_columns: polynomial_columns(kernel, &centres),
-            matrix: Matrix::new(tree, &centres, kernel, tolerance),
-            centres,
-            values,
-            lambda,
-            order,
+            system: System::new(constraints, kernel, tolerance, seed),
             tolerance,
-            inverse,
-            stage: Stage::Inverse,
+            revision: None,
+            stage: Stage::Build,
+            slices: 0,
             iterations: 0,
             rounds: 0,
             residual: 1.0,
         }
+    }
+
+    /// Turns to other constraints, of which most are the same: keeps what was made for the first ones, and starts from
+    /// `weights`, in the order of the new ones. The result depends on the first constraints, these and the weights, not on
+    /// others in between. Returns false, and does nothing, where too many differ.
+    pub fn revise(&mut self, constraints: &Constraints, weights: Vec<f64>) -> bool {
+        if !self.system.is_near(constraints) {
+            return false;
+        }
+        self.revision = Some((constraints.clone(), weights));
+        self.stage = Stage::Build;
+        (self.slices, self.iterations, self.rounds, self.residual) = (0, 0, 0, 1.0);
+        true
     }
 
     /// A slice of work. Returns whether the solution is there.
@@ -194,10 +103,10 @@ impl Solver {
     /// # Errors
     /// [`Singular`] where the tolerance cannot be reached.
     pub fn advance(&mut self) -> Result<bool, Singular> {
-        let stage = std::mem::replace(&mut self.stage, Stage::Inverse);
+        let stage = std::mem::replace(&mut self.stage, Stage::Build);
+        self.slices += 1;
         self.stage = match stage {
-            Stage::Inverse => self.make_inverse(),
-            Stage::Matrix => self.make_matrix()?,
+            Stage::Build => self.build()?,
             Stage::Iterate(polynomials, gradients) => self.iterate(polynomials, gradients)?,
             Stage::Check(polynomials, gradients, found) => self.check(polynomials, gradients, found)?,
             Stage::Renew(polynomials, gradients, found) => self.renew(polynomials, gradients, found),
@@ -206,19 +115,33 @@ impl Solver {
         Ok(matches!(self.stage, Stage::Done(_)))
     }
 
+    /// How far it is, for [`Self::advance_to`].
+    pub fn position(&self) -> Position {
+        Position { built: !matches!(self.stage, Stage::Build), slices: self.slices }
+    }
+
+    /// Does the slices up to a position again.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub fn advance_to(&mut self, to: Position) -> Result<(), Singular> {
+        while to.built && !self.position().built {
+            self.advance()?;
+        }
+        while self.slices < to.slices && !self.advance()? {}
+        Ok(())
+    }
+
     /// The solution, once [`Self::advance`] said that it is there.
     pub fn solution(&self) -> Option<Solution> {
         let Stage::Done(gradients) = &self.stage else { return None };
-        let mut weights = vec![0.0; self.order.len()];
-        for (&i, &w) in self.order.iter().zip(&gradients.weights) {
-            weights[i as usize] = w;
-        }
+        let weights = self.system.by_constraint(&gradients.weights);
         Some(Solution { weights, coefficients: gradients.coefficients.clone() })
     }
 
     /// The radial function.
     pub fn kernel(&self) -> Kernel {
-        self.table.kernel()
+        self.system.kernel()
     }
 
     /// The relative residual: while iterating that of the iteration, at the end the true one.
@@ -234,8 +157,7 @@ impl Solver {
     /// About how much of the work is done, 0 to 1.
     pub fn progress(&self) -> f64 {
         match &self.stage {
-            Stage::Inverse => 0.3 * self.inverse.progress(),
-            Stage::Matrix => 0.3 + 0.4 * self.matrix.progress(),
+            Stage::Build => 0.7 * self.system.progress(),
             Stage::Iterate(..) => {
                 let wanted = libm::log(ITERATE_TO * self.tolerance);
                 0.7 + 0.25 * (libm::log(self.residual) / wanted).clamp(0.0, 1.0)
@@ -245,28 +167,30 @@ impl Solver {
         }
     }
 
-    /// Bytes that the matrix takes.
-    pub fn matrix_bytes(&self) -> usize {
-        match &self.matrix {
-            Matrix::Single(matrix) => matrix.bytes(),
-            Matrix::Double(matrix) => matrix.bytes(),
-        }
+    /// Bytes that the system takes.
+    pub fn bytes(&self) -> usize {
+        self.system.bytes()
     }
 
-    fn make_inverse(&mut self) -> Stage {
-        let done = self.inverse.build(&self.centres, &self.lambda, &self.table, SLICE / ROW_WORK);
-        if done { Stage::Matrix } else { Stage::Inverse }
-    }
-
-    fn make_matrix(&mut self) -> Result<Stage, Singular> {
-        if !self.matrix.build(&self.table) {
-            return Ok(Stage::Matrix);
+    fn build(&mut self) -> Result<Stage, Singular> {
+        if !self.system.build() {
+            return Ok(Stage::Build);
         }
-        let columns = self.polynomial_columns.clone();
-        let polynomials = Box::new(Polynomials::new(columns, &self.inverse).ok_or(Singular)?);
-        let start = vec![0.0; self.centres.len()];
-        let gradients = ConjugateGradients::new(start, self.values.clone(), &polynomials, &self.inverse);
-        Ok(Stage::Iterate(polynomials, gradients))
+        self.slices = 0;
+        let start = match self.revision.take() {
+            Some((constraints, weights)) => {
+                self.system.revise(&constraints);
+                self.system.by_place(&weights)
+            }
+            None => vec![0.0; self.system.len()],
+        };
+        let columns = self.system.polynomials();
+        let polynomials = Polynomials::new(columns, self.system.inverse()).ok_or(Singular)?;
+        let start = polynomials.orthogonal(start);
+        let mut residual = self.system.product(&start);
+        residual.iter_mut().zip(self.system.values()).for_each(|(r, y)| *r = y - *r);
+        let gradients = ConjugateGradients::new(start, residual, &polynomials, self.system.inverse());
+        Ok(Stage::Iterate(Box::new(polynomials), gradients))
     }
 
     fn iterate(
@@ -274,14 +198,15 @@ impl Solver {
         polynomials: Box<Polynomials>,
         mut gradients: ConjugateGradients,
     ) -> Result<Stage, Singular> {
-        let before = self.iterations;
-        self.residual = norm(&gradients.residual) / norm(&self.values);
+        let system = &self.system;
+        let size = norm(system.values());
+        self.residual = norm(&gradients.residual) / size;
         if self.residual > ITERATE_TO * self.tolerance
             && self.iterations < MOST_ITERATIONS * (self.rounds + 1)
         {
-            gradients.iterate(|x| self.product(x), &polynomials, &self.inverse);
-            self.iterations = before + 1;
-            self.residual = norm(&gradients.residual) / norm(&self.values);
+            gradients.iterate(|x| system.product(x), &polynomials, system.inverse());
+            self.iterations += 1;
+            self.residual = norm(&gradients.residual) / size;
             if !self.residual.is_finite() {
                 return Err(Singular);
             }
@@ -290,40 +215,24 @@ impl Solver {
         Ok(Stage::Check(polynomials, gradients, Vec::new()))
     }
 
-    /// (Φ+Λ)x with the approximated Φ.
-    fn product(&self, x: &[f64]) -> Vec<f64> {
-        let mut out = match &self.matrix {
-            Matrix::Single(matrix) => matrix.product(x),
-            Matrix::Double(matrix) => matrix.product(x),
-        };
-        out.iter_mut().zip(&self.lambda).zip(x).for_each(|((y, l), x)| *y += l * x);
-        out
-    }
-
     fn check(
         &mut self,
         polynomials: Box<Polynomials>,
         gradients: ConjugateGradients,
         mut found: Vec<f64>,
     ) -> Result<Stage, Singular> {
-        let count = self.centres.len();
-        let step = count.div_ceil(CHECKED_ROWS);
-        let rows = (0..count).step_by(step);
+        let count = self.system.len();
+        let rows = (0..count).step_by(count.div_ceil(CHECKED_ROWS));
         let total = rows.len();
-        for i in rows.skip(found.len()).take(SLICE / count + 1) {
-            let polynomial: f64 = self
-                .polynomial_columns
-                .iter()
-                .zip(&gradients.coefficients)
-                .map(|(column, c)| c * column[i])
-                .sum();
-            found.push(self.row_residual(i, &gradients.weights) - polynomial);
+        for i in rows.skip(found.len()).take(WORK / count + 1) {
+            let polynomial = polynomials.value(i, &gradients.coefficients);
+            found.push(self.system.row_residual(i, &gradients.weights) - polynomial);
         }
         if found.len() < total {
             return Ok(Stage::Check(polynomials, gradients, found));
         }
         let squared: f64 = found.iter().map(|r| r * r).sum();
-        self.residual = (squared * count as f64 / total as f64).sqrt() / norm(&self.values);
+        self.residual = (squared * count as f64 / total as f64).sqrt() / norm(self.system.values());
         if self.residual <= self.tolerance {
             return Ok(Stage::Done(gradients));
         }
@@ -340,62 +249,32 @@ impl Solver {
         gradients: ConjugateGradients,
         mut found: Vec<f64>,
     ) -> Stage {
-        let count = self.centres.len();
-        let rows = (found.len()..count).take(SLICE / count + 1);
-        found.extend(rows.map(|i| self.row_residual(i, &gradients.weights)));
+        let count = self.system.len();
+        let rows = (found.len()..count).take(WORK / count + 1);
+        found.extend(rows.map(|i| self.system.row_residual(i, &gradients.weights)));
         if found.len() < count {
             return Stage::Renew(polynomials, gradients, found);
         }
-        let gradients = ConjugateGradients::new(gradients.weights, found, &polynomials, &self.inverse);
+        let inverse = self.system.inverse();
+        let gradients = ConjugateGradients::new(gradients.weights, found, &polynomials, inverse);
         Stage::Iterate(polynomials, gradients)
     }
-
-    /// yᵢ − ((Φ+Λ)w)ᵢ from the kernel itself.
-    fn row_residual(&self, i: usize, weights: &[f64]) -> f64 {
-        let own = self.centres[i];
-        let terms = self.centres.iter().zip(weights);
-        let sum: f64 = terms.map(|(c, w)| w * self.table.value(own.distance_squared(*c))).sum();
-        self.values[i] - sum - self.lambda[i] * weights[i]
-    }
 }
 
-impl Matrix {
-    fn new(tree: ClusterTree, centres: &[DVec3], kernel: Kernel, tolerance: f64) -> Self {
-        let conditional = kernel.is_conditional();
-        let error = if conditional { CONDITIONAL_ERROR } else { FAR_ERROR * tolerance };
-        if conditional || centres.len() <= DOUBLE_BELOW {
-            Self::Double(HierarchicalMatrix::new(tree, centres.to_vec(), error))
-        } else {
-            Self::Single(HierarchicalMatrix::new(tree, centres.to_vec(), error))
-        }
-    }
-
-    fn build(&mut self, table: &KernelTable) -> bool {
-        let share = match self {
-            Self::Single(matrix) => matrix.build(table, SLICE),
-            Self::Double(matrix) => matrix.build(table, SLICE),
-        };
-        share == 1.0
-    }
-
-    fn progress(&self) -> f64 {
-        match self {
-            Self::Single(matrix) => matrix.progress(),
-            Self::Double(matrix) => matrix.progress(),
-        }
-    }
-}
-
-/// 1, and with a thin plate x, y and z, at the centres.
-fn polynomial_columns(kernel: Kernel, centres: &[DVec3]) -> Vec<Vec<f64>> {
-    let constant = std::iter::once(vec![1.0; centres.len()]);
-    let linear = (0..kernel.polynomials() - 1).map(|axis| centres.iter().map(|p| p[axis]).collect());
-    constant.chain(linear).collect()
+/// How far a solver is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Position {
+    /// Whether matrix and inverse are there.
+    built: bool,
+    /// Slices since then, or since the beginning.
+    slices: u32,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::{DVec3, Random, Vec3};
+    use crate::methods::implicit::cloud::Cloud;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -495,6 +374,13 @@ mod tests {
             x[k] = (a[k][m] - known) / a[k][k];
         }
         x
+    }
+
+    /// 1, and with a thin plate x, y and z, at the centres.
+    fn polynomial_columns(kernel: Kernel, centres: &[DVec3]) -> Vec<Vec<f64>> {
+        let constant = std::iter::once(vec![1.0; centres.len()]);
+        let linear = (0..kernel.polynomials() - 1).map(|axis| centres.iter().map(|p| p[axis]).collect());
+        constant.chain(linear).collect()
     }
 
     fn value(constraints: &Constraints, kernel: Kernel, x: &[f64], p: DVec3) -> f64 {
@@ -605,6 +491,118 @@ mod tests {
         while !solver.advance().unwrap() {}
         while !copy.advance().unwrap() {}
         assert!(solver.solution().unwrap().weights == copy.solution().unwrap().weights);
+    }
+
+    /// `base` with some of its points and of those outside taken away, and others added.
+    fn changed(base: &Constraints) -> Constraints {
+        let mut random = Random::new(11);
+        let (surface, outside) = base.centres.split_at(base.surface);
+        let mut points: Vec<Vec3> = surface.iter().skip(20).copied().collect();
+        points.extend((0..30).map(|_| (direction(&mut random) * 0.85).as_vec3()));
+        let mut far: Vec<Vec3> = outside.iter().skip(3).copied().collect();
+        far.push((direction(&mut random) * 1.3).as_vec3());
+        let mut changed = Constraints::new(&Cloud { points, ..Cloud::default() }, &far);
+        changed.regularize(base.lambda[0], base.lambda[base.surface]);
+        changed
+    }
+
+    /// The weights of `solution` at those centres that are in `to`, too.
+    fn carried(from: &Constraints, solution: &Solution, to: &Constraints) -> Vec<f64> {
+        let known = ByPlace::new(&from.centres);
+        to.centres.iter().map(|&c| known.find(c).map_or(0.0, |i| solution.weights[i])).collect()
+    }
+
+    fn run(solver: &mut Solver) -> u32 {
+        for slices in 1..100_000 {
+            if solver.advance().unwrap() {
+                return slices;
+            }
+        }
+        panic!("no end")
+    }
+
+    #[test]
+    fn a_few_other_constraints_are_solved_as_if_from_the_start() {
+        for lambda in [[0.0, 0.0], [0.001, 2.0]] {
+            let base = system(900, lambda, false);
+            for kernel in kernels(base.radius()) {
+                let changed = changed(&base);
+                let mut solver = Solver::new(&base, kernel, 1e-7, 1);
+                let whole = run(&mut solver);
+                let iterations = solver.iterations();
+                let weights = carried(&base, &solver.solution().unwrap(), &changed);
+                assert!(solver.revise(&changed, weights));
+                let again = run(&mut solver);
+                let (expected, _) = solved(&changed, kernel, 1e-7);
+                let found = solver.solution().unwrap();
+                println!(
+                    "{kernel:?}: {again} slices after {whole}, {} after {iterations}",
+                    solver.iterations()
+                );
+                let residual = true_residual(&changed, kernel, &found);
+                println!("true residual {residual:e}");
+                // That of the kernel's table for weights that without regularization are huge.
+                assert!(residual <= if lambda[0] == 0.0 { 1e-5 } else { 2e-7 });
+                // The others take most of their time for iterations.
+                assert!(again < whole || kernel.is_conditional());
+                let mut random = Random::new(8);
+                for _ in 0..50 {
+                    let p = direction(&mut random) * (1.5 * unit(&mut random));
+                    let [f, g] = [&found, &expected].map(|solution| {
+                        let x: Vec<f64> =
+                            solution.weights.iter().chain(&solution.coefficients).copied().collect();
+                        value(&changed, kernel, &x, p)
+                    });
+                    assert!((f - g).abs() < 1e-4 * (1.0 + g.abs()), "{kernel:?} at {p}: {f} for {g}");
+                }
+            }
+        }
+    }
+
+    /// So that a restored run, which has to make the matrix again, goes on as the saved one would have.
+    #[test]
+    fn what_was_solved_in_between_does_not_matter() {
+        let base = system(900, [0.001, 2.0], false);
+        let kernel = Kernel::MultiOrder { delta: 5.0, tau: 0.025 };
+        let changed = changed(&base);
+        let mut kept = Solver::new(&base, kernel, 1e-6, 1);
+        run(&mut kept);
+        let weights = carried(&base, &kept.solution().unwrap(), &changed);
+        // There and back, and there again; and on a solver that has made nothing yet.
+        for constraints in [&changed, &base, &changed] {
+            let start = if constraints.centres == changed.centres {
+                weights.clone()
+            } else {
+                vec![0.0; base.centres.len()]
+            };
+            assert!(kept.revise(constraints, start));
+            run(&mut kept);
+        }
+        let mut fresh = Solver::new(&base, kernel, 1e-6, 1);
+        assert!(fresh.revise(&changed, weights));
+        run(&mut fresh);
+        assert!(kept.solution().unwrap().weights == fresh.solution().unwrap().weights);
+        assert_eq!(kept.position(), fresh.position());
+        // To the same place again, slice by slice.
+        let (mut one, mut other) = (Solver::new(&base, kernel, 1e-6, 1), Solver::new(&base, kernel, 1e-6, 1));
+        while !one.advance().unwrap() {
+            let mut copy = other.clone();
+            copy.advance_to(one.position()).unwrap();
+            assert_eq!((copy.position(), copy.residual()), (one.position(), one.residual()));
+            other = copy;
+        }
+    }
+
+    #[test]
+    fn too_many_others_are_refused() {
+        let base = system(900, [0.001, 2.0], false);
+        let kernel = Kernel::MultiOrder { delta: 5.0, tau: 0.025 };
+        let mut solver = Solver::new(&base, kernel, 1e-6, 1);
+        run(&mut solver);
+        let fewer = system(600, [0.001, 2.0], false);
+        let (before, position) = (solver.solution().unwrap().weights, solver.position());
+        assert!(!solver.revise(&fewer, vec![0.0; fewer.centres.len()]));
+        assert!(solver.solution().unwrap().weights == before && solver.position() == position);
     }
 
     #[test]

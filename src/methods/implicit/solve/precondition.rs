@@ -13,6 +13,8 @@ const NEIGHBOURS: usize = 24;
 #[derive(Clone, Debug)]
 pub struct SparseInverse {
     /// In which order centres are predicted, and from which earlier ones.
+    rows: Rows,
+    /// What is still to be planned.
     plan: Plan,
     /// Rows that are made.
     made: usize,
@@ -20,20 +22,44 @@ pub struct SparseInverse {
     weights: Vec<f64>,
 }
 
+/// Centres in order, each with some of those before it.
+#[derive(Clone, Debug, Default)]
+struct Rows {
+    centres: Vec<u32>,
+    /// Their neighbours, one row after the other, and where each row ends.
+    neighbours: Vec<u32>,
+    ends: Vec<usize>,
+}
+
+impl Rows {
+    fn push(&mut self, centre: u32, neighbours: impl IntoIterator<Item = u32>) {
+        self.centres.push(centre);
+        self.neighbours.extend(neighbours);
+        self.ends.push(self.neighbours.len());
+    }
+
+    fn iter(&self) -> impl Iterator<Item = (u32, &[u32])> {
+        let starts = std::iter::once(&0).chain(&self.ends);
+        let ranges = starts.zip(&self.ends).map(|(&from, &to)| &self.neighbours[from..to]);
+        self.centres.iter().copied().zip(ranges)
+    }
+}
+
 impl SparseInverse {
     /// The inverse for `centres`, all of which are named once in `first` and `last`, which come in that order; nothing is
     /// made yet.
     pub fn new(centres: &[Vec3], first: Vec<u32>, last: Vec<u32>) -> Self {
-        Self { plan: Plan::new(centres, first, last), made: 0, weights: Vec::new() }
+        let plan = Plan::new(centres, first, last);
+        Self { rows: Rows::default(), plan, made: 0, weights: Vec::new() }
     }
 
     /// Plans or makes up to `count` more rows. Returns whether all are made.
     ///
     /// Where a local system is singular to rounding, its diagonal is raised: that costs iterations, never accuracy.
     pub fn build(&mut self, centres: &[DVec3], lambda: &[f64], table: &KernelTable, count: usize) -> bool {
-        if self.plan.extend(count) {
-            for (centre, near) in self.plan.rows().skip(self.made).take(count) {
-                row(centre as usize, near, centres, lambda, table, &mut self.weights);
+        if self.plan.extend(count, &mut self.rows) {
+            for (centre, near) in self.rows.iter().skip(self.made).take(count) {
+                row(centre, near, centres, lambda, table, &mut self.weights);
                 self.made += 1;
             }
         }
@@ -42,14 +68,47 @@ impl SparseInverse {
 
     /// The share of rows planned and made.
     pub fn progress(&self) -> f64 {
-        0.5 * (self.plan.order.len() + self.made) as f64 / self.plan.centres.len() as f64
+        0.5 * (self.rows.centres.len() + self.made) as f64 / self.plan.centres.len() as f64
+    }
+
+    /// The inverse, once made, without the centres that are `gone` and with those that follow its own in `centres`, each
+    /// predicted from the nearest ones of all others.
+    pub fn revised(&self, gone: &[bool], centres: &[DVec3], lambda: &[f64], table: &KernelTable) -> Self {
+        let mut revised = Self { rows: Rows::default(), plan: Plan::default(), made: 0, weights: Vec::new() };
+        let mut rest = &self.weights[..];
+        let is_gone = |i: &u32| gone[*i as usize];
+        for (centre, near) in self.rows.iter() {
+            let (weights, after) = rest.split_at(near.len() + 1);
+            rest = after;
+            if is_gone(&centre) {
+                continue;
+            }
+            if near.iter().any(is_gone) {
+                let near: Vec<u32> = near.iter().copied().filter(|i| !is_gone(i)).collect();
+                revised.add(centre, &near, centres, lambda, table);
+            } else {
+                revised.rows.push(centre, near.iter().copied());
+                revised.weights.extend_from_slice(weights);
+            }
+        }
+        for added in gone.len()..centres.len() {
+            let near = nearest(&centres[..added], centres[added], |i| i >= gone.len() || !gone[i]);
+            revised.add(added as u32, &near, centres, lambda, table);
+        }
+        revised.made = revised.rows.centres.len();
+        revised
+    }
+
+    fn add(&mut self, centre: u32, near: &[u32], centres: &[DVec3], lambda: &[f64], table: &KernelTable) {
+        self.rows.push(centre, near.iter().copied());
+        row(centre, near, centres, lambda, table, &mut self.weights);
     }
 
     /// The approximate inverse times `x`.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
         let mut rest = &self.weights[..];
-        for (centre, neighbours) in self.plan.rows().take(self.made) {
+        for (centre, neighbours) in self.rows.iter().take(self.made) {
             let (weights, after) = rest.split_at(neighbours.len() + 1);
             rest = after;
             let others = neighbours.iter().zip(&weights[1..]);
@@ -62,17 +121,30 @@ impl SparseInverse {
     }
 }
 
+/// The [`NEIGHBOURS`] of the points `among` that are nearest to `p`, nearest first.
+fn nearest(points: &[DVec3], p: DVec3, among: impl Fn(usize) -> bool) -> Vec<u32> {
+    let with_distance = |i: usize| (points[i].distance_squared(p), i as u32);
+    let mut found: Vec<(f64, u32)> = (0..points.len()).filter(|&i| among(i)).map(with_distance).collect();
+    let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    if found.len() > NEIGHBOURS {
+        found.select_nth_unstable_by(NEIGHBOURS, order);
+        found.truncate(NEIGHBOURS);
+    }
+    found.sort_unstable_by(order);
+    found.into_iter().map(|(_, i)| i).collect()
+}
+
 /// The row of one centre: with A its neighbours' system and b its own entries there, c = A⁻¹b, the row is
 /// (1, −c)/√(φ(0) + λ − bᵀc), added to `out`.
 fn row(
-    centre: usize,
+    centre: u32,
     neighbours: &[u32],
     centres: &[DVec3],
     lambda: &[f64],
     table: &KernelTable,
     out: &mut Vec<f64>,
 ) {
-    let n = neighbours.len();
+    let (centre, n) = (centre as usize, neighbours.len());
     let entry = |i: usize, j: usize| table.value(centres[i].distance_squared(centres[j]));
     let mut b: Vec<f64> = neighbours.iter().map(|&j| entry(centre, j as usize)).collect();
     let own = table.value(0.0);
@@ -146,18 +218,13 @@ const LEAST_SPACING: f32 = 1e-6;
 const CELL: f32 = 2.5;
 const REACH: f32 = 5.0;
 
-/// Centres in an order from coarse to fine, each with its nearest ones before it: each is as far from those before it as
-/// those that follow let it, within a factor of √2. In rounds: each takes the centres that are farther than some distance
-/// from all taken.
-#[derive(Clone, Debug)]
+/// An order from coarse to fine, each centre with its nearest ones before it: each is as far from those before it as those
+/// that follow let it, within a factor of √2. In rounds: each takes the centres that are farther than some distance from
+/// all taken.
+#[derive(Clone, Debug, Default)]
 struct Plan {
     centres: Vec<Vec3>,
-    /// The centres taken so far.
-    order: Vec<u32>,
-    /// Their neighbours, one row after the other, and where each row ends.
-    neighbours: Vec<u32>,
-    ends: Vec<usize>,
-    /// What was taken, in the same order.
+    /// What was taken, in order.
     grid: PointGrid,
     spacing: f32,
     /// Centres to be looked at in this round, the next one last, and those left for the next round.
@@ -172,9 +239,6 @@ impl Plan {
         first.reverse();
         Self {
             centres: centres.to_vec(),
-            order: Vec::new(),
-            neighbours: Vec::new(),
-            ends: Vec::new(),
             grid: PointGrid::new(CELL * FIRST_SPACING, centres.len()),
             spacing: FIRST_SPACING,
             waiting: first,
@@ -183,51 +247,43 @@ impl Plan {
         }
     }
 
-    /// Each centre taken, with its neighbours.
-    fn rows(&self) -> impl Iterator<Item = (u32, &[u32])> {
-        let starts = std::iter::once(&0).chain(&self.ends);
-        let ranges = starts.zip(&self.ends).map(|(&from, &to)| &self.neighbours[from..to]);
-        self.order.iter().copied().zip(ranges)
-    }
-
     /// Looks at up to `count` centres. Returns whether all are taken.
-    fn extend(&mut self, count: usize) -> bool {
+    fn extend(&mut self, count: usize, rows: &mut Rows) -> bool {
         for _ in 0..count {
             while self.waiting.is_empty() {
                 if self.others.is_empty() && self.last.is_empty() {
                     return true;
                 }
-                self.begin_round();
+                self.begin_round(rows);
             }
             if let Some(i) = self.waiting.pop() {
-                self.look_at(i);
+                self.look_at(i, rows);
             }
         }
-        self.order.len() == self.centres.len()
+        rows.centres.len() == self.centres.len()
     }
 
-    fn begin_round(&mut self) {
+    fn begin_round(&mut self, rows: &Rows) {
         let of_others = !self.others.is_empty();
         self.waiting = std::mem::take(if of_others { &mut self.others } else { &mut self.last });
         self.waiting.reverse();
         self.spacing = if of_others { self.spacing * RATIO } else { FIRST_SPACING };
         let cell = if self.spacing > LEAST_SPACING { self.spacing } else { LEAST_SPACING };
-        let taken = self.order.iter().map(|&i| self.centres[i as usize]);
+        let taken = rows.centres.iter().map(|&i| self.centres[i as usize]);
         let mut grid = PointGrid::new(CELL * cell, self.centres.len());
         taken.for_each(|p| grid.insert(p));
         self.grid = grid;
     }
 
-    fn look_at(&mut self, i: u32) {
+    fn look_at(&mut self, i: u32, rows: &mut Rows) {
         let p = self.centres[i as usize];
         if self.spacing > LEAST_SPACING && self.grid.has_within(p, self.spacing) {
             self.others.push(i);
             return;
         }
         let near = self.grid.nearest(p, NEIGHBOURS, REACH * self.spacing);
-        self.neighbours.extend(near.into_iter().map(|(_, at)| self.order[at as usize]));
-        self.order.push(i);
-        self.ends.push(self.neighbours.len());
+        let near: Vec<u32> = near.into_iter().map(|(_, at)| rows.centres[at as usize]).collect();
+        rows.push(i, near);
         self.grid.insert(p);
     }
 }

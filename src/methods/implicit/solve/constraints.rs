@@ -1,0 +1,91 @@
+//! What the function has to be where.
+
+use super::Solution;
+use crate::math::{Bounds, Vec3};
+use crate::methods::implicit::cloud::Cloud;
+
+/// What the function has to be where.
+#[derive(Clone, Debug, Default)]
+pub struct Constraints {
+    /// Where, in units of the box; no two are equal.
+    pub centres: Vec<Vec3>,
+    /// Wanted values: 0 on the surface, −1 outside.
+    pub values: Vec<f64>,
+    /// λ of each, at least 0.
+    pub lambda: Vec<f64>,
+    /// How many of them, the first ones, are on the surface.
+    pub surface: usize,
+    /// Of those on the surface, where it is known.
+    pub confidence: Option<Vec<f32>>,
+}
+
+impl Constraints {
+    /// 0 at the points of `surface`, −1 at those `outside`; λ is 0 until [`Self::regularize`].
+    pub fn new(surface: &Cloud, outside: &[Vec3]) -> Self {
+        let count = surface.len() + outside.len();
+        let value = |i: usize| if i < surface.len() { 0.0 } else { -1.0 };
+        Self {
+            centres: surface.points.iter().chain(outside).copied().collect(),
+            values: (0..count).map(value).collect(),
+            lambda: vec![0.0; count],
+            surface: surface.len(),
+            confidence: surface.confidence.clone(),
+        }
+    }
+
+    /// Sets λ: of surface constraints by their confidence, and from 3,000 on by their number, so that more points
+    /// mean a better surface and not a rougher one.
+    pub fn regularize(&mut self, surface: f64, outside: f64) {
+        let crowd = self.surface as f64 / USUAL_POINTS;
+        let surface = if crowd > 1.0 { surface * crowd } else { surface };
+        for (i, lambda) in self.lambda.iter_mut().enumerate() {
+            let sure = self.confidence.as_ref().and_then(|all| all.get(i)).map_or(1.0, |&c| f64::from(c));
+            *lambda = if i < self.surface { surface / sure } else { outside };
+        }
+    }
+
+    /// A centre that two constraints share, if any do.
+    pub fn shared_centre(&self) -> Option<Vec3> {
+        let found = ByPlace::new(&self.centres).0;
+        let shared = found.windows(2).find(|pair| pair[0].0 == pair[1].0);
+        shared.map(|pair| self.centres[pair[0].1 as usize])
+    }
+
+    /// Radius of a ball that holds all centres.
+    pub fn radius(&self) -> f64 {
+        let bounds = Bounds::of(&self.centres);
+        0.5 * f64::from(bounds.max.distance(bounds.min))
+    }
+
+    /// The mean of the function over the surface constraints: at each it is y − λw.
+    pub fn mean_on_surface(&self, solution: &Solution) -> f64 {
+        let terms = self.lambda.iter().zip(&solution.weights).take(self.surface);
+        -terms.map(|(lambda, w)| lambda * w).sum::<f64>() / self.surface as f64
+    }
+}
+
+/// Surface constraints that the usual values of λ are for (paper, section VI-B).
+const USUAL_POINTS: f64 = 3000.0;
+
+/// Points by where they are, to find them again.
+pub struct ByPlace(Vec<([u32; 3], u32)>);
+
+impl ByPlace {
+    /// All of `points`.
+    pub fn new(points: &[Vec3]) -> Self {
+        let mut all: Vec<([u32; 3], u32)> = points.iter().map(|&p| bits(p)).zip(0..).collect();
+        all.sort_unstable();
+        Self(all)
+    }
+
+    /// The first of the points that is equal to `p`.
+    pub fn find(&self, p: Vec3) -> Option<usize> {
+        let at = self.0.partition_point(|(place, _)| *place < bits(p));
+        self.0.get(at).filter(|(place, _)| *place == bits(p)).map(|&(_, i)| i as usize)
+    }
+}
+
+/// The same for equal points; −0 is 0.
+fn bits(p: Vec3) -> [u32; 3] {
+    p.to_array().map(|x| (x + 0.0).to_bits())
+}
