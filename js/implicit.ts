@@ -64,6 +64,16 @@ export interface ImplicitOptions {
   params?: ImplicitParams;
 }
 
+/** What differs from the points as they were given. */
+export interface PointEdits {
+  /** More points near the surface, packed. */
+  added?: Float32Array;
+  /** Points to leave out, by their index in those given. */
+  removed?: Uint32Array;
+  /** More points known to be outside, packed. */
+  outside?: Float32Array;
+}
+
 /** How well a surface fits its points, in their units. */
 export interface Fitness {
   /** Mean distance of all the original points from the surface. */
@@ -214,6 +224,32 @@ export class ImplicitSurface implements Stepper {
     this.#handle.use((raw) => raw.setParams(values));
   }
 
+  /** Points by hand as they are now; a copy. */
+  get edits(): Required<PointEdits> {
+    return this.#handle.use((raw) => ({
+      added: raw.added(),
+      removed: raw.removed(),
+      outside: raw.outside(),
+    }));
+  }
+
+  /**
+   * Takes points in and leaves some out, in place of all edits before; `{}` takes all back. Live: the surface stays until
+   * the new one is there. Up to some 250 of each change the system that was solved last, whose matrix and solution
+   * serve again; more are solved from the start.
+   *
+   * @throws {@link VesicleError} `invalid-argument` naming the list: not finite, farther from the others than their own
+   *   size, no such index, too few points left, on the surface and outside at once; nothing has changed then.
+   */
+  setEdits(edits: PointEdits): void {
+    const known = options('edits', edits, ['added', 'removed', 'outside']) as PointEdits;
+    const { added = new Float32Array(), removed = new Uint32Array(), outside = new Float32Array() } = known;
+    finite('added', added, 3);
+    finite('outside', outside, 3);
+    typed('removed', removed, Uint32Array);
+    this.#handle.use((raw) => raw.setEdits(added, removed, outside));
+  }
+
   /**
    * f at packed points: above 0 inside, 0 on the surface, below 0 outside. Summed term by term: some 3 ns for each pair of
    * a point and a constraint.
@@ -237,7 +273,7 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Distances of all the original points from the surface, and its curvature.
+   * Distances of all points, with edits, from the surface, and its curvature.
    *
    * @throws {@link VesicleError} `invalid-argument` before there is a surface.
    */

@@ -23,6 +23,7 @@ export {
   type ImplicitOptions,
   type ImplicitParams,
   ImplicitSurface,
+  type PointEdits,
   parsePoints,
 } from './implicit.js';
 export {

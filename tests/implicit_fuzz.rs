@@ -19,7 +19,7 @@ use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{measure, report};
 use vesicle::methods::MethodError;
 use vesicle::methods::implicit::{
-    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, KernelKind, Level,
+    Camera, Cloud, Edits, ImplicitOptions, ImplicitParams, ImplicitSurface, KernelKind, Level,
 };
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -174,6 +174,7 @@ fn run(seed: u64, tally: &mut Tally) {
     let mut random = Random(seed);
     let cloud = cloud(&mut random);
     let options = options(&mut random, &cloud);
+    let count = cloud.points.len();
     let mut surface = match ImplicitSurface::new(cloud, options) {
         Ok(surface) => surface,
         Err(MethodError::InvalidArgument { .. }) => {
@@ -192,7 +193,7 @@ fn run(seed: u64, tally: &mut Tally) {
                 if !report.done {
                     if random.below(30) == 0 && changes > 0 {
                         changes -= 1;
-                        let _ = change(&mut surface, &mut random);
+                        let _ = change(&mut surface, count, &mut random);
                     }
                     continue;
                 }
@@ -212,14 +213,36 @@ fn run(seed: u64, tally: &mut Tally) {
             return;
         }
         changes -= 1;
-        if change(&mut surface, &mut random).is_err() {
+        if change(&mut surface, count, &mut random).is_err() {
             return;
         }
     }
     panic!("seed {seed}: no end");
 }
 
-fn change(surface: &mut ImplicitSurface, random: &mut Random) -> Result<(), MethodError> {
+/// Points by hand, near others or anywhere, and some of the first taken away; or all edits taken back.
+fn edits(surface: &ImplicitSurface, count: usize, random: &mut Random) -> Edits {
+    let [known, _] = surface.constraints();
+    let mut places = |most: usize| -> Vec<Vec3> {
+        let near = |random: &mut Random| match known.get(random.below(known.len().max(1))) {
+            Some(p) => *p + (direction(random) * [0.0, 1e-6, 0.01, 1.0, 9.0][random.below(5)]).as_vec3(),
+            None => direction(random).as_vec3(),
+        };
+        (0..random.below(most)).map(|_| near(random)).collect()
+    };
+    if places(5).is_empty() {
+        return Edits::default();
+    }
+    let (added, outside) = (places(300), places(4));
+    let removed = (0..random.below(40)).map(|_| random.below(count + 1) as u32).collect();
+    Edits { added, removed, outside }
+}
+
+fn change(surface: &mut ImplicitSurface, count: usize, random: &mut Random) -> Result<(), MethodError> {
+    if random.below(2) == 0 {
+        let edits = edits(surface, count, random);
+        return surface.set_edits(edits);
+    }
     let now = surface.params().clone();
     let next = match random.below(3) {
         0 => ImplicitParams {

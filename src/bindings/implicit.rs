@@ -14,7 +14,7 @@ use super::volume::RawVolume;
 use crate::io::{PointCloud, parse_points};
 use crate::math::Vec3;
 use crate::methods::implicit::{
-    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, param_specs,
+    Camera, Cloud, Edits, ImplicitOptions, ImplicitParams, ImplicitSurface, param_specs,
 };
 
 /// The points of a file.
@@ -151,6 +151,34 @@ impl RawImplicit {
         let params = merged(surface.params(), params)?;
         surface.set_params(params).map_err(Failure::from)?;
         Ok(())
+    }
+
+    /// Points by hand, packed, in place of those before.
+    #[wasm_bindgen(js_name = setEdits)]
+    pub fn set_edits(
+        &self,
+        added: &Float32Array,
+        removed: Vec<u32>,
+        outside: &Float32Array,
+    ) -> Result<(), JsValue> {
+        let edits = Edits { added: points(added)?, removed, outside: points(outside)? };
+        self.0.borrow_mut().set_edits(edits).map_err(Failure::from)?;
+        Ok(())
+    }
+
+    /// Points added by hand, packed.
+    pub fn added(&self) -> Vec<f32> {
+        packed(&self.0.borrow().edits().added)
+    }
+
+    /// Indices of those left out by hand.
+    pub fn removed(&self) -> Vec<u32> {
+        self.0.borrow().edits().removed.clone()
+    }
+
+    /// Points outside by hand, packed.
+    pub fn outside(&self) -> Vec<f32> {
+        packed(&self.0.borrow().edits().outside)
     }
 
     /// f at packed points.

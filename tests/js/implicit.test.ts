@@ -106,6 +106,46 @@ test('restore(save()) goes on bit for bit in every phase', () => {
   }
 });
 
+test('points by hand are live, and come back with a saved state', () => {
+  const found = finished();
+  const { volume } = found.mesh.info();
+  const edits = {
+    added: Float32Array.of(0, 0, 1.15, 0, 0.1, 1.14),
+    removed: Uint32Array.of(0, 1, 2),
+    outside: Float32Array.of(0, 0, -1.1),
+  };
+  const before = found.constraints().surface.length / 3;
+  found.setEdits(edits);
+  expect(found.edits).toEqual(edits);
+  expect(found.mesh.info().volume).toBe(volume);
+  expect(found.step(100_000)).toMatchObject({ done: true, components: 1, euler: 2 });
+  expect(found.mesh.check().selfIntersections).toBe(0);
+  expect(found.evaluate(Float32Array.of(0, 0, 1.12))[0]).toBeGreaterThan(0);
+  expect(found.constraints().surface.length / 3).toBe(before - 1);
+  const other = surface();
+  other.restore(found.save());
+  expect(other.edits).toEqual(edits);
+  for (const one of [found, other]) {
+    one.setEdits({});
+    one.step(100_000);
+  }
+  expect(bytesOf(other).equals(bytesOf(found))).toBe(true);
+  expect(found.mesh.info().volume).toBeCloseTo(volume, 3);
+  for (const [name, bad] of [
+    ['added', { added: Float32Array.of(0, 0, 9) }],
+    ['added', { added: Float32Array.of(0, Number.NaN, 0) }],
+    ['added', { added: Float32Array.of(0, 1) }],
+    ['outside', { outside: wrong([0, 0, 1]) }],
+    ['removed', { removed: Uint32Array.of(1_000_000) }],
+    ['removed', { removed: wrong([1]) }],
+    ['remove', { remove: Uint32Array.of(1) } as object],
+  ] as const) {
+    const { code, message } = failure(() => found.setEdits(bad));
+    expect(code).toBe('invalid-argument');
+    expect(message).toContain(name);
+  }
+});
+
 test('states that are none are refused', () => {
   const found = finished();
   const state = found.save();

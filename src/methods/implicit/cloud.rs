@@ -1,8 +1,7 @@
-//! The points in the box: scaled, without duplicates, without outliers, thinned (paper, sections VI-B and VI-D).
+//! The points in the box: scaled, without duplicates, without outliers (paper, section VI-D).
 
-use crate::math::{Bounds, DAffine3, DMat3, DVec3, Random, Vec3, symmetric};
+use crate::math::{Bounds, DAffine3, DMat3, DVec3, Vec3, symmetric};
 use crate::methods::MethodError;
-use crate::spatial::PointGrid;
 
 /// Points near a surface, with what is known of each.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -115,7 +114,7 @@ impl Cloud {
 
     /// Everything moved and scaled by `map`, which does not turn or mirror.
     pub fn mapped(&self, map: &BoxMap) -> Self {
-        Self { points: self.points.iter().map(|&p| map.to_box(p)).collect(), ..self.clone() }
+        Self { points: self.points.iter().map(|&p| map.in_box(p)).collect(), ..self.clone() }
     }
 }
 
@@ -156,17 +155,17 @@ impl BoxMap {
     }
 
     /// A point in the box.
-    pub fn to_box(&self, p: Vec3) -> Vec3 {
-        self.to_box_exactly(p.as_dvec3()).as_vec3()
+    pub fn in_box(&self, p: Vec3) -> Vec3 {
+        self.in_box_exactly(p.as_dvec3()).as_vec3()
     }
 
     /// A point in the box, not rounded.
-    pub fn to_box_exactly(&self, p: DVec3) -> DVec3 {
+    pub fn in_box_exactly(&self, p: DVec3) -> DVec3 {
         (p - self.centre) * self.scale
     }
 
     /// A point of the box in the points' units.
-    pub fn from_box(&self, p: DVec3) -> DVec3 {
+    pub fn in_world(&self, p: DVec3) -> DVec3 {
         p / self.scale + self.centre
     }
 
@@ -239,64 +238,10 @@ fn neighbours([x, y, z]: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
     steps.map(move |[dx, dy, dz]| [x + dx, y + dy, z + dz])
 }
 
-/// Poisson-disc sampling: the points in a random order without those nearer than `radius` to one before.
-pub fn thinned(points: &[Vec3], order: &[u32], radius: f32) -> Vec<u32> {
-    let mut grid = PointGrid::new(radius, points.len());
-    let mut kept = Vec::new();
-    for &i in order {
-        let p = points[i as usize];
-        if !grid.has_within(p, radius) {
-            grid.insert(p);
-            kept.push(i);
-        }
-    }
-    kept
-}
-
-/// At most `most` of the points by Poisson-disc sampling, with the largest radius that gives nearly so many; all, where
-/// there are no more. In random order, the same for the same seed.
-pub fn subsampled(points: &[Vec3], most: usize, seed: u64) -> Vec<u32> {
-    let order = Random::new(seed).order(points.len());
-    if points.len() <= most {
-        return order;
-    }
-    // Between too small and large enough a radius; a surface of side 2 has a hundred points a tenth apart or so.
-    let (mut small, mut large) = (0.0_f32, 0.0_f32);
-    let mut radius = 2.0 / (most as f32).sqrt();
-    let mut best = Vec::new();
-    for _ in 0..ROUNDS {
-        let kept = thinned(points, &order, radius);
-        let count = kept.len();
-        if count <= most {
-            (large, best) = (radius, kept);
-            if count as f64 >= NEARLY * most as f64 {
-                break;
-            }
-        } else {
-            small = radius;
-        }
-        // On a surface the number falls with the square of the radius.
-        let guess = radius * (count as f32 / (0.5 * (1.0 + NEARLY as f32) * most as f32)).sqrt();
-        let bracketed = guess > small && (large == 0.0 || guess < large);
-        radius = if bracketed {
-            guess
-        } else if large > 0.0 {
-            0.5 * (small + large)
-        } else {
-            2.0 * small
-        };
-    }
-    if best.is_empty() { order[..most].to_vec() } else { best }
-}
-
-/// Trials for the radius.
-const ROUNDS: usize = 16;
-/// The share of the points wanted that is near enough.
-const NEARLY: f64 = 0.97;
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Random;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -321,17 +266,17 @@ mod tests {
                 .map(|p| *p * Vec3::new(1.0, 0.5, 0.2) * scale + Vec3::splat(shift))
                 .collect();
             let map = BoxMap::of(&points);
-            let inside: Vec<Vec3> = points.iter().map(|&p| map.to_box(p)).collect();
+            let inside: Vec<Vec3> = points.iter().map(|&p| map.in_box(p)).collect();
             let bounds = Bounds::of(&inside);
             assert!((bounds.max - bounds.min).max_element() <= 2.0 + 1e-6 && bounds.max.x >= 1.0 - 1e-6);
             for (p, q) in points.iter().zip(&inside) {
-                let back = map.from_box(map.to_box_exactly(p.as_dvec3()));
+                let back = map.in_world(map.in_box_exactly(p.as_dvec3()));
                 assert!(back.distance(p.as_dvec3()) <= 1e-12 / map.scale() + 1e-14 * f64::from(shift));
                 assert!(map.affine().transform_point3(p.as_dvec3()).distance(q.as_dvec3()) < 1e-6);
             }
         }
         let widest = BoxMap::of(&[Vec3::splat(f32::MIN), Vec3::splat(f32::MAX)]);
-        assert_eq!(widest.to_box(Vec3::splat(f32::MAX)), Vec3::ONE);
+        assert_eq!(widest.in_box(Vec3::splat(f32::MAX)), Vec3::ONE);
     }
 
     #[test]
@@ -348,45 +293,6 @@ mod tests {
         assert_eq!(found.normals.as_deref().unwrap()[3], Vec3::splat(4.0));
         assert_eq!(found.confidence.as_deref().unwrap(), [0.1, 0.2, 0.3, 0.5]);
         assert_eq!(found.distinct(), found);
-    }
-
-    #[test]
-    fn thinned_points_keep_their_distance_and_leave_no_gap() {
-        let points = on_ball(4000);
-        let order = Random::new(1).order(points.len());
-        for radius in [0.02_f32, 0.1, 0.5] {
-            let kept = thinned(&points, &order, radius);
-            for (k, &i) in kept.iter().enumerate() {
-                assert!(kept[..k].iter().all(|&j| points[i as usize].distance(points[j as usize]) > radius));
-            }
-            let reached =
-                |p: &Vec3| kept.iter().any(|&j| points[j as usize].distance_squared(*p) <= radius * radius);
-            assert!(points.iter().all(reached));
-        }
-    }
-
-    #[test]
-    fn nearly_as_many_as_asked_for() {
-        let mut uneven = on_ball(3000);
-        // Most of them on a fifth of the ball.
-        uneven.extend(on_ball(30_000).into_iter().filter(|p| p.z > 0.6));
-        for points in [on_ball(5000), uneven] {
-            for most in [4, 30, 300, 2000, 4999] {
-                let kept = subsampled(&points, most, 1);
-                let least = if most < 100 { 0.6 } else { 0.9 };
-                assert!(
-                    kept.len() <= most && kept.len() as f64 >= least * most as f64,
-                    "{} of {most}",
-                    kept.len()
-                );
-                let mut sorted = kept.clone();
-                sorted.sort_unstable();
-                sorted.dedup();
-                assert_eq!(sorted.len(), kept.len());
-                assert_eq!(kept, subsampled(&points, most, 1));
-            }
-            assert_eq!(subsampled(&points, points.len(), 1).len(), points.len());
-        }
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! Where the function has to be negative (paper, section VI-A).
 
 use super::camera::Camera;
-use super::cloud::{Cloud, subsampled};
+use super::cloud::Cloud;
 use super::normals::{Normals, estimated_normals};
+use super::sampling::subsampled;
 use crate::math::{Bounds, DVec3, Vec3};
 use crate::spatial::PointGrid;
 
@@ -25,21 +26,53 @@ const LEAST_OFFSET: f32 = 0.04;
 /// One that is nearer to another point of the surface than this share of its own distance may be inside.
 const CLEAR: f32 = 0.8;
 
-/// The points outside, for surface points of mean distance `spacing`; all in units of the box.
+/// The points outside; all in units of the box.
+#[derive(Clone, Debug)]
+pub struct Exterior {
+    /// Given, or made from the points.
+    pub near: Vec<Vec3>,
+    /// How far from the surface they were made; 0 for given ones.
+    pub offset: f32,
+    /// On the sphere around everything.
+    pub around: Vec<Vec3>,
+}
+
+impl Exterior {
+    /// Those of [`Self::near`] that go with points added to and removed from the `surface` that they were made for: not too
+    /// near to one added, and with a point left that they may have been made from. Given ones all do.
+    pub fn beside<'a>(&'a self, surface: &'a [Vec3], added: &'a [Vec3]) -> impl Iterator<Item = Vec3> + 'a {
+        let cell = if self.offset > 0.0 { self.offset } else { 1.0 };
+        let [surface, added] = [surface, added].map(|points| PointGrid::of(points, cell));
+        self.near.iter().copied().filter(move |&p| {
+            self.offset == 0.0
+                || surface.has_within(p, LOST * self.offset) && !added.has_within(p, CLEAR * self.offset)
+        })
+    }
+}
+
+/// One that is farther than so many offsets from all points of the surface has lost those that it was made from.
+const LOST: f32 = 1.25;
+
+/// Points given as outside, with those on the sphere.
+pub fn given_exterior(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
+    Exterior { near: given, offset: 0.0, around: sphere_around(&cloud.points) }
+}
+
+/// The points outside, for surface points of mean distance `spacing`.
 ///
 /// Towards each camera that sees the point; where no cameras are given, along the normals, given or estimated.
 /// Thinned by Poisson-disc sampling to one for ten surface points. Then those on the sphere.
-pub fn exterior_points(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: u64) -> Vec<Vec3> {
+pub fn made_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: u64) -> Exterior {
     let wanted = (cloud.len() / SURFACE_POINTS).max(LEAST);
     // A few more places than points wanted, as some will be refused.
-    let places = subsampled(&cloud.points, wanted + wanted / 4, seed);
-    let ways = ways_out(cloud, cameras, &places, spacing);
+    let places = wanted + wanted / 4;
+    let ways = ways_out(cloud, cameras, places, spacing, seed);
     let offset = [OFFSET * spacing, NOISE * ways.noise, LEAST_OFFSET].into_iter().fold(0.0, f32::max);
     let surface = PointGrid::of(&cloud.points, offset);
     let candidates = ways.directions.iter().map(|&(i, way)| cloud.points[i as usize] + way * offset);
     let outside: Vec<Vec3> = candidates.filter(|&p| !surface.has_within(p, CLEAR * offset)).collect();
     let kept = subsampled(&outside, wanted, seed).into_iter().map(|i| outside[i as usize]);
-    kept.chain(sphere_around(&cloud.points)).collect()
+    Exterior { near: kept.collect(), offset, around: sphere_around(&cloud.points) }
 }
 
 /// Directions that lead outwards.
@@ -49,15 +82,23 @@ struct Ways {
     noise: f32,
 }
 
-fn ways_out(cloud: &Cloud, cameras: &[Camera], places: &[u32], spacing: f32) -> Ways {
-    let normals = match &cloud.normals {
-        Some(given) => Normals {
-            directions: places.iter().map(|&i| given[i as usize].normalize_or_zero()).collect(),
-            noise: 0.0,
-        },
-        None => estimated_normals(&cloud.points, places, spacing),
+/// From at most so many places.
+fn ways_out(cloud: &Cloud, cameras: &[Camera], places: usize, spacing: f32, seed: u64) -> Ways {
+    let (oriented, normals) = match &cloud.normals {
+        Some(given) => {
+            let at = subsampled(&cloud.points, places, seed);
+            let directions = at.iter().map(|&i| given[i as usize].normalize_or_zero()).collect();
+            (at, Normals { directions, noise: 0.0 })
+        }
+        None => {
+            let at = subsampled(&cloud.points, if places > ORIENTED { places } else { ORIENTED }, seed);
+            let normals = estimated_normals(&cloud.points, &at, spacing);
+            (at, normals)
+        }
     };
-    let with_normals = places.iter().copied().zip(normals.directions);
+    let points: Vec<Vec3> = oriented.iter().map(|&i| cloud.points[i as usize]).collect();
+    let chosen = subsampled(&points, places, seed).into_iter().map(|k| k as usize);
+    let with_normals = chosen.map(|k| (oriented[k], normals.directions[k]));
     let directions = if cameras.is_empty() {
         with_normals.collect()
     } else {
@@ -65,6 +106,9 @@ fn ways_out(cloud: &Cloud, cameras: &[Camera], places: &[u32], spacing: f32) -> 
     };
     Ways { directions, noise: normals.noise }
 }
+
+/// Places whose normals are estimated, at least: with fewer, neighbours on thin things are on different sides.
+const ORIENTED: usize = 3000;
 
 /// The way from each place to each camera on the outer side of its normal from which nothing hides it.
 ///
@@ -91,7 +135,7 @@ fn towards_cameras(
 const GRAZING: f32 = 0.2;
 
 /// Points spread evenly on a sphere around the bounds of `points`, on a spiral.
-pub fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
+fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
     let bounds = Bounds::of(points);
     let [min, max] = [bounds.min, bounds.max].map(|corner| corner.as_dvec3());
     let radius = 0.5 * SPHERE * max.distance(min);
@@ -215,19 +259,23 @@ mod tests {
             ("both", &known, &around),
             ("none", &unknown, &[]),
         ] {
-            let found = exterior_points(cloud, cameras, spacing, 1);
-            let (near, sphere) = found.split_at(found.len() - ON_SPHERE);
+            let Exterior { near, offset, around } = made_exterior(cloud, cameras, spacing, 1);
             println!(
                 "{name}: {} points, nearest {}",
                 near.len(),
                 near.iter().map(|&p| distance(p)).fold(9.0, f32::min)
             );
             assert!((100..=200).contains(&near.len()), "{name}: {}", near.len());
-            for &p in near {
+            for &p in &near {
                 assert!(distance(p) > 0.02 && distance(p) < 0.3, "{name}: {p} is {} outside", distance(p));
             }
-            assert!(sphere.iter().all(|p| p.length() > 1.05));
-            assert_eq!(found, exterior_points(cloud, cameras, spacing, 1));
+            assert!(around.len() == ON_SPHERE && around.iter().all(|p| p.length() > 1.05));
+            let again = made_exterior(cloud, cameras, spacing, 1);
+            assert_eq!((&near, &around, offset), (&again.near, &again.around, again.offset));
+            // Each goes with its own points, and not with a point of the surface in its place.
+            assert_eq!(again.beside(&cloud.points, &[]).count(), near.len());
+            assert_eq!(again.beside(&cloud.points, &near[..1]).count(), near.len() - 1);
+            assert_eq!(again.beside(&[], &[]).count(), 0);
         }
     }
 

@@ -66,7 +66,7 @@ impl Extraction {
         });
         follower.scan(SCAN)?;
         follower.refine(STEPS);
-        let field = FastField::new(field.clone(), map.to_box_exactly(low), map.to_box_exactly(high));
+        let field = FastField::new(field.clone(), map.in_box_exactly(low), map.in_box_exactly(high));
         Ok(Self { field, map, level, follower, stage: Stage::Follow })
     }
 
@@ -81,7 +81,7 @@ impl Extraction {
                 let mut places = Vec::new();
                 let done = self.follower.advance(SLICE, &mut |points: &[DVec3], values: &mut [f64]| {
                     places.clear();
-                    places.extend(points.iter().map(|&p| map.to_box_exactly(p)));
+                    places.extend(points.iter().map(|&p| map.in_box_exactly(p)));
                     field.values(&places, values);
                     values.iter_mut().for_each(|value| *value -= level);
                 })?;
@@ -92,7 +92,7 @@ impl Extraction {
             }
             Stage::Normals(mesh, normals) => {
                 for p in mesh.positions.iter().skip(normals.len()).take(SLICE) {
-                    let (_, gradient) = self.field.value_and_gradient(self.map.to_box_exactly(p.as_dvec3()));
+                    let (_, gradient) = self.field.value_and_gradient(self.map.in_box_exactly(p.as_dvec3()));
                     normals.push((-gradient).normalize_or_zero().as_vec3());
                 }
                 if normals.len() < mesh.positions.len() {
@@ -100,6 +100,16 @@ impl Extraction {
                 }
                 let mesh = std::mem::take(mesh);
                 Ok(Some(TriangleMesh { normals: Some(std::mem::take(normals)), ..mesh }))
+            }
+        }
+    }
+
+    /// About how much is done.
+    pub fn progress(&self) -> f64 {
+        match &self.stage {
+            Stage::Follow => 0.8 * self.follower.progress(),
+            Stage::Normals(mesh, normals) => {
+                0.8 + 0.2 * normals.len() as f64 / (mesh.positions.len() + 1) as f64
             }
         }
     }

@@ -56,17 +56,12 @@ impl Kernel {
         matches!(self, Self::ThinPlate { .. } | Self::Biharmonic { .. })
     }
 
-    /// φ(r).
+    /// φ(r), and dφ/d(r²) = φ′(r)/2r, which has a limit at 0.
     ///
     /// r³ and −r are only conditionally positive definite. To both is added what makes them positive definite between
     /// points of the ball and vanishes in every sum whose weights are orthogonal to the polynomials: a constant, and for r³
     /// a multiple of r². So one solver does for all kernels. The amounts are those at which spherical harmonics of degree 0
     /// and 1 get positive eigenvalues on the sphere, with some room.
-    pub fn value(&self, r: f64) -> f64 {
-        self.value_and_slope(r)[0]
-    }
-
-    /// φ(r), and dφ/d(r²) = φ′(r)/2r, which has a limit at 0.
     pub fn value_and_slope(&self, r: f64) -> [f64; 2] {
         match *self {
             Self::MultiOrder { delta, tau } => multi_order(delta, tau, r),
@@ -82,6 +77,14 @@ impl Kernel {
                 [value, -half * value]
             }
         }
+    }
+}
+
+#[cfg(test)]
+impl Kernel {
+    /// φ(r).
+    pub fn value(&self, r: f64) -> f64 {
+        self.value_and_slope(r)[0]
     }
 }
 

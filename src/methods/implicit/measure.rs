@@ -58,7 +58,7 @@ pub fn colors_of_points(
     let reach = 2.0 * spacing as f32;
     let grid = PointGrid::of(points, reach);
     let color = |p: &Vec3| {
-        let near = grid.nearest(map.to_box(*p), BLENDED, reach);
+        let near = grid.nearest(map.in_box(*p), BLENDED, reach);
         // Half a spacing beside the distance: else each point makes a spot.
         let least = 0.25 * (spacing * spacing) as f32;
         let weights = near.iter().map(|(squared, i)| (1.0 / (squared + least), colors[*i as usize]));

@@ -32,40 +32,43 @@
 //! # Ok::<(), vesicle::methods::MethodError>(())
 //! ```
 
-pub mod camera;
-pub mod cloud;
-pub mod color;
+mod camera;
+mod cloud;
+mod color;
+mod edits;
 mod exterior;
 mod extract;
-pub mod fast;
-pub mod field;
-pub mod kernel;
+mod fast;
+mod field;
+mod kernel;
 mod low_rank;
 mod measure;
-pub mod normals;
+mod normals;
 mod params;
-pub mod solve;
+mod queries;
+mod sampling;
+mod solve;
 mod state;
 mod vectors;
 
 pub use camera::Camera;
 pub use cloud::Cloud;
+pub use edits::Edits;
 pub use measure::Fitness;
 pub use params::{ImplicitParams, KernelKind, Level, param_specs};
 
 use super::{MethodError, StepReport, Times};
-use crate::math::{Bounds, DAffine3, DVec3, Vec3};
+use crate::math::Vec3;
 use crate::mesh::{TriangleMesh, measure as measure_mesh};
 use crate::remesh::Changes;
-use crate::volume::{Space, Volume, VolumeError, VolumeInit, Voxels};
-use cloud::{BoxMap, largest_clusters, mean_spacing, subsampled};
+use cloud::BoxMap;
 use color::Coloring;
-use exterior::{exterior_points, sphere_around};
+use exterior::{Exterior, given_exterior, made_exterior};
 use extract::{Extraction, default_cell};
-use fast::FastField;
 use field::Field;
 use kernel::{Kernel, KernelTable};
-use solve::{Constraints, Solution, Solver};
+use sampling::{Samples, Sampling};
+use solve::{ByPlace, Constraints, Solution, Solver};
 
 /// How an [`ImplicitSurface`] is set up, beside its points.
 #[derive(Clone, Debug)]
@@ -98,8 +101,8 @@ impl Default for ImplicitOptions {
 const DEFAULT_POINTS: usize = 20_000;
 /// The most that can be asked for: their matrix takes about 2 GB.
 const MOST_POINTS: usize = 100_000;
-/// Edge of the cells that join points to clusters, in mean spacings.
-const CLUSTER_CELL: f64 = 2.0;
+/// A solver is kept for edits while it takes no more; without, it is made again when it is needed.
+const KEPT_BYTES: usize = 256 << 20;
 /// Of all random choices.
 const SEED: u64 = 1;
 
@@ -112,12 +115,19 @@ pub struct ImplicitSurface {
     map: BoxMap,
     options: ImplicitOptions,
     params: ImplicitParams,
+    edits: Edits,
     samples: Option<Samples>,
+    exterior: Option<Exterior>,
+    /// In force, of samples, exterior and edits.
     constraints: Constraints,
     stage: Stage,
     /// Slices of work that the stage has had.
     slices: u32,
     solved: Option<Solved>,
+    /// The edits at the last solve from the start: later ones revise its system.
+    base: Option<Edits>,
+    /// That system, where it is kept.
+    solver: Option<Box<Solver>>,
     mesh: TriangleMesh,
     /// Counts the surfaces so far.
     version: u32,
@@ -129,33 +139,34 @@ pub struct ImplicitSurface {
     clock: fn() -> f64,
 }
 
-/// The points that take part.
-#[derive(Clone, Debug)]
-struct Samples {
-    cloud: Cloud,
-    spacing: f64,
-}
-
-/// The function, with the values that it was solved for.
+/// The function, with what it was solved for.
 #[derive(Clone, Debug)]
 struct Solved {
-    field: Field,
+    centres: Vec<Vec3>,
     solution: Solution,
     kernel: Kernel,
     /// The mean of f over the surface constraints.
     mean: f64,
+    field: Field,
 }
 
 impl Solved {
-    fn new(kernel: Kernel, constraints: &Constraints, solution: Solution) -> Self {
-        let field = Field::new(KernelTable::new(kernel), &constraints.centres, &solution);
-        Self { field, kernel, mean: constraints.mean_on_surface(&solution), solution }
+    fn new(kernel: Kernel, centres: Vec<Vec3>, solution: Solution, mean: f64) -> Self {
+        let field = Field::new(KernelTable::new(kernel), &centres, &solution);
+        Self { centres, solution, kernel, mean, field }
+    }
+
+    /// The weights at the centres of `constraints`, 0 at those that it did not have.
+    fn weights_at(&self, constraints: &Constraints) -> Vec<f64> {
+        let known = ByPlace::new(&self.centres);
+        let weight = |&centre: &Vec3| known.find(centre).map_or(0.0, |i| self.solution.weights[i]);
+        constraints.centres.iter().map(weight).collect()
     }
 }
 
 /// What is to be done next.
 enum Stage {
-    Subsample,
+    Subsample(Box<Sampling>),
     Constrain,
     Solve(Box<Solver>),
     Extract(Box<Extraction>),
@@ -188,21 +199,25 @@ impl ImplicitSurface {
         let cloud = cloud.mapped(&map).distinct();
         cloud.check_count()?;
         cloud.check_span()?;
-        Ok(Self { original, cloud, params: options.params.clone(), options, ..Self::empty(map) })
+        Ok(Self::begun(original, cloud, map, options))
     }
 
-    fn empty(map: BoxMap) -> Self {
+    fn begun(original: Vec<Vec3>, cloud: Cloud, map: BoxMap, options: ImplicitOptions) -> Self {
         Self {
-            original: Vec::new(),
-            cloud: Cloud::default(),
+            original,
+            cloud,
             map,
-            params: ImplicitParams::default(),
-            options: ImplicitOptions::default(),
+            params: options.params.clone(),
+            edits: Edits::default(),
             samples: None,
+            exterior: None,
             constraints: Constraints::default(),
-            stage: Stage::Subsample,
+            stage: first_stage(&options),
+            options,
             slices: 0,
             solved: None,
+            base: None,
+            solver: None,
             mesh: TriangleMesh::default(),
             version: 0,
             components: 0,
@@ -242,7 +257,7 @@ impl ImplicitSurface {
         let stage = std::mem::replace(&mut self.stage, fallback);
         let (before, slices) = (stage.phase(), std::mem::take(&mut self.slices));
         self.stage = match stage {
-            Stage::Subsample => self.subsample()?,
+            Stage::Subsample(sampling) => self.subsample(sampling)?,
             Stage::Constrain => self.constrain()?,
             Stage::Solve(solver) => self.solve(solver)?,
             Stage::Extract(extraction) => self.extract(extraction)?,
@@ -270,52 +285,76 @@ impl ImplicitSurface {
         }
     }
 
-    fn subsample(&mut self) -> Result<Stage, MethodError> {
-        let mut cloud = self.cloud.clone();
-        if let Some(keep) = self.options.keep_components {
-            let cell = CLUSTER_CELL * mean_spacing(&cloud.points);
-            cloud = cloud.gathered(&largest_clusters(&cloud.points, cell as f32, keep));
-            cloud.check_count()?;
-            cloud.check_span()?;
-        }
-        let cloud = cloud.gathered(&subsampled(&cloud.points, self.options.max_points, SEED));
-        cloud.check_span()?;
-        let spacing = mean_spacing(&cloud.points);
-        self.samples = Some(Samples { cloud, spacing });
-        Ok(Stage::Constrain)
+    fn subsample(&mut self, mut sampling: Box<Sampling>) -> Result<Stage, MethodError> {
+        self.samples = sampling.advance(&self.cloud)?;
+        Ok(if self.samples.is_some() { Stage::Constrain } else { Stage::Subsample(sampling) })
     }
 
     fn constrain(&mut self) -> Result<Stage, MethodError> {
-        let Some(samples) = &self.samples else { return Ok(Stage::Subsample) };
-        let exterior = match &self.options.exterior {
-            Some(given) => {
-                let mut points: Vec<Vec3> = given.iter().map(|&p| self.map.to_box(p)).collect();
-                points.extend(sphere_around(&samples.cloud.points));
-                points
-            }
-            None => {
-                let cameras: Vec<Camera> = self
-                    .options
-                    .cameras
-                    .iter()
-                    .map(|camera| camera.clone().moved(&self.map.affine()))
-                    .collect();
-                exterior_points(&samples.cloud, &cameras, samples.spacing as f32, SEED)
-            }
-        };
-        let exterior = Cloud { points: exterior, ..Cloud::default() }.distinct().points;
-        self.constraints = Constraints::new(&samples.cloud, &exterior);
-        if let Some(i) = self.constraints.shared_centre() {
-            let problem = format!("{} is a surface point, too", self.map.from_box(i.as_dvec3()));
-            return Err(MethodError::invalid("exterior", problem));
-        }
-        Ok(self.begin_solve())
+        self.make_constraints()?;
+        Ok(if self.exterior.is_some() { self.begin_solve() } else { first_stage(&self.options) })
     }
 
+    /// From the points that take part, where they are chosen.
+    fn make_constraints(&mut self) -> Result<(), MethodError> {
+        let Some(samples) = &self.samples else { return Ok(()) };
+        let exterior = match &self.options.exterior {
+            Some(given) => {
+                given_exterior(&samples.cloud, given.iter().map(|&p| self.map.in_box(p)).collect())
+            }
+            None => {
+                let cameras = self.options.cameras.iter();
+                let cameras: Vec<Camera> =
+                    cameras.map(|camera| camera.clone().moved(&self.map.affine())).collect();
+                made_exterior(&samples.cloud, &cameras, samples.spacing as f32, SEED)
+            }
+        };
+        let constraints = self.edits.constraints(samples, &exterior, &self.original, &self.map)?;
+        self.constraints = self.regularized(constraints);
+        self.exterior = Some(exterior);
+        Ok(())
+    }
+
+    fn regularized(&self, mut constraints: Constraints) -> Constraints {
+        constraints.regularize(self.params.lambda_surface, self.params.lambda_exterior);
+        constraints
+    }
+
+    /// From the start.
     fn begin_solve(&mut self) -> Stage {
-        self.constraints.regularize(self.params.lambda_surface, self.params.lambda_exterior);
+        self.base = Some(self.edits.clone());
+        self.solver = None;
+        Stage::Solve(self.new_solver(&self.constraints))
+    }
+
+    fn new_solver(&self, constraints: &Constraints) -> Box<Solver> {
+        let kernel = Kernel::new(&self.params, constraints.radius());
+        Box::new(Solver::new(constraints, kernel, self.params.tolerance, SEED))
+    }
+
+    /// From the system of the last solve from the start, where that serves.
+    fn begin_revision(&mut self) -> Stage {
+        self.revised_solver().map_or_else(|| self.begin_solve(), Stage::Solve)
+    }
+
+    fn revised_solver(&mut self) -> Option<Box<Solver>> {
+        let solved = self.solved.as_ref()?;
+        let mut solver = match self.solver.take() {
+            Some(kept) => kept,
+            None => self.new_solver(&self.base_constraints()?),
+        };
         let kernel = Kernel::new(&self.params, self.constraints.radius());
-        Stage::Solve(Box::new(Solver::new(&self.constraints, kernel, self.params.tolerance, SEED)))
+        let serves = solver.kernel() == kernel
+            && solver.revise(&self.constraints, solved.weights_at(&self.constraints));
+        serves.then_some(solver)
+    }
+
+    /// What the last solve from the start was for.
+    fn base_constraints(&self) -> Option<Constraints> {
+        let (base, samples, exterior) =
+            (self.base.as_ref()?, self.samples.as_ref()?, self.exterior.as_ref()?);
+        let constraints = base.constraints(samples, exterior, &self.original, &self.map).ok()?;
+        Some(self.regularized(constraints))
     }
 
     fn solve(&mut self, mut solver: Box<Solver>) -> Result<Stage, MethodError> {
@@ -324,11 +363,15 @@ impl ImplicitSurface {
             return Ok(Stage::Solve(solver));
         };
         self.residual = solver.residual();
-        self.solved = Some(Solved::new(solver.kernel(), &self.constraints, solution));
+        let mean = self.constraints.mean_on_surface(&solution);
+        self.solved = Some(Solved::new(solver.kernel(), self.constraints.centres.clone(), solution, mean));
+        self.solver = (solver.bytes() <= KEPT_BYTES).then_some(solver);
         self.begin_extraction()
     }
 
-    fn singular(&self) -> MethodError {
+    /// What is left of the solver is of no use any more.
+    fn singular(&mut self) -> MethodError {
+        (self.base, self.solver) = (None, None);
         let cause = if self.params.lambda_surface == 0.0 {
             "lambdaSurface is 0 and some points lie too close together; give it a value above 0"
         } else {
@@ -338,14 +381,15 @@ impl ImplicitSurface {
     }
 
     fn begin_extraction(&self) -> Result<Stage, MethodError> {
-        let (Some(solved), Some(samples)) = (&self.solved, &self.samples) else {
-            return Ok(Stage::Subsample);
-        };
-        let points: Vec<Vec3> =
-            samples.cloud.points.iter().map(|p| self.map.from_box(p.as_dvec3()).as_vec3()).collect();
+        let Some(solved) = &self.solved else { return Ok(first_stage(&self.options)) };
+        let points = self.in_world(&self.constraints.centres[..self.constraints.surface]);
         let level = self.level_of(solved);
         let extraction = Extraction::new(&solved.field, self.map, level, &points, self.cell())?;
         Ok(Stage::Extract(Box::new(extraction)))
+    }
+
+    fn in_world(&self, points: &[Vec3]) -> Vec<Vec3> {
+        points.iter().map(|p| self.map.in_world(p.as_dvec3()).as_vec3()).collect()
     }
 
     /// The value of the function that counts as 0.
@@ -384,7 +428,7 @@ impl ImplicitSurface {
 
     /// The stage to go on from when the present one fails.
     fn fallback(&self) -> Stage {
-        if self.mesh.triangles.is_empty() { Stage::Subsample } else { Stage::Done }
+        if self.mesh.triangles.is_empty() { first_stage(&self.options) } else { Stage::Done }
     }
 
     /// The edge of a cell, in the points' units: as asked for, or from the spacing of the points, once that is known.
@@ -409,7 +453,7 @@ impl ImplicitSurface {
         params.validate()?;
         let before = std::mem::replace(&mut self.params, params);
         let (now, only_extraction) = (&self.params, before.with_extraction_of(&self.params));
-        if before == *now || matches!(self.stage, Stage::Subsample | Stage::Constrain) {
+        if before == *now || matches!(self.stage, Stage::Subsample(_) | Stage::Constrain) {
             return Ok(());
         }
         if only_extraction == *now && !matches!(self.stage, Stage::Solve(_)) {
@@ -421,7 +465,42 @@ impl ImplicitSurface {
                 }
             }
         } else if only_extraction != *now {
+            let constraints = std::mem::take(&mut self.constraints);
+            self.constraints = self.regularized(constraints);
             (self.stage, self.slices) = (self.begin_solve(), 0);
+        }
+        Ok(())
+    }
+
+    /// What differs from the points as they were given.
+    pub fn edits(&self) -> &Edits {
+        &self.edits
+    }
+
+    /// Takes other points in and leaves some out, in place of all edits before. The surface stays until the new one is
+    /// there. A few edits change the system that was solved last: its matrix and its solution serve again.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] naming the list and the entry, or where too few points are left; nothing has changed
+    /// then.
+    pub fn set_edits(&mut self, edits: Edits) -> Result<(), MethodError> {
+        edits.validate(&self.original, &self.map)?;
+        let left = edits.applied(&self.cloud, &self.original, &self.map);
+        left.check_count()?;
+        left.check_span()?;
+        if edits == self.edits {
+            return Ok(());
+        }
+        if let (Some(samples), Some(exterior)) = (&self.samples, &self.exterior) {
+            let constraints = edits.constraints(samples, exterior, &self.original, &self.map)?;
+            self.constraints = self.regularized(constraints);
+            self.edits = edits;
+            if let Stage::Solve(solver) = std::mem::replace(&mut self.stage, Stage::Done) {
+                self.solver = Some(solver);
+            }
+            (self.stage, self.slices) = (self.begin_revision(), 0);
+        } else {
+            self.edits = edits;
         }
         Ok(())
     }
@@ -463,122 +542,12 @@ impl ImplicitSurface {
     pub fn spacing(&self) -> f64 {
         self.samples.as_ref().map_or(0.0, |samples| samples.spacing)
     }
-
-    /// f at points in their own units, less the level: above 0 inside, 0 on the surface, below outside.
-    ///
-    /// # Errors
-    /// [`MethodError::InvalidArgument`] before the system was solved.
-    pub fn evaluate(&self, points: &[Vec3]) -> Result<Vec<f64>, MethodError> {
-        let solved = self.solved("evaluate")?;
-        let level = self.level_of(solved);
-        Ok(points.iter().map(|p| solved.field.value(self.map.to_box_exactly(p.as_dvec3())) - level).collect())
-    }
-
-    /// ∇f at points in their own units, per unit; it points inwards.
-    ///
-    /// # Errors
-    /// As [`Self::evaluate`].
-    pub fn gradient(&self, points: &[Vec3]) -> Result<Vec<DVec3>, MethodError> {
-        let solved = self.solved("gradient")?;
-        let at = |p: &Vec3| solved.field.value_and_gradient(self.map.to_box_exactly(p.as_dvec3())).1;
-        Ok(points.iter().map(|p| at(p) * self.map.scale()).collect())
-    }
-
-    fn solved(&self, what: &'static str) -> Result<&Solved, MethodError> {
-        let problem = "the system is not solved yet: step until the phase is 'extract'";
-        self.solved.as_ref().ok_or_else(|| MethodError::invalid(what, problem))
-    }
-
-    /// The points that take part, and those outside, in the points' units; empty before they are chosen.
-    pub fn constraints(&self) -> [Vec<Vec3>; 2] {
-        let world = |all: &[Vec3]| all.iter().map(|p| self.map.from_box(p.as_dvec3()).as_vec3()).collect();
-        let surface = self.samples.as_ref().map_or(&[][..], |samples| &samples.cloud.points[..]);
-        let outside = self.constraints.centres.get(self.constraints.surface..).unwrap_or_default();
-        [world(surface), world(outside)]
-    }
-
-    /// Distances of all original points from the surface, and its mean curvature.
-    ///
-    /// # Errors
-    /// [`MethodError::InvalidArgument`] before there is a surface.
-    pub fn fitness(&self) -> Result<Fitness, MethodError> {
-        Fitness::of(&self.original, &self.mesh)
-    }
-
-    /// f, less the level, on a grid of `dims` voxels around the points, so that other methods can take over: above 0 inside.
-    ///
-    /// # Errors
-    /// [`MethodError::InvalidArgument`] before the system was solved, and for fewer than 2 voxels along an axis;
-    /// [`MethodError::Volume`] where memory ends.
-    pub fn to_volume(&self, dims: [usize; 3]) -> Result<Volume, MethodError> {
-        let solved = self.solved("toVolume")?;
-        if dims.iter().any(|&n| n < 2) {
-            return Err(MethodError::invalid(
-                "dims",
-                format!("{dims:?}; at least 2 along each axis are needed"),
-            ));
-        }
-        let (origin, spacing) = self.grid(dims);
-        let map = DAffine3::from_translation(origin) * DAffine3::from_scale(spacing);
-        let corner = |p: DVec3| self.map.to_box_exactly(map.transform_point3(p));
-        let last = DVec3::from_array(dims.map(|n| (n - 1) as f64));
-        let mut fast = FastField::new(solved.field.clone(), corner(DVec3::ZERO), corner(last));
-        let level = self.level_of(solved);
-        let values = sampled(dims, |places, row| {
-            let places: Vec<DVec3> = places.iter().map(|&p| corner(p)).collect();
-            fast.values(&places, row);
-            row.iter_mut().for_each(|value| *value -= level);
-        })?;
-        Ok(Volume::new(VolumeInit {
-            voxels: Voxels::F32(values),
-            dims: [dims[0], dims[1], dims[2], 1],
-            affine: map,
-            slope: 1.0,
-            intercept: 0.0,
-            frame_seconds: 0.0,
-            space: Space::Ras,
-        })?)
-    }
-
-    /// First voxel and voxel size of a grid around the points and the surface.
-    fn grid(&self, dims: [usize; 3]) -> (DVec3, DVec3) {
-        let bounds = Bounds::of(&self.original).joined(&Bounds::of(&self.mesh.positions));
-        let margin = DVec3::splat(GRID_MARGIN * 2.0 / self.map.scale());
-        let (low, high) = (bounds.min.as_dvec3() - margin, bounds.max.as_dvec3() + margin);
-        (low, (high - low) / DVec3::from_array(dims.map(|n| (n - 1) as f64)))
-    }
-
-    /// Colours the surface from photographs.
-    ///
-    /// # Errors
-    /// [`MethodError::InvalidArgument`] before there is a surface, and where no camera has a picture.
-    pub fn colorize(&mut self, cameras: &[Camera]) -> Result<(), MethodError> {
-        if self.mesh.triangles.is_empty() {
-            return Err(MethodError::invalid("colorize", "there is no surface yet: step to the end first"));
-        }
-        if !cameras.iter().any(Camera::has_image) {
-            return Err(MethodError::invalid("cameras", "none has an image; at least one is needed"));
-        }
-        if let Some(colors) = color::colors(&self.mesh, cameras) {
-            self.mesh.colors = Some(colors);
-            self.version = self.version.wrapping_add(1);
-        }
-        Ok(())
-    }
-
-    fn colors_of_points(&self, mesh: &TriangleMesh) -> Option<Vec<Vec3>> {
-        let colors = self.cloud.colors.as_ref()?;
-        Some(measure::colors_of_points(&self.cloud.points, colors, self.spacing(), mesh, &self.map))
-    }
 }
-
-/// Room around the points in a volume made of them, of their longest side: enough for the surface to close in.
-const GRID_MARGIN: f64 = 0.1;
 
 impl Stage {
     fn phase(&self) -> &'static str {
         match self {
-            Self::Subsample => "subsample",
+            Self::Subsample(_) => "subsample",
             Self::Constrain => "constraints",
             Self::Solve(_) => "solve",
             Self::Extract(_) => "extract",
@@ -588,29 +557,18 @@ impl Stage {
 
     fn progress(&self, cameras: usize) -> f64 {
         match self {
-            Self::Subsample | Self::Constrain => 0.0,
+            Self::Subsample(sampling) => sampling.progress(),
+            Self::Constrain => 0.0,
             Self::Solve(solver) => solver.progress(),
-            Self::Extract(_) => f64::NAN,
+            Self::Extract(extraction) => extraction.progress(),
             Self::Color(painting) => painting.camera as f64 / (cameras + 1) as f64,
             Self::Done => 1.0,
         }
     }
 }
 
-/// Numbers at all nodes of a grid, x fastest, a row at a time.
-fn sampled(dims: [usize; 3], mut row: impl FnMut(&[DVec3], &mut [f64])) -> Result<Vec<f32>, VolumeError> {
-    let count = dims.iter().try_fold(1_usize, |product, &n| product.checked_mul(n)).unwrap_or(usize::MAX);
-    let mut values: Vec<f32> = Vec::new();
-    let bytes = 4 * count as u64;
-    values.try_reserve_exact(count).map_err(|_| VolumeError::TooLarge { bytes })?;
-    let (mut places, mut line) = (vec![DVec3::ZERO; dims[0]], vec![0.0; dims[0]]);
-    for at in 0..dims[1] * dims[2] {
-        let [y, z] = [at % dims[1], at / dims[1]].map(|k| k as f64);
-        places.iter_mut().enumerate().for_each(|(x, p)| *p = DVec3::new(x as f64, y, z));
-        row(&places, &mut line);
-        values.extend(line.iter().map(|&value| value as f32));
-    }
-    Ok(values)
+fn first_stage(options: &ImplicitOptions) -> Stage {
+    Stage::Subsample(Box::new(Sampling::new(options.keep_components, options.max_points, SEED)))
 }
 
 fn check_options(options: &ImplicitOptions) -> Result<(), MethodError> {

@@ -1,25 +1,26 @@
 //! Saving a run and going on with it, bit for bit.
 //!
 //! A state holds what took long, the solution, and what cannot be made again, the last surface. The rest is done again from the
-//! same points, as many slices of it as had been done.
+//! same points, as many slices of it as had been done. The system that edits revise is made again when the first of them comes.
 
 use super::kernel::Kernel;
-use super::solve::Solution;
-use super::{ImplicitParams, ImplicitSurface, Solved, Stage};
+use super::solve::{Position, Solution};
+use super::{Edits, ImplicitParams, ImplicitSurface, Solved, Stage};
 use crate::math::Vec3;
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::methods::saved::{Hash, Mark, opened, sealed};
 use serde::{Deserialize, Serialize};
 
-const MARK: Mark = *b"VSCLIMP\x01";
+const MARK: Mark = *b"VSCLIMP\x02";
 
 /// How far a run is.
-#[derive(Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
 enum Reached {
     Subsample,
     Constrain,
-    Solve,
+    /// How far the solver is, and whether it revises the system of the last solve from the start.
+    Solve(Position, bool),
     Extract,
     Color,
     Done,
@@ -30,13 +31,24 @@ enum Reached {
 struct State {
     fingerprint: u64,
     params: ImplicitParams,
+    edits: Edits,
+    base: Option<Edits>,
     reached: Reached,
     slices: u32,
     iteration: u32,
     residual: f64,
     strays: u32,
-    solved: Option<(Kernel, Solution)>,
+    solved: Option<Function>,
     surface: Surface,
+}
+
+/// The function of the last solve.
+#[derive(Serialize, Deserialize)]
+struct Function {
+    kernel: Kernel,
+    centres: Vec<Vec3>,
+    solution: Solution,
+    mean: f64,
 }
 
 /// A closed surface as a mesh has it.
@@ -57,12 +69,19 @@ impl ImplicitSurface {
             &State {
                 fingerprint: self.fingerprint(),
                 params: self.params.clone(),
+                edits: self.edits.clone(),
+                base: self.base.clone(),
                 reached: self.stage.reached(),
                 slices: self.slices,
                 iteration: self.iteration,
                 residual: self.residual,
                 strays: self.strays as u32,
-                solved: self.solved.as_ref().map(|solved| (solved.kernel, solved.solution.clone())),
+                solved: self.solved.as_ref().map(|solved| Function {
+                    kernel: solved.kernel,
+                    centres: solved.centres.clone(),
+                    solution: solved.solution.clone(),
+                    mean: solved.mean,
+                }),
                 surface: Surface {
                     positions: mesh.positions.clone(),
                     triangles: mesh.triangles.clone(),
@@ -88,19 +107,20 @@ impl ImplicitSurface {
         let Surface { positions, triangles, normals, colors } = state.surface;
         let mesh = TriangleMesh { positions, triangles, normals, colors, ..TriangleMesh::default() };
         mesh.validate()?;
-        if state.reached >= Reached::Extract && state.solved.is_none() {
+        if state.reached.needs_solution() && state.solved.is_none() {
             return bad("solution", "it is missing");
         }
+        for edits in std::iter::once(&state.edits).chain(&state.base) {
+            edits.validate(&self.original, &self.map)?;
+        }
         let mut next = self.begun_anew();
-        next.params = state.params;
-        next.repeat_constraints(state.reached)?;
-        if let Some((kernel, solution)) = state.solved {
-            if solution.weights.len() != next.constraints.centres.len()
-                || solution.coefficients.len() != kernel.polynomials()
+        (next.params, next.edits, next.base) = (state.params, state.edits, state.base);
+        if let Some(Function { kernel, centres, solution, mean }) = state.solved {
+            if solution.weights.len() != centres.len() || solution.coefficients.len() != kernel.polynomials()
             {
-                return bad("solution", "it does not fit the constraints");
+                return bad("solution", "its parts do not fit each other");
             }
-            next.solved = Some(Solved::new(kernel, &next.constraints, solution));
+            next.solved = Some(Solved::new(kernel, centres, solution, mean));
         }
         next.repeat(state.reached, state.slices)?;
         next.strays = state.strays as usize;
@@ -134,52 +154,56 @@ impl ImplicitSurface {
     }
 
     fn begun_anew(&self) -> Self {
-        Self {
-            original: self.original.clone(),
-            cloud: self.cloud.clone(),
-            options: self.options.clone(),
-            params: self.params.clone(),
-            clock: self.clock,
-            ..Self::empty(self.map)
-        }
+        let (original, cloud) = (self.original.clone(), self.cloud.clone());
+        Self { clock: self.clock, ..Self::begun(original, cloud, self.map, self.options.clone()) }
     }
 
-    fn repeat_constraints(&mut self, reached: Reached) -> Result<(), MethodError> {
-        if reached > Reached::Subsample {
-            self.stage = self.subsample()?;
-        }
-        if reached > Reached::Constrain {
-            self.constrain()?;
-        }
-        Ok(())
-    }
-
-    /// Does the slices of a stage again that had been done.
+    /// Does again what leads to a stage, and the slices of it that had been done.
     fn repeat(&mut self, reached: Reached, slices: u32) -> Result<(), MethodError> {
-        self.stage = match reached {
-            Reached::Subsample => Stage::Subsample,
-            Reached::Constrain => Stage::Constrain,
-            Reached::Solve => self.begin_solve(),
-            Reached::Extract | Reached::Color => self.begin_extraction()?,
-            Reached::Done => Stage::Done,
-        };
-        self.slices = 0;
-        while reached == Reached::Color && self.stage.reached() == Reached::Extract {
+        while reached != Reached::Subsample && matches!(self.stage, Stage::Subsample(_)) {
             self.advance()?;
         }
-        while self.slices < slices && self.stage.reached() == reached && reached != Reached::Done {
+        if !matches!(reached, Reached::Subsample | Reached::Constrain) {
+            self.make_constraints()?;
+        }
+        self.stage = match reached {
+            Reached::Solve(position, revised) => {
+                let mut solver = if revised { self.revised_solver() } else { None }
+                    .unwrap_or_else(|| self.new_solver(&self.constraints));
+                solver.advance_to(position).map_err(|_| self.singular())?;
+                Stage::Solve(solver)
+            }
+            Reached::Extract | Reached::Color => self.begin_extraction()?,
+            Reached::Done => Stage::Done,
+            Reached::Subsample | Reached::Constrain => return self.repeat_slices(reached, slices),
+        };
+        while reached == Reached::Color && matches!(self.stage, Stage::Extract(_)) {
+            self.advance()?;
+        }
+        self.repeat_slices(reached, slices)
+    }
+
+    fn repeat_slices(&mut self, reached: Reached, slices: u32) -> Result<(), MethodError> {
+        self.slices = 0;
+        while self.slices < slices && !matches!(reached, Reached::Solve(..) | Reached::Done) {
             self.advance()?;
         }
         Ok(())
     }
 }
 
+impl Reached {
+    fn needs_solution(self) -> bool {
+        matches!(self, Self::Extract | Self::Color | Self::Done | Self::Solve(_, true))
+    }
+}
+
 impl Stage {
     fn reached(&self) -> Reached {
         match self {
-            Self::Subsample => Reached::Subsample,
+            Self::Subsample(_) => Reached::Subsample,
             Self::Constrain => Reached::Constrain,
-            Self::Solve(_) => Reached::Solve,
+            Self::Solve(solver) => Reached::Solve(solver.position(), solver.is_revised()),
             Self::Extract(_) => Reached::Extract,
             Self::Color(_) => Reached::Color,
             Self::Done => Reached::Done,

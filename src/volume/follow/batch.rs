@@ -32,6 +32,11 @@ impl Batch {
         count
     }
 
+    /// The share of the points that is evaluated.
+    pub fn progress(&self) -> f64 {
+        if self.points.is_empty() { 0.0 } else { self.values.len() as f64 / self.points.len() as f64 }
+    }
+
     /// The values, in the order of the points, once all are there.
     pub fn values(&self) -> Option<&[f64]> {
         (self.values.len() == self.points.len()).then_some(&self.values)

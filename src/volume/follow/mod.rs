@@ -146,6 +146,7 @@ pub struct Follower {
     surface: Option<Surface>,
     batch: Batch,
     task: Task,
+    waves: u32,
     evaluations: usize,
 }
 
@@ -167,6 +168,7 @@ impl Follower {
             surface: None,
             batch: Batch::default(),
             task: Task::Nothing,
+            waves: 0,
             evaluations: 0,
         })
     }
@@ -241,7 +243,7 @@ impl Follower {
         match self.task {
             Task::Nothing => {}
             Task::Wave => {
-                (self.surface, self.taken) = (None, 0);
+                (self.surface, self.taken, self.waves) = (None, 0, self.waves + 1);
                 self.flood.take(values, &mut self.blocks)?;
             }
             Task::Scan => self.scan.iter_mut().for_each(|scan| scan.take(values, &self.blocks)),
@@ -310,6 +312,18 @@ impl Follower {
         match &self.surface {
             Some(surface) => read(surface),
             None => read(&Surface::new(&self.flood.cut, &self.blocks)?),
+        }
+    }
+
+    /// About how much of the work is done: how many waves are still to come is not known before the last.
+    pub fn progress(&self) -> f64 {
+        let share = self.batch.progress();
+        let waves = f64::from(self.waves) + share;
+        match self.task {
+            Task::Nothing => 0.0,
+            Task::Wave => 0.6 * waves / (waves + 2.0),
+            Task::Scan => 0.6,
+            Task::Refine => 0.6 + 0.4 * (self.taken as f64 + share) / self.steps as f64,
         }
     }
 

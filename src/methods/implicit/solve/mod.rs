@@ -115,6 +115,11 @@ impl Solver {
         Ok(matches!(self.stage, Stage::Done(_)))
     }
 
+    /// Whether it turned to other constraints than its first ones.
+    pub fn is_revised(&self) -> bool {
+        self.revision.is_some() || self.system.is_revised()
+    }
+
     /// How far it is, for [`Self::advance_to`].
     pub fn position(&self) -> Position {
         Position { built: !matches!(self.stage, Stage::Build), slices: self.slices }
@@ -147,11 +152,6 @@ impl Solver {
     /// The relative residual: while iterating that of the iteration, at the end the true one.
     pub fn residual(&self) -> f64 {
         self.residual
-    }
-
-    /// Iterations so far.
-    pub fn iterations(&self) -> u32 {
-        self.iterations
     }
 
     /// About how much of the work is done, 0 to 1.
@@ -529,7 +529,7 @@ mod tests {
                 let changed = changed(&base);
                 let mut solver = Solver::new(&base, kernel, 1e-7, 1);
                 let whole = run(&mut solver);
-                let iterations = solver.iterations();
+                let iterations = solver.iterations;
                 let weights = carried(&base, &solver.solution().unwrap(), &changed);
                 assert!(solver.revise(&changed, weights));
                 let again = run(&mut solver);
@@ -537,7 +537,7 @@ mod tests {
                 let found = solver.solution().unwrap();
                 println!(
                     "{kernel:?}: {again} slices after {whole}, {} after {iterations}",
-                    solver.iterations()
+                    solver.iterations
                 );
                 let residual = true_residual(&changed, kernel, &found);
                 println!("true residual {residual:e}");

@@ -14,6 +14,9 @@ pub const WORK: usize = 2_000_000;
 const ROW_WORK: usize = 4_000;
 /// Error of far blocks, of the tolerance: with it the residual found at the end is seldom above the tolerance.
 const FAR_ERROR: f64 = 0.1;
+/// Constraints from which on far blocks are the more exact the more of them there are: errors add up, and a residual that is
+/// too large is paid for with one from all pairs of constraints.
+const USUAL_CONSTRAINTS: f64 = 25_000.0;
 /// Error of far blocks where kernels are only conditionally positive definite: what is large in them cancels.
 const CONDITIONAL_ERROR: f64 = 1e-11;
 /// Constraints up to which the matrix is stored in double precision; beyond, memory matters more.
@@ -133,6 +136,11 @@ impl System {
         self.revision = Some(Revision { gone, rows, inverse });
     }
 
+    /// Whether it was.
+    pub fn is_revised(&self) -> bool {
+        self.revision.is_some()
+    }
+
     /// Centres of the matrix.
     fn own_centres(&self) -> &[DVec3] {
         &self.centres[..self.revision.as_ref().map_or(self.centres.len(), |revision| revision.gone.len())]
@@ -233,7 +241,9 @@ fn at_places(order: &[u32], all: &[f64]) -> Vec<f64> {
 impl Matrix {
     fn new(tree: ClusterTree, centres: &[DVec3], kernel: Kernel, tolerance: f64) -> Self {
         let conditional = kernel.is_conditional();
-        let error = if conditional { CONDITIONAL_ERROR } else { FAR_ERROR * tolerance };
+        let crowd = centres.len() as f64 / USUAL_CONSTRAINTS;
+        let far = FAR_ERROR * tolerance / if crowd > 1.0 { crowd } else { 1.0 };
+        let error = if conditional { CONDITIONAL_ERROR } else { far };
         if conditional || centres.len() <= DOUBLE_BELOW {
             Self::Double(HierarchicalMatrix::new(tree, centres.to_vec(), error))
         } else {

@@ -1,0 +1,106 @@
+//! Points added and taken away by hand.
+
+use super::cloud::{BoxMap, Cloud, check_finite};
+use super::exterior::Exterior;
+use super::sampling::Samples;
+use super::solve::{ByPlace, Constraints};
+use crate::math::Vec3;
+use crate::methods::MethodError;
+use serde::{Deserialize, Serialize};
+
+/// What differs from the points as they were given.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Edits {
+    /// More points near the surface, in the units of the others.
+    pub added: Vec<Vec3>,
+    /// Points that are left out, by their index in those given; others in the same place are, too.
+    pub removed: Vec<u32>,
+    /// More points known to be outside.
+    pub outside: Vec<Vec3>,
+}
+
+/// How far from the middle of the points as given others may be added, in half sides of their box.
+const REACH: f32 = 3.0;
+
+impl Edits {
+    /// Tests everything against the points as given.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] naming the list, the entry and what is accepted.
+    pub fn validate(&self, original: &[Vec3], map: &BoxMap) -> Result<(), MethodError> {
+        for (name, points) in [("added", &self.added), ("outside", &self.outside)] {
+            check_finite(name, points)?;
+            if let Some(i) = points.iter().position(|&p| map.in_box(p).abs().max_element() > REACH) {
+                let problem =
+                    format!("point {i} is {}, more than the size of the others away from them", points[i]);
+                return Err(MethodError::invalid(name, problem));
+            }
+        }
+        match self.removed.iter().find(|&&i| i as usize >= original.len()) {
+            Some(i) => {
+                let problem = format!("{i} given; indices below {} are accepted", original.len());
+                Err(MethodError::invalid("removed", problem))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Where the removed points are, in the box.
+    fn removed_places(&self, original: &[Vec3], map: &BoxMap) -> ByPlace {
+        let places: Vec<Vec3> = self.removed.iter().map(|&i| map.in_box(original[i as usize])).collect();
+        ByPlace::new(&places)
+    }
+
+    /// The points of `cloud`, all in the box, that are left of it, and those added. The latter have no normals, colours or
+    /// confidence of their own: `cloud` comes back without the first two.
+    pub fn applied(&self, cloud: &Cloud, original: &[Vec3], map: &BoxMap) -> Cloud {
+        let left = self.left(cloud, original, map);
+        let added = self.added.iter().map(|&p| map.in_box(p));
+        let points: Vec<Vec3> = left.points.iter().copied().chain(added).collect();
+        let confidence = left.confidence.map(|mut sure| {
+            sure.resize(points.len(), 1.0);
+            sure
+        });
+        Cloud { points, confidence, ..Cloud::default() }.distinct()
+    }
+
+    /// The points of `cloud` that are not removed.
+    pub fn left(&self, cloud: &Cloud, original: &[Vec3], map: &BoxMap) -> Cloud {
+        if self.removed.is_empty() {
+            return cloud.clone();
+        }
+        let removed = self.removed_places(original, map);
+        let stays = |i: &u32| removed.find(cloud.points[*i as usize]).is_none();
+        cloud.gathered(&(0..cloud.len() as u32).filter(stays).collect::<Vec<u32>>())
+    }
+
+    /// The constraints that the points which take part, and those outside, become.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] where too few points are left, or one is on the surface and outside.
+    pub fn constraints(
+        &self,
+        samples: &Samples,
+        exterior: &Exterior,
+        original: &[Vec3],
+        map: &BoxMap,
+    ) -> Result<Constraints, MethodError> {
+        let surface = self.applied(&samples.cloud, original, map);
+        surface.check_count()?;
+        surface.check_span()?;
+        let all_in_box = |all: &[Vec3]| all.iter().map(|&p| map.in_box(p)).collect::<Vec<Vec3>>();
+        let mut outside: Vec<Vec3> = exterior.beside(&surface.points, &all_in_box(&self.added)).collect();
+        outside.extend(all_in_box(&self.outside));
+        outside.extend(&exterior.around);
+        let outside = Cloud { points: outside, ..Cloud::default() }.distinct().points;
+        let constraints = Constraints::new(&surface, &outside);
+        match constraints.shared_centre() {
+            Some(p) => {
+                let name = if self.outside.is_empty() { "exterior" } else { "outside" };
+                let problem = format!("{} is a surface point, too", map.in_world(p.as_dvec3()));
+                Err(MethodError::invalid(name, problem))
+            }
+            None => Ok(constraints),
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! The points that take part (paper, section VI-B): Poisson-disc sampling, slice by slice.
+
+use super::cloud::{Cloud, largest_clusters, mean_spacing};
+use crate::math::{Random, Vec3};
+use crate::methods::MethodError;
+use crate::spatial::PointGrid;
+
+/// Edge of the cells that join points to clusters, in mean spacings.
+const CLUSTER_CELL: f64 = 2.0;
+/// Points looked at in a slice: some ten milliseconds.
+const SLICE: usize = 50_000;
+/// Trials for the radius.
+const ROUNDS: u32 = 16;
+/// The share of the points wanted that is near enough.
+const NEARLY: f64 = 0.97;
+
+/// The points that take part.
+#[derive(Clone, Debug)]
+pub struct Samples {
+    /// In random order.
+    pub cloud: Cloud,
+    /// Their mean distance.
+    pub spacing: f64,
+}
+
+/// The choice of the points that take part, on its way.
+#[derive(Clone, Debug)]
+pub struct Sampling {
+    /// Number of clusters to keep of the cloud that is given, until that is done.
+    keep: Option<usize>,
+    most: usize,
+    seed: u64,
+    thinning: Option<(Cloud, Thinning)>,
+}
+
+impl Sampling {
+    /// At most `most` points of the `keep` largest clusters, or of all.
+    pub fn new(keep: Option<usize>, most: usize, seed: u64) -> Self {
+        Self { keep, most, seed, thinning: None }
+    }
+
+    /// A slice of the work on `cloud`, always the same one. Returns the points once they are chosen.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] where too few points are left, or only such in a plane.
+    pub fn advance(&mut self, cloud: &Cloud) -> Result<Option<Samples>, MethodError> {
+        let Some((kept, thinning)) = &mut self.thinning else {
+            let kept = match self.keep {
+                Some(keep) => Self::largest(cloud, keep)?,
+                None => cloud.clone(),
+            };
+            let thinning = Thinning::new(&kept.points, self.most, self.seed);
+            self.thinning = Some((kept, thinning));
+            return Ok(None);
+        };
+        let Some(chosen) = thinning.advance(&kept.points, SLICE) else { return Ok(None) };
+        let cloud = kept.gathered(&chosen);
+        cloud.check_span()?;
+        Ok(Some(Samples { spacing: mean_spacing(&cloud.points), cloud }))
+    }
+
+    fn largest(cloud: &Cloud, keep: usize) -> Result<Cloud, MethodError> {
+        let cell = CLUSTER_CELL * mean_spacing(&cloud.points);
+        let kept = cloud.gathered(&largest_clusters(&cloud.points, cell as f32, keep));
+        kept.check_count()?;
+        kept.check_span()?;
+        Ok(kept)
+    }
+
+    /// About how much is done.
+    pub fn progress(&self) -> f64 {
+        self.thinning.as_ref().map_or(0.0, |(_, thinning)| thinning.progress())
+    }
+}
+
+/// At most `most` of the points by Poisson-disc sampling: the points in a random order without those nearer than a radius to
+/// one before, with the largest radius that gives nearly so many. All, where there are no more.
+#[derive(Clone, Debug)]
+struct Thinning {
+    order: Vec<u32>,
+    most: usize,
+    round: u32,
+    radius: f32,
+    /// The largest radius known to leave too many, and the smallest known to do; 0 where none is.
+    small: f32,
+    large: f32,
+    /// What the latter left.
+    best: Vec<u32>,
+    /// This round: points looked at, and those kept, with their places.
+    looked_at: usize,
+    kept: Vec<u32>,
+    grid: PointGrid,
+}
+
+impl Thinning {
+    fn new(points: &[Vec3], most: usize, seed: u64) -> Self {
+        let mut thinning = Self {
+            order: Random::new(seed).order(points.len()),
+            most,
+            round: 0,
+            // A surface of side 2 has a hundred points a tenth apart or so.
+            radius: 2.0 / (most as f32).sqrt(),
+            small: 0.0,
+            large: 0.0,
+            best: Vec::new(),
+            looked_at: 0,
+            kept: Vec::new(),
+            grid: PointGrid::default(),
+        };
+        thinning.begin_round();
+        thinning
+    }
+
+    fn begin_round(&mut self) {
+        let expected = if self.most < self.order.len() { self.most } else { self.order.len() };
+        (self.looked_at, self.grid) = (0, PointGrid::new(self.radius, expected));
+        self.kept.clear();
+    }
+
+    /// Looks at up to `count` points. Returns the indices of those chosen, in random order, once they are.
+    fn advance(&mut self, points: &[Vec3], count: usize) -> Option<Vec<u32>> {
+        if self.order.len() <= self.most {
+            return Some(self.order.clone());
+        }
+        for &i in self.order.iter().skip(self.looked_at).take(count) {
+            let p = points[i as usize];
+            if !self.grid.has_within(p, self.radius) {
+                self.grid.insert(p);
+                self.kept.push(i);
+            }
+            self.looked_at += 1;
+        }
+        if self.looked_at < self.order.len() { None } else { self.end_round() }
+    }
+
+    fn end_round(&mut self) -> Option<Vec<u32>> {
+        let count = self.kept.len();
+        if count > self.most {
+            self.small = self.radius;
+        } else {
+            self.large = self.radius;
+            self.best = std::mem::take(&mut self.kept);
+        }
+        self.round += 1;
+        let near_enough = count <= self.most && count as f64 >= NEARLY * self.most as f64;
+        if near_enough || self.round == ROUNDS {
+            let none = self.best.is_empty();
+            return Some(if none {
+                self.order[..self.most].to_vec()
+            } else {
+                std::mem::take(&mut self.best)
+            });
+        }
+        self.radius = self.next_radius(count);
+        self.begin_round();
+        None
+    }
+
+    /// On a surface the number falls with the square of the radius; between bounds, else, their middle.
+    fn next_radius(&self, count: usize) -> f32 {
+        let wanted = 0.5 * (1.0 + NEARLY as f32) * self.most as f32;
+        let guess = self.radius * (count as f32 / wanted).sqrt();
+        if guess > self.small && (self.large == 0.0 || guess < self.large) {
+            guess
+        } else if self.large > 0.0 {
+            0.5 * (self.small + self.large)
+        } else {
+            2.0 * self.small
+        }
+    }
+
+    /// Most often a handful of rounds do.
+    fn progress(&self) -> f64 {
+        let rounds = f64::from(self.round) + self.looked_at as f64 / self.order.len() as f64;
+        rounds / (rounds + 2.0)
+    }
+}
+
+/// At most `most` of the points, as [`Sampling`] chooses them, at once.
+pub fn subsampled(points: &[Vec3], most: usize, seed: u64) -> Vec<u32> {
+    let mut thinning = Thinning::new(points, most, seed);
+    loop {
+        if let Some(chosen) = thinning.advance(points, points.len()) {
+            return chosen;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn unit(random: &mut Random) -> f32 {
+        random.bits() as f32 / 2_147_483_648.0 - 1.0
+    }
+
+    fn on_ball(count: usize) -> Vec<Vec3> {
+        let mut random = Random::new(7);
+        let mut place =
+            || Vec3::new(unit(&mut random), unit(&mut random), unit(&mut random)).normalize_or(Vec3::X);
+        (0..count).map(|_| place()).collect()
+    }
+
+    #[test]
+    fn thinned_points_keep_their_distance_and_leave_no_gap() {
+        let points = on_ball(4000);
+        for most in [10, 200, 3000] {
+            let mut thinning = Thinning::new(&points, most, 1);
+            let kept = loop {
+                if let Some(kept) = thinning.advance(&points, 777) {
+                    break kept;
+                }
+                assert!((0.0..1.0).contains(&thinning.progress()));
+            };
+            assert_eq!(kept, subsampled(&points, most, 1));
+            let radius = thinning.large;
+            for (k, &i) in kept.iter().enumerate() {
+                assert!(kept[..k].iter().all(|&j| points[i as usize].distance(points[j as usize]) > radius));
+            }
+            let reached =
+                |p: &Vec3| kept.iter().any(|&j| points[j as usize].distance_squared(*p) <= radius * radius);
+            assert!(points.iter().all(reached));
+        }
+    }
+
+    #[test]
+    fn nearly_as_many_as_asked_for() {
+        let mut uneven = on_ball(3000);
+        // Most of them on a fifth of the ball.
+        uneven.extend(on_ball(30_000).into_iter().filter(|p| p.z > 0.6));
+        for points in [on_ball(5000), uneven] {
+            for most in [4, 30, 300, 2000, 4999] {
+                let kept = subsampled(&points, most, 1);
+                let least = if most < 100 { 0.6 } else { 0.9 };
+                assert!(
+                    kept.len() <= most && kept.len() as f64 >= least * most as f64,
+                    "{} of {most}",
+                    kept.len()
+                );
+                let mut sorted = kept.clone();
+                sorted.sort_unstable();
+                sorted.dedup();
+                assert_eq!(sorted.len(), kept.len());
+                assert_eq!(kept, subsampled(&points, most, 1));
+            }
+            assert_eq!(subsampled(&points, points.len(), 1).len(), points.len());
+        }
+    }
+}
