@@ -1,0 +1,151 @@
+//! The implicit surface, given no normals, against screened Poisson surface reconstruction, given the true ones: topology
+//! and mean distance to shapes that are known.
+//!
+//! The figures of the other were recorded with pymeshlab 2025.7.post1 (MeshLab's library, which has M. Kazhdan's code) by
+//!
+//! ```sh
+//! cargo test --release --test implicit_accuracy -- --ignored   # writes the points of the tests, with normals
+//! python scripts/poisson_reference.py target/tmp/accuracy      # prints the table
+//! ```
+//!
+//! that is `generate_surface_reconstruction_screened_poisson(depth=<depth>, threads=1)` on each, all else as it comes.
+//! Noise is the standard deviation along each axis. The ball, the torus and the pair fill a box of side 2; the blend's box
+//! is 1.8 wide, so that there the same noise is a tenth more.
+#![cfg(not(target_arch = "wasm32"))]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test fails by panicking, and says its figures"
+)]
+mod common;
+#[path = "common/points.rs"]
+mod points;
+
+use common::{Random, euler_of_parts};
+use points::{Shape, blend, distance, noisy, pair, sphere, surface_points, torus};
+use std::fmt::Write;
+use std::path::Path;
+use vesicle::mesh::{TriangleMesh, report};
+use vesicle::methods::implicit::{Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, Level};
+
+const POINTS: usize = 3000;
+const SEEDS: [u64; 3] = [1, 2, 3];
+/// What is asked for, as a share of screened Poisson's error at the depth that suits the case best.
+const BAR: f64 = 1.1;
+
+/// A shape, what its parts are, and how far screened Poisson is from it.
+struct Known {
+    name: &'static str,
+    shape: Shape,
+    /// χ of each part.
+    euler: &'static [i64],
+    /// Its mean error in the mean of the seeds, for each noise: at depth 8, and at the best depth of 5 to 9.
+    poisson: [[f64; 2]; 3],
+}
+
+const NOISES: [f64; 3] = [0.0, 0.01, 0.02];
+
+#[rustfmt::skip]
+const ALL: [Known; 4] = [
+    // depth 8, best                                             no noise              0.01                  0.02
+    Known { name: "sphere", shape: sphere, euler: &[2], poisson: [[0.000610, 0.000610], [0.002972, 0.002495], [0.005456, 0.004586]] },
+    Known { name: "torus", shape: torus, euler: &[0], poisson:   [[0.000592, 0.000592], [0.002951, 0.002580], [0.005332, 0.003944]] },
+    Known { name: "blend", shape: blend, euler: &[0], poisson:   [[0.000621, 0.000621], [0.002893, 0.002857], [0.005121, 0.003795]] },
+    Known { name: "pair", shape: pair, euler: &[2, 2], poisson:  [[0.000505, 0.000504], [0.002715, 0.002601], [0.004916, 0.003252]] },
+];
+
+/// One setting for noise up to 0.01, found by trying: less first-order and more third-order smoothness than by default suit
+/// shapes without edges. With λ 0.001 the noise of the ball shows (1.13 of Poisson's error), with 0.002 the blend without
+/// noise is rounded off (1.19). The default δ, τ and λ with the mean level have 0.8 without noise and 1.6 with it, at most.
+/// The mean level takes back what λ shrinks. The cell saves time: with that of the default, which is finer, the errors
+/// without noise are up to a third less, and those with noise the same.
+fn usual() -> ImplicitParams {
+    ImplicitParams {
+        delta: 2.0,
+        tau: 0.1,
+        lambda_surface: 0.0015,
+        level: Level::Mean,
+        cell: 0.02,
+        ..ImplicitParams::default()
+    }
+}
+
+/// For noise of 0.02, where the setting above gives the pair a third part. Without noise this one rounds off the blend.
+fn smoother() -> ImplicitParams {
+    ImplicitParams { tau: 0.2, lambda_surface: 0.003, cell: 0.03, ..usual() }
+}
+
+fn reconstructed(known: &Known, noise: f64, seed: u64, params: ImplicitParams) -> TriangleMesh {
+    let cloud = Cloud { points: noisy(known.shape, POINTS, noise, seed), ..Cloud::default() };
+    let options = ImplicitOptions { params, ..ImplicitOptions::default() };
+    let mut surface = ImplicitSurface::new(cloud, options).unwrap();
+    while !surface.step().unwrap().done {}
+    surface.surface().clone()
+}
+
+/// Mean distance to the shape: that of the centre of each triangle, weighted by area.
+fn mean_error(shape: Shape, mesh: &TriangleMesh) -> f64 {
+    let (mut sum, mut total) = (0.0, 0.0);
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|i| mesh.positions[i as usize].as_dvec3());
+        let area = (b - a).cross(c - a).length();
+        sum += area * distance(shape, (a + b + c) / 3.0).abs();
+        total += area;
+    }
+    sum / total
+}
+
+fn as_good_as_poisson(noise: usize, params: &ImplicitParams) {
+    let missed = ALL.iter().filter(|known| {
+        let errors = SEEDS.map(|seed| {
+            let mesh = reconstructed(known, NOISES[noise], seed, params.clone());
+            let found = report(&mesh).unwrap();
+            assert!(found.is_healthy(), "{}, seed {seed}: {found:?}", known.name);
+            assert_eq!(euler_of_parts(&mesh), known.euler, "{}, seed {seed}", known.name);
+            mean_error(known.shape, &mesh)
+        });
+        let mean = errors.iter().sum::<f64>() / SEEDS.len() as f64;
+        let [usual, best] = known.poisson[noise].map(|poisson| mean / poisson);
+        println!(
+            "{}, noise {}: {mean:.6}, of Poisson's {usual:.2} (depth 8), {best:.2} (best depth); seeds {errors:.6?}",
+            known.name, NOISES[noise]
+        );
+        best > BAR
+    });
+    let missed: Vec<_> = missed.map(|known| known.name).collect();
+    assert!(missed.is_empty(), "{missed:?}");
+}
+
+#[test]
+fn without_noise() {
+    as_good_as_poisson(0, &usual());
+}
+
+#[test]
+fn with_noise() {
+    as_good_as_poisson(1, &usual());
+}
+
+#[test]
+fn with_twice_the_noise() {
+    as_good_as_poisson(2, &smoother());
+}
+
+#[test]
+#[ignore = "writes files: what scripts/poisson_reference.py reads"]
+fn write_points() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("accuracy");
+    std::fs::create_dir_all(&folder).unwrap();
+    for (known, noise, seed) in ALL.iter().flat_map(|known| {
+        NOISES.iter().flat_map(move |noise| SEEDS.iter().map(move |seed| (known, noise, seed)))
+    }) {
+        let places = noisy(known.shape, POINTS, *noise, *seed);
+        let (_, normals) = surface_points(known.shape, POINTS, &mut Random(*seed));
+        let mut text = String::new();
+        for (p, n) in places.iter().zip(normals) {
+            writeln!(text, "{} {} {} {} {} {}", p.x, p.y, p.z, n.x, n.y, n.z).unwrap();
+        }
+        std::fs::write(folder.join(format!("{}-{noise}-{seed}.xyz", known.name)), text).unwrap();
+    }
+    println!("{}", folder.display());
+}
