@@ -39,10 +39,8 @@ export function layOut(root: HTMLElement, parts: Parts): void {
   const view = h(
     'div',
     { class: 'view beside' },
-    h('div', { class: 'scene' }, parts.canvas),
-    parts.photograph,
     parts.options,
-    parts.legend,
+    h('div', { class: 'pictures' }, h('div', { class: 'scene' }, parts.canvas, parts.legend), parts.photograph),
     parts.banner,
     parts.drop,
   );
@@ -101,7 +99,7 @@ export class CloudPanel {
     this.element = h(
       'div',
       { class: 'data' },
-      h('div', { class: 'row' }, h('label', { for: id }, 'Example'), h('span', { class: 'value' }, this.#examples)),
+      h('div', { class: 'row stacked' }, h('label', { for: id }, 'Example'), this.#examples),
       h('div', { class: 'row' }, chooser),
       h(
         'p',

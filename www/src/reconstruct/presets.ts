@@ -59,7 +59,7 @@ const STEREO_COW = {
 export const CLOUD_PRESETS: CloudPreset[] = [
   {
     id: 'figure-2',
-    name: 'Figure 2: a corner, λ from 0 to 2',
+    name: 'Figure 2: a corner, λ 0 to 2',
     source: { shape: 'cube corner' },
     up: 'z',
     front: -1,

@@ -53,7 +53,7 @@ export class PhotoStrip {
     if (photograph?.picture) {
       draw(this.#canvas, photograph.picture, photograph.picture.width);
       this.#canvas.setAttribute('aria-label', `Photograph ${(index ?? 0) + 1}, ${photograph.name}`);
-      this.#caption.textContent = `Photograph ${(index ?? 0) + 1} of ${this.#photographs.length}; the surface beside it is seen through the same camera.`;
+      this.#caption.textContent = `Photograph ${(index ?? 0) + 1} of ${this.#photographs.length}; beside it the surface through the same camera.`;
     }
     if (changed) this.#onChoose(this.#chosen);
   }

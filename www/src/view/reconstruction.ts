@@ -11,8 +11,8 @@ import { Viewport } from './viewport';
 
 /** Points that lie farther out than this share of them on each side do not count for what the view shows. */
 const STRAY = 0.02;
-/** Of a point's disc, as a part of the diagonal of the box. */
-const DISC = 0.006;
+/** Of a point's disc, as a part of the diagonal of the box: two to three pixels. Smaller ones are hard to see, larger ones hide the surface. */
+const DISC = 0.014;
 const CAMERA_LENGTH = 0.12;
 
 export interface CloudViewOptions {
