@@ -1,3 +1,4 @@
+import { toFailure } from '../channel';
 import type { ReconstructClient } from '../reconstruct/client';
 import { CLOUDS, type CloudExample } from '../reconstruct/examples';
 import { type CloudVariant, cloudById, isCloudPreset } from '../reconstruct/presets';
@@ -124,9 +125,17 @@ export class Opening {
       await this.#adopt({ cloud, params, photographs, setup, source });
     } catch (error) {
       if (turn !== this.#turn) return;
+      if (source.linked) return this.#openWithoutLink(source, toFailure(error).message);
       this.#ui.data.choose(this.#source?.example);
       this.#states.fail(`${source.name} could not be opened.`, error);
     }
+  }
+
+  /** What a link leads to without what it says of settings: something in them is refused. */
+  async #openWithoutLink({ linked: _, ...source }: Source, why: string): Promise<void> {
+    await this.#open(source);
+    if (this.#states.value === 'error' || this.#source !== source) return;
+    this.#ui.banner.show('The link’s settings are left out.', `One of them cannot be: ${why}.`);
   }
 
   async #restartEngine(): Promise<void> {

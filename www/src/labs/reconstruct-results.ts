@@ -125,7 +125,7 @@ export class Results {
     this.#ui.clearSurface();
     this.#ui.banner.show(
       'There is no surface.',
-      'f is below 0 everywhere: try a smaller λs, a smaller δ, or the level “mean”.',
+      'f is nowhere above the level. Few points need a smaller δ, or more points; else try a smaller λs, the level “mean”, or a smaller cell.',
     );
   }
 }

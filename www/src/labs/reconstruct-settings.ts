@@ -4,7 +4,7 @@ import type { Cloud, Edits, ParamValues, Setup } from '../reconstruct/protocol';
 import type { CloudChoice } from '../ui/cloud-setup';
 import type { Hit } from '../view/reconstruction';
 import type { LabStates } from './lab-states';
-import { editedBy, NO_EDITS, shownColors, shownPoints } from './picking';
+import { editedBy, NO_EDITS, without } from './picking';
 import type { ReconstructParts } from './reconstruct-parts';
 import type { Results } from './reconstruct-results';
 import type { Running } from './reconstruct-running';
@@ -34,6 +34,8 @@ export class ModelSettings {
   #cloud: Cloud | undefined;
   #params: ParamValues = {};
   #edits: Edits = NO_EDITS;
+  /** Ends when all changes so far are in force, or refused. */
+  #turn: Promise<unknown> = Promise.resolve();
 
   /** `onParams` hears whenever other parameters may be in force. */
   constructor(
@@ -67,7 +69,8 @@ export class ModelSettings {
   /** Other points are open: what was done to the former cannot be undone. */
   adopt(cloud: Cloud, setup: Setup): void {
     this.#cloud = cloud;
-    this.#edits = setup.edits;
+    const removed = setup.edits.removed.filter((index) => index < cloud.points.length / 3);
+    this.#edits = { ...setup.edits, removed };
     this.#undo.clear();
     this.#tellUndo();
     this.#ui.setup.show(setup);
@@ -80,17 +83,55 @@ export class ModelSettings {
     this.#onParams(params);
   }
 
-  /** A new model with other settings; the surface stays until the new one is there. When it is refused, all stays. */
-  async change(changed: Partial<Settings>, label: string): Promise<boolean> {
-    if (!this.#states.canChange) return false;
-    const before = this.#now;
-    const done = await this.#apply({ ...before, ...changed });
-    if (done) this.#remember(before, label);
-    return done;
+  /** Other settings; the surface stays until the new one is there. When they are refused, all stays. */
+  change(changed: Partial<Settings>, label: string): Promise<void> {
+    return this.#inTurn(() => this.#change(changed, label));
   }
 
   /** Live: the run goes on, or is taken up again, with the new value. */
-  async setParam(name: string, value: unknown): Promise<void> {
+  setParam(name: string, value: unknown): Promise<void> {
+    return this.#inTurn(() => this.#setParam(name, value));
+  }
+
+  /** A click in the view, with the tool that is chosen. */
+  pick(hit: Hit): Promise<void> {
+    const { tool, distance } = this.#ui.tools;
+    const length = distance * this.#ui.view.size;
+    return this.#inTurn(async () => {
+      if (!this.#cloud || !this.#states.canChange) return;
+      const edits = editedBy(tool, hit, length, this.#edits, this.#cloud.points);
+      if (edits) await this.#change({ edits }, 'points by hand');
+      else if (tool === 'remove') this.#ui.status.say('No point is so near to that place.');
+    });
+  }
+
+  takeBackEdits(): Promise<void> {
+    return this.change({ edits: NO_EDITS }, 'taking all back');
+  }
+
+  travel(way: 'undo' | 'redo'): Promise<void> {
+    return this.#inTurn(() => this.#travel(way));
+  }
+
+  /** A new model with the same settings, before its first step. */
+  async rebuild(): Promise<void> {
+    this.showParams(await this.#handOver(this.#now));
+  }
+
+  /** One change after the other, so that each begins with what the one before it left. */
+  #inTurn(work: () => Promise<void>): Promise<void> {
+    const turn = this.#turn.then(work);
+    this.#turn = turn.catch(() => undefined);
+    return turn;
+  }
+
+  async #change(changed: Partial<Settings>, label: string): Promise<void> {
+    if (!this.#states.canChange) return;
+    const before = this.#now;
+    if (await this.#apply({ ...before, ...changed })) this.#remember(before, label);
+  }
+
+  async #setParam(name: string, value: unknown): Promise<void> {
     if (!this.#cloud) return;
     const before = this.#now;
     try {
@@ -108,31 +149,13 @@ export class ModelSettings {
     }
   }
 
-  /** A click in the view, with the tool that is chosen. */
-  pick(hit: Hit): void {
-    const { tool, distance } = this.#ui.tools;
-    if (!this.#cloud || this.#states.value === 'loading') return;
-    const edits = editedBy(tool, hit, distance * this.#ui.view.size, this.#edits, this.#cloud.points);
-    if (edits) void this.change({ edits }, 'points by hand');
-    else if (tool === 'remove') this.#ui.status.say('No point is so near to that place.');
-  }
-
-  takeBackEdits(): void {
-    void this.change({ edits: NO_EDITS }, 'taking all back');
-  }
-
-  async travel(way: 'undo' | 'redo'): Promise<void> {
+  async #travel(way: 'undo' | 'redo'): Promise<void> {
     if (!this.#states.canChange) return;
     const state = this.#now;
     const back = this.#undo[way]({ bytes: sizeOf(state), state });
     this.#lastChange.together = '';
     this.#tellUndo();
     if (back) await this.#apply(back);
-  }
-
-  /** A new model with the same settings, before its first step. */
-  async rebuild(): Promise<void> {
-    this.showParams(await this.#handOver(this.#now));
   }
 
   get #now(): Settings {
@@ -183,7 +206,9 @@ export class ModelSettings {
     this.#ui.tools.show(this.#edits);
     if (!this.#cloud) return;
     const { points, colors } = this.#cloud;
-    this.#ui.view.showPoints(shownPoints(points, this.#edits), shownColors(colors, this.#edits));
+    const { added, removed, outside } = this.#edits;
+    this.#ui.view.showPoints(without(points, removed), colors && without(colors, removed));
+    this.#ui.view.showByHand(Float32Array.from(added.flat()), Float32Array.from(outside.flat()));
   }
 }
 

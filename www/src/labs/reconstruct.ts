@@ -94,8 +94,8 @@ export class ReconstructLab implements Lab {
       onVariant: (preset, variant) => this.#openVariant(preset, variant),
       onChoice: (choice, what) => void this.#settings.change({ choice }, `change of ${what}`),
       onParam: (name, value) => void this.#settings.setParam(name, value),
-      onPick: (hit) => this.#settings.pick(hit),
-      onTakeBack: () => this.#settings.takeBackEdits(),
+      onPick: (hit) => void this.#settings.pick(hit),
+      onTakeBack: () => void this.#settings.takeBackEdits(),
       onOptions: (options) => this.#setOptions(options),
       onPhotograph: () => this.#sharing.updateAddress(),
       onToggle: () => this.#running.toggle(),
@@ -121,6 +121,12 @@ export class ReconstructLab implements Lab {
       { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#settings.travel('undo') },
       { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: redo },
       { key: 'y', ctrl: true, shown: 'Ctrl Y', text: 'redo', act: redo },
+      {
+        key: 'Escape',
+        shown: 'Esc',
+        text: 'away with the message, the tool or the photograph',
+        act: () => this.#putAway(),
+      },
     ];
   }
 
@@ -187,6 +193,14 @@ export class ReconstructLab implements Lab {
     const { beneath, ready } = this.#states;
     this.#root.dataset.state = state;
     this.#ui.showState(beneath, ready, state !== 'loading' && this.#results.whole);
+  }
+
+  /** Away with what is in the way: a message, else the tool that clicks are for, else the photograph. */
+  #putAway(): void {
+    const { banner, tools, photos } = this.#ui;
+    if (banner.shown) this.#dismiss();
+    else if (tools.tool !== 'none') tools.putAway();
+    else photos.choose(undefined);
   }
 
   #dismiss(): void {
