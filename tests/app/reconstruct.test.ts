@@ -421,6 +421,20 @@ describe('a link', () => {
     expect(await measured()).toMatchObject({ surfaceConstraints: 812, components: 1, genus: 0 });
   });
 
+  test('to a figure with another of its pictures says what comes of that one', async () => {
+    await openAt('#reconstruct?example=figure-8&p.lambdaSurface=0.001', 'done');
+    const pressed = () => text('.figure button[aria-pressed=true]');
+    expect([await pressed(), (await measured()).genus]).toEqual(['λ = 0.001', 1]);
+    expect(await text('[data-figure=came]')).toContain('a handle too many');
+    await afterRun(() => app.page.click('.figure button:has-text("2,168 points")'));
+    expect([await pressed(), (await measured()).genus]).toEqual(['2,168 points', 0]);
+    expect(await text('[data-figure=came]')).toContain('genus 0');
+    expect(await app.page.evaluate(() => document.activeElement?.textContent)).toBe('2,168 points');
+    await afterRun(() => setParam('tau', '0.02'));
+    expect(await app.page.locator('.figure button[aria-pressed=true]').count()).toBe(0);
+    expect(await text('[data-figure=came]')).toBe('Here the settings are others than those of the figure.');
+  });
+
   test('that cannot be followed says so, and the first example opens', async () => {
     await openAt('#reconstruct?example=nowhere', 'done');
     expect(await text('.banner')).toContain('no example “nowhere”');

@@ -154,9 +154,10 @@ export class ReconstructLab implements Lab {
   }
 
   #showParams(params: ParamValues): void {
-    const example = this.#opening.source?.example;
+    const { source, defaults } = this.#opening;
+    const example = source?.example;
     const preset = isCloudPreset(example) ? example : undefined;
-    const variant = preset && variantInForce(preset, params, this.#settings.choice.maxPoints);
+    const variant = preset && variantInForce(preset, params, this.#settings.choice.maxPoints, defaults);
     this.#ui.showParams(params, preset, variant);
     this.#sharing.updateAddress();
   }

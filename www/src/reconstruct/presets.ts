@@ -305,15 +305,18 @@ export function isCloudPreset(example: CloudExample | undefined): example is Clo
   return example !== undefined && 'variants' in example;
 }
 
-/** The picture of a figure whose settings are in force, if any is. */
+/** The picture of a figure whose settings are in force, if any is; what it does not say is as in `defaults`. */
 export function variantInForce(
   preset: CloudPreset,
   params: ParamValues,
   maxPoints: number | undefined,
+  defaults: ParamValues,
 ): CloudVariant | undefined {
   return preset.variants.find(
     (one) =>
       (one.maxPoints ?? preset.maxPoints) === maxPoints &&
-      Object.entries({ ...preset.params, ...one.params }).every(([name, value]) => Object.is(params[name], value)),
+      Object.entries({ ...defaults, ...preset.params, ...one.params }).every(([name, value]) =>
+        Object.is(params[name], value),
+      ),
   );
 }
