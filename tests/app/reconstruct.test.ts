@@ -322,6 +322,24 @@ describe('files', () => {
     expect(await text('.facts')).toContain('balls.xyz');
   });
 
+  test('a file does not inherit what suits an example: both balls stay after the cow, of which one cluster is kept', async () => {
+    await openAt('#reconstruct?p.lambdaSurface=0.002', 'done');
+    await afterRun(() => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
+    expect(await measured()).toMatchObject({ components: 2 });
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz');
+    await afterRun(() => setParam('lambdaSurface', '0.003'));
+    await afterRun(() => drop(app.page, [{ name: 'again.xyz', bytes: asText('two balls') }]));
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=again.xyz&p.lambdaSurface=0.003');
+  });
+
+  test('a link to a file waits for it, and then has its settings', async () => {
+    await openAt('#reconstruct?file=balls.xyz&p.delta=9', 'done');
+    expect(await text('.banner')).toContain('Open balls.xyz from your disk');
+    await afterRun(() => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz&p.delta=9');
+    expect(await measured()).toMatchObject({ components: 2 });
+  });
+
   test('each point given twice counts once', async () => {
     const points = asText('two balls');
     const twice = new Uint8Array([...points, ...points]);
@@ -453,6 +471,19 @@ describe('a link', () => {
     expect(await text('.banner')).toMatch(new RegExp(`settings are left out.*${why}`));
     expect(await measured()).toMatchObject({ components: 2, closed: true });
     expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');
+  });
+
+  test('warns where δ is too large for gaps, beside the view', async () => {
+    await openAt('#reconstruct?example=torus&p.delta=30', 'done');
+    expect(await app.page.locator('.stage [data-warning]').textContent()).toContain('25 or more');
+  });
+
+  test('followed in the open page to no example leaves what is open, and its address', async () => {
+    await app.page.evaluate(() => {
+      location.hash = '#reconstruct?example=nope';
+    });
+    await expect.poll(() => text('.banner')).toContain('no example “nope”');
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=torus&p.delta=30');
   });
 
   test('that removes points there are not, or one twice, removes those there are', async () => {

@@ -3,6 +3,7 @@ import type { ReconstructClient } from '../reconstruct/client';
 import { CLOUDS, type CloudExample } from '../reconstruct/examples';
 import { type CloudVariant, cloudById, isCloudPreset } from '../reconstruct/presets';
 import type { Cloud, CloudSource, ParamValues, Setup } from '../reconstruct/protocol';
+import type { CloudChoice } from '../ui/cloud-setup';
 import type { LabStates } from './lab-states';
 import type { Photograph } from './photographs';
 import { NO_EDITS } from './picking';
@@ -116,11 +117,12 @@ export class Opening {
       const { source: points, photographs } = await source.opened();
       if (turn !== this.#turn) return;
       const from = points ?? (await this.#presentPoints());
-      const setup = this.#setupFor(source);
+      const setup = this.#setupFor(source, points === undefined);
       const cameras = photographs.map(({ view }) => view);
       const { cloud, params } = await this.#client.request('load', { source: from, cameras, setup });
       if (turn !== this.#turn) return;
-      this.#source = points ? source : { ...source, name: this.#source?.name ?? source.name };
+      const whole = async () => ({ source: from, photographs });
+      this.#source = points ? source : { ...source, name: this.#source?.name ?? source.name, opened: whole };
       this.#awaiting = undefined;
       await this.#adopt({ cloud, params, photographs, setup, source });
     } catch (error) {
@@ -152,21 +154,30 @@ export class Opening {
     return source;
   }
 
-  #setupFor({ example, linked }: Source): Setup {
-    const { cell: _, ...params } = this.#settings.params;
-    // A cell is a length in the units of other points.
-    const usual = example ? { ...this.defaults, ...example.params } : params;
-    const first = example ? variantOf(example) : undefined;
-    const choice = example
-      ? { maxPoints: first?.maxPoints ?? example.maxPoints, keepComponents: example.keepComponents }
-      : this.#settings.choice;
-    const { maxPoints, keepComponents } = withLink(choice, linked ?? {});
+  #setupFor(source: Source, samePoints: boolean): Setup {
+    const { linked } = source;
+    const { params, ...choice } = this.#usual(source, samePoints);
     return {
-      params: { ...usual, ...(linked ? {} : first?.params), ...linked?.params },
-      maxPoints,
-      keepComponents,
+      params: { ...params, ...linked?.params },
+      ...withLink(choice, linked ?? {}),
       edits: linked?.edits ?? NO_EDITS,
     };
+  }
+
+  /** The settings before a link says otherwise: an example's own; those in force from file to file; else the method's. */
+  #usual({ example, linked }: Source, samePoints: boolean): CloudChoice & { params: ParamValues } {
+    if (example) {
+      const first = variantOf(example);
+      const params = { ...this.defaults, ...example.params, ...(linked ? {} : first?.params) };
+      return { params, maxPoints: first?.maxPoints ?? example.maxPoints, keepComponents: example.keepComponents };
+    }
+    const { params, choice } = this.#settings;
+    if (samePoints) return { params, ...choice };
+    if (linked || !this.#source || this.#source.example)
+      return { params: this.defaults, maxPoints: undefined, keepComponents: undefined };
+    // A cell is a length in the units of other points.
+    const { cell: _, ...others } = params;
+    return { params: others, ...choice };
   }
 }
 

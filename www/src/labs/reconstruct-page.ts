@@ -47,7 +47,7 @@ export function layOut(root: HTMLElement, parts: Parts): void {
   const params = folded('Parameters', parts.params);
   params.open = matchMedia('(min-width: 700px)').matches;
   root.replaceChildren(
-    h('div', { class: 'stage' }, view, parts.transport, parts.status, parts.photos),
+    h('div', { class: 'stage' }, view, parts.transport, parts.status, parts.warning, parts.photos),
     h(
       'div',
       { class: 'column setup' },
@@ -59,7 +59,7 @@ export function layOut(root: HTMLElement, parts: Parts): void {
       'div',
       { class: 'column results' },
       section('Progress', parts.phases),
-      section('Surface', parts.measures, parts.warning),
+      section('Surface', parts.measures),
       section('Save', parts.exports, parts.volume, parts.extract, parts.link),
       section('Plots', parts.plots, parts.kernel, parts.csv),
       folded('Time against number of constraints', parts.timing),

@@ -66,7 +66,7 @@ export class ReconstructLab implements Lab {
     }
     const { signal } = this.#closing;
     if (signal.aborted) return;
-    window.addEventListener('hashchange', () => void this.#opening.link(), { signal });
+    window.addEventListener('hashchange', () => void this.#followLink(), { signal });
     await this.#opening.link(CLOUDS[0]);
   }
 
@@ -83,6 +83,12 @@ export class ReconstructLab implements Lab {
     const { specs } = await this.#client.request('hello', undefined);
     this.#opening.defaults = Object.fromEntries(specs.map(({ name, default: value }) => [name, value]));
     this.#ui.makeParams(specs);
+  }
+
+  /** Also where a link could not be followed the address is that of what is open. */
+  async #followLink(): Promise<void> {
+    await this.#opening.link();
+    this.#sharing.updateAddress();
   }
 
   /** What is asked for on the page, and who does it. */

@@ -13,6 +13,8 @@ import { Viewport } from './viewport';
 const STRAY = 0.02;
 /** Of a point's disc, as a part of the diagonal of the box: two to three pixels. Smaller ones are hard to see, larger ones hide the surface. */
 const DISC = 0.014;
+/** With more points than this the discs get smaller, so that they do not cover everything. */
+const MANY = 10_000;
 const CAMERA_LENGTH = 0.12;
 
 export interface CloudViewOptions {
@@ -79,7 +81,8 @@ export class ReconstructionView {
   setCloud({ points, colors, cameras, up, front }: ShownCloud): void {
     this.#box = middleBox(points);
     const length = this.#box.getSize(new Vector3()).length();
-    for (const cloud of [this.#points, this.#inside]) cloud.size = DISC * length;
+    const disc = DISC * length * Math.min(1, Math.sqrt((3 * MANY) / points.length));
+    for (const cloud of [this.#points, this.#inside]) cloud.size = disc;
     this.#outside.size = 1.6 * DISC * length;
     for (const cloud of [this.#addedByHand, this.#outsideByHand]) cloud.size = 3 * DISC * length;
     this.#cameras.show(cameras, CAMERA_LENGTH * length);
