@@ -11,7 +11,15 @@ const COMPILED = 'target/wasm32-unknown-unknown/release/vesicle.wasm';
 const GLUE = 'target/glue';
 
 // What the README links to comes along.
-const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md', 'CHANGELOG.md', 'docs/extract.png'];
+const PAPERS = [
+  'LICENSE-MIT',
+  'LICENSE-APACHE',
+  'README.md',
+  'ARCHITECTURE.md',
+  'CHANGELOG.md',
+  'docs/extract.png',
+  'docs/reconstruct.jpg',
+];
 
 async function compile() {
   await must('cargo', [

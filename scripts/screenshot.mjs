@@ -1,27 +1,31 @@
-// Takes docs/extract.png, the README's picture, from the running app: the built-in example when it is done.
+// Takes docs/*, the README's pictures, from the running app: the built-in example of each lab when it is done.
 import { mkdir } from 'node:fs/promises';
 import { launchChromium } from './chromium.mjs';
 import { serve } from './serve.mjs';
 import { at, say, script } from './shell.mjs';
 
 const SIZE = { width: 1440, height: 900 };
+/** Many small dots: as JPEG a third as large. */
+const PICTURES = [
+  { file: 'docs/extract.png', hash: '#extract' },
+  { file: 'docs/reconstruct.jpg', hash: '#reconstruct', type: 'jpeg', quality: 85 },
+];
 
 /** Waits for the example to be done, then for the frame that shows it. */
-async function shoot(page, address, file) {
-  await page.goto(address);
+async function shoot(page, address, { hash, file, ...format }) {
+  await page.goto(address + hash);
   await page.waitForSelector('[data-state=done]', { timeout: 120_000 });
   await page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
-  await page.screenshot({ path: file });
+  await page.screenshot({ path: at(file), ...format });
+  say('picture', at(file));
 }
 
 await script(async () => {
-  const file = at('docs/extract.png');
   await mkdir(at('docs'), { recursive: true });
   const server = await serve(at('dist'), 0);
   const browser = await launchChromium();
   try {
-    await shoot(await browser.newPage({ viewport: SIZE }), server.address, file);
-    say('picture', file);
+    for (const picture of PICTURES) await shoot(await browser.newPage({ viewport: SIZE }), server.address, picture);
   } finally {
     await browser.close();
     await server.close();

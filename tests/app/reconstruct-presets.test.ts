@@ -1,7 +1,7 @@
 /** The figures of the points paper: what the page says comes of them does come of them. Run by the package from Node, which gives the same bits. */
 import { readFile } from 'node:fs/promises';
 import { beforeAll, expect, test } from 'vitest';
-import init, { type Camera, ImplicitSurface, parsePoints } from '../../pkg/index.js';
+import init, { type Camera, ImplicitSurface, paramSpecs, parsePoints } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import { computedCloud } from '../../www/src/reconstruct/clouds';
 import { CLOUDS, type CloudExample } from '../../www/src/reconstruct/examples';
@@ -12,6 +12,7 @@ import {
   type CloudOutcome,
   type CloudPreset,
   type CloudVariant,
+  variantInForce,
 } from '../../www/src/reconstruct/presets';
 
 beforeAll(() => init());
@@ -78,6 +79,14 @@ test('every figure has an id of its own, says what the paper saw and what comes 
     for (const text of [saw, came]) expect(text).toMatch(/^\S.{40,}\.$/);
     expect(came).toMatch(/^Here/);
   }
+});
+
+test.each(CASES)('the settings of figure %s are known as its own', (_, preset, variant) => {
+  const defaults = Object.fromEntries(paramSpecs('implicit').map(({ name, default: value }) => [name, value]));
+  const params = { ...defaults, ...preset.params, ...variant.params };
+  const maxPoints = variant.maxPoints ?? preset.maxPoints;
+  expect(variantInForce(preset, params, maxPoints, defaults)?.id).toBe(variant.id);
+  expect(variantInForce(preset, { ...params, lambdaExterior: 7 }, maxPoints, defaults)).toBeUndefined();
 });
 
 test.each(CLOUDS.map((example) => [example.id, example] as const))('%s is one closed surface', async (id, example) => {

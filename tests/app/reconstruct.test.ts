@@ -234,6 +234,65 @@ describe('points by hand', () => {
     expect(await measured()).toMatchObject({ components: 2, closed: true });
     await app.page.check('[data-tool=none]');
   });
+
+  test('two clicks at once are two points; each can be undone, and redone', async () => {
+    await openAt('#reconstruct?example=two-balls', 'done');
+    await app.page.check('[data-tool=add]');
+    const told = () => text('.edit-tools [role=status]');
+    await app.page.evaluate(() => {
+      const view = document.querySelector('.scene > canvas');
+      for (let i = 0; i < 2; i++) view?.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter', bubbles: true }));
+    });
+    await expect.poll(told).toBe('2 points added.');
+    await app.page.keyboard.press('Control+z');
+    await expect.poll(told).toBe('1 point added.');
+    await app.page.keyboard.press('Control+z');
+    await expect.poll(told).toBe('Nothing was changed by hand.');
+    await app.page.keyboard.press('Control+Shift+Z');
+    await expect.poll(told).toBe('1 point added.');
+    await reach(app.page, 'done');
+  });
+
+  test('where no point is near, none is removed, and the lab says so', async () => {
+    await app.page.check('[data-tool=remove]');
+    await app.page.locator('.scene > canvas').click({ position: { x: 12, y: 12 } });
+    await expect.poll(() => text('.status')).toBe('No point is so near to that place.');
+    expect(await text('.edit-tools [role=status]')).toBe('1 point added.');
+  });
+
+  test('a distance that cannot be is refused beside it', async () => {
+    const field = app.page.locator('.edit-tools input[type=number]');
+    await field.fill('900');
+    await field.press('Enter');
+    expect(await text('.edit-tools .field-error')).toContain('from −50 to 50');
+    expect(await field.inputValue()).toBe('5');
+    await field.fill('-3');
+    await field.press('Enter');
+    expect(await text('.edit-tools .field-error')).toBe('');
+  });
+
+  test('all points cannot go: what was there stays', async () => {
+    const before = await measured();
+    const size = await app.page.locator('.scene > canvas').boundingBox();
+    await app.page.fill('.edit-tools input[type=number]', '50');
+    for (const at of [0.3, 0.7]) {
+      const position = { x: at * (size?.width ?? 0), y: 0.5 * (size?.height ?? 0) };
+      await app.page.locator('.scene > canvas').click({ position });
+      await expect.poll(() => app.page.locator('[data-state=running]').count()).toBe(0);
+    }
+    await expect.poll(() => text('[data-error]')).toContain('at least 4');
+    expect((await measured()).vertices).toBeLessThan(Number(before.vertices));
+    expect((await measured()).closed).toBe(true);
+  });
+
+  test('Escape takes the message away, then the tool', async () => {
+    await app.page.keyboard.press('Escape');
+    await reach(app.page, 'done');
+    expect(await app.page.isChecked('[data-tool=remove]')).toBe(true);
+    await app.page.keyboard.press('Escape');
+    expect(await app.page.isChecked('[data-tool=none]')).toBe(true);
+    expect(await app.page.locator('[data-placing]').count()).toBe(0);
+  });
 });
 
 describe('files', () => {
@@ -248,6 +307,9 @@ describe('files', () => {
     ['notes.txt', 'no points at all'],
     ['few.xyz', '0 0 0\n1 0 0\n0 1 0\n'],
     ['broken.ply', 'ply\nformat ascii 1.0\nelement vertex 5\n'],
+    ['flat.xyz', Array.from({ length: 60 }, (_, i) => `${Math.cos(i)} ${Math.sin(3 * i)} 0`).join('\n')],
+    ['same.xyz', '1 2 3\n'.repeat(40)],
+    ['unmeasured.xyz', '0 0 0\n1 0 0\n0 1 0\n0 0 1\nnan 0 1\n'],
   ])('%s is refused with a message, and nothing is lost', async (name, content) => {
     const before = await measured();
     await drop(app.page, [{ name, bytes: new TextEncoder().encode(content) }]);
@@ -258,6 +320,40 @@ describe('files', () => {
     await app.page.click('.banner button');
     await reach(app.page, 'done');
     expect(await text('.facts')).toContain('balls.xyz');
+  });
+
+  test('a file does not inherit what suits an example: both balls stay after the cow, of which one cluster is kept', async () => {
+    await openAt('#reconstruct?p.lambdaSurface=0.002', 'done');
+    await afterRun(() => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
+    expect(await measured()).toMatchObject({ components: 2 });
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz');
+    await afterRun(() => setParam('lambdaSurface', '0.003'));
+    await afterRun(() => drop(app.page, [{ name: 'again.xyz', bytes: asText('two balls') }]));
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=again.xyz&p.lambdaSurface=0.003');
+  });
+
+  test('a link to a file waits for it, and then has its settings', async () => {
+    await openAt('#reconstruct?file=balls.xyz&p.delta=9', 'done');
+    expect(await text('.banner')).toContain('Open balls.xyz from your disk');
+    await afterRun(() => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz&p.delta=9');
+    expect(await measured()).toMatchObject({ components: 2 });
+  });
+
+  test('each point given twice counts once', async () => {
+    const points = asText('two balls');
+    const twice = new Uint8Array([...points, ...points]);
+    await afterRun(() => drop(app.page, [{ name: 'twice.xyz', bytes: twice }]));
+    expect(await measured()).toMatchObject({ components: 2, duplicates: 1600, surfaceConstraints: 1600 });
+  });
+
+  test('four points make no surface, and the lab says what may help', async () => {
+    const bytes = new TextEncoder().encode('0 0 0\n1 0 0\n0 1 0\n0 0 1\n');
+    await drop(app.page, [{ name: 'four.xyz', bytes }]);
+    await expect.poll(() => text('.banner')).toContain('There is no surface. f is nowhere above the level.');
+    expect(await app.page.isDisabled('[data-export=ply]')).toBe(true);
+    await app.page.keyboard.press('Escape');
+    expect(await app.page.locator('.banner').isVisible()).toBe(false);
   });
 
   test('photographs with a cameras.json colour points of one’s own', async () => {
@@ -343,15 +439,92 @@ describe('a link', () => {
     expect(await measured()).toMatchObject({ surfaceConstraints: 812, components: 1, genus: 0 });
   });
 
+  test('to a figure with another of its pictures says what comes of that one', async () => {
+    await openAt('#reconstruct?example=figure-8&p.lambdaSurface=0.001', 'done');
+    const pressed = () => text('.figure button[aria-pressed=true]');
+    expect([await pressed(), (await measured()).genus]).toEqual(['λ = 0.001', 1]);
+    expect(await text('[data-figure=came]')).toContain('a handle too many');
+    await afterRun(() => app.page.click('.figure button:has-text("2,168 points")'));
+    expect([await pressed(), (await measured()).genus]).toEqual(['2,168 points', 0]);
+    expect(await text('[data-figure=came]')).toContain('genus 0');
+    expect(await app.page.evaluate(() => document.activeElement?.textContent)).toBe('2,168 points');
+    await afterRun(() => setParam('tau', '0.02'));
+    expect(await app.page.locator('.figure button[aria-pressed=true]').count()).toBe(0);
+    expect(await text('[data-figure=came]')).toBe('Here the settings are others than those of the figure.');
+  });
+
   test('that cannot be followed says so, and the first example opens', async () => {
     await openAt('#reconstruct?example=nowhere', 'done');
     expect(await text('.banner')).toContain('no example “nowhere”');
     expect(await measured()).toMatchObject({ components: 1, genus: 0 });
   });
+
+  test.each([
+    ['p.delta=-1', 'delta'],
+    ['p.kernel=cubic', 'kernel'],
+    ['p.nonsense=3', 'nonsense'],
+    ['maxPoints=2', 'maxPoints'],
+    ['keepComponents=1.5', 'keepComponents'],
+    ['add=1e30,0,0', 'plane'],
+  ])('with %s opens its example without the settings, and says why', async (settings, why) => {
+    await openAt(`#reconstruct?example=two-balls&${settings}`, 'done');
+    expect(await text('.banner')).toMatch(new RegExp(`settings are left out.*${why}`));
+    expect(await measured()).toMatchObject({ components: 2, closed: true });
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');
+  });
+
+  test('warns where δ is too large for gaps, beside the view', async () => {
+    await openAt('#reconstruct?example=torus&p.delta=30', 'done');
+    expect(await app.page.locator('.stage [data-warning]').textContent()).toContain('25 or more');
+  });
+
+  test('followed in the open page to no example leaves what is open, and its address', async () => {
+    await app.page.evaluate(() => {
+      location.hash = '#reconstruct?example=nope';
+    });
+    await expect.poll(() => text('.banner')).toContain('no example “nope”');
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=torus&p.delta=30');
+  });
+
+  test('that removes points there are not, or one twice, removes those there are', async () => {
+    await openAt('#reconstruct?example=two-balls&remove=1,1,999999,-4,x', 'done');
+    expect(await text('.edit-tools [role=status]')).toBe('1 point removed.');
+    expect((await measured()).surfaceConstraints).toBe(1599);
+  });
+
+  test.each(['maxPoints=abc', 'add=1,2', 'photo=99', '&&', '%E0%A4%A'])('passes over %s', async (nonsense) => {
+    await openAt(`#reconstruct?example=two-balls&${nonsense}`, 'done');
+    expect(await app.page.locator('.banner').isVisible()).toBe(false);
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');
+  });
 });
 
 describe('the page', () => {
+  test('photographs are one stop of the tab key; arrow keys go along them', async () => {
+    await openAt('#reconstruct?example=figure-9', 'done');
+    const strip = app.page.locator('.strip');
+    expect(await strip.locator('button[tabindex="0"]').getAttribute('data-photo')).toBe('3');
+    await strip.locator('[data-photo="3"]').focus();
+    await app.page.keyboard.press('ArrowRight');
+    await app.page.keyboard.press('Enter');
+    expect(await app.page.evaluate(() => location.hash)).toContain('photo=5');
+    await app.page.keyboard.press('End');
+    expect(await app.page.evaluate(() => document.activeElement?.getAttribute('data-photo'))).toBe('23');
+    expect(await strip.locator('button[tabindex="0"]').count()).toBe(1);
+    await app.page.keyboard.press('Escape');
+    expect(await app.page.locator('.photograph').isVisible()).toBe(false);
+  });
+
+  test('nothing lies over the pictures but the legend', async () => {
+    await openAt('#reconstruct?example=figure-2', 'done');
+    const box = async (selector: string) => app.page.locator(selector).boundingBox();
+    const [bar, scene, legend] = [await box('.view-options'), await box('.scene'), await box('.color-legend')];
+    expect((bar?.y ?? 0) + (bar?.height ?? 0)).toBeLessThanOrEqual((scene?.y ?? 0) + 1);
+    expect(legend?.y).toBeGreaterThan(scene?.y ?? 0);
+  });
+
   test.each([
+    [320, 640],
     [390, 844],
     [1024, 768],
     [1440, 900],

@@ -21,14 +21,14 @@ export function editedBy(
     case 'outside':
       return { ...edits, outside: [...edits.outside, before] };
     case 'remove':
-      return without(point, Math.abs(distance), edits, points);
+      return withoutNear(point, Math.abs(distance), edits, points);
     default:
       return undefined;
   }
 }
 
 /** Without all points near a place, those added by hand, too. */
-function without(place: Vec3, reach: number, edits: Edits, points: Float32Array): Edits | undefined {
+function withoutNear(place: Vec3, reach: number, edits: Edits, points: Float32Array): Edits | undefined {
   const near = (x = 0, y = 0, z = 0) => Math.hypot(x - place[0], y - place[1], z - place[2]) <= reach;
   const gone = new Set(edits.removed);
   const found: number[] = [];
@@ -40,29 +40,8 @@ function without(place: Vec3, reach: number, edits: Edits, points: Float32Array)
   return { ...edits, added, removed: [...edits.removed, ...found] };
 }
 
-/** The points as they take part, to be shown. */
-export function shownPoints(points: Float32Array, { added, removed }: Edits): Float32Array {
-  return joined(points, removed, added.flat());
-}
-
-/** Their colours: those added by hand stand out. */
-export function shownColors(colors: Float32Array | undefined, { added, removed }: Edits): Float32Array | undefined {
-  const red = [0.9, 0.1, 0.5];
-  return (
-    colors &&
-    joined(
-      colors,
-      removed,
-      added.flatMap(() => red),
-    )
-  );
-}
-
-function joined(values: Float32Array, removed: number[], more: number[]): Float32Array {
+/** Values, three of each point, without those of some. */
+export function without(values: Float32Array, removed: number[]): Float32Array {
   const gone = new Set(removed);
-  const kept = gone.size > 0 ? values.filter((_, i) => !gone.has(Math.floor(i / 3))) : values;
-  const out = new Float32Array(kept.length + more.length);
-  out.set(kept);
-  out.set(more, kept.length);
-  return out;
+  return gone.size > 0 ? values.filter((_, i) => !gone.has(Math.floor(i / 3))) : values;
 }

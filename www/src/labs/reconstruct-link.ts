@@ -97,7 +97,7 @@ export function fromHash(hash: string): LinkedCloud | undefined {
   const edits = {
     added: pointsOf(query, 'add'),
     outside: pointsOf(query, 'outside'),
-    removed: removed.filter((index) => Number.isInteger(index) && index >= 0),
+    removed: [...new Set(removed)].filter((index) => Number.isInteger(index) && index >= 0),
   };
   const linked: LinkedCloud = { params: {}, edits };
   for (const name of ['example', 'file', 'color'] as const) {

@@ -39,17 +39,15 @@ export function layOut(root: HTMLElement, parts: Parts): void {
   const view = h(
     'div',
     { class: 'view beside' },
-    h('div', { class: 'scene' }, parts.canvas),
-    parts.photograph,
     parts.options,
-    parts.legend,
+    h('div', { class: 'pictures' }, h('div', { class: 'scene' }, parts.canvas, parts.legend), parts.photograph),
     parts.banner,
     parts.drop,
   );
   const params = folded('Parameters', parts.params);
   params.open = matchMedia('(min-width: 700px)').matches;
   root.replaceChildren(
-    h('div', { class: 'stage' }, view, parts.transport, parts.status, parts.photos),
+    h('div', { class: 'stage' }, view, parts.transport, parts.status, parts.warning, parts.photos),
     h(
       'div',
       { class: 'column setup' },
@@ -61,7 +59,7 @@ export function layOut(root: HTMLElement, parts: Parts): void {
       'div',
       { class: 'column results' },
       section('Progress', parts.phases),
-      section('Surface', parts.measures, parts.warning),
+      section('Surface', parts.measures),
       section('Save', parts.exports, parts.volume, parts.extract, parts.link),
       section('Plots', parts.plots, parts.kernel, parts.csv),
       folded('Time against number of constraints', parts.timing),
@@ -101,7 +99,7 @@ export class CloudPanel {
     this.element = h(
       'div',
       { class: 'data' },
-      h('div', { class: 'row' }, h('label', { for: id }, 'Example'), h('span', { class: 'value' }, this.#examples)),
+      h('div', { class: 'row stacked' }, h('label', { for: id }, 'Example'), this.#examples),
       h('div', { class: 'row' }, chooser),
       h(
         'p',

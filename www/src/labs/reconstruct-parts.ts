@@ -59,8 +59,9 @@ export interface PartEvents extends TransportEvents {
 export class ReconstructParts {
   readonly #canvas = h('canvas', {
     tabindex: 0,
-    role: 'img',
-    'aria-label': '3D view of the points and the surface. Arrow keys turn it, plus and minus zoom.',
+    role: 'application',
+    'aria-label':
+      '3D view of the points and the surface. Arrow keys turn it, plus and minus zoom; with a tool for points by hand, Enter is a click in its middle.',
   });
   readonly view = new ReconstructionView(this.#canvas, INITIAL_VIEW);
   readonly status = new StatusLine();

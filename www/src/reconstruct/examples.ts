@@ -26,7 +26,7 @@ const SPOT = 'Spot by Keenan Crane, public domain; rendered and turned into poin
 export const CLOUDS: [CloudExample, ...CloudExample[]] = [
   {
     id: 'spot-stereo',
-    name: 'Cow, stereo from 24 photographs',
+    name: 'Cow, 24 stereo photographs',
     source: { file: 'spot/stereo.ply' },
     photographs: 'spot',
     up: 'y',

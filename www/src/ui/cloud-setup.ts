@@ -41,10 +41,10 @@ export class CloudSetup {
     return this.#inForce;
   }
 
-  show(choice: CloudChoice): void {
-    this.#inForce = choice;
-    this.#most.input.value = choice.maxPoints === undefined ? '' : String(choice.maxPoints);
-    this.#keep.input.value = choice.keepComponents === undefined ? '' : String(choice.keepComponents);
+  show({ maxPoints, keepComponents }: CloudChoice): void {
+    this.#inForce = { maxPoints, keepComponents };
+    this.#most.input.value = maxPoints === undefined ? '' : String(maxPoints);
+    this.#keep.input.value = keepComponents === undefined ? '' : String(keepComponents);
     for (const { error } of [this.#most, this.#keep]) error.textContent = '';
   }
 

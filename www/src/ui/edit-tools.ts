@@ -23,6 +23,9 @@ const TOOLS: { tool: EditTool; label: string; help: string }[] = [
   },
 ];
 
+/** Of a click from the surface, in percent of the size of the points. */
+const DISTANCE = 5;
+
 /** Tools that change the points by clicking in the 3D view. */
 export class EditTools {
   readonly element: HTMLElement;
@@ -30,20 +33,33 @@ export class EditTools {
   readonly #counts = h('p', { class: 'help', role: 'status' });
   readonly #clear: HTMLButtonElement;
   readonly #distance: HTMLInputElement;
+  readonly #error: HTMLElement;
+  readonly #radios: HTMLInputElement[] = [];
+  readonly #onTool: (tool: EditTool) => void;
   #tool: EditTool = 'none';
 
   constructor(onTool: (tool: EditTool) => void, onClear: () => void) {
+    this.#onTool = onTool;
     const name = uniqueId('tool');
     const radios = TOOLS.map(({ tool, label }) => {
       const radio = h('input', { type: 'radio', name, value: tool, checked: tool === 'none', 'data-tool': tool });
-      radio.addEventListener('change', () => {
-        this.#choose(tool);
-        onTool(tool);
-      });
+      radio.addEventListener('change', () => this.#choose(tool));
+      this.#radios.push(radio);
       return h('label', { class: 'check' }, radio, label);
     });
     const id = uniqueId('distance');
-    this.#distance = h('input', { type: 'number', id, value: 5, min: -50, max: 50, step: 'any', required: true });
+    this.#error = h('p', { class: 'field-error', id: `${id}-error`, role: 'alert' });
+    this.#distance = h('input', {
+      type: 'number',
+      id,
+      value: DISTANCE,
+      min: -50,
+      max: 50,
+      step: 'any',
+      required: true,
+    });
+    this.#distance.setAttribute('aria-describedby', `${id}-error`);
+    this.#distance.addEventListener('change', () => this.#checkDistance());
     this.#clear = h('button', { type: 'button', onclick: onClear, 'data-edit': 'clear' }, 'Take all back');
     this.element = h(
       'div',
@@ -55,12 +71,13 @@ export class EditTools {
         h('label', { for: id }, 'Distance'),
         h('span', { class: 'value' }, this.#distance, h('span', { class: 'unit' }, '% of size')),
       ),
+      this.#error,
       this.#help,
       h('p', { class: 'help' }, 'By keyboard: Enter in the view is a click in its middle.'),
       this.#counts,
       this.#clear,
     );
-    this.#choose('none');
+    this.#tell();
     this.show({ added: [], removed: [], outside: [] });
   }
 
@@ -70,7 +87,14 @@ export class EditTools {
 
   /** As a part of the size of the points; nothing that is no number. */
   get distance(): number {
-    return this.#distance.checkValidity() ? this.#distance.valueAsNumber / 100 : 0.05;
+    return (this.#distance.checkValidity() ? this.#distance.valueAsNumber : DISTANCE) / 100;
+  }
+
+  /** Clicks do nothing again. */
+  putAway(): void {
+    const [first] = this.#radios;
+    if (first) first.checked = true;
+    this.#choose('none');
   }
 
   show({ added, removed, outside }: { added: unknown[]; removed: unknown[]; outside: unknown[] }): void {
@@ -85,6 +109,18 @@ export class EditTools {
 
   #choose(tool: EditTool): void {
     this.#tool = tool;
+    this.#tell();
+    this.#onTool(tool);
+  }
+
+  #checkDistance(): void {
+    const valid = this.#distance.checkValidity();
+    this.#error.textContent = valid ? '' : `A number from −50 to 50 is needed; it is ${DISTANCE} again.`;
+    if (!valid) this.#distance.valueAsNumber = DISTANCE;
+  }
+
+  #tell(): void {
+    const tool = this.#tool;
     this.#help.textContent = TOOLS.find((one) => one.tool === tool)?.help ?? '';
   }
 }

@@ -21,6 +21,7 @@ interface Figure<One extends Picture> {
 export class FigurePanel<Variant extends Picture, Preset extends Figure<Variant>> {
   readonly element = h('div', { class: 'figure', hidden: true });
   readonly #onVariant: (preset: Preset, variant: Variant) => void;
+  #shown: Preset | undefined;
   #buttons: { variant: Variant; button: HTMLButtonElement }[] = [];
   readonly #came = h('p', { 'data-figure': 'came' });
 
@@ -28,10 +29,16 @@ export class FigurePanel<Variant extends Picture, Preset extends Figure<Variant>
     this.#onVariant = onVariant;
   }
 
-  /** Shows a figure, with the variant that is in force, or nothing. */
+  /** Shows a figure, with the variant that is in force, if one is; or nothing. */
   show(preset: Preset | undefined, variant?: Variant): void {
     this.element.hidden = preset === undefined;
-    if (!preset) return;
+    // Buttons that are there already stay, and with them the focus.
+    if (preset && preset !== this.#shown) this.#layOut(preset);
+    this.#shown = preset;
+    if (preset) this.#choose(variant);
+  }
+
+  #layOut(preset: Preset): void {
     this.#buttons = preset.variants.map((one) => ({ variant: one, button: this.#button(preset, one) }));
     const several = preset.variants.length > 1;
     const group = h('div', { class: 'buttons', role: 'group', 'aria-label': 'Pictures of the figure' });
@@ -42,11 +49,10 @@ export class FigurePanel<Variant extends Picture, Preset extends Figure<Variant>
       ...(several ? [group] : []),
       ...(preset.hint ? [h('p', { class: 'help' }, preset.hint)] : []),
     );
-    this.choose(variant ?? preset.variants[0]);
   }
 
-  choose(variant: Variant): void {
-    this.#came.textContent = variant.came;
+  #choose(variant: Variant | undefined): void {
+    this.#came.textContent = variant?.came ?? 'Here the settings are others than those of the figure.';
     for (const { variant: one, button } of this.#buttons) button.setAttribute('aria-pressed', String(one === variant));
   }
 

@@ -5,7 +5,7 @@ const THUMBNAIL = 72;
 
 /** All photographs as small pictures to choose from; the chosen one stands large beside the view of the same camera. */
 export class PhotoStrip {
-  readonly element = h('div', { class: 'photos', role: 'group', 'aria-label': 'Photographs', hidden: true });
+  readonly element = h('div', { class: 'photos', hidden: true });
   /** Beside the view. */
   readonly large: HTMLElement;
   readonly #canvas = h('canvas', { role: 'img' });
@@ -34,9 +34,20 @@ export class PhotoStrip {
     this.element.hidden = pictured.length === 0;
     this.#buttons = photographs.map((photograph, i) => this.#button(photograph, i));
     this.element.replaceChildren(
-      h('p', { class: 'help' }, 'Photographs: choose one to look through its camera.'),
-      h('div', { class: 'strip' }, ...this.#buttons),
+      h('p', { class: 'help' }, 'Photographs: choose one to look through its camera; arrow keys go along them.'),
+      h(
+        'div',
+        {
+          class: 'strip',
+          role: 'toolbar',
+          'aria-label': 'Photographs',
+          onkeydown: (event) => this.#goAlong(event),
+          onfocusin: ({ target }) => this.#makeStop(this.#buttons.indexOf(target as HTMLButtonElement)),
+        },
+        ...this.#buttons,
+      ),
     );
+    this.#makeStop(0);
   }
 
   get chosen(): number | undefined {
@@ -53,9 +64,24 @@ export class PhotoStrip {
     if (photograph?.picture) {
       draw(this.#canvas, photograph.picture, photograph.picture.width);
       this.#canvas.setAttribute('aria-label', `Photograph ${(index ?? 0) + 1}, ${photograph.name}`);
-      this.#caption.textContent = `Photograph ${(index ?? 0) + 1} of ${this.#photographs.length}; the surface beside it is seen through the same camera.`;
+      this.#caption.textContent = `Photograph ${(index ?? 0) + 1} of ${this.#photographs.length}; beside it the surface through the same camera.`;
     }
+    if (this.#chosen !== undefined) this.#makeStop(this.#chosen);
     if (changed) this.#onChoose(this.#chosen);
+  }
+
+  /** Tab stops at one of them only; from there arrow keys go along. */
+  #makeStop(index: number): void {
+    for (const [i, button] of this.#buttons.entries()) button.tabIndex = i === index ? 0 : -1;
+  }
+
+  #goAlong(event: KeyboardEvent): void {
+    const last = this.#buttons.length - 1;
+    const at = this.#buttons.indexOf(event.target as HTMLButtonElement);
+    const to = { ArrowRight: Math.min(at + 1, last), ArrowLeft: Math.max(at - 1, 0), Home: 0, End: last }[event.key];
+    if (to === undefined) return;
+    event.preventDefault();
+    this.#buttons[to]?.focus();
   }
 
   #button({ name, picture }: Photograph, index: number): HTMLButtonElement {

@@ -61,12 +61,14 @@ class Typing {
   }
 }
 
+const UNTYPED = ['range', 'checkbox', 'radio'];
+
 /** Whether the focused element uses the key itself: space presses buttons, letters go into fields and choose in lists. */
 function isTakenBy({ target, key }: KeyboardEvent): boolean {
   if (!(target instanceof HTMLElement)) return false;
   if (target.closest('dialog, select, textarea, [contenteditable]')) return true;
-  if (target instanceof HTMLInputElement)
-    return !['range', 'checkbox'].includes(target.type) || (key === ' ' && target.type === 'checkbox');
+  if (target instanceof HTMLInputElement && key !== 'Escape')
+    return !UNTYPED.includes(target.type) || (key === ' ' && target.type !== 'range');
   return key === ' ' && target.closest('button, summary, a, label.button') !== null;
 }
 

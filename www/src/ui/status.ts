@@ -25,6 +25,10 @@ export class ErrorBanner {
     );
   }
 
+  get shown(): boolean {
+    return !this.element.hidden;
+  }
+
   show(title: string, message: string): void {
     this.#title.textContent = title;
     this.#message.textContent = message;

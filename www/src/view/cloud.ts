@@ -16,7 +16,7 @@ export class PointCloud {
     this.#paint();
   }
 
-  /** Diameter in world units. */
+  /** Diameter in world units where the view is 90° wide; a narrower view shows them smaller. */
   set size(size: number) {
     this.#material.size = size;
   }

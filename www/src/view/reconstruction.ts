@@ -11,8 +11,10 @@ import { Viewport } from './viewport';
 
 /** Points that lie farther out than this share of them on each side do not count for what the view shows. */
 const STRAY = 0.02;
-/** Of a point's disc, as a part of the diagonal of the box. */
-const DISC = 0.006;
+/** Of a point's disc, as a part of the diagonal of the box: two to three pixels. Smaller ones are hard to see, larger ones hide the surface. */
+const DISC = 0.014;
+/** With more points than this the discs get smaller, so that they do not cover everything. */
+const MANY = 10_000;
 const CAMERA_LENGTH = 0.12;
 
 export interface CloudViewOptions {
@@ -49,6 +51,8 @@ export class ReconstructionView {
   readonly #points = new PointCloud();
   readonly #inside = new PointCloud();
   readonly #outside = new PointCloud();
+  readonly #addedByHand = new PointCloud();
+  readonly #outsideByHand = new PointCloud();
   readonly #cameras = new CameraMarks();
   readonly legend = new Legend(diverging);
   /** Called with the place that was clicked. */
@@ -61,8 +65,7 @@ export class ReconstructionView {
   constructor(canvas: HTMLCanvasElement, options: CloudViewOptions) {
     this.#viewport = new Viewport(canvas);
     this.#options = options;
-    for (const { object } of [this.#surface, this.#points, this.#inside, this.#outside, this.#cameras])
-      this.#viewport.add(object);
+    for (const { object } of [this.#surface, ...this.#clouds, this.#cameras]) this.#viewport.add(object);
     this.#viewport.add(this.#cameras.chosenObject);
     this.#viewport.onClick = (ray) => this.#pick(ray);
     this.#recolor();
@@ -78,12 +81,15 @@ export class ReconstructionView {
   setCloud({ points, colors, cameras, up, front }: ShownCloud): void {
     this.#box = middleBox(points);
     const length = this.#box.getSize(new Vector3()).length();
-    for (const cloud of [this.#points, this.#inside, this.#outside]) cloud.size = DISC * length;
+    const disc = DISC * length * Math.min(1, Math.sqrt((3 * MANY) / points.length));
+    for (const cloud of [this.#points, this.#inside]) cloud.size = disc;
     this.#outside.size = 1.6 * DISC * length;
+    for (const cloud of [this.#addedByHand, this.#outsideByHand]) cloud.size = 3 * DISC * length;
     this.#cameras.show(cameras, CAMERA_LENGTH * length);
     this.#viewport.up = up;
     this.#front = front;
     this.showPoints(points, colors);
+    this.showByHand(new Float32Array(0), new Float32Array(0));
     this.showConstraints(new Float32Array(0), new Float32Array(0));
     this.clearSurface();
     this.#frame();
@@ -91,6 +97,13 @@ export class ReconstructionView {
 
   showPoints(points: Float32Array, colors: Float32Array | undefined): void {
     this.#points.show(points, colors);
+    this.#viewport.invalidate();
+  }
+
+  /** Points added by hand stand out, and so do those said to be outside. */
+  showByHand(added: Float32Array, outside: Float32Array): void {
+    this.#addedByHand.show(added);
+    this.#outsideByHand.show(outside);
     this.#viewport.invalidate();
   }
 
@@ -121,6 +134,8 @@ export class ReconstructionView {
     this.#points.object.visible = options.points && !options.constraints;
     this.#inside.object.visible = options.constraints;
     this.#outside.object.visible = options.constraints;
+    for (const { object } of [this.#addedByHand, this.#outsideByHand])
+      object.visible = options.points || options.constraints;
     this.#cameras.visible = options.cameras;
     this.#showLegend();
     if (reframe) this.#frame();
@@ -142,8 +157,12 @@ export class ReconstructionView {
   }
 
   dispose(): void {
-    for (const part of [this.#surface, this.#points, this.#inside, this.#outside, this.#cameras]) part.dispose();
+    for (const part of [this.#surface, ...this.#clouds, this.#cameras]) part.dispose();
     this.#viewport.dispose();
+  }
+
+  get #clouds(): PointCloud[] {
+    return [this.#points, this.#inside, this.#outside, this.#addedByHand, this.#outsideByHand];
   }
 
   #frame(): void {
@@ -180,6 +199,8 @@ export class ReconstructionView {
     this.#points.color = token('--point');
     this.#inside.color = token('--point');
     this.#outside.color = token('--exterior');
+    this.#addedByHand.color = token('--attractor');
+    this.#outsideByHand.color = token('--exterior');
     this.#cameras.colors = { all: token('--muted'), chosen: token('--outline') };
     this.#viewport.invalidate();
   }

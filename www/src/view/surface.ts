@@ -20,6 +20,8 @@ import { isShade, linearColors, robustRange, SHADES, shadeColors, type ValueShad
 /** Room beyond what is needed now, so that a growing surface gets new GPU buffers only now and then. */
 const SPARE = 1.5;
 const BONE: ColorRepresentation = '#e9dcc3';
+/** Colours from photographs hold their light already: lit once more as they are, white comes out grey. */
+const OWN_GAIN = 1.6;
 
 /** What the colour of a surface tells; 'own' are the colours that its vertices came with. */
 export type SurfaceColor = ColorMode | ValueShade | 'own';
@@ -151,9 +153,9 @@ export class SurfaceObject {
     this.#mesh.material = own && !this.#lit ? this.#plainMaterial : this.#material;
     if (this.#material.vertexColors !== on) {
       this.#material.vertexColors = on;
-      this.#material.color.set(on ? '#ffffff' : BONE);
       this.#material.needsUpdate = true;
     }
+    this.#material.color.set(on ? '#ffffff' : BONE).multiplyScalar(own ? OWN_GAIN : 1);
     this.#range = shaded ? robustRange(this.#values, SHADES[mode].least) : 0;
     const { geometry } = this.#mesh;
     if (!on || !geometry.index) return;

@@ -1,0 +1,94 @@
+import { toFailure } from '../channel';
+import { type LabState, Observable } from '../state';
+import type { ErrorBanner, StatusLine } from '../ui/status';
+
+/** The state a lab is in, with what went wrong laid over it until it has been read. */
+export class LabStates {
+  readonly #state = new Observable<LabState>('loading');
+  readonly #banner: ErrorBanner;
+  readonly #status: StatusLine;
+  readonly #signal: AbortSignal;
+  /** The state to return to when an error has been read. */
+  #calm: 'loading' | 'paused' | 'done' = 'loading';
+  /** There is a model. */
+  ready = false;
+  /** The worker has to be started again before it can do anything. */
+  engineBroken = false;
+
+  /** Nothing is shown any more once `signal` is aborted. */
+  constructor(banner: ErrorBanner, status: StatusLine, signal: AbortSignal) {
+    this.#banner = banner;
+    this.#status = status;
+    this.#signal = signal;
+  }
+
+  /** Calls `follower` now and at every change. */
+  follow(follower: (state: LabState) => void): void {
+    this.#state.follow((state) => {
+      if (state === 'paused' || state === 'done') this.#calm = state;
+      follower(state);
+    });
+  }
+
+  get value(): LabState {
+    return this.#state.value;
+  }
+
+  /** The state beneath an error that is being shown. */
+  get beneath(): LabState {
+    return this.value === 'error' ? this.#calm : this.value;
+  }
+
+  get canChange(): boolean {
+    return this.ready && !this.engineBroken && this.value !== 'loading';
+  }
+
+  get canRun(): boolean {
+    return this.ready && !this.engineBroken && this.beneath === 'paused';
+  }
+
+  load(text: string): void {
+    this.#banner.hide();
+    this.#state.value = 'loading';
+    this.#status.say(text);
+  }
+
+  /** Loading is over, and nothing runs yet. */
+  stand(text: string): void {
+    this.#state.value = 'paused';
+    this.#status.say(text);
+  }
+
+  /** What the model does now. While something is loading only a start counts; false where this does not. */
+  enter(state: 'running' | 'paused' | 'done'): boolean {
+    if (this.value === 'loading' && state !== 'running') {
+      this.#calm = state;
+      return false;
+    }
+    this.#state.value = state;
+    return true;
+  }
+
+  /** Says what went wrong; what was there stays. */
+  fail(title: string, error: unknown): void {
+    if (this.#signal.aborted) return;
+    const failure = toFailure(error);
+    if (failure.code === 'internal') this.engineBroken = true;
+    const hint =
+      failure.code === 'internal' && this.ready
+        ? 'What you see is the last result; Reset starts the engine again. It said: '
+        : '';
+    this.#banner.show(title, hint + failure.message);
+    this.#status.say('');
+    if (this.value === 'running') this.#calm = 'paused';
+    this.#state.value = 'error';
+  }
+
+  /** The error has been read; true where the lab is back in the state from before. */
+  dismiss(): boolean {
+    this.#banner.hide();
+    if (this.value !== 'error' || !this.ready) return false;
+    this.#state.value = this.#calm;
+    return true;
+  }
+}

@@ -1,0 +1,131 @@
+import type { ReconstructClient } from '../reconstruct/client';
+import type { ConstraintsEvent, MeasuredEvent, ProgressEvent, SurfaceEvent, TimedEvent } from '../reconstruct/protocol';
+import type { LabState } from '../state';
+import { count, figure, plural } from '../ui/format';
+import type { History } from '../ui/history';
+import { overallProgress } from '../ui/phases';
+import type { LabStates } from './lab-states';
+import { fitValues } from './reconstruct-measures';
+import type { ReconstructParts } from './reconstruct-parts';
+
+export type ResultEvent = ProgressEvent | SurfaceEvent | ConstraintsEvent | MeasuredEvent | TimedEvent;
+
+/** What comes of a run, on the screen: progress, constraints, surface and measures as the worker tells them. */
+export class Results {
+  readonly #client: ReconstructClient;
+  readonly #ui: ReconstructParts;
+  readonly #states: LabStates;
+  readonly #history: History;
+  /** A complete surface is shown: what is being extracted must not replace it. */
+  #whole = false;
+  /** To be shown at the next animation frame. */
+  #surface: SurfaceEvent | undefined;
+  #framePending = 0;
+
+  constructor(client: ReconstructClient, ui: ReconstructParts, states: LabStates, history: History) {
+    this.#client = client;
+    this.#ui = ui;
+    this.#states = states;
+    this.#history = history;
+  }
+
+  /** Whether there is a complete surface, to be saved or passed on. */
+  get whole(): boolean {
+    return this.#whole;
+  }
+
+  take(event: ResultEvent): void {
+    switch (event.event) {
+      case 'progress':
+        this.#history.add(event.reports);
+        this.#showHistory();
+        break;
+      case 'surface':
+        this.#takeSurface(event);
+        break;
+      case 'constraints':
+        this.#ui.view.showConstraints(event.surface, event.exterior);
+        break;
+      case 'measured':
+        this.#showMeasures(event);
+        break;
+      case 'timed':
+        this.#ui.timing.tell(event.timing);
+    }
+  }
+
+  /** The model runs or stands: says how far it has come, and why where nothing came of it. */
+  showState(state: LabState): void {
+    this.#showHistory();
+    this.#ui.status.say(this.describe(state));
+    if (state === 'done' && this.#history.reports.at(-1)?.vertices === 0) this.#showNothing();
+  }
+
+  /** In words, for the status line. */
+  describe(state: LabState): string {
+    const last = this.#history.reports.at(-1);
+    if (state === 'running') return 'Running.';
+    if (!last) return 'Ready to start.';
+    if (state !== 'done') return `Paused at iteration ${count(last.iteration)}, in the phase ${last.phase}.`;
+    if (last.vertices === 0) return 'Done, but there is no surface: f is nowhere 0.';
+    return `Done: ${count(last.vertices)} vertices in ${plural(last.components, 'component')}, residual ${figure(last.residual)}.`;
+  }
+
+  /** A new run begins; the surface stays until the new one is there. */
+  startOver(): void {
+    this.#history.clear();
+  }
+
+  /** Nothing on the screen but the points. */
+  clear(): void {
+    this.#whole = false;
+    this.#surface = undefined;
+    this.#history.clear();
+    this.#ui.clearSurface();
+    this.#showHistory();
+  }
+
+  close(): void {
+    cancelAnimationFrame(this.#framePending);
+  }
+
+  /** Shows a surface at the next animation frame; only then the worker may send another. */
+  #takeSurface(event: SurfaceEvent): void {
+    if (event.preview && this.#whole) {
+      this.#client.shown();
+      return;
+    }
+    this.#surface = event;
+    this.#whole = !event.preview;
+    this.#framePending ||= requestAnimationFrame(() => {
+      this.#framePending = 0;
+      if (this.#surface) this.#ui.view.showSurface(this.#surface.surface);
+      this.#surface = undefined;
+      this.#client.shown();
+    });
+  }
+
+  #showMeasures({ measures, fit }: MeasuredEvent): void {
+    if (measures) this.#ui.measures.showMeasures(measures);
+    this.#ui.measures.showMore(fitValues(fit));
+    this.#ui.warning.textContent = fit.warning ?? '';
+  }
+
+  #showHistory(): void {
+    const last = this.#history.reports.at(-1);
+    this.#ui.transport.showReport(last && { ...last, progress: overallProgress(last) });
+    this.#ui.phases.update(this.#history, this.#states.value === 'running');
+    this.#ui.plots.update();
+    this.#ui.csv.disabled = this.#history.reports.length === 0;
+  }
+
+  /** What was shown belongs to other settings. */
+  #showNothing(): void {
+    this.#whole = false;
+    this.#ui.clearSurface();
+    this.#ui.banner.show(
+      'There is no surface.',
+      'f is nowhere above the level. Few points need a smaller δ, or more points; else try a smaller λs, the level “mean”, or a smaller cell.',
+    );
+  }
+}

@@ -1,0 +1,217 @@
+import { toFailure } from '../channel';
+import type { ReconstructClient } from '../reconstruct/client';
+import type { Cloud, Edits, ParamValues, Setup } from '../reconstruct/protocol';
+import type { CloudChoice } from '../ui/cloud-setup';
+import type { Hit } from '../view/reconstruction';
+import type { LabStates } from './lab-states';
+import { editedBy, NO_EDITS, without } from './picking';
+import type { ReconstructParts } from './reconstruct-parts';
+import type { Results } from './reconstruct-results';
+import type { Running } from './reconstruct-running';
+import { UndoStack } from './undo';
+
+const UNDO_LIMITS = { entries: 60, bytes: 96e6 };
+/** Milliseconds within which changes of the same thing are one, as when a slider is dragged. */
+const TOGETHER = 1500;
+
+/** All that undo brings back. */
+interface Settings {
+  choice: CloudChoice;
+  params: ParamValues;
+  edits: Edits;
+}
+
+/** The points, and all that the model of them is made with: changed here, handed to the worker, undone. */
+export class ModelSettings {
+  readonly #client: ReconstructClient;
+  readonly #ui: ReconstructParts;
+  readonly #states: LabStates;
+  readonly #results: Results;
+  readonly #running: Running;
+  readonly #onParams: (params: ParamValues) => void;
+  readonly #undo = new UndoStack<Settings>(UNDO_LIMITS);
+  #lastChange = { together: '', at: 0 };
+  #cloud: Cloud | undefined;
+  #params: ParamValues = {};
+  #edits: Edits = NO_EDITS;
+  /** Ends when all changes so far are in force, or refused. */
+  #turn: Promise<unknown> = Promise.resolve();
+
+  /** `onParams` hears whenever other parameters may be in force. */
+  constructor(
+    client: ReconstructClient,
+    ui: ReconstructParts,
+    states: LabStates,
+    results: Results,
+    running: Running,
+    onParams: (params: ParamValues) => void,
+  ) {
+    this.#client = client;
+    this.#ui = ui;
+    this.#states = states;
+    this.#results = results;
+    this.#running = running;
+    this.#onParams = onParams;
+  }
+
+  get params(): ParamValues {
+    return this.#params;
+  }
+
+  get edits(): Edits {
+    return this.#edits;
+  }
+
+  get choice(): CloudChoice {
+    return this.#ui.setup.value;
+  }
+
+  /** Other points are open: what was done to the former cannot be undone. */
+  adopt(cloud: Cloud, setup: Setup): void {
+    this.#cloud = cloud;
+    const removed = setup.edits.removed.filter((index) => index < cloud.points.length / 3);
+    this.#edits = { ...setup.edits, removed };
+    this.#undo.clear();
+    this.#tellUndo();
+    this.#ui.setup.show(setup);
+    this.#showEdits();
+  }
+
+  /** What the worker says is in force. */
+  showParams(params: ParamValues): void {
+    this.#params = params;
+    this.#onParams(params);
+  }
+
+  /** Other settings; the surface stays until the new one is there. When they are refused, all stays. */
+  change(changed: Partial<Settings>, label: string): Promise<void> {
+    return this.#inTurn(() => this.#change(changed, label));
+  }
+
+  /** Live: the run goes on, or is taken up again, with the new value. */
+  setParam(name: string, value: unknown): Promise<void> {
+    return this.#inTurn(() => this.#setParam(name, value));
+  }
+
+  /** A click in the view, with the tool that is chosen. */
+  pick(hit: Hit): Promise<void> {
+    const { tool, distance } = this.#ui.tools;
+    const length = distance * this.#ui.view.size;
+    return this.#inTurn(async () => {
+      if (!this.#cloud || !this.#states.canChange) return;
+      const edits = editedBy(tool, hit, length, this.#edits, this.#cloud.points);
+      if (edits) await this.#change({ edits }, 'points by hand');
+      else if (tool === 'remove') this.#ui.status.say('No point is so near to that place.');
+    });
+  }
+
+  takeBackEdits(): Promise<void> {
+    return this.change({ edits: NO_EDITS }, 'taking all back');
+  }
+
+  travel(way: 'undo' | 'redo'): Promise<void> {
+    return this.#inTurn(() => this.#travel(way));
+  }
+
+  /** A new model with the same settings, before its first step. */
+  async rebuild(): Promise<void> {
+    this.showParams(await this.#handOver(this.#now));
+  }
+
+  /** One change after the other, so that each begins with what the one before it left. */
+  #inTurn(work: () => Promise<void>): Promise<void> {
+    const turn = this.#turn.then(work);
+    this.#turn = turn.catch(() => undefined);
+    return turn;
+  }
+
+  async #change(changed: Partial<Settings>, label: string): Promise<void> {
+    if (!this.#states.canChange) return;
+    const before = this.#now;
+    if (await this.#apply({ ...before, ...changed })) this.#remember(before, label);
+  }
+
+  async #setParam(name: string, value: unknown): Promise<void> {
+    if (!this.#cloud) return;
+    const before = this.#now;
+    try {
+      const params = await this.#client.request('setParams', { [name]: value });
+      this.#remember(before, `change of ${name}`, name);
+      this.showParams(params);
+      if (this.#states.beneath === 'done') {
+        this.#results.startOver();
+        this.#running.ask(this.#running.play());
+      }
+    } catch (error) {
+      const { code, message } = toFailure(error);
+      this.#ui.refuseParam(name, message, this.#params);
+      if (code === 'internal') this.#states.fail('That did not work.', error);
+    }
+  }
+
+  async #travel(way: 'undo' | 'redo'): Promise<void> {
+    if (!this.#states.canChange) return;
+    const state = this.#now;
+    const back = this.#undo[way]({ bytes: sizeOf(state), state });
+    this.#lastChange.together = '';
+    this.#tellUndo();
+    if (back) await this.#apply(back);
+  }
+
+  get #now(): Settings {
+    return { choice: this.choice, params: this.#params, edits: this.#edits };
+  }
+
+  async #apply(settings: Settings): Promise<boolean> {
+    const { choice, edits } = settings;
+    this.#ui.banner.hide();
+    try {
+      const params = await this.#handOver(settings);
+      this.#edits = edits;
+      this.#ui.setup.show(choice);
+      this.#showEdits();
+      this.#results.startOver();
+      this.showParams(params);
+      await this.#running.play();
+      return true;
+    } catch (error) {
+      this.#ui.setup.show(this.choice);
+      this.#states.fail('That cannot be.', error);
+      return false;
+    }
+  }
+
+  /**
+   * Has the worker work with these settings; gives the parameters in force. The one place that does, whatever has
+   * changed, points by hand too, forth and back: for now always a new model.
+   */
+  async #handOver({ choice, params, edits }: Settings): Promise<ParamValues> {
+    const ready = await this.#client.request('rebuild', { ...choice, params, edits });
+    return ready.params;
+  }
+
+  #remember(state: Settings, label: string, together = ''): void {
+    const now = performance.now();
+    const isOne = together !== '' && together === this.#lastChange.together && now - this.#lastChange.at < TOGETHER;
+    this.#lastChange = { together, at: now };
+    if (!isOne) this.#undo.push({ label, bytes: sizeOf(state), state });
+    this.#tellUndo();
+  }
+
+  #tellUndo(): void {
+    this.#ui.transport.showUndo(this.#undo.undoable, this.#undo.redoable);
+  }
+
+  #showEdits(): void {
+    this.#ui.tools.show(this.#edits);
+    if (!this.#cloud) return;
+    const { points, colors } = this.#cloud;
+    const { added, removed, outside } = this.#edits;
+    this.#ui.view.showPoints(without(points, removed), colors && without(colors, removed));
+    this.#ui.view.showByHand(Float32Array.from(added.flat()), Float32Array.from(outside.flat()));
+  }
+}
+
+function sizeOf({ edits: { added, removed, outside } }: Settings): number {
+  return 100 + 8 * (3 * added.length + removed.length + 3 * outside.length);
+}

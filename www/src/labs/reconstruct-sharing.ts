@@ -1,0 +1,86 @@
+import type { ReconstructClient } from '../reconstruct/client';
+import type { LabStates } from './lab-states';
+import type { PassOn } from './labs';
+import { ADDRESS, fits, linkOf, toHash } from './reconstruct-link';
+import type { Opening } from './reconstruct-opening';
+import type { ReconstructParts } from './reconstruct-parts';
+import type { ModelSettings } from './reconstruct-settings';
+
+/** Voxels along the longest side of a volume that is saved or passed on. */
+const VOLUME_SIZE = 96;
+
+/** Gives on what the lab has: as an address, as a volume to save, and to the Extract lab. */
+export class Sharing {
+  readonly #client: ReconstructClient;
+  readonly #ui: ReconstructParts;
+  readonly #states: LabStates;
+  readonly #settings: ModelSettings;
+  readonly #opening: Opening;
+
+  constructor(
+    client: ReconstructClient,
+    ui: ReconstructParts,
+    states: LabStates,
+    settings: ModelSettings,
+    opening: Opening,
+  ) {
+    this.#client = client;
+    this.#ui = ui;
+    this.#states = states;
+    this.#settings = settings;
+    this.#opening = opening;
+  }
+
+  /** The page's address says what is open and how it is set. */
+  updateAddress(): void {
+    const { source, defaults } = this.#opening;
+    if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
+    const { choice, params, edits } = this.#settings;
+    const linked = linkOf({
+      example: source.example,
+      file: source.name,
+      choice,
+      params,
+      defaults,
+      edits,
+      color: this.#ui.options.value.color,
+      photo: this.#ui.photos.chosen,
+    });
+    const hash = toHash(linked);
+    if (hash !== (location.hash || ADDRESS)) window.history.replaceState(null, '', hash);
+  }
+
+  async copyLink(): Promise<void> {
+    this.updateAddress();
+    const lacks = [
+      ...(this.#opening.source?.example ? [] : ['Your file is not in it: whoever opens it needs the file too.']),
+      ...(fits(this.#settings.edits) ? [] : ['So many points by hand are not in it.']),
+    ];
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.#ui.status.say(['Link copied.', ...lacks].join(' '));
+    } catch {
+      this.#ui.status.say(['The link is in the address bar.', ...lacks].join(' '));
+    }
+  }
+
+  saveVolume(): void {
+    this.#tryTo(async () => {
+      const { bytes } = await this.#client.request('volume', { size: VOLUME_SIZE });
+      this.#ui.saving.bytes('nii', bytes, 'application/octet-stream');
+    });
+  }
+
+  /** The function as a volume that the deformable model follows: inside is above the level. */
+  toExtract(passOn: PassOn): void {
+    this.#ui.status.say('Making a volume.');
+    this.#tryTo(async () => {
+      const { bytes, level } = await this.#client.request('volume', { size: VOLUME_SIZE });
+      passOn({ name: `${this.#ui.saving.name} (volume)`, bytes, params: { iso: level, isoForce: -1 } });
+    });
+  }
+
+  #tryTo(work: () => Promise<void>): void {
+    work().catch((error) => this.#states.fail('The volume could not be made.', error));
+  }
+}
