@@ -132,6 +132,12 @@ pub fn check_finite(name: &'static str, values: &[Vec3]) -> Result<(), MethodErr
     }
 }
 
+/// Longest side of points that single precision has room around for.
+const LEAST_SIZE: f64 = 1e-27;
+const MOST_SIZE: f64 = 1e38;
+/// Distance from the origin, in longest sides, at which a cell of 1/30 of a side is still as exact as it has to be.
+const MOST_AWAY: f64 = 240.0;
+
 /// From the points' own units into the box, whose longest side is 2, and back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxMap {
@@ -147,6 +153,33 @@ impl BoxMap {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         // Halves first: the sum of two large coordinates can overflow.
         Self { centre: min * 0.5 + max * 0.5, scale: 1.0 / (max * 0.5 - min * 0.5).max_element() }
+    }
+
+    /// How far from the origin of the points' units anything in the box is, at most; in those units.
+    pub fn reach(&self) -> f64 {
+        self.centre.abs().max_element() + 1.0 / self.scale
+    }
+
+    /// Tests that vertices on a surface of such points can be told apart in single precision.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] for points too small or too large, or too far from the origin for their size.
+    pub fn check_place(&self) -> Result<(), MethodError> {
+        let size = 2.0 / self.scale;
+        let bad = |problem| Err(MethodError::invalid("points", problem));
+        if !(LEAST_SIZE..=MOST_SIZE).contains(&size) {
+            return bad(format!(
+                "their longest side is {size:e}; {LEAST_SIZE:e} to {MOST_SIZE:e} is accepted"
+            ));
+        }
+        let away = self.reach() / size;
+        if away <= MOST_AWAY {
+            return Ok(());
+        }
+        bad(format!(
+            "they lie {away:.0} times their size from the origin, where single precision has too few digits left; \
+             {MOST_AWAY} times is accepted: move them nearer"
+        ))
     }
 
     /// Box units a unit of the points.

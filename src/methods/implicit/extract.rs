@@ -37,10 +37,16 @@ enum Stage {
     Normals(TriangleMesh, Vec<Vec3>),
 }
 
-/// The edge of a cell in the points' units that suits points of mean distance `spacing`, in units of the box.
+/// The edge of a cell in the points' units that suits points of mean distance `spacing`, in units of the box. Far from the
+/// origin it is coarser, as single precision is.
 pub fn default_cell(map: &BoxMap, spacing: f64) -> f64 {
-    (CELL * spacing).clamp(2.0 / CELLS[1], 2.0 / CELLS[0]) / map.scale()
+    let cell = (CELL * spacing).clamp(2.0 / CELLS[1], 2.0 / CELLS[0]) / map.scale();
+    let least = (map.reach() + 2.0 * MARGIN / map.scale()) / MOST_EDGES_AWAY;
+    if cell > least { cell } else { least }
 }
+
+/// Edges that a lattice may reach from the origin, with room for one more than needed.
+const MOST_EDGES_AWAY: f64 = 8100.0;
 
 impl Extraction {
     /// The surface where `field` is `level`, around `points`, with cells of edge `cell`; points and cell in their own units.

@@ -195,6 +195,7 @@ impl ImplicitSurface {
         let cloud = points.distinct();
         cloud.check_count()?;
         let map = BoxMap::of(&cloud.points);
+        map.check_place()?;
         // Rounding in the box may make equal what was not.
         let cloud = cloud.mapped(&map).distinct();
         cloud.check_count()?;

@@ -1,8 +1,9 @@
 //! The function at very many places: a fast multipole method with Chebyshev interpolation (Fong & Darve, *The black-box
 //! fast multipole method*, 2009).
 //!
-//! Near terms are summed one by one. What all others add up to is smooth within a cube, and is interpolated there. Cubes
-//! are filled when first asked about, so only those around the surface are. Off by about a thousandth of what f changes
+//! Near terms are summed one by one. What all others add up to is smooth within a cube, and is interpolated there: the
+//! smaller the cube, the nearer terms are. Cubes are filled when first asked about, so small ones are around the surface
+//! only. Off by about a thousandth of what f changes
 //! by from one point of the surface to the next; sums that must be right to rounding are [`Field`]'s. Kernels that grow
 //! with the distance are summed one by one here, too: what is large in them cancels.
 
@@ -15,7 +16,7 @@ use chebyshev::{CUBE, Chebyshev, Nodal};
 use translate::{Translations, Turns};
 
 /// Terms in a finest cube, about. More, and near terms take longer; fewer, and there are more cubes.
-const TERMS_A_CUBE: usize = 12;
+const TERMS_A_CUBE: usize = 24;
 /// Levels of cubes at most: tables of the finest have 8^this entries.
 const MOST_LEVELS: usize = 6;
 /// No cube, or none yet.
@@ -46,6 +47,7 @@ pub struct FastField {
 /// The terms around a cube.
 #[derive(Clone, Debug)]
 struct Near {
+    level: usize,
     cube: Place,
     number: usize,
     ranges: Vec<[usize; 2]>,
@@ -108,7 +110,7 @@ impl FastField {
             terms: terms.to_vec(),
             ranges: Vec::new(),
             direct: field.table().kernel().is_conditional(),
-            near: Near { cube: NOWHERE, number: 0, ranges: Vec::new() },
+            near: Near { level: 0, cube: NOWHERE, number: 0, ranges: Vec::new() },
             field,
         };
         if !fast.direct {
@@ -127,7 +129,7 @@ impl FastField {
 
     fn value(&mut self, p: DVec3) -> f64 {
         let Some(at) = self.local(p) else { return self.field.value(p) };
-        let mut sum = self.chebyshev.value(&self.finest().places[self.near.number], at);
+        let mut sum = self.chebyshev.value(self.nodal(), at);
         for &[from, to] in &self.near.ranges {
             for term in &self.terms[from..to] {
                 sum += self.field.term(term, p);
@@ -139,8 +141,8 @@ impl FastField {
     /// f and ∇f at `p`.
     pub fn value_and_gradient(&mut self, p: DVec3) -> (f64, DVec3) {
         let Some(at) = self.local(p) else { return self.field.value_and_gradient(p) };
-        let (mut sum, slope) = self.chebyshev.value_and_gradient(&self.finest().places[self.near.number], at);
-        let mut gradient = slope * (2.0 / self.cube_edge(self.levels.len() - 1));
+        let (mut sum, slope) = self.chebyshev.value_and_gradient(self.nodal(), at);
+        let mut gradient = slope * (2.0 / self.cube_edge(self.near.level));
         for &[from, to] in &self.near.ranges {
             for term in &self.terms[from..to] {
                 let (value, slope) = self.field.term_and_gradient(term, p);
@@ -151,8 +153,9 @@ impl FastField {
         (sum + self.field.polynomial(p), gradient + self.field.slopes())
     }
 
-    fn finest(&self) -> &Level {
-        &self.levels[self.levels.len() - 1]
+    /// What all far terms add up to in the near cube.
+    fn nodal(&self) -> &Nodal {
+        &self.levels[self.near.level].places[self.near.number]
     }
 
     fn cube_edge(&self, level: usize) -> f64 {
@@ -230,21 +233,27 @@ impl FastField {
         }
     }
 
-    /// Where `p` is in its finest cube, which becomes the near one; `None` outside of all.
+    /// Where `p` is in the largest cube with no terms near it, or else in its finest one, which becomes the near one; `None`
+    /// outside of all.
     fn local(&mut self, p: DVec3) -> Option<DVec3> {
         if self.direct {
             return None;
         }
-        let level = self.levels.len() - 1;
-        let cube = self.place_of(p, level);
-        self.levels[level].index(cube)?;
-        if cube != self.near.cube {
+        let finest = self.levels.len() - 1;
+        self.levels[finest].index(self.place_of(p, finest))?;
+        if self.place_of(p, self.near.level) != self.near.cube {
+            let is_far = |&level: &usize| {
+                around(self.place_of(p, level)).all(|near| self.levels[level].sources_at(near).is_none())
+            };
+            let level = (2..finest).find(is_far).unwrap_or(finest);
+            let cube = self.place_of(p, level);
             let number = self.fill(level, cube);
-            let sources = around(cube).filter_map(|place| self.finest().sources_at(place));
+            // The sources of larger cubes are none.
+            let sources = around(cube).filter_map(|place| self.levels[level].sources_at(place));
             let ranges = sources.map(|source| self.ranges[source]).collect();
-            self.near = Near { cube, number, ranges };
+            self.near = Near { level, cube, number, ranges };
         }
-        Some(self.within(p, cube, level))
+        Some(self.within(p, self.near.cube, self.near.level))
     }
 
     /// Makes what all far terms add up to in a cube, if it is not there yet. Returns its number.

@@ -215,8 +215,8 @@ const RATIO: f32 = std::f32::consts::FRAC_1_SQRT_2;
 /// Distance below which centres are taken as they come.
 const LEAST_SPACING: f32 = 1e-6;
 /// Cells of the grid, and where neighbours are looked for first, in distances of the round.
-const CELL: f32 = 2.5;
-const REACH: f32 = 5.0;
+const CELL: f32 = 3.6;
+const REACH: f32 = 3.6;
 
 /// An order from coarse to fine, each centre with its nearest ones before it: each is as far from those before it as those
 /// that follow let it, within a factor of √2. In rounds: each takes the centres that are farther than some distance from
