@@ -1,4 +1,5 @@
-// Times the head CT in Node and in Chromium; prints a table and writes bench.json.
+// Times points to a surface and the head CT, in Node and in Chromium; prints tables and writes bench.json. `npm run bench --
+// points` does one of the two, and writes nothing.
 import { readFile, writeFile } from 'node:fs/promises';
 import { cpus } from 'node:os';
 import { build } from './build.mjs';
@@ -10,22 +11,27 @@ import { at, root, script } from './shell.mjs';
 const SCAN = 'www/public/data/visible-human-head-full.nii.gz';
 const REPEATS = 3;
 
-async function inNode() {
-  const { measure } = await import('../bench/head.mjs');
-  return {
-    host: `Node ${process.versions.node}`,
-    ...(await measure(new Uint8Array(await readFile(at(SCAN))), REPEATS)),
-  };
-}
+/** What can be measured, and how each is printed. Each has a module of its own, with nothing in its memory yet. */
+const BENCHES = {
+  points: {
+    inNode: async () => (await import('../bench/points.mjs')).measure(REPEATS),
+    rows: pointRows,
+  },
+  head: {
+    inNode: async () => (await import('../bench/head.mjs')).measure(new Uint8Array(await readFile(at(SCAN))), REPEATS),
+    rows: headRows,
+  },
+};
 
-async function inChromium() {
+async function inChromium(name) {
   const server = await serve(root);
   const browser = await launchChromium();
   try {
     const page = await browser.newPage();
     await page.goto(`${server.address}bench/index.html`);
     await page.waitForFunction(() => 'measure' in window);
-    const measured = await page.evaluate(([scan, repeats]) => window.measure(scan, repeats), [`/${SCAN}`, REPEATS]);
+    const given = [name, REPEATS, `/${SCAN}`];
+    const measured = await page.evaluate(([what, repeats, scan]) => window.measure[what](repeats, scan), given);
     return { host: `Chromium ${browser.version()}`, ...measured };
   } finally {
     await browser.close();
@@ -35,7 +41,7 @@ async function inChromium() {
 
 const seconds = (milliseconds) => `${(milliseconds / 1000).toFixed(2)} s`;
 
-function rows({ host, cubes, model, ratio }) {
+function headRows({ host, cubes, model, ratio }) {
   const parts = Object.entries(model.parts).sort(([, a], [, b]) => b - a);
   return [
     [host, '', ''],
@@ -47,17 +53,48 @@ function rows({ host, cubes, model, ratio }) {
   ];
 }
 
-function print(results) {
-  for (const [what, figure, remark] of results.flatMap(rows)) {
+function pointRows({ host, few, many, perConstraint, edit, bytes }) {
+  const solved = ({ points, exterior, first, solve, residual }) => [
+    `  solve ${points} + ${exterior}`,
+    seconds(solve),
+    `first ${seconds(first.solve)}, residual ${residual.toExponential(1)}`,
+  ];
+  const extracted = ({ points, first, extract, vertices, components, euler }) => [
+    `  extract, ${points} points`,
+    seconds(extract),
+    `first ${seconds(first.extract)}, ${vertices} vertices, ${components} component, χ ${euler}`,
+  ];
+  return [
+    [host, '', `128 cells along the box; best of ${REPEATS}`],
+    ...[solved(few), solved(many), extracted(few), extracted(many)],
+    ['  solve per constraint', perConstraint.toFixed(2), 'many to few'],
+    ['  solve, one point by hand', edit.toFixed(2), 'of the solve of many'],
+    ['  memory', `${(bytes / 1e6).toFixed(0)} MB`, 'of the module, at the end'],
+  ];
+}
+
+function print(rows) {
+  for (const [what, figure, remark] of rows) {
     process.stdout.write(`${what.padEnd(28)}${figure.padStart(10)}  ${remark}\n`);
   }
 }
 
+async function run(name) {
+  const { inNode, rows } = BENCHES[name];
+  const results = [{ host: `Node ${process.versions.node}`, ...(await inNode()) }, await inChromium(name)];
+  print(results.flatMap(rows));
+  return results;
+}
+
 await script(async () => {
+  const asked = process.argv.slice(2);
+  const unknown = asked.filter((name) => !(name in BENCHES));
+  if (unknown.length > 0) throw new Error(`nothing to measure is called ${unknown}; there are ${Object.keys(BENCHES)}`);
   await setup();
   await build();
-  const results = [await inNode(), await inChromium()];
-  print(results);
-  const report = { scan: SCAN, bestOf: REPEATS, processor: cpus()[0]?.model, results };
+  const all = {};
+  for (const name of asked.length > 0 ? asked : Object.keys(BENCHES)) all[name] = await run(name);
+  if (asked.length > 0) return;
+  const report = { scan: SCAN, bestOf: REPEATS, processor: cpus()[0]?.model, ...all };
   await writeFile(at('bench.json'), `${JSON.stringify(report, null, 2)}\n`);
 });
