@@ -42,6 +42,22 @@ pub struct ParamSpec {
 }
 
 impl ParamSpec {
+    /// A number of any size, for the specs to differ from.
+    pub(super) const NUMBER: Self = Self {
+        name: "",
+        label: "",
+        help: "",
+        symbol: None,
+        kind: ParamKind::Number,
+        default: ParamDefault::Number(0.0),
+        min: None,
+        max: None,
+        step: None,
+        scale: Some(ParamScale::Linear),
+        unit: None,
+        choices: None,
+    };
+
     /// Tests a number against the range.
     ///
     /// # Errors

@@ -137,21 +137,6 @@ pub fn param_specs() -> Vec<ParamSpec> {
     SPECS.to_vec()
 }
 
-const NUMBER: ParamSpec = ParamSpec {
-    name: "",
-    label: "",
-    help: "",
-    symbol: None,
-    kind: ParamKind::Number,
-    default: ParamDefault::Number(0.0),
-    min: None,
-    max: None,
-    step: None,
-    scale: Some(ParamScale::Linear),
-    unit: None,
-    choices: None,
-};
-
 const SPECS: [ParamSpec; 15] = [
     ParamSpec {
         name: "iso",
@@ -160,7 +145,7 @@ const SPECS: [ParamSpec; 15] = [
         symbol: Some("πI"),
         default: ParamDefault::FromData,
         unit: Some("intensity"),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "isoForce",
@@ -171,7 +156,7 @@ const SPECS: [ParamSpec; 15] = [
         min: Some(-10.0),
         max: Some(10.0),
         step: Some(0.1),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "gradientNormal",
@@ -181,7 +166,7 @@ const SPECS: [ParamSpec; 15] = [
         min: Some(-10.0),
         max: Some(10.0),
         step: Some(0.05),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "gradientTangent",
@@ -191,7 +176,7 @@ const SPECS: [ParamSpec; 15] = [
         min: Some(-10.0),
         max: Some(10.0),
         step: Some(0.05),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "gradientBound",
@@ -202,7 +187,7 @@ const SPECS: [ParamSpec; 15] = [
         max: Some(1.0),
         step: Some(0.01),
         unit: Some("range/voxel"),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "rigidity",
@@ -213,7 +198,7 @@ const SPECS: [ParamSpec; 15] = [
         min: Some(0.0),
         max: Some(3.0),
         step: Some(0.01),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "stiffness",
@@ -223,7 +208,7 @@ const SPECS: [ParamSpec; 15] = [
         min: Some(0.0),
         max: Some(1.0),
         step: Some(0.001),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "restLength",
@@ -237,7 +222,7 @@ const SPECS: [ParamSpec; 15] = [
         scale: None,
         unit: Some("world units"),
         choices: Some(&["zero", "mean"]),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "mass",
@@ -248,7 +233,7 @@ const SPECS: [ParamSpec; 15] = [
         min: Some(0.1),
         max: Some(100.0),
         step: Some(0.1),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "damping",
@@ -259,7 +244,7 @@ const SPECS: [ParamSpec; 15] = [
         min: Some(0.01),
         max: Some(2.0),
         step: Some(0.01),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "integrator",
@@ -269,7 +254,7 @@ const SPECS: [ParamSpec; 15] = [
         default: ParamDefault::Choice("euler"),
         scale: None,
         choices: Some(&["euler", "runge-kutta"]),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "timeStep",
@@ -280,7 +265,7 @@ const SPECS: [ParamSpec; 15] = [
         min: Some(0.01),
         max: Some(2.0),
         step: Some(0.01),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "maxMove",
@@ -291,7 +276,7 @@ const SPECS: [ParamSpec; 15] = [
         max: Some(0.5),
         step: Some(0.01),
         unit: Some("δ"),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "energyTolerance",
@@ -302,7 +287,7 @@ const SPECS: [ParamSpec; 15] = [
         min: Some(1e-12),
         max: Some(1.0),
         scale: Some(ParamScale::Log),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "topology",
@@ -312,7 +297,7 @@ const SPECS: [ParamSpec; 15] = [
         default: ParamDefault::Choice("adaptive"),
         scale: None,
         choices: Some(&["adaptive", "fixed"]),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
 ];
 

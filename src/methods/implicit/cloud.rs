@@ -272,7 +272,7 @@ fn neighbours([x, y, z]: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use crate::math::Random;
     #[cfg(target_arch = "wasm32")]
@@ -282,7 +282,8 @@ mod tests {
         random.bits() as f32 / 2_147_483_648.0 - 1.0
     }
 
-    fn on_ball(count: usize) -> Vec<Vec3> {
+    /// Points spread over the unit ball.
+    pub fn on_ball(count: usize) -> Vec<Vec3> {
         let mut random = Random::new(7);
         let mut place =
             || Vec3::new(unit(&mut random), unit(&mut random), unit(&mut random)).normalize_or(Vec3::X);

@@ -108,21 +108,6 @@ pub fn param_specs() -> Vec<ParamSpec> {
     SPECS.to_vec()
 }
 
-const NUMBER: ParamSpec = ParamSpec {
-    name: "",
-    label: "",
-    help: "",
-    symbol: None,
-    kind: ParamKind::Number,
-    default: ParamDefault::Number(0.0),
-    min: None,
-    max: None,
-    step: None,
-    scale: Some(ParamScale::Linear),
-    unit: None,
-    choices: None,
-};
-
 const SPECS: [ParamSpec; 9] = [
     ParamSpec {
         name: "kernel",
@@ -133,7 +118,7 @@ const SPECS: [ParamSpec; 9] = [
         default: ParamDefault::Choice("multi-order"),
         scale: None,
         choices: Some(&["multi-order", "thin-plate", "biharmonic", "gaussian"]),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "delta",
@@ -146,7 +131,7 @@ const SPECS: [ParamSpec; 9] = [
         step: Some(0.1),
         scale: Some(ParamScale::Log),
         unit: Some("1/box"),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "tau",
@@ -159,7 +144,7 @@ const SPECS: [ParamSpec; 9] = [
         step: Some(0.001),
         scale: Some(ParamScale::Log),
         unit: Some("box"),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "sigma",
@@ -172,7 +157,7 @@ const SPECS: [ParamSpec; 9] = [
         step: Some(0.001),
         scale: Some(ParamScale::Log),
         unit: Some("box"),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "lambdaSurface",
@@ -183,7 +168,7 @@ const SPECS: [ParamSpec; 9] = [
         min: Some(0.0),
         max: Some(10.0),
         step: Some(0.0001),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "lambdaExterior",
@@ -194,7 +179,7 @@ const SPECS: [ParamSpec; 9] = [
         min: Some(0.0),
         max: Some(1000.0),
         step: Some(0.1),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "tolerance",
@@ -204,7 +189,7 @@ const SPECS: [ParamSpec; 9] = [
         min: Some(1e-12),
         max: Some(0.01),
         scale: Some(ParamScale::Log),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "cell",
@@ -214,7 +199,7 @@ const SPECS: [ParamSpec; 9] = [
         max: Some(1e30),
         scale: None,
         unit: Some("points' units"),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
     ParamSpec {
         name: "level",
@@ -224,6 +209,6 @@ const SPECS: [ParamSpec; 9] = [
         default: ParamDefault::Choice("zero"),
         scale: None,
         choices: Some(&["zero", "mean"]),
-        ..NUMBER
+        ..ParamSpec::NUMBER
     },
 ];

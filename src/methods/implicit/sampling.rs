@@ -189,19 +189,9 @@ pub fn subsampled(points: &[Vec3], most: usize, seed: u64) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::methods::implicit::cloud::tests::on_ball;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
-
-    fn unit(random: &mut Random) -> f32 {
-        random.bits() as f32 / 2_147_483_648.0 - 1.0
-    }
-
-    fn on_ball(count: usize) -> Vec<Vec3> {
-        let mut random = Random::new(7);
-        let mut place =
-            || Vec3::new(unit(&mut random), unit(&mut random), unit(&mut random)).normalize_or(Vec3::X);
-        (0..count).map(|_| place()).collect()
-    }
 
     #[test]
     fn thinned_points_keep_their_distance_and_leave_no_gap() {
