@@ -253,6 +253,45 @@ describe('points by hand', () => {
     await reach(app.page, 'done');
   });
 
+  test('an edit changes what is solved: points are not chosen anew, and the surface stays until the next', async () => {
+    const times = () => app.page.locator('.phases .time').allTextContents();
+    await afterRun(() => app.page.locator('.scene > canvas').press('Enter'));
+    const [subsample, constraints, solve, extract] = await times();
+    expect([subsample, constraints]).toEqual(['', '']);
+    for (const time of [solve, extract]) expect(time).toMatch(/^[\d.,]+ m?s$/);
+    await afterRun(() => app.page.keyboard.press('Control+z'));
+    expect((await times())[0]).toBe('');
+    expect(await text('.edit-tools [role=status]')).toBe('1 point added.');
+    expect((await measured()).surfaceConstraints).toBe(1601);
+  });
+
+  test('many clicks at once are all taken; one that cannot be is refused, and the others stay', async () => {
+    const before = await measured();
+    const address = () => app.page.evaluate(() => location.hash);
+    await afterRun(() =>
+      app.page.evaluate(() => {
+        const view = document.querySelector('.scene > canvas');
+        const distance = document.querySelector<HTMLInputElement>('.edit-tools input[type=number]');
+        const click = (tool: string, percent: number) => {
+          document.querySelector<HTMLElement>(`[data-tool=${tool}]`)?.click();
+          if (distance) distance.value = String(percent);
+          view?.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter', bubbles: true }));
+        };
+        for (const percent of [1, 2, 3]) click('add', percent);
+        click('outside', 2);
+      }),
+    );
+    expect(await text('[data-error]')).toMatch(/outside.*is a surface point, too/);
+    expect(await text('.edit-tools [role=status]')).toBe('4 points added.');
+    expect(await measured()).toMatchObject({ surfaceConstraints: 1604, closed: true });
+    expect(await address()).not.toContain('outside');
+    for (let i = 0; i < 3; i++) await app.page.keyboard.press('Control+z');
+    await expect.poll(() => text('.edit-tools [role=status]')).toBe('1 point added.');
+    expect(await app.page.locator('.banner').isVisible()).toBe(false);
+    await expect.poll(async () => (await measured()).surfaceConstraints).toBe(before.surfaceConstraints);
+    await reach(app.page, 'done');
+  });
+
   test('where no point is near, none is removed, and the lab says so', async () => {
     await app.page.check('[data-tool=remove]');
     await app.page.locator('.scene > canvas').click({ position: { x: 12, y: 12 } });
@@ -465,7 +504,8 @@ describe('a link', () => {
     ['p.nonsense=3', 'nonsense'],
     ['maxPoints=2', 'maxPoints'],
     ['keepComponents=1.5', 'keepComponents'],
-    ['add=1e30,0,0', 'plane'],
+    ['add=1e30,0,0', 'added'],
+    ['outside=0,0,1e30', 'outside'],
   ])('with %s opens its example without the settings, and says why', async (settings, why) => {
     await openAt(`#reconstruct?example=two-balls&${settings}`, 'done');
     expect(await text('.banner')).toMatch(new RegExp(`settings are left out.*${why}`));
