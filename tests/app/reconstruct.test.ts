@@ -268,19 +268,14 @@ describe('points by hand', () => {
   test('many clicks at once are all taken; one that cannot be is refused, and the others stay', async () => {
     const before = await measured();
     const address = () => app.page.evaluate(() => location.hash);
-    await afterRun(() =>
-      app.page.evaluate(() => {
-        const view = document.querySelector('.scene > canvas');
-        const distance = document.querySelector<HTMLInputElement>('.edit-tools input[type=number]');
-        const click = (tool: string, percent: number) => {
-          document.querySelector<HTMLElement>(`[data-tool=${tool}]`)?.click();
-          if (distance) distance.value = String(percent);
-          view?.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter', bubbles: true }));
-        };
-        for (const percent of [1, 2, 3]) click('add', percent);
-        click('outside', 2);
-      }),
-    );
+    const view = app.page.locator('.scene > canvas');
+    const { x = 0, y = 0, width = 0, height = 0 } = (await view.boundingBox()) ?? {};
+    await afterRun(async () => {
+      for (const right of [0.66, 0.68, 0.7]) await app.page.mouse.click(x + right * width, y + 0.5 * height);
+      await app.page.check('[data-tool=outside]');
+      // In the middle a point was added before.
+      await view.press('Enter');
+    });
     expect(await text('[data-error]')).toMatch(/outside.*is a surface point, too/);
     expect(await text('.edit-tools [role=status]')).toBe('4 points added.');
     expect(await measured()).toMatchObject({ surfaceConstraints: 1604, closed: true });
