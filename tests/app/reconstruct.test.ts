@@ -211,10 +211,10 @@ describe('points by hand', () => {
     expect((await measured()).surfaceConstraints).toBe(Number(before.surfaceConstraints) + 1);
     expect(await app.page.evaluate(() => location.hash)).toMatch(/add=[-\d.e]+,[-\d.e]+,[-\d.e]+/);
     await afterRun(() => app.page.click('[data-edit=clear]'));
-    expect(await measured()).toMatchObject({
-      surfaceConstraints: before.surfaceConstraints,
-      vertices: before.vertices,
-    });
+    const { surfaceConstraints, vertices } = await measured();
+    expect(surfaceConstraints).toBe(before.surfaceConstraints);
+    // Solved from another start: the same within the tolerance.
+    expect(Math.abs(Number(vertices) / Number(before.vertices) - 1)).toBeLessThan(0.002);
   });
 
   test('a click removes the points around it, and one puts a point outside', async () => {

@@ -249,7 +249,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
         id: '8l',
         name: 'λ = 0.001',
         params: { lambdaSurface: 0.001 },
-        came: 'Here λ = 0.001, enough for the other figures, leaves a handle too many (genus 1) below, where no camera saw the cow; it is 6 % smaller than the true one.',
+        came: 'Here λ = 0.001, enough for the other figures, leaves a handle too many (genus 1), a thread in the nape from the back to the head; the cow is 6 % smaller than the true one.',
         outcome: { components: 1, genus: 1, meanCurvature: 4.23, fitness: 0.0208 },
       },
       {
