@@ -69,7 +69,7 @@ export class LabStates {
     return true;
   }
 
-  /** Says what went wrong; what was there stays. */
+  /** Says what went wrong; what was there stays, and what runs goes on. */
   fail(title: string, error: unknown): void {
     if (this.#signal.aborted) return;
     const failure = toFailure(error);
@@ -79,6 +79,7 @@ export class LabStates {
         ? 'What you see is the last result; Reset starts the engine again. It said: '
         : '';
     this.#banner.show(title, hint + failure.message);
+    if (this.value === 'running' && !this.engineBroken) return;
     this.#status.say('');
     if (this.value === 'running') this.#calm = 'paused';
     this.#state.value = 'error';

@@ -9,7 +9,7 @@ export const FIT_ROWS: MoreMeasure[] = [
   {
     name: 'fitMean',
     label: 'Distance of points, mean',
-    help: 'From all points as loaded to the surface',
+    help: 'From all points, with those changed by hand, to the surface',
     text: figure,
   },
   { name: 'fitRms', label: 'Distance, rms', help: 'Root of the mean squared distance', text: figure },

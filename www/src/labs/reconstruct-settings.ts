@@ -182,10 +182,16 @@ export class ModelSettings {
   }
 
   /**
-   * Has the worker work with these settings; gives the parameters in force. The one place that does, whatever has
-   * changed, points by hand too, forth and back: for now always a new model.
+   * Has the worker work with these settings; gives the parameters in force. Where points by hand alone have changed,
+   * the living model takes them, and revises what it has solved; else it is made anew.
    */
   async #handOver({ choice, params, edits }: Settings): Promise<ParamValues> {
+    const before = this.#now;
+    const samePoints = edits === before.edits;
+    if (!samePoints && isSame(choice, before.choice) && isSame(params, before.params)) {
+      await this.#client.request('setEdits', edits);
+      return params;
+    }
     const ready = await this.#client.request('rebuild', { ...choice, params, edits });
     return ready.params;
   }
@@ -210,6 +216,13 @@ export class ModelSettings {
     this.#ui.view.showPoints(without(points, removed), colors && without(colors, removed));
     this.#ui.view.showByHand(Float32Array.from(added.flat()), Float32Array.from(outside.flat()));
   }
+}
+
+function isSame(a: object, b: object): boolean {
+  const [one, other] = [Object.entries(a), new Map<string, unknown>(Object.entries(b))];
+  return (
+    one.length === other.size && one.every(([name, value]) => other.has(name) && Object.is(other.get(name), value))
+  );
 }
 
 function sizeOf({ edits: { added, removed, outside } }: Settings): number {

@@ -1,12 +1,10 @@
 /** Points and models as the page asks for them. Used by the worker only. */
-import { type ImplicitOptions, ImplicitSurface, parsePoints } from 'vesicle';
+import { type ImplicitOptions, ImplicitSurface, type PointEdits, parsePoints } from 'vesicle';
 import type { Vec3 } from '../protocol';
 import { computedCloud } from './clouds';
 import { distances, span } from './nearest';
 import type { CameraView, Cloud, CloudSource, Edits, Fit, PointShade, Setup } from './protocol';
 
-/** The method itself adds so many exterior points around everything, after all others. */
-const AROUND = 16;
 /** Voxels along the shortest side at least. */
 const LEAST_DIM = 8;
 
@@ -14,71 +12,53 @@ export function cloudFrom(source: CloudSource): Cloud {
   return 'shape' in source ? computedCloud(source.shape) : parsePoints(source.file.bytes);
 }
 
-/** The points without those that were removed, and with those that were added, which take after their nearest. */
-export function edited({ points, normals, colors }: Cloud, { added, removed }: Edits): Cloud {
-  const gone = new Set(removed);
-  const models = added.map((point) => nearestOf(points, point));
-  const like = (values: Float32Array) => models.flatMap((i) => [...values.subarray(3 * i, 3 * i + 3)]);
-  const changed = (values: Float32Array, more: number[]) => {
-    const kept = values.filter((_, i) => !gone.has(Math.floor(i / 3)));
-    const out = new Float32Array(kept.length + more.length);
-    out.set(kept);
-    out.set(more, kept.length);
-    return out;
-  };
-  return {
-    points: changed(points, added.flat()),
-    ...(normals && { normals: changed(normals, like(normals)) }),
-    ...(colors && { colors: changed(colors, like(colors)) }),
-  };
-}
-
-function nearestOf(points: Float32Array, [x, y, z]: Vec3): number {
-  let best = 0;
-  let least = Number.POSITIVE_INFINITY;
-  for (let i = 0; i < points.length / 3; i++) {
-    const distance = Math.hypot((points[3 * i] ?? 0) - x, (points[3 * i + 1] ?? 0) - y, (points[3 * i + 2] ?? 0) - z);
-    if (distance >= least) continue;
-    least = distance;
-    best = i;
-  }
-  return best;
-}
-
-/**
- * A model of the points with the changes made by hand: for now always a new one. `exterior` are those that
- * the method makes by itself, to which points outside by hand are added.
- */
-export function buildModel(cloud: Cloud, cameras: CameraView[], setup: Setup, exterior: Float32Array): ImplicitSurface {
+/** A model of the points, with the changes made by hand. */
+export function buildModel({ points, normals, colors }: Cloud, cameras: CameraView[], setup: Setup): ImplicitSurface {
   const { params, maxPoints, keepComponents, edits } = setup;
-  const options: ImplicitOptions = { ...edited(cloud, edits), cameras, params };
+  const options: ImplicitOptions = { points, cameras, params };
+  if (normals) options.normals = normals;
+  if (colors) options.colors = colors;
   if (maxPoints !== undefined) options.maxPoints = maxPoints;
   if (keepComponents !== undefined) options.keepComponents = keepComponents;
-  if (edits.outside.length > 0) options.exterior = Float32Array.of(...exterior, ...edits.outside.flat());
-  return new ImplicitSurface(options);
+  const model = new ImplicitSurface(options);
+  try {
+    model.setEdits(packed(edits));
+    return model;
+  } catch (error) {
+    model.free();
+    throw error;
+  }
 }
 
-/** The exterior points that a model makes by itself; none where none by hand go with them, as it then will. */
-export function ownExterior(cloud: Cloud, cameras: CameraView[], setup: Setup): Float32Array {
-  if (setup.edits.outside.length === 0) return new Float32Array(0);
-  const edits = { ...setup.edits, outside: [] };
-  const model = buildModel(cloud, cameras, { ...setup, edits }, new Float32Array(0));
-  try {
-    while (model.constraints().exterior.length === 0) model.step(1);
-    return model.constraints().exterior.slice(0, -3 * AROUND);
-  } finally {
-    model.free();
-  }
+/** The changes as the model takes them. */
+export function packed({ added, removed, outside }: Edits): Required<PointEdits> {
+  return {
+    added: Float32Array.from(added.flat()),
+    removed: Uint32Array.from(removed),
+    outside: Float32Array.from(outside.flat()),
+  };
+}
+
+/** The points without those that were removed by hand, and with those that were added. */
+export function edited(points: Float32Array, { added, removed }: Edits): Float32Array {
+  if (added.length + removed.length === 0) return points;
+  const gone = new Set(removed);
+  const kept = points.filter((_, i) => !gone.has(Math.floor(i / 3)));
+  const all = new Float32Array(kept.length + 3 * added.length);
+  all.set(kept);
+  all.set(added.flat(), kept.length);
+  return all;
 }
 
 /** One number a vertex for each shade, in the order of the mesh's arrays. */
-const SHADES: Record<PointShade, (model: ImplicitSurface, cloud: Cloud) => Float32Array> = {
+const SHADES: Record<PointShade, (model: ImplicitSurface, points: Float32Array) => Float32Array> = {
   'mean curvature': ({ mesh }) => mesh.curvature('mean'),
-  distance: ({ mesh }, { points }) => distances(mesh.arrays().positions, points),
+  distance: ({ mesh }, points) => distances(mesh.arrays().positions, points),
 };
 
-export function valuesFor(model: ImplicitSurface, cloud: Cloud, shade: PointShade): Float32Array {
-  return SHADES[shade](model, cloud);
+/** `points` are those in force. */
+export function valuesFor(model: ImplicitSurface, points: Float32Array, shade: PointShade): Float32Array {
+  return SHADES[shade](model, points);
 }
 
 /** The value of f that the surface is taken at. */

@@ -97,14 +97,16 @@ export interface Timing {
 
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** When it fails, the former points and model stay. */
+  /** When it fails, the former points and model stay. Removed points that there are not are passed over. */
   load: { body: { source: CloudSource; cameras: CameraView[]; setup: Setup }; reply: Loaded };
-  /** A new model of the same points, or of what edits made of them. When it fails, the former model stays. */
+  /** A new model of the same points. When it fails, the former model stays. */
   rebuild: { body: Setup; reply: Ready };
   play: { body: undefined; reply: undefined };
   pause: { body: undefined; reply: undefined };
   step: { body: { count: number }; reply: undefined };
   setParams: { body: ParamValues; reply: ParamValues };
+  /** Live, in place of all edits before: a run goes on with them. When they are refused, all stays. */
+  setEdits: { body: Edits; reply: undefined };
   export: { body: { format: MeshFormat }; reply: Uint8Array };
   /** f on a grid with so many voxels along the longest side, as NIfTI, and the value that the surface is taken at. */
   volume: { body: { size: number }; reply: { bytes: Uint8Array; level: number } };

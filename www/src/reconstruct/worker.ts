@@ -3,10 +3,11 @@ import init, { type ImplicitSurface, paramSpecs, type StepReport, version } from
 import type { Surface } from '../protocol';
 import { Refusal, toFailure } from '../worker/refusal';
 import { answer, buffersOf, stop, type Work } from '../worker/serving';
-import { buildModel, cloudFrom, cubicDims, fitOf, levelOf, ownExterior, valuesFor } from './model';
+import { buildModel, cloudFrom, cubicDims, edited, fitOf, levelOf, packed, valuesFor } from './model';
 import type {
   CameraView,
   Cloud,
+  Edits,
   Loaded,
   ParamValues,
   PointShade,
@@ -36,8 +37,6 @@ class Session {
   #cameras: CameraView[] = [];
   #setup: Setup | undefined;
   #model: ImplicitSurface | undefined;
-  /** Exterior points that the method makes by itself, where some by hand go with them, and what they were made for. */
-  #exterior = { of: '', points: new Float32Array(0) as Float32Array };
   #shade: PointShade | undefined;
   /** Steps the page has not heard of yet. */
   #reports: StepReport[] = [];
@@ -63,6 +62,7 @@ class Session {
     pause: () => this.#pause(),
     step: ({ count }) => this.#step(count),
     setParams: (params) => this.#setParams(params),
+    setEdits: (edits) => this.#setEdits(edits),
     export: ({ format }) => this.#current().mesh.toBytes(format),
     volume: ({ size }) => this.#volume(size),
     shade: (shade) => this.#setShade(shade),
@@ -77,42 +77,44 @@ class Session {
   async #load({ source, cameras, setup }: Requests['load']['body']): Promise<Loaded> {
     await this.#pause();
     const cloud = cloudFrom(source);
-    const model = buildModel(cloud, cameras, setup, ownExterior(cloud, cameras, setup));
+    const removed = setup.edits.removed.filter((index) => index < cloud.points.length / 3);
+    const known = { ...setup, edits: { ...setup.edits, removed } };
+    const model = buildModel(cloud, cameras, known);
     this.#cloud = cloud;
     this.#cameras = cameras;
-    this.#exterior = { of: '', points: new Float32Array(0) };
-    return { ...this.#adopt(model, setup), cloud };
+    return { ...this.#adopt(model, known), cloud };
   }
 
   async #rebuild(setup: Setup): Promise<Ready> {
     await this.#pause();
-    const cloud = this.#points();
-    return this.#adopt(buildModel(cloud, this.#cameras, setup, this.#exteriorFor(setup)), setup);
-  }
-
-  #exteriorFor(setup: Setup): Float32Array {
-    const { maxPoints, keepComponents, edits } = setup;
-    const of = JSON.stringify([maxPoints, keepComponents, edits.added, edits.removed]);
-    if (edits.outside.length > 0 && of !== this.#exterior.of)
-      this.#exterior = { of, points: ownExterior(this.#points(), this.#cameras, setup) };
-    return this.#exterior.points;
+    return this.#adopt(buildModel(this.#points(), this.#cameras, setup), setup);
   }
 
   #adopt(model: ImplicitSurface, setup: Setup): Ready {
     this.#model?.free();
     this.#model = model;
     this.#setup = setup;
+    this.#sent = '';
+    this.#shown = true;
+    this.#startOver();
+    return { params: { ...model.params } };
+  }
+
+  /** Steps and constraints so far are those of other points. */
+  #startOver(): void {
     this.#reports = [];
     this.#last = undefined;
-    this.#sent = '';
     this.#constraintsSent = false;
-    this.#shown = true;
-    return { params: { ...model.params } };
   }
 
   #points(): Cloud {
     if (!this.#cloud) throw new Refusal('invalid-argument', 'no points are loaded: open some first');
     return this.#cloud;
+  }
+
+  #pointsInForce(): Float32Array {
+    const { points } = this.#points();
+    return this.#setup ? edited(points, this.#setup.edits) : points;
   }
 
   #current(): ImplicitSurface {
@@ -193,6 +195,13 @@ class Session {
     return { ...model.params };
   }
 
+  /** A run that is under way goes on with them. */
+  #setEdits(edits: Edits): undefined {
+    this.#current().setEdits(packed(edits));
+    if (this.#setup) this.#setup = { ...this.#setup, edits };
+    this.#startOver();
+  }
+
   #setShade(shade: PointShade | undefined): undefined {
     this.#shade = shade;
     this.#sent = '';
@@ -219,7 +228,7 @@ class Session {
     const version = `${mesh.topologyVersion} ${mesh.geometryVersion} ${this.#last?.done}`;
     if (version === this.#sent) return;
     this.#sent = version;
-    const values = this.#shade && valuesFor(model, this.#points(), this.#shade);
+    const values = this.#shade && valuesFor(model, this.#pointsInForce(), this.#shade);
     this.#sendSurface({ ...mesh.arrays(), ...countsOf(mesh), ...(values && { values }) }, false);
   }
 
@@ -240,7 +249,7 @@ class Session {
 
   #volume(size: number): Requests['volume']['reply'] {
     const model = this.#current();
-    const volume = model.toVolume(cubicDims(this.#points().points, size));
+    const volume = model.toVolume(cubicDims(this.#pointsInForce(), size));
     try {
       return { bytes: volume.toNifti(), level: levelOf(model) };
     } finally {
