@@ -431,7 +431,11 @@ fn many_points_by_hand_are_solved_from_the_start() {
 #[test]
 fn impossible_edits_are_named_and_change_nothing() {
     let (points, edits) = edited();
-    let mut surface = finished(points.clone(), ImplicitParams::default());
+    let on_a_point = Edits { outside: vec![Vec3::X, points[7]], ..Edits::default() };
+    let mut surface = begun(points.clone(), ImplicitParams::default());
+    // Also before anything was chosen.
+    assert_eq!(refused(surface.set_edits(on_a_point)), "outside");
+    finish(&mut surface);
     surface.set_edits(edits.clone()).unwrap();
     finish(&mut surface);
     let before = surface.surface().clone();

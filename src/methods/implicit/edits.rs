@@ -45,6 +45,21 @@ impl Edits {
         }
     }
 
+    /// Tests that none of those outside is a point of the surface, too.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] naming the first that is.
+    pub fn check_outside(&self, surface: &Cloud, map: &BoxMap) -> Result<(), MethodError> {
+        let known = ByPlace::new(&surface.points);
+        match self.outside.iter().position(|&p| known.find(map.in_box(p)).is_some()) {
+            Some(i) => {
+                let problem = format!("point {i} is {}, where a point of the surface is", self.outside[i]);
+                Err(MethodError::invalid("outside", problem))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Where the removed points are, in the box.
     fn removed_places(&self, original: &[Vec3], map: &BoxMap) -> ByPlace {
         let places: Vec<Vec3> = self.removed.iter().map(|&i| map.in_box(original[i as usize])).collect();
@@ -96,9 +111,8 @@ impl Edits {
         let constraints = Constraints::new(&surface, &outside);
         match constraints.shared_centre() {
             Some(p) => {
-                let name = if self.outside.is_empty() { "exterior" } else { "outside" };
                 let problem = format!("{} is a surface point, too", map.in_world(p.as_dvec3()));
-                Err(MethodError::invalid(name, problem))
+                Err(MethodError::invalid("exterior", problem))
             }
             None => Ok(constraints),
         }

@@ -489,6 +489,7 @@ impl ImplicitSurface {
         let left = edits.applied(&self.cloud, &self.original, &self.map);
         left.check_count()?;
         left.check_span()?;
+        edits.check_outside(&left, &self.map)?;
         if edits == self.edits {
             return Ok(());
         }
