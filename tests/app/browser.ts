@@ -99,3 +99,20 @@ export async function drop(page: Page, files: { name: string; bytes: Uint8Array 
     }
   }, encoded);
 }
+
+/** How much wider than a window of this size the page is. */
+export async function overflow(page: Page, width: number, height: number): Promise<number> {
+  await page.setViewportSize({ width, height });
+  return page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+}
+
+/** The controls that a screen reader has no name for. */
+export function unnamedControls(page: Page): Promise<string[]> {
+  return page.evaluate(() => {
+    const controls = document.querySelectorAll<HTMLInputElement>('input, select, button, canvas, progress');
+    const named = (control: HTMLInputElement) =>
+      control.getAttribute('aria-label') || control.textContent?.trim() || control.labels?.[0]?.textContent?.trim();
+    const hidden = (control: Element) => control.closest('[aria-hidden=true], [hidden]') !== null;
+    return [...controls].filter((one) => !hidden(one) && !named(one)).map((one) => one.outerHTML);
+  });
+}

@@ -1,5 +1,5 @@
 import { afterAll, beforeAll, expect, test } from 'vitest';
-import { type App, openApp, reach } from './browser';
+import { type App, openApp, overflow, reach, unnamedControls } from './browser';
 
 let app: App;
 
@@ -15,22 +15,11 @@ test.each([
   [1440, 900],
   [390, 844],
 ])('nothing is wider than a page of %i by %i', async (width, height) => {
-  await app.page.setViewportSize({ width, height });
-  const overflow = await app.page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
-  expect(overflow).toBeLessThanOrEqual(0);
+  expect(await overflow(app.page, width, height)).toBeLessThanOrEqual(0);
 });
 
 test('every control has a name', async () => {
-  const unnamed = await app.page.evaluate(() => {
-    const controls = document.querySelectorAll<HTMLInputElement>('input, select, button, canvas');
-    const named = (control: HTMLInputElement) =>
-      control.getAttribute('aria-label') || control.textContent?.trim() || control.labels?.[0]?.textContent?.trim();
-    const decoration = (control: Element) => control.closest('[aria-hidden=true]') !== null;
-    return [...controls]
-      .filter((control) => !decoration(control) && !named(control))
-      .map((control) => control.outerHTML);
-  });
-  expect(unnamed).toEqual([]);
+  expect(await unnamedControls(app.page)).toEqual([]);
 });
 
 test('the help lists the keys and closes again', async () => {

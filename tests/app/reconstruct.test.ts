@@ -4,7 +4,7 @@ import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import { computedCloud } from '../../www/src/reconstruct/clouds';
-import { type App, drop, iteration, openApp, reach, recordStates } from './browser';
+import { type App, drop, iteration, openApp, overflow, reach, recordStates, unnamedControls } from './browser';
 
 let app: App;
 
@@ -564,19 +564,10 @@ describe('the page', () => {
     [1024, 768],
     [1440, 900],
   ])('nothing is wider than a page of %i by %i', async (width, height) => {
-    await app.page.setViewportSize({ width, height });
-    const overflow = await app.page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
-    expect(overflow).toBeLessThanOrEqual(0);
+    expect(await overflow(app.page, width, height)).toBeLessThanOrEqual(0);
   });
 
   test('every control has a name', async () => {
-    const unnamed = await app.page.evaluate(() => {
-      const controls = document.querySelectorAll<HTMLInputElement>('input, select, button, canvas, progress');
-      const named = (control: HTMLInputElement) =>
-        control.getAttribute('aria-label') || control.textContent?.trim() || control.labels?.[0]?.textContent?.trim();
-      const hidden = (control: Element) => control.closest('[aria-hidden=true], [hidden]') !== null;
-      return [...controls].filter((one) => !hidden(one) && !named(one)).map((one) => one.outerHTML);
-    });
-    expect(unnamed).toEqual([]);
+    expect(await unnamedControls(app.page)).toEqual([]);
   });
 });
