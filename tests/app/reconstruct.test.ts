@@ -276,7 +276,7 @@ describe('points by hand', () => {
       // In the middle a point was added before.
       await view.press('Enter');
     });
-    expect(await text('[data-error]')).toMatch(/outside.*is a surface point, too/);
+    expect(await text('[data-error]')).toMatch(/outside.*where a point of the surface is/);
     expect(await text('.edit-tools [role=status]')).toBe('4 points added.');
     expect(await measured()).toMatchObject({ surfaceConstraints: 1604, closed: true });
     expect(await address()).not.toContain('outside');
