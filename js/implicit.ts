@@ -50,7 +50,7 @@ export interface ImplicitOptions {
   normals?: Float32Array;
   /** Of each point, above 0 and at most 1: λ is divided by it, so that unsure points bind less. */
   confidence?: Float32Array;
-  /** Of each point, packed rgb, 0..1: colours the mesh where no camera has a picture. */
+  /** Of each point, packed rgb, 0..1: colours the mesh where no camera saw it. */
   colors?: Float32Array;
   /** Points known to be outside, packed. Else made from cameras, normals, or the points alone. */
   exterior?: Float32Array;
@@ -236,7 +236,7 @@ export class ImplicitSurface implements Stepper {
   /**
    * Takes points in and leaves some out, in place of all edits before; `{}` takes all back. Live: the surface stays until
    * the new one is there. Up to some 250 of each change the system that was solved last, whose matrix and solution
-   * serve again; more are solved from the start.
+   * serve again; more are solved from the start. Where not all points take part, none takes the place of one left out.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the list: not finite, farther from the others than their own
    *   size, no such index, too few points left, on the surface and outside at once; nothing has changed then.
@@ -314,7 +314,8 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Back to a saved state, bit for bit. Takes as long as the phase then under way had taken.
+   * Back to a saved state, bit for bit. Takes as long as choosing the points and the phase then under way had taken; while
+   * colouring, as long as the extraction, too.
    *
    * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a surface, which then stays as it was;
    *   `invalid-argument` while a run is under way.

@@ -428,6 +428,29 @@ fn many_points_by_hand_are_solved_from_the_start() {
     assert!(found.mean < 1.3 * all.mean, "{found:?}, all at once {all:?}");
 }
 
+/// A wide block of the matrix whose first row underflows is not 0.
+#[test]
+fn a_clump_beside_a_ball_is_solved_with_a_narrow_gaussian() {
+    let mut points = noisy(sphere, 500, 0.0, 3);
+    points.extend(noisy(sphere, 500, 0.0, 4).iter().map(|p| *p * 0.01 + Vec3::Z));
+    for sigma in [0.005, 0.02] {
+        let params = ImplicitParams { kernel: KernelKind::Gaussian, sigma, ..ImplicitParams::default() };
+        let surface = finished(points.clone(), params);
+        assert!(report(surface.surface()).unwrap().is_healthy());
+        let most = surface.evaluate(&points).unwrap().iter().fold(0.0, |most: f64, f| most.max(f.abs()));
+        assert!(most < 0.1, "σ {sigma}: {most}");
+    }
+}
+
+#[test]
+fn far_from_the_origin_points_by_hand_have_room() {
+    let points = noisy(sphere, 3000, 0.0, 3).iter().map(|p| *p + Vec3::X * 120.0).collect();
+    let mut surface = finished(points, ImplicitParams::default());
+    surface.set_edits(Edits { added: vec![Vec3::X * 122.9], ..Edits::default() }).unwrap();
+    finish(&mut surface);
+    sound(surface.surface());
+}
+
 #[test]
 fn impossible_edits_are_named_and_change_nothing() {
     let (points, edits) = edited();
@@ -693,6 +716,17 @@ fn bad_points_and_options_are_named() {
     far[3].y = f32::INFINITY;
     let flat: Vec<Vec3> = points.iter().map(|p| Vec3::new(p.x, p.y, 0.5 * p.x - 0.3 * p.y)).collect();
     let line: Vec<Vec3> = points.iter().map(|p| Vec3::ONE * p.x).collect();
+    let crowd = vec![Vec3::X; 100_001];
+    let outside = Edits { outside: crowd.clone(), ..Edits::default() };
+    assert_eq!(refused(new(of_points(points.clone()), options()).unwrap().set_edits(outside)), "outside");
+    let exterior = ImplicitOptions { exterior: Some(crowd), ..options() };
+    assert_eq!(refused(new(of_points(points.clone()), exterior)), "exterior");
+    // With a point added where one is outside.
+    let exterior = ImplicitOptions { exterior: Some(vec![Vec3::X * 1.2]), ..options() };
+    let mut placed = new(of_points(points.clone()), exterior).unwrap();
+    finish(&mut placed);
+    let added = Edits { added: vec![Vec3::X * 1.2], ..Edits::default() };
+    assert_eq!(refused(placed.set_edits(added)), "added");
     let moved = |by: f32| points.iter().map(|p| *p + Vec3::splat(by)).collect::<Vec<Vec3>>();
     let scaled = |by: f32| points.iter().map(|p| *p * by).collect::<Vec<Vec3>>();
     let unplaced = [moved(1000.0), moved(-1e6), scaled(1e-30), scaled(2e38)];

@@ -82,7 +82,14 @@ impl PointGrid {
         // From 0 no factor leads anywhere.
         let mut reach = if radius > 0.0 { radius } else { self.cell };
         loop {
+            // So many cells take longer than all points. With a cell of 0 there is no number of them.
+            let across = 2.0 * reach / self.cell;
+            let few = across * across * across <= 8.0 * self.points.len() as f32;
             found.clear();
+            if !few {
+                found = self.points.iter().map(|q| q.distance_squared(p)).zip(0..).collect();
+                break;
+            }
             self.within(p, reach, |i, squared| {
                 found.push((squared, i));
                 true
@@ -91,12 +98,6 @@ impl PointGrid {
                 break;
             }
             reach *= 1.5;
-            // So many cells take longer than all points.
-            let across = 2.0 * reach / self.cell;
-            if across * across * across > 8.0 * self.points.len() as f32 {
-                found = self.points.iter().map(|q| q.distance_squared(p)).zip(0..).collect();
-                break;
-            }
         }
         let order = |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
         if found.len() > count {
@@ -213,5 +214,14 @@ mod tests {
             seen < 3
         });
         assert_eq!(seen, 3);
+    }
+
+    #[test]
+    fn cells_and_radii_of_0_lead_to_all_points() {
+        let points = points(20);
+        for (cell, radius) in [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1e-38, 1e-38)] {
+            let found = PointGrid::of(&points, cell).nearest(points[3], 3, radius);
+            assert_eq!((found.len(), found[0].0), (3, 0.0), "{cell}, {radius}");
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::methods::MethodError;
+use crate::methods::saved::Hash;
 
 /// Pixels a side that are accepted: more than any photograph has, and its bytes still fit memory.
 const MOST_PIXELS: u32 = 16384;
@@ -65,6 +66,15 @@ impl Camera {
             MethodError::invalid("cameras", problem)
         })?;
         Ok(Self { to_view, from_view: to_view.inverse(), width, height, image })
+    }
+
+    /// Tells it apart from others.
+    pub fn mix_into(&self, hash: &mut Hash) {
+        self.to_view.to_cols_array().into_iter().for_each(|x| hash.mix(x.to_bits()));
+        [self.width, self.height].into_iter().for_each(|n| hash.mix(u64::from(n)));
+        let (words, _) = self.image.as_deref().unwrap_or_default().as_chunks::<4>();
+        hash.mix(words.len() as u64);
+        words.iter().for_each(|&pixel| hash.mix(u32::from_le_bytes(pixel).into()));
     }
 
     /// The same camera for a world moved by `map`, which must have an inverse: it sees `map`(p) where it saw p.

@@ -118,6 +118,20 @@ impl Cloud {
     }
 }
 
+/// The most points that take part: their matrix takes about 2 GB.
+pub const MOST_POINTS: usize = 100_000;
+
+/// Tests that there are no more points than can take part.
+///
+/// # Errors
+/// [`MethodError::InvalidArgument`] with both numbers.
+pub fn check_number(name: &'static str, count: usize) -> Result<(), MethodError> {
+    if count <= MOST_POINTS {
+        return Ok(());
+    }
+    Err(MethodError::invalid(name, format!("{count} points; at most {MOST_POINTS} are accepted")))
+}
+
 /// Tests that all values are finite.
 ///
 /// # Errors
@@ -166,6 +180,7 @@ impl BoxMap {
     /// [`MethodError::InvalidArgument`] for points too small or too large, or too far from the origin for their size.
     pub fn check_place(&self) -> Result<(), MethodError> {
         let size = 2.0 / self.scale;
+        let largest = self.reach() + size;
         let bad = |problem| Err(MethodError::invalid("points", problem));
         if !(LEAST_SIZE..=MOST_SIZE).contains(&size) {
             return bad(format!(
@@ -173,6 +188,9 @@ impl BoxMap {
             ));
         }
         let away = self.reach() / size;
+        if largest > f64::from(f32::MAX) {
+            return bad(format!("they reach to {largest:e} with some room, beyond single precision"));
+        }
         if away <= MOST_AWAY {
             return Ok(());
         }
@@ -217,7 +235,7 @@ pub fn mean_spacing(points: &[Vec3]) -> f64 {
     let distance = |i: usize| {
         let mut best = f64::INFINITY;
         tree.nearest(points[i], |j, bound| {
-            let squared = f64::from(points[j as usize].distance_squared(points[i]));
+            let squared = points[j as usize].as_dvec3().distance_squared(points[i].as_dvec3());
             best = if j as usize != i && squared < best { squared } else { best };
             if best < bound { best } else { bound }
         });
@@ -268,7 +286,7 @@ fn clusters(points: &[Vec3], cell: f32) -> Vec<Vec<u32>> {
 
 fn neighbours([x, y, z]: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
     let steps = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
-    steps.map(move |[dx, dy, dz]| [x + dx, y + dy, z + dz])
+    steps.map(move |[dx, dy, dz]| [x.saturating_add(dx), y.saturating_add(dy), z.saturating_add(dz)])
 }
 
 #[cfg(test)]

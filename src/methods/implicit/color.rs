@@ -83,6 +83,17 @@ impl Coloring {
         }
     }
 
+    /// Adds a colour to a vertex.
+    pub fn gather(&mut self, vertex: usize, color: Vec3, weight: f32) {
+        self.gathered[vertex].color += color * weight;
+        self.gathered[vertex].weight += weight;
+    }
+
+    /// Whether nothing was gathered.
+    pub fn is_empty(&self) -> bool {
+        self.gathered.iter().all(|gathered| gathered.weight == 0.0)
+    }
+
     /// The colour of each vertex: the mean of those gathered. Unseen vertices take the mean of their neighbours, ring by
     /// ring outwards from the seen ones; parts of which nothing is seen the mean of all seen vertices. `None` where no
     /// vertex is seen.

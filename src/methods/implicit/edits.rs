@@ -1,6 +1,6 @@
 //! Points added and taken away by hand.
 
-use super::cloud::{BoxMap, Cloud, check_finite};
+use super::cloud::{BoxMap, Cloud, check_finite, check_number};
 use super::exterior::Exterior;
 use super::sampling::Samples;
 use super::solve::{ByPlace, Constraints};
@@ -13,14 +13,15 @@ use serde::{Deserialize, Serialize};
 pub struct Edits {
     /// More points near the surface, in the units of the others.
     pub added: Vec<Vec3>,
-    /// Points that are left out, by their index in those given; others in the same place are, too.
+    /// Points that are left out, by their index in those given; others in the same place are, too. Where not all points
+    /// take part, none takes the place of one that is left out.
     pub removed: Vec<u32>,
     /// More points known to be outside.
     pub outside: Vec<Vec3>,
 }
 
 /// How far from the middle of the points as given others may be added, in half sides of their box.
-const REACH: f32 = 3.0;
+pub const REACH: f32 = 3.0;
 
 impl Edits {
     /// Tests everything against the points as given.
@@ -28,6 +29,9 @@ impl Edits {
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the list, the entry and what is accepted.
     pub fn validate(&self, original: &[Vec3], map: &BoxMap) -> Result<(), MethodError> {
+        for (name, points) in [("added", &self.added), ("outside", &self.outside)] {
+            check_number(name, points.len())?;
+        }
         for (name, points) in [("added", &self.added), ("outside", &self.outside)] {
             check_finite(name, points)?;
             if let Some(i) = points.iter().position(|&p| map.in_box(p).abs().max_element() > REACH) {
@@ -61,7 +65,7 @@ impl Edits {
     }
 
     /// Where the removed points are, in the box.
-    fn removed_places(&self, original: &[Vec3], map: &BoxMap) -> ByPlace {
+    pub fn removed_places(&self, original: &[Vec3], map: &BoxMap) -> ByPlace {
         let places: Vec<Vec3> = self.removed.iter().map(|&i| map.in_box(original[i as usize])).collect();
         ByPlace::new(&places)
     }
@@ -111,8 +115,11 @@ impl Edits {
         let constraints = Constraints::new(&surface, &outside);
         match constraints.shared_centre() {
             Some(p) => {
-                let problem = format!("{} is a surface point, too", map.in_world(p.as_dvec3()));
-                Err(MethodError::invalid("exterior", problem))
+                let is_added = self.added.iter().any(|&added| map.in_box(added) == p);
+                let [name, other] =
+                    if is_added { ["added", "a point outside"] } else { ["exterior", "a surface point"] };
+                let problem = format!("{} is {other}, too", map.in_world(p.as_dvec3()));
+                Err(MethodError::invalid(name, problem))
             }
             None => Ok(constraints),
         }

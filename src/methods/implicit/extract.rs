@@ -2,6 +2,7 @@
 //! *Marching cubes*, 1987).
 
 use super::cloud::BoxMap;
+use super::edits::REACH;
 use super::fast::FastField;
 use super::field::Field;
 use crate::math::{Bounds, DVec3, Vec3};
@@ -41,7 +42,8 @@ enum Stage {
 /// origin it is coarser, as single precision is.
 pub fn default_cell(map: &BoxMap, spacing: f64) -> f64 {
     let cell = (CELL * spacing).clamp(2.0 / CELLS[1], 2.0 / CELLS[0]) / map.scale();
-    let least = (map.reach() + 2.0 * MARGIN / map.scale()) / MOST_EDGES_AWAY;
+    let around = (f64::from(REACH) + 2.0 * MARGIN) / map.scale();
+    let least = (map.reach() + around) / MOST_EDGES_AWAY;
     if cell > least { cell } else { least }
 }
 

@@ -151,7 +151,7 @@ fn near_centre(a: f64, product: f64, kappa: f64, scale: f64, r: f64) -> [f64; 2]
 }
 
 /// A kernel as a table over r², for sums with millions of terms: a cubic on each of 32 equal parts of every octave, so
-/// that resolution follows the distance. Off by less than 1e-9 of φ(0).
+/// that resolution follows the distance. Off by less than 1e-7 of φ(0).
 #[derive(Clone, Debug)]
 pub struct KernelTable {
     kernel: Kernel,

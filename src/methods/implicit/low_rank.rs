@@ -35,8 +35,12 @@ pub fn cross_approximation<T: Number>(
         let pivot_column = largest(&v, |_| true);
         let pivot = v[pivot_column];
         if pivot == 0.0 {
-            // All that is left of the row has underflowed, and with it that of its neighbours.
-            break;
+            // Nothing is left of this row, as where a Gaussian underflowed; others of a wide cluster may be nearer.
+            match row_used.iter().position(|used| !used) {
+                Some(next) => pivot_row = next,
+                None => break,
+            }
+            continue;
         }
         v.iter_mut().for_each(|x| *x /= pivot);
         let mut u = vec![0.0; height];

@@ -45,6 +45,7 @@ mod low_rank;
 mod measure;
 mod normals;
 mod params;
+mod point_colors;
 mod queries;
 mod sampling;
 mod solve;
@@ -61,12 +62,13 @@ use super::{MethodError, StepReport, Times};
 use crate::math::Vec3;
 use crate::mesh::{TriangleMesh, measure as measure_mesh};
 use crate::remesh::Changes;
-use cloud::BoxMap;
+use cloud::{BoxMap, MOST_POINTS};
 use color::Coloring;
 use exterior::{Exterior, given_exterior, made_exterior};
 use extract::{Extraction, default_cell};
 use field::Field;
 use kernel::{Kernel, KernelTable};
+use point_colors::PointColors;
 use sampling::{Samples, Sampling};
 use solve::{ByPlace, Constraints, Solution, Solver};
 
@@ -99,9 +101,7 @@ impl Default for ImplicitOptions {
 
 /// Points that take part where no number is asked for.
 const DEFAULT_POINTS: usize = 20_000;
-/// The most that can be asked for: their matrix takes about 2 GB.
-const MOST_POINTS: usize = 100_000;
-/// A solver is kept for edits while it takes no more; without, it is made again when it is needed.
+/// A solver is kept for edits while its matrix takes no more; without, it is made again when it is needed.
 const KEPT_BYTES: usize = 256 << 20;
 /// Of all random choices.
 const SEED: u64 = 1;
@@ -180,6 +180,8 @@ struct Painting {
     coloring: Coloring,
     /// The next camera.
     camera: usize,
+    /// The coloured points, where no camera saw anything.
+    points: Option<PointColors>,
 }
 
 impl ImplicitSurface {
@@ -235,7 +237,7 @@ impl ImplicitSurface {
         self.clock = clock;
     }
 
-    /// One slice of the next stage: some ten milliseconds of work. At the end it does nothing.
+    /// One slice of the next stage: some ten milliseconds of work with some ten thousand points. At the end it does nothing.
     ///
     /// # Errors
     /// [`MethodError::Singular`] where the system cannot be solved, [`MethodError::InvalidArgument`] where the cell does not
@@ -244,7 +246,7 @@ impl ImplicitSurface {
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let (phase, begun) = (self.stage.phase(), (self.clock)());
         if !matches!(self.stage, Stage::Done) {
-            self.iteration += 1;
+            self.iteration = self.iteration.wrapping_add(1);
             self.advance()?;
         }
         let mut times = Times::default();
@@ -366,7 +368,7 @@ impl ImplicitSurface {
         self.residual = solver.residual();
         let mean = self.constraints.mean_on_surface(&solution);
         self.solved = Some(Solved::new(solver.kernel(), self.constraints.centres.clone(), solution, mean));
-        self.solver = (solver.bytes() <= KEPT_BYTES).then_some(solver);
+        self.solver = (solver.matrix_bytes() <= KEPT_BYTES).then_some(solver);
         self.begin_extraction()
     }
 
@@ -405,7 +407,7 @@ impl ImplicitSurface {
         let Some(mesh) = extraction.advance()? else { return Ok(Stage::Extract(extraction)) };
         self.strays = extraction.strays();
         let coloring = Coloring::new(mesh.positions.len());
-        Ok(Stage::Color(Box::new(Painting { mesh, coloring, camera: 0 })))
+        Ok(Stage::Color(Box::new(Painting { mesh, coloring, camera: 0, points: None })))
     }
 
     fn color(&mut self, mut painting: Painting) -> Stage {
@@ -414,8 +416,17 @@ impl ImplicitSurface {
             painting.camera += 1;
             return Stage::Color(Box::new(painting));
         }
+        if painting.points.is_none() && painting.coloring.is_empty() {
+            let cloud = self.edits.left(&self.cloud, &self.original, &self.map);
+            painting.points = PointColors::new(cloud, self.spacing());
+        }
+        if let Some(points) = &mut painting.points
+            && !points.advance(&painting.mesh, &self.map, &mut painting.coloring)
+        {
+            return Stage::Color(Box::new(painting));
+        }
         let Painting { mut mesh, coloring, .. } = painting;
-        mesh.colors = coloring.finish(&mesh).or_else(|| self.colors_of_points(&mesh));
+        mesh.colors = coloring.finish(&mesh);
         self.take_mesh(mesh);
         Stage::Done
     }
@@ -581,7 +592,9 @@ fn check_options(options: &ImplicitOptions) -> Result<(), MethodError> {
     if options.keep_components == Some(0) {
         return Err(MethodError::invalid("keepComponents", "0 given, at least 1 is needed"));
     }
-    cloud::check_finite("exterior", options.exterior.as_deref().unwrap_or_default())
+    let exterior = options.exterior.as_deref().unwrap_or_default();
+    cloud::check_number("exterior", exterior.len())?;
+    cloud::check_finite("exterior", exterior)
 }
 
 /// Fewer points span no volume.

@@ -2,10 +2,9 @@
 
 use super::camera::Camera;
 use super::fast::FastField;
-use super::measure::{Fitness, colors_of_points};
+use super::measure::Fitness;
 use super::{ImplicitSurface, Solved, color};
 use crate::math::{Bounds, DAffine3, DVec3, Vec3};
-use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::volume::{Space, Volume, VolumeError, VolumeInit, Voxels};
 
@@ -43,9 +42,9 @@ impl ImplicitSurface {
 
     /// All points as given, without those removed and with those added.
     fn points(&self) -> Vec<Vec3> {
-        let mut stays = vec![true; self.original.len()];
-        self.edits.removed.iter().for_each(|&i| stays[i as usize] = false);
-        let left = self.original.iter().zip(stays).filter(|(_, stays)| *stays).map(|(&p, _)| p);
+        let removed = self.edits.removed_places(&self.original, &self.map);
+        let stays = |p: &Vec3| removed.find(self.map.in_box(*p)).is_none();
+        let left = self.original.iter().copied().filter(stays);
         left.chain(self.edits.added.iter().copied()).collect()
     }
 
@@ -117,12 +116,6 @@ impl ImplicitSurface {
         }
         Ok(())
     }
-
-    pub(super) fn colors_of_points(&self, mesh: &TriangleMesh) -> Option<Vec<Vec3>> {
-        let cloud = self.edits.left(&self.cloud, &self.original, &self.map);
-        let colors = cloud.colors.as_ref()?;
-        Some(colors_of_points(&cloud.points, colors, self.spacing(), mesh, &self.map))
-    }
 }
 
 /// Room around the points in a volume made of them, of their longest side: enough for the surface to close in.
@@ -132,7 +125,7 @@ const GRID_MARGIN: f64 = 0.1;
 fn sampled(dims: [usize; 3], mut row: impl FnMut(&[DVec3], &mut [f64])) -> Result<Vec<f32>, VolumeError> {
     let count = dims.iter().try_fold(1_usize, |product, &n| product.checked_mul(n)).unwrap_or(usize::MAX);
     let mut values: Vec<f32> = Vec::new();
-    let bytes = 4 * count as u64;
+    let bytes = (count as u64).saturating_mul(4);
     values.try_reserve_exact(count).map_err(|_| VolumeError::TooLarge { bytes })?;
     let (mut places, mut line) = (vec![DVec3::ZERO; dims[0]], vec![0.0; dims[0]]);
     for at in 0..dims[1] * dims[2] {

@@ -92,13 +92,20 @@ impl ImplicitSurface {
         )
     }
 
-    /// Goes on from bytes that [`Self::save`] gave, for a surface of the same points and options. Takes as long as the
-    /// present stage took so far.
+    /// Goes on from bytes that [`Self::save`] gave, for a surface of the same points and options. Takes as long as
+    /// the choice of the points and the present stage took so far; in colouring, as the extraction, too.
     ///
     /// # Errors
     /// [`MethodError::BadState`] where the bytes are none of those; the run is then as it was.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
         let state: State = opened(&MARK, bytes)?;
+        self.restore_state(state).map_err(|error| match error {
+            MethodError::BadState { .. } => error,
+            other => MethodError::BadState { field: "contents", problem: other.to_string() },
+        })
+    }
+
+    fn restore_state(&mut self, state: State) -> Result<(), MethodError> {
         let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
         if state.fingerprint != self.fingerprint() {
             return bad("points", "the state belongs to other points or options");
@@ -141,15 +148,13 @@ impl ImplicitSurface {
         };
         mix(&self.original);
         mix(self.cloud.normals.as_deref().unwrap_or_default());
-        mix(self.options.exterior.as_deref().unwrap_or_default());
+        mix(self.options.exterior.as_deref().unwrap_or(&[Vec3::NAN]));
         mix(self.cloud.colors.as_deref().unwrap_or_default());
+        hash.mix(self.cloud.confidence.is_some().into());
         self.cloud.confidence.iter().flatten().for_each(|c| hash.mix(u64::from(c.to_bits())));
         hash.mix(self.options.max_points as u64);
         hash.mix(self.options.keep_components.map_or(0, |n| n as u64));
-        for camera in &self.options.cameras {
-            camera.centre().to_array().into_iter().for_each(|x| hash.mix(x.to_bits()));
-            camera.size().into_iter().for_each(|n| hash.mix(u64::from(n)));
-        }
+        self.options.cameras.iter().for_each(|camera| camera.mix_into(&mut hash));
         hash.value()
     }
 
@@ -185,8 +190,15 @@ impl ImplicitSurface {
 
     fn repeat_slices(&mut self, reached: Reached, slices: u32) -> Result<(), MethodError> {
         self.slices = 0;
-        while self.slices < slices && !matches!(reached, Reached::Solve(..) | Reached::Done) {
+        if matches!(reached, Reached::Solve(..) | Reached::Done) {
+            return Ok(());
+        }
+        while self.slices < slices {
             self.advance()?;
+            if self.stage.reached() != reached {
+                let problem = format!("{slices} given; the stage is over before");
+                return Err(MethodError::BadState { field: "slices", problem });
+            }
         }
         Ok(())
     }

@@ -73,17 +73,17 @@ impl ConjugateGradients {
         start
     }
 
-    /// One iteration; `product` multiplies by Φ+Λ.
+    /// One iteration; `product` multiplies by Φ+Λ. False where rounding lets it go no further.
     pub fn iterate(
         &mut self,
         product: impl Fn(&[f64]) -> Vec<f64>,
         polynomials: &Polynomials,
         inverse: &SparseInverse,
-    ) {
+    ) -> bool {
         let image = product(&self.direction);
         let curvature = dot(&self.direction, &image);
         if curvature <= 0.0 || self.energy <= 0.0 {
-            return;
+            return false;
         }
         let step = self.energy / curvature;
         add(step, &self.direction, &mut self.weights);
@@ -93,6 +93,7 @@ impl ConjugateGradients {
         let ratio = energy / self.energy;
         self.energy = energy;
         self.direction.iter_mut().zip(&image).for_each(|(d, z)| *d = z + ratio * *d);
+        true
     }
 
     /// Moves what polynomials can explain of the residual to their coefficients. Returns the approximate inverse times what

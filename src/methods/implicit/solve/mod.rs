@@ -39,6 +39,8 @@ pub struct Singular;
 const ITERATE_TO: f64 = 0.5;
 /// Iterations in a round. With a system that can be solved, a few dozen do.
 const MOST_ITERATIONS: u32 = 500;
+/// A round that leaves more of the residual than this share has met rounding.
+const LEAST_GAIN: f64 = 0.7;
 /// Rounds of iterations from a residual computed anew.
 const MOST_ROUNDS: u32 = 6;
 /// Rows that the true residual is taken from; all, where there are no more. Of a thousand, it is known to some 3 %.
@@ -57,6 +59,8 @@ pub struct Solver {
     iterations: u32,
     rounds: u32,
     residual: f64,
+    /// The true residual of the round before.
+    reached: f64,
 }
 
 #[derive(Clone, Debug)]
@@ -82,6 +86,7 @@ impl Solver {
             iterations: 0,
             rounds: 0,
             residual: 1.0,
+            reached: f64::INFINITY,
         }
     }
 
@@ -94,7 +99,8 @@ impl Solver {
         }
         self.revision = Some((constraints.clone(), weights));
         self.stage = Stage::Build;
-        (self.slices, self.iterations, self.rounds, self.residual) = (0, 0, 0, 1.0);
+        (self.slices, self.iterations, self.rounds) = (0, 0, 0);
+        (self.residual, self.reached) = (1.0, f64::INFINITY);
         true
     }
 
@@ -167,9 +173,9 @@ impl Solver {
         }
     }
 
-    /// Bytes that the system takes.
-    pub fn bytes(&self) -> usize {
-        self.system.bytes()
+    /// Bytes of the matrix, which is most of it.
+    pub fn matrix_bytes(&self) -> usize {
+        self.system.matrix_bytes()
     }
 
     fn build(&mut self) -> Result<Stage, Singular> {
@@ -204,13 +210,15 @@ impl Solver {
         if self.residual > ITERATE_TO * self.tolerance
             && self.iterations < MOST_ITERATIONS * (self.rounds + 1)
         {
-            gradients.iterate(|x| system.product(x), &polynomials, system.inverse());
+            let moved = gradients.iterate(|x| system.product(x), &polynomials, system.inverse());
             self.iterations += 1;
             self.residual = norm(&gradients.residual) / size;
             if !self.residual.is_finite() {
                 return Err(Singular);
             }
-            return Ok(Stage::Iterate(polynomials, gradients));
+            if moved {
+                return Ok(Stage::Iterate(polynomials, gradients));
+            }
         }
         Ok(Stage::Check(polynomials, gradients, Vec::new()))
     }
@@ -237,9 +245,12 @@ impl Solver {
             return Ok(Stage::Done(gradients));
         }
         self.rounds += 1;
-        if self.rounds >= MOST_ROUNDS || !self.residual.is_finite() {
+        // Not a number counts as no gain.
+        let gained = self.residual <= LEAST_GAIN * self.reached;
+        if self.rounds >= MOST_ROUNDS || !gained {
             return Err(Singular);
         }
+        self.reached = self.residual;
         Ok(Stage::Renew(polynomials, gradients, Vec::new()))
     }
 

@@ -161,8 +161,8 @@ impl System {
         self.centres.len()
     }
 
-    /// Bytes that the matrix takes.
-    pub fn bytes(&self) -> usize {
+    /// Bytes of the matrix.
+    pub fn matrix_bytes(&self) -> usize {
         match &self.matrix {
             Matrix::Single(matrix) => matrix.bytes(),
             Matrix::Double(matrix) => matrix.bytes(),
