@@ -36,6 +36,14 @@ impl Random {
 }
 
 #[cfg(test)]
+impl Random {
+    /// At least 0, below 1.
+    pub fn unit(&mut self) -> f64 {
+        f64::from(self.bits()) / 4_294_967_296.0
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
     #[cfg(target_arch = "wasm32")]

@@ -43,3 +43,13 @@ export async function rejection(promise: Promise<unknown>): Promise<VesicleError
 /** Deliberately wrong arguments, past the type checker. */
 // biome-ignore lint/suspicious/noExplicitAny: what a caller without types may pass
 export const wrong = (value: unknown): any => value;
+
+/** What `check()` tells of a sound mesh. */
+export const HEALTHY = {
+  closed: true,
+  oriented: true,
+  nonManifoldEdges: 0,
+  nonManifoldVertices: 0,
+  degenerateTriangles: 0,
+  selfIntersections: 0,
+};

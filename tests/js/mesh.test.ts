@@ -1,15 +1,6 @@
 import { expect, test } from 'vitest';
 import { Mesh, type MeshArrays, type MeshFormat } from '../../pkg/index.js';
-import { ball, failure, wrong } from './helpers.js';
-
-const HEALTHY = {
-  closed: true,
-  oriented: true,
-  nonManifoldEdges: 0,
-  nonManifoldVertices: 0,
-  degenerateTriangles: 0,
-  selfIntersections: 0,
-};
+import { ball, failure, HEALTHY, wrong } from './helpers.js';
 
 const sphere = (radius = 1, edge = 0.2) => Mesh.icosphere([0, 0, 0], radius, edge);
 

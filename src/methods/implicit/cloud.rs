@@ -17,7 +17,7 @@ pub struct Cloud {
 }
 
 /// Fewer different points span no volume.
-const LEAST_POINTS: usize = 4;
+pub const LEAST_POINTS: usize = 4;
 /// A cloud is flat where its thickness is at most this share of its length.
 const FLAT: f64 = 1e-6;
 

@@ -31,8 +31,6 @@ impl Edits {
     pub fn validate(&self, original: &[Vec3], map: &BoxMap) -> Result<(), MethodError> {
         for (name, points) in [("added", &self.added), ("outside", &self.outside)] {
             check_number(name, points.len())?;
-        }
-        for (name, points) in [("added", &self.added), ("outside", &self.outside)] {
             check_finite(name, points)?;
             if let Some(i) = points.iter().position(|&p| map.in_box(p).abs().max_element() > REACH) {
                 let problem =

@@ -216,12 +216,11 @@ mod tests {
 
     fn torus(count: usize) -> Cloud {
         let mut random = Random::new(12);
-        let mut unit = || f64::from(random.bits()) / 4_294_967_296.0;
         let (mut points, mut normals) = (Vec::new(), Vec::new());
         while points.len() < count {
-            let (a, b) = (std::f64::consts::TAU * unit(), std::f64::consts::TAU * unit());
+            let (a, b) = (std::f64::consts::TAU * random.unit(), std::f64::consts::TAU * random.unit());
             let out = DVec3::new(libm::cos(a), libm::sin(a), 0.0);
-            if 0.3 * libm::cos(b) + 0.7 > unit() {
+            if 0.3 * libm::cos(b) + 0.7 > random.unit() {
                 let n = out * libm::cos(b) + DVec3::Z * libm::sin(b);
                 points.push((out * 0.7 + n * 0.3).as_vec3());
                 normals.push(n.as_vec3());

@@ -333,19 +333,15 @@ mod tests {
         1.0 / (4.0 * PI * delta * (1.0 + 2.0 * delta * tau).sqrt())
     }
 
-    fn unit(random: &mut Random) -> f64 {
-        f64::from(random.bits()) / 4_294_967_296.0
-    }
-
     /// Of the ball of radius 1, some of them close together.
     fn points(count: usize, seed: u64) -> Vec<DVec3> {
         let mut random = Random::new(seed);
         let mut found = Vec::new();
         while found.len() < count {
-            let p = DVec3::from([0; 3].map(|_| 2.0 * unit(&mut random) - 1.0));
+            let p = DVec3::from([0; 3].map(|_| 2.0 * random.unit() - 1.0));
             if p.length() < 0.95 {
                 found.push(p);
-                found.push(p + DVec3::new(unit(&mut random), 0.5, unit(&mut random)) * 0.01);
+                found.push(p + DVec3::new(random.unit(), 0.5, random.unit()) * 0.01);
             }
         }
         found
@@ -406,8 +402,8 @@ mod tests {
     fn equation_six_in_complex_numbers_agrees() {
         let mut random = Random::new(1);
         for _ in 0..20_000 {
-            let (delta, tau) = (5.0 + 35.0 * unit(&mut random), 0.005 + 0.02 * unit(&mut random));
-            let r = 0.02 + 3.98 * unit(&mut random);
+            let (delta, tau) = (5.0 + 35.0 * random.unit(), 0.005 + 0.02 * random.unit());
+            let r = 0.02 + 3.98 * random.unit();
             // Near b = 0 equation 6 itself cancels; the sixty digits are for that.
             if (2.0 * delta * tau - 1.0).abs() > 1e-3 {
                 let (found, expected) = (multi(delta, tau).value(r), equation_six(delta, tau, r));
@@ -509,10 +505,10 @@ mod tests {
                 let s = match kernel {
                     // Within the ball; a cone has no slope at its tip, and nearer than 1e-6 the table is flat.
                     Kernel::ThinPlate { .. } | Kernel::Biharmonic { .. } => {
-                        libm::exp2(-39.9 + 43.9 * unit(&mut random))
+                        libm::exp2(-39.9 + 43.9 * random.unit())
                     }
                     _ if k < 100 => 0.0,
-                    _ => libm::exp2(-44.0 + 53.0 * unit(&mut random)),
+                    _ => libm::exp2(-44.0 + 53.0 * random.unit()),
                 };
                 let (expected, found) = (kernel.value_and_slope(s.sqrt()), table.value_and_slope(s));
                 assert_eq!(found[0].to_bits(), table.value(s).to_bits(), "{kernel:?} at {s}");

@@ -62,7 +62,7 @@ use super::{MethodError, StepReport, Times};
 use crate::math::Vec3;
 use crate::mesh::{TriangleMesh, measure as measure_mesh};
 use crate::remesh::Changes;
-use cloud::{BoxMap, MOST_POINTS};
+use cloud::{BoxMap, LEAST_POINTS, MOST_POINTS};
 use color::Coloring;
 use exterior::{Exterior, given_exterior, made_exterior};
 use extract::{Extraction, default_cell};
@@ -596,6 +596,3 @@ fn check_options(options: &ImplicitOptions) -> Result<(), MethodError> {
     cloud::check_number("exterior", exterior.len())?;
     cloud::check_finite("exterior", exterior)
 }
-
-/// Fewer points span no volume.
-const LEAST_POINTS: usize = 4;

@@ -170,13 +170,9 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    fn unit(random: &mut Random) -> f64 {
-        f64::from(random.bits()) / 4_294_967_296.0
-    }
-
     /// About normally distributed, of deviation 1.
     fn noise(random: &mut Random) -> f64 {
-        2.0 * ((0..3).map(|_| unit(random)).sum::<f64>() - 1.5)
+        2.0 * ((0..3).map(|_| random.unit()).sum::<f64>() - 1.5)
     }
 
     type Surface = fn(&mut Random) -> (DVec3, DVec3);
@@ -188,10 +184,10 @@ mod tests {
 
     fn torus(random: &mut Random) -> (DVec3, DVec3) {
         loop {
-            let [a, b] = [0; 2].map(|_| std::f64::consts::TAU * unit(random));
+            let [a, b] = [0; 2].map(|_| std::f64::consts::TAU * random.unit());
             let out = DVec3::new(libm::cos(a), libm::sin(a), 0.0);
             // As many to an area everywhere.
-            if 0.3 * libm::cos(b) + 0.7 > unit(random) {
+            if 0.3 * libm::cos(b) + 0.7 > random.unit() {
                 let n = out * libm::cos(b) + DVec3::Z * libm::sin(b);
                 return (out * 0.7 + n * 0.3, n);
             }
@@ -200,7 +196,7 @@ mod tests {
 
     fn two_balls(random: &mut Random) -> (DVec3, DVec3) {
         let (_, n) = ball(random);
-        if unit(random) < 0.7 { (n * 0.5 - DVec3::X * 0.5, n) } else { (n * 0.3 + DVec3::X * 0.7, n) }
+        if random.unit() < 0.7 { (n * 0.5 - DVec3::X * 0.5, n) } else { (n * 0.3 + DVec3::X * 0.7, n) }
     }
 
     #[test]

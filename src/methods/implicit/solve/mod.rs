@@ -289,13 +289,9 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    fn unit(random: &mut Random) -> f64 {
-        f64::from(random.bits()) / 4_294_967_296.0
-    }
-
     fn direction(random: &mut Random) -> DVec3 {
         loop {
-            let p = DVec3::from([0; 3].map(|_| 2.0 * unit(random) - 1.0));
+            let p = DVec3::from([0; 3].map(|_| 2.0 * random.unit() - 1.0));
             if p.length() > 0.1 && p.length() < 1.0 {
                 return p.normalize();
             }
@@ -412,7 +408,7 @@ mod tests {
                 let found: Vec<f64> =
                     solution.weights.iter().chain(&solution.coefficients).copied().collect();
                 for _ in 0..50 {
-                    let p = direction(&mut random) * (1.5 * unit(&mut random));
+                    let p = direction(&mut random) * (1.5 * random.unit());
                     let [f, g] = [&found, &expected].map(|x| value(&constraints, kernel, x, p));
                     assert!(
                         (f - g).abs() < 1e-5 * (1.0 + g.abs()),
@@ -558,7 +554,7 @@ mod tests {
                 assert!(again < whole || kernel.is_conditional());
                 let mut random = Random::new(8);
                 for _ in 0..50 {
-                    let p = direction(&mut random) * (1.5 * unit(&mut random));
+                    let p = direction(&mut random) * (1.5 * random.unit());
                     let [f, g] = [&found, &expected].map(|solution| {
                         let x: Vec<f64> =
                             solution.weights.iter().chain(&solution.coefficients).copied().collect();
