@@ -2,9 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "the lints spare tests, but not their helpers")]
 
-use vesicle::io::{FormatError, MeshFormat, parse_mesh, write_mesh};
+use std::sync::Arc;
+use vesicle::io::{FormatError, MeshFormat, parse_mesh, write_animation, write_mesh};
 use vesicle::math::{Vec2, Vec3};
-use vesicle::mesh::{MeshError, TriangleMesh, measure, report};
+use vesicle::mesh::{MeshError, Texture, TriangleMesh, measure, report};
 
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -22,9 +23,9 @@ fn octahedron() -> TriangleMesh {
         triangles: [[0, 1], [1, 2], [2, 3], [3, 0]].into_iter().flat_map(quarter).collect(),
         normals: Some(positions.clone()),
         uvs: Some(positions.iter().map(|p| Vec2::new(0.1 + p.x / 3.0, p.y)).collect()),
-        corner_uvs: None,
         colors: Some(positions.iter().map(|p| (*p + 1.0) / 2.0).collect()),
         positions,
+        ..TriangleMesh::default()
     }
 }
 
@@ -77,6 +78,49 @@ fn compression_is_refused_by_name() {
     assert!(error.to_string().contains("KHR_draco_mesh_compression"), "{error}");
 }
 
+/// The file with some of its text exchanged, blanks keeping its length.
+fn patched(file: &[u8], from: &str, to: &str) -> Vec<u8> {
+    let at = file.windows(from.len()).position(|window| window == from.as_bytes()).unwrap();
+    let mut file = file.to_vec();
+    file[at..at + from.len()].copy_from_slice(format!("{to:<0$}", from.len()).as_bytes());
+    file
+}
+
+#[test]
+fn compression_that_is_not_demanded_is_refused_where_nothing_else_is_there() {
+    let draco = patched(DRACO, r#","extensionsRequired":["KHR_draco_mesh_compression"]"#, "");
+    // By the parts of the name: they are no longer in the list of what is demanded.
+    let error = parse_mesh(&draco).unwrap_err().to_string();
+    assert!(error.starts_with("GLB: primitives: KHR_draco_mesh_compression is not supported"), "{error}");
+
+    let good = strip_document(r#"{"mesh":0}"#);
+    let draco = r#"{"mode":5,"extensions":{"KHR_draco_mesh_compression":{}},"attributes""#;
+    let beside = good.replace(r#"{"mode":5,"attributes""#, draco);
+    assert!(parse_mesh(&glb(&beside, &STRIP)).is_ok(), "plain data stands beside the compressed");
+    let without = |document: &str, what: &str| {
+        let error = parse_mesh(&glb(&document.replace(what, ""), &STRIP)).unwrap_err().to_string();
+        assert!(error.contains("KHR_draco_mesh_compression is not supported"), "{error}");
+    };
+    without(&beside, r#""bufferView":0,"#);
+    without(&beside, r#""bufferView":1,"#);
+    without(&beside, r#""POSITION":0"#);
+
+    for name in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
+        let packed = format!(r#"{{"extensions":{{"{name}":{{"buffer":0}}}},"buffer":0,"byteLength":16"#);
+        let beside = good.replace(r#"{"buffer":0,"byteLength":16"#, &packed);
+        assert!(parse_mesh(&glb(&beside, &STRIP)).is_ok());
+        let stand_in = format!(r#""buffers":[{{"extensions":{{"{name}":{{"fallback":true}}}},"#);
+        for document in [
+            beside.replace(r#""buffers":[{"#, &stand_in),
+            beside.replace(r#"}},"buffer":0"#, r#"}},"buffer":1"#),
+        ] {
+            let error = parse_mesh(&glb(&document, &STRIP)).unwrap_err().to_string();
+            let expected = format!("GLB: bufferViews[0]: {name} is not supported");
+            assert!(error.starts_with(&expected), "{error}");
+        }
+    }
+}
+
 /// The mesh with triangles and vertices as numbered by first use, without the extras that `keep` leaves out.
 fn only(mesh: &TriangleMesh, normals: bool, uvs: bool, colors: bool) -> TriangleMesh {
     let mut mesh = mesh.welded();
@@ -110,7 +154,8 @@ fn what_is_written_reads_back_the_same() {
 #[test]
 fn real_meshes_survive_every_format() {
     for bytes in [KNOT, FUZE, SPOT] {
-        let mesh = parse_mesh(bytes).unwrap();
+        // Without a texture, whose coordinates OBJ and PLY count from its other edge.
+        let mesh = TriangleMesh { texture: None, ..parse_mesh(bytes).unwrap() };
         for format in [MeshFormat::Glb, MeshFormat::Ply, MeshFormat::Obj, MeshFormat::Stl] {
             let found = parse_mesh(&write_mesh(&mesh, format).unwrap()).unwrap();
             assert_eq!(found.positions, mesh.positions, "{format:?}");
@@ -450,6 +495,10 @@ fn samples() -> Vec<Vec<u8>> {
     let written = [MeshFormat::Glb, MeshFormat::Ply, MeshFormat::Stl, MeshFormat::Obj]
         .map(|format| write_mesh(&octahedron_with_seam(), format).unwrap());
     let mut all = written.to_vec();
+    let texture = Texture::new(b"\xff\xd8\xff picture".to_vec()).ok().map(Arc::new);
+    let textured = TriangleMesh { texture, ..octahedron_with_seam() };
+    all.push(write_mesh(&textured, MeshFormat::Glb).unwrap());
+    all.push(write_animation([octahedron(), textured], 0.5).unwrap());
     all.push(CUBE_PLY.as_bytes().to_vec());
     all.push(glb(&strip_document(r#"{"mesh":0,"rotation":[0,0,0,1]}"#), &STRIP));
     all.push(b"solid\nfacet\nvertex 1 2 3\nvertex 2 2 3\nvertex 1 4 3\nendloop\nendsolid".to_vec());

@@ -6,13 +6,18 @@
 
 use super::FormatError;
 use super::glb::FORMAT;
+use super::gltf_material::BaseColor;
 use crate::math::{DAffine3, DVec3, Vec2, Vec3};
 use crate::mesh::TriangleMesh;
 use glam::{DMat4, DQuat};
 use serde_json::Value;
+use std::sync::Arc;
 
 /// Triangle corners in all: nodes may repeat a mesh, so the file's size bounds nothing.
 const CORNER_LIMIT: u64 = 3 << 23;
+
+/// What compressed files are to be, instead.
+const UNCOMPRESSED: &str = "files without compression (save the mesh without it)";
 
 /// What a primitive counts at least, so that empty ones repeated by many nodes come to an end, too.
 const PRIMITIVE_COST: u64 = 64;
@@ -25,7 +30,7 @@ fn is_harmless(extension: &str) -> bool {
 }
 
 /// All triangles of the default scene, each where its node puts it. Normals, texture coordinates and colours are
-/// taken where every part has them.
+/// taken where every part has them, and with the coordinates the first base colour texture that a part has.
 pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, FormatError> {
     let document = Document { root, binary };
     document.check_extensions()?;
@@ -38,9 +43,14 @@ pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, For
             None => read,
         });
     }
-    mesh.ok_or_else(|| {
+    let mut mesh = mesh.ok_or_else(|| {
         FormatError::invalid(FORMAT, "meshes", "the scene has no triangles; at least one is needed")
-    })
+    })?;
+    let base_color = parts.iter().find_map(|part| part.primitive.base_color.as_ref());
+    if let Some(base_color) = base_color.filter(|_| mesh.has_uvs()) {
+        mesh.texture = base_color.texture(&document)?.map(Arc::new);
+    }
+    Ok(mesh)
 }
 
 fn joined(mut mesh: TriangleMesh, part: TriangleMesh) -> TriangleMesh {
@@ -60,7 +70,7 @@ fn both<T>(a: Option<Vec<T>>, b: Option<Vec<T>>) -> Option<Vec<T>> {
 }
 
 #[derive(Clone, Copy)]
-struct Document<'a> {
+pub(super) struct Document<'a> {
     root: &'a Value,
     binary: &'a [u8],
 }
@@ -76,15 +86,12 @@ impl<'a> Document<'a> {
         let required = self.root["extensionsRequired"].as_array().map_or(&[][..], Vec::as_slice);
         match required.iter().filter_map(Value::as_str).find(|name| !is_harmless(name)) {
             None => Ok(()),
-            Some(name) => {
-                let accepted = "files without compression (save the mesh without it)";
-                Err(FormatError::unsupported(FORMAT, "extensionsRequired", name, accepted))
-            }
+            Some(name) => Err(FormatError::unsupported(FORMAT, "extensionsRequired", name, UNCOMPRESSED)),
         }
     }
 
     /// An entry of one of the document's tables.
-    fn entry(&self, table: &'static str, index: u64) -> Result<&'a Value, FormatError> {
+    pub(super) fn entry(&self, table: &'static str, index: u64) -> Result<&'a Value, FormatError> {
         let entries = self.root[table].as_array().map_or(&[][..], Vec::as_slice);
         let found = usize::try_from(index).ok().and_then(|i| entries.get(i));
         let problem = || format!("number {index} is named; there are {}", entries.len());
@@ -176,11 +183,15 @@ impl<'a> Document<'a> {
         Ok(Accessor { bytes, count: count as usize, stride: stride as usize, width, component, normalized })
     }
 
-    fn view(&self, index: u64) -> Result<View<'a>, FormatError> {
+    pub(super) fn view(&self, index: u64) -> Result<View<'a>, FormatError> {
         let value = self.entry("bufferViews", index)?;
         let field = format!("bufferViews[{index}]");
         let buffer = required(value, "buffer", &field)?;
-        if buffer != 0 || !self.entry("buffers", buffer)?["uri"].is_null() {
+        let outside = buffer != 0 || !self.entry("buffers", buffer)?["uri"].is_null();
+        if let Some(name) = compression(value).filter(|name| outside || self.is_stand_in(buffer, name)) {
+            return Err(FormatError::unsupported(FORMAT, field, name, UNCOMPRESSED));
+        }
+        if outside {
             let accepted = "the file's own binary chunk";
             return Err(FormatError::unsupported(
                 FORMAT,
@@ -196,10 +207,27 @@ impl<'a> Document<'a> {
         let bytes = bytes.ok_or(FormatError::Truncated { format: FORMAT, field, needed, found })?;
         Ok(View { bytes, stride: unsigned(value, "byteStride")? })
     }
+
+    /// Whether a buffer has nothing in it but room for what is compressed elsewhere.
+    fn is_stand_in(&self, buffer: u64, extension: &str) -> bool {
+        let buffer = self.entry("buffers", buffer);
+        buffer.is_ok_and(|buffer| buffer["extensions"][extension]["fallback"] == true)
+    }
+
+    /// Whether an accessor has nothing but a length: its elements are compressed elsewhere.
+    fn is_hollow(&self, accessor: u64) -> bool {
+        self.entry("accessors", accessor).is_ok_and(|accessor| accessor["bufferView"].is_null())
+    }
 }
 
-struct View<'a> {
-    bytes: &'a [u8],
+/// The extension by which a primitive or a view is compressed; what stands beside it is for readers that do not know it.
+fn compression(value: &Value) -> Option<&'static str> {
+    let known = ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
+    known.into_iter().find(|name| !value["extensions"][name].is_null())
+}
+
+pub(super) struct View<'a> {
+    pub(super) bytes: &'a [u8],
     stride: Option<u64>,
 }
 
@@ -217,6 +245,7 @@ struct Primitive<'a> {
     mode: Mode,
     positions: Accessor<'a>,
     indices: Option<Accessor<'a>>,
+    base_color: Option<BaseColor<'a>>,
     /// A bound on the corners of its triangles and on its vertices.
     corners: u64,
 }
@@ -231,6 +260,7 @@ impl<'a> Primitive<'a> {
             _ => return Ok(None),
         };
         let attributes = &value["attributes"];
+        check_compression(document, value)?;
         let positions = document.accessor(required(attributes, "POSITION", "attributes")?, &[3])?;
         let indices = unsigned(value, "indices")?.map(|i| document.accessor(i, &[1])).transpose()?;
         let vertices = indices.as_ref().map_or(positions.count, |indices| indices.count) as u64;
@@ -239,7 +269,8 @@ impl<'a> Primitive<'a> {
             Mode::Strip | Mode::Fan => vertices.saturating_mul(3),
         };
         let corners = corners.max(positions.count as u64);
-        Ok(Some(Self { document: *document, attributes, mode, positions, indices, corners }))
+        let base_color = BaseColor::of(document, value)?;
+        Ok(Some(Self { document: *document, attributes, mode, positions, indices, base_color, corners }))
     }
 
     fn read(&self) -> Result<TriangleMesh, FormatError> {
@@ -248,12 +279,21 @@ impl<'a> Primitive<'a> {
             positions: (0..self.positions.count).map(|i| self.positions.vector(i)).collect(),
             triangles: self.triangles()?,
             normals: self.attribute("NORMAL", &[3])?.map(vectors),
-            uvs: self.attribute("TEXCOORD_0", &[2])?.map(|a| {
-                (0..a.count).map(|i| Vec2::new(a.number(i, 0) as f32, a.number(i, 1) as f32)).collect()
-            }),
-            corner_uvs: None,
+            uvs: self.uvs()?,
             colors: self.attribute("COLOR_0", &[3, 4])?.map(vectors),
+            ..TriangleMesh::default()
         })
+    }
+
+    /// The coordinates that the base colour goes by, as it moves them; the first ones, where it has no texture.
+    fn uvs(&self) -> Result<Option<Vec<Vec2>>, FormatError> {
+        let set = self.base_color.as_ref().map_or(0, |base| base.set);
+        let Some(a) = self.attribute(&format!("TEXCOORD_{set}"), &[2])? else { return Ok(None) };
+        let uvs = (0..a.count).map(|i| Vec2::new(a.number(i, 0) as f32, a.number(i, 1) as f32));
+        Ok(Some(match &self.base_color {
+            Some(base) => uvs.map(|uv| base.place(uv)).collect(),
+            None => uvs.collect(),
+        }))
     }
 
     fn attribute(&self, name: &str, widths: &[usize]) -> Result<Option<Accessor<'a>>, FormatError> {
@@ -284,6 +324,17 @@ impl<'a> Primitive<'a> {
             Mode::Fan => order.windows(2).skip(1).map(|w| [order[0], w[0], w[1]]).collect(),
         })
     }
+}
+
+/// An error where nothing but compressed data is there.
+fn check_compression(document: &Document, primitive: &Value) -> Result<(), FormatError> {
+    let Some(name) = compression(primitive) else { return Ok(()) };
+    let attributes = &primitive["attributes"];
+    let used = [unsigned(attributes, "POSITION")?, unsigned(primitive, "indices")?];
+    if used[0].is_none() || used.into_iter().flatten().any(|accessor| document.is_hollow(accessor)) {
+        return Err(FormatError::unsupported(FORMAT, "primitives", name, UNCOMPRESSED));
+    }
+    Ok(())
 }
 
 #[derive(Clone, Copy)]
@@ -412,7 +463,7 @@ fn transform(node: &Value, index: u64) -> Result<DAffine3, FormatError> {
     ))
 }
 
-fn numbers<const N: usize>(
+pub(super) fn numbers<const N: usize>(
     value: &Value,
     field: impl Fn() -> String,
 ) -> Result<Option<[f64; N]>, FormatError> {
@@ -425,7 +476,7 @@ fn numbers<const N: usize>(
 }
 
 /// A whole number that may be missing.
-fn unsigned(object: &Value, key: &str) -> Result<Option<u64>, FormatError> {
+pub(super) fn unsigned(object: &Value, key: &str) -> Result<Option<u64>, FormatError> {
     let value = &object[key];
     if value.is_null() {
         return Ok(None);
@@ -433,7 +484,7 @@ fn unsigned(object: &Value, key: &str) -> Result<Option<u64>, FormatError> {
     value.as_u64().map(Some).ok_or_else(|| FormatError::invalid(FORMAT, key, "is no whole number from 0"))
 }
 
-fn required(object: &Value, key: &str, field: &str) -> Result<u64, FormatError> {
+pub(super) fn required(object: &Value, key: &str, field: &str) -> Result<u64, FormatError> {
     unsigned(object, key)?.ok_or_else(|| FormatError::invalid(FORMAT, format!("{field}.{key}"), "is missing"))
 }
 

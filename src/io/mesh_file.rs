@@ -1,7 +1,8 @@
 //! Mesh files: which format the bytes are in, and what holds for meshes of every format.
 
-use super::{FormatError, glb, mz3, obj, ply, stl, vtp};
-use crate::mesh::{MeshError, TriangleMesh};
+use super::{FormatError, glb, glb_writer, mz3, obj, ply, stl, vtp};
+use crate::mesh::{MeshError, Texture, TriangleMesh};
+use std::sync::Arc;
 
 /// A file format that meshes can be written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,18 +41,46 @@ impl MeshFormat {
     pub fn from_extension(extension: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|format| format.extension() == extension)
     }
+
+    /// Whether v is counted from the lower edge of a picture, and not from the upper one as in glTF.
+    fn counts_v_from_below(self) -> bool {
+        matches!(self, Self::Ply | Self::Obj | Self::Vtp)
+    }
 }
 
 /// The mesh in a GLB, PLY, STL or OBJ file, told apart by their content.
 ///
 /// Vertices at one position are one ([`TriangleMesh::welded`]), polygons are fans of triangles, positions are in the
-/// file's own units, and texture coordinates as the file has them (v runs down in glTF, up in OBJ). Memory is linear
-/// in the size of the file.
+/// file's own units, and texture coordinates as the file has them (v runs down in glTF, up in OBJ and PLY). A GLB that
+/// has its texture in it brings it along: the picture of the base colour of the first triangles that have one, with
+/// coordinates as `KHR_texture_transform` places them. Memory is linear in the size of the file.
 ///
 /// # Errors
 /// [`FormatError`] with the format and the field for bytes in no such format, files that end early, contradict
 /// themselves or use what cannot be read, positions that are not finite, and files without triangles.
 pub fn parse_mesh(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
+    Ok(parse_welded(bytes)?.1)
+}
+
+/// The same with the picture that belongs to it, for files that have it beside them (OBJ, PLY); in a GLB it takes the
+/// place of the file's own. As everywhere where there is a texture, v runs down: that of an OBJ or PLY becomes 1 − v.
+///
+/// # Errors
+/// As [`parse_mesh`], and for files without texture coordinates.
+pub fn parse_textured_mesh(bytes: &[u8], texture: Arc<Texture>) -> Result<TriangleMesh, FormatError> {
+    let (format, mut mesh) = parse_welded(bytes)?;
+    if !mesh.has_uvs() {
+        let problem = "there are none for every triangle; a texture needs them";
+        return Err(FormatError::invalid(format, "texture coordinates", problem));
+    }
+    if format != glb::FORMAT {
+        mesh.turn_v_over();
+    }
+    mesh.texture = Some(texture);
+    Ok(mesh)
+}
+
+fn parse_welded(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
     let (format, mesh) = parse(bytes)?;
     mesh.validate().map_err(|error| match error {
         MeshError::InvalidArgument { parameter, problem } => FormatError::invalid(format, parameter, problem),
@@ -65,7 +94,7 @@ pub fn parse_mesh(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
             "there are none that span a triangle; at least one is needed",
         ));
     }
-    Ok(welded)
+    Ok((format, welded))
 }
 
 fn parse(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
@@ -113,14 +142,23 @@ fn unknown(bytes: &[u8]) -> FormatError {
 /// The bytes of a file with the mesh, with the extras that the format knows: all but colours lossless, and those in
 /// 8 bits except in GLB and OBJ. Read back by [`parse_mesh`] (not VTP and MZ3), closed is closed.
 ///
+/// A texture is in GLB only. The coordinates of a mesh with one are written to PLY, OBJ and VTP as they count them, v as
+/// 1 − v.
+///
 /// # Errors
 /// [`MeshError::InvalidArgument`] for a mesh that is not valid, [`MeshError::TooLarge`] where the file would pass 4
 /// GiB.
 pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, MeshError> {
     mesh.validate()?;
     check_size(mesh)?;
+    let turned = (mesh.texture.is_some() && format.counts_v_from_below()).then(|| {
+        let mut mesh = mesh.clone();
+        mesh.turn_v_over();
+        mesh
+    });
+    let mesh = turned.as_ref().unwrap_or(mesh);
     Ok(match format {
-        MeshFormat::Glb => glb::write(mesh),
+        MeshFormat::Glb => glb_writer::write(mesh)?,
         MeshFormat::Ply => ply::write(mesh),
         MeshFormat::Stl => stl::write(mesh),
         MeshFormat::Obj => obj::write(mesh),

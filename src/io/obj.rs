@@ -130,7 +130,14 @@ impl Reader {
             sums.into_iter().map(|n| n.normalize_or_zero()).collect()
         });
         let colors = (self.colors.len() == self.positions.len()).then_some(self.colors);
-        TriangleMesh { positions: self.positions, triangles, normals, uvs: None, corner_uvs, colors }
+        TriangleMesh {
+            positions: self.positions,
+            triangles,
+            normals,
+            corner_uvs,
+            colors,
+            ..Default::default()
+        }
     }
 
     fn into_points(mut self) -> PointCloud {

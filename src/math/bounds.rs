@@ -1,6 +1,7 @@
 //! Axis-aligned boxes, and a tree of them for finding the few that matter.
 
 use super::{DVec3, Vec3};
+use smallvec::SmallVec;
 
 /// A closed axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,25 +62,43 @@ impl Bounds {
         low.max(high).max(DVec3::ZERO).length_squared()
     }
 
-    /// The distance along the ray, in lengths of `direction`, at which it enters the box; `None` where it misses.
+    /// The distance along the ray, in lengths of its direction, at which it enters the box; `None` where it misses.
     /// Zero where it starts inside. Rounded so that a ray along a face counts.
-    pub fn ray_entry(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+    #[inline]
+    pub fn ray_entry(&self, ray: &Ray) -> Option<f64> {
+        self.span_on(ray, 0.0).map(|(enter, _)| enter)
+    }
+
+    /// The distance from the ray's origin, in lengths of its direction, at which the line through it enters the box,
+    /// ahead or behind; `None` where it misses. Zero where the origin is inside. Rounded as [`Self::ray_entry`].
+    #[inline]
+    pub fn line_entry(&self, ray: &Ray) -> Option<f64> {
+        let (enter, leave) = self.span_on(ray, f64::NEG_INFINITY)?;
+        let near = if enter > 0.0 { enter } else { -leave };
+        Some(if near > 0.0 { near } else { 0.0 })
+    }
+
+    /// Where the line along the ray is inside, from `start` on.
+    #[inline]
+    fn span_on(&self, ray: &Ray, start: f64) -> Option<(f64, f64)> {
+        let (mut enter, mut leave) = (start, f64::INFINITY);
         for axis in 0..3 {
-            let (low, high) =
-                (f64::from(self.min[axis]) - origin[axis], f64::from(self.max[axis]) - origin[axis]);
-            if direction[axis] == 0.0 {
-                // Parallel to the slab: a division would give 0 / 0 on its faces.
+            let low = f64::from(self.min[axis]) - ray.origin[axis];
+            let high = f64::from(self.max[axis]) - ray.origin[axis];
+            if ray.inverse[axis] == 0.0 {
+                // Parallel to the slab: a product would be 0 · ∞ on its faces.
                 if low > 0.0 || high < 0.0 {
                     return None;
                 }
                 continue;
             }
-            let (a, b) = (low / direction[axis], high / direction[axis]);
-            enter = enter.max(a.min(b));
-            leave = leave.min(a.max(b));
+            let (a, b) = (low * ray.inverse[axis], high * ray.inverse[axis]);
+            let (near, far) = if a < b { (a, b) } else { (b, a) };
+            enter = if near > enter { near } else { enter };
+            leave = if far < leave { far } else { leave };
         }
-        (enter <= leave * ROUNDING).then_some(enter)
+        // Behind the origin both are negative.
+        (enter <= leave + ROUNDING * leave.abs()).then_some((enter, leave))
     }
 
     /// The axis along which the box is longest: 0, 1 or 2.
@@ -95,8 +114,30 @@ impl Bounds {
     }
 }
 
-/// Each quotient is within an ulp; less would let a ray slip between two boxes that share a face.
-const ROUNDING: f64 = 1.0 + 4.0 * f64::EPSILON;
+/// Each product is within two ulps; less would let a ray slip between two boxes that share a face.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// A ray made ready for many boxes.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    origin: DVec3,
+    /// One over the direction, by axis; 0 across it.
+    inverse: DVec3,
+}
+
+impl Ray {
+    /// From `origin` along `direction`, of any length but 0.
+    pub fn new(origin: DVec3, direction: DVec3) -> Self {
+        let inverse = |x: f64| if x.abs() > LEAST_SLOPE { 1.0 / x } else { 0.0 };
+        Self { origin, inverse: DVec3::from(direction.to_array().map(inverse)) }
+    }
+}
+
+/// A direction across an axis but for less than this is taken as one across it: its inverse would be near infinity.
+const LEAST_SLOPE: f64 = 1e-290;
+
+/// Nodes to be looked at, and how far away they are: as many as a tree of a million items needs without an allocation.
+type Stack = SmallVec<[(f64, usize); 24]>;
 
 /// Boxes in a leaf: 1 doubles the nodes, 16 tests many boxes in vain.
 const LEAF: usize = 4;
@@ -157,6 +198,7 @@ impl BoxTree {
     pub fn nearest(&self, p: Vec3, mut visit: impl FnMut(u32, f64) -> f64) {
         let mut bound = f64::INFINITY;
         self.descend(
+            f64::INFINITY,
             |bounds| Some(bounds.distance_squared(p)),
             |item| {
                 bound = visit(item, bound);
@@ -166,14 +208,34 @@ impl BoxTree {
     }
 
     /// Visits items whose boxes the ray enters, nearest entry first, leaving out those entered beyond the bound that
-    /// `visit` gave back last (in lengths of `direction`).
-    pub fn along_ray(&self, origin: DVec3, direction: DVec3, visit: impl FnMut(u32) -> f64) {
-        self.descend(|bounds| bounds.ray_entry(origin, direction), visit);
+    /// `visit` gave back last (in lengths of the ray's direction).
+    pub fn along_ray(&self, ray: &Ray, visit: impl FnMut(u32) -> f64) {
+        self.descend(f64::INFINITY, |bounds| bounds.ray_entry(ray), visit);
     }
 
-    fn descend(&self, entry: impl Fn(&Bounds) -> Option<f64>, mut visit: impl FnMut(u32) -> f64) {
+    /// As [`Self::along_ray`], along the whole line, ahead and behind, with a bound from the beginning.
+    pub fn along_line(&self, ray: &Ray, most: f64, visit: impl FnMut(u32) -> f64) {
+        self.descend(most, |bounds| bounds.line_entry(ray), visit);
+    }
+
+    /// Visits items whose boxes share a point with `bounds`.
+    pub fn meeting(&self, bounds: &Bounds, mut visit: impl FnMut(u32)) {
+        let entry = |other: &Bounds| other.meets(bounds).then_some(0.0);
+        self.descend(0.0, entry, |item| {
+            visit(item);
+            0.0
+        });
+    }
+
+    fn descend(
+        &self,
+        mut bound: f64,
+        entry: impl Fn(&Bounds) -> Option<f64>,
+        mut visit: impl FnMut(u32) -> f64,
+    ) {
         let Some(start) = self.nodes.first().and_then(|root| entry(&root.bounds)) else { return };
-        let (mut stack, mut bound) = (vec![(start, 0)], f64::INFINITY);
+        let mut stack = Stack::new();
+        stack.push((start, 0));
         while let Some((distance, i)) = stack.pop() {
             if distance > bound {
                 continue;
@@ -190,19 +252,18 @@ impl BoxTree {
         }
     }
 
-    fn push_children(
-        &self,
-        i: usize,
-        entry: &impl Fn(&Bounds) -> Option<f64>,
-        stack: &mut Vec<(f64, usize)>,
-    ) {
+    fn push_children(&self, i: usize, entry: &impl Fn(&Bounds) -> Option<f64>, stack: &mut Stack) {
         let children = [i + 1, self.nodes[i].link as usize];
         let [a, b] = children.map(|c| entry(&self.nodes[c].bounds).map(|distance| (distance, c)));
-        let near_last = match (a, b) {
-            (Some(x), Some(y)) if x.0 <= y.0 => [b, a],
-            _ => [a, b],
-        };
-        stack.extend(near_last.into_iter().flatten());
+        match (a, b) {
+            (Some(a), Some(b)) => {
+                let (near, far) = if a.0 <= b.0 { (a, b) } else { (b, a) };
+                stack.push(far);
+                stack.push(near);
+            }
+            (Some(only), None) | (None, Some(only)) => stack.push(only),
+            (None, None) => {}
+        }
     }
 
     fn items_of(&self, node: &Node) -> &[(Bounds, u32)] {
@@ -292,11 +353,13 @@ mod tests {
     #[test]
     fn a_ray_in_a_face_enters() {
         let unit = Bounds { min: Vec3::ZERO, max: Vec3::ONE };
-        let along = DVec3::new(1.0, 0.0, 0.0);
-        assert_eq!(unit.ray_entry(DVec3::new(-2.0, 0.0, 1.0), along), Some(2.0));
-        assert_eq!(unit.ray_entry(DVec3::new(0.5, 0.5, 0.5), along), Some(0.0));
-        assert_eq!(unit.ray_entry(DVec3::new(-2.0, 1.5, 0.5), along), None);
-        assert_eq!(unit.ray_entry(DVec3::new(2.0, 0.5, 0.5), along), None);
+        let entry = |x, y, z| unit.ray_entry(&Ray::new(DVec3::new(x, y, z), DVec3::X));
+        assert_eq!(entry(-2.0, 0.0, 1.0), Some(2.0));
+        assert_eq!(entry(0.5, 0.5, 0.5), Some(0.0));
+        assert_eq!(entry(-2.0, 1.5, 0.5), None);
+        assert_eq!(entry(2.0, 0.5, 0.5), None);
+        let nearly = Ray::new(DVec3::new(-2.0, 0.0, 1.0), DVec3::new(1.0, 1e-300, 0.0));
+        assert_eq!(unit.ray_entry(&nearly), Some(2.0));
     }
 
     #[test]

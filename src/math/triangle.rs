@@ -42,25 +42,42 @@ pub fn closest([a, b, c]: [Vec3; 3], p: Vec3) -> DVec3 {
     let size = normal.length_squared();
     let (v, w) = (normal.dot(ac.cross(a)) / size, normal.dot(a.cross(ab)) / size);
     let u = 1.0 - v - w;
-    // Not so for a quotient of zeros either.
-    if u >= 0.0 && v >= 0.0 && w >= 0.0 {
-        return DVec3::new(u, v, w);
+    let on_ab = || segment(a, b, |s| DVec3::new(1.0 - s, s, 0.0));
+    let on_bc = || segment(b, c, |s| DVec3::new(0.0, 1.0 - s, s));
+    let on_ca = || segment(c, a, |s| DVec3::new(s, 0.0, 1.0 - s));
+    let is_sliver = size <= SLIVER * ab.length_squared() * ac.length_squared();
+    // Lengths beyond the range leave no number.
+    if is_sliver || size.is_nan() {
+        return nearest([on_ab(), on_bc(), on_ca()]);
     }
-    closest_on_edges(a, b, c)
+    // Across one edge the nearest point is on it; beyond a corner, on one of two.
+    match [u < 0.0, v < 0.0, w < 0.0] {
+        [false, false, false] => DVec3::new(u, v, w),
+        [false, false, true] => on_ab().0,
+        [true, false, false] => on_bc().0,
+        [false, true, false] => on_ca().0,
+        [true, false, true] => nearest([on_ab(), on_bc()]),
+        [false, true, true] => nearest([on_ab(), on_ca()]),
+        // All three would not sum to one.
+        [true, true, _] => nearest([on_bc(), on_ca()]),
+    }
 }
 
-/// Nearest to the origin.
-fn closest_on_edges(a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
-    let [s, t, r] = [fraction(a, b), fraction(b, c), fraction(c, a)];
-    let candidates = [DVec3::new(1.0 - s, s, 0.0), DVec3::new(0.0, 1.0 - t, t), DVec3::new(r, 0.0, 1.0 - r)];
-    let distance = |k: &DVec3| (a * k.x + b * k.y + c * k.z).length_squared();
-    let [mut best, rest @ ..] = candidates;
-    for candidate in rest {
-        if distance(&candidate) < distance(&best) {
-            best = candidate;
-        }
-    }
-    best
+/// The squared sine of an angle below which a triangle is taken as its edges: which side of one a point is on is lost in
+/// rounding there.
+const SLIVER: f64 = 1e-12;
+
+/// The first of those with the least squared distance.
+fn nearest<const N: usize>(candidates: [(DVec3, f64); N]) -> DVec3 {
+    let nearer = |best: (DVec3, f64), next: (DVec3, f64)| if next.1 < best.1 { next } else { best };
+    candidates.into_iter().fold((DVec3::X, f64::INFINITY), nearer).0
+}
+
+/// The point of a segment nearest to the origin, as `barycentric` of how far along it is, and its squared distance.
+#[inline]
+fn segment(a: DVec3, b: DVec3, barycentric: impl Fn(f64) -> DVec3) -> (DVec3, f64) {
+    let s = fraction(a, b);
+    (barycentric(s), (a * (1.0 - s) + b * s).length_squared())
 }
 
 /// How far from `a` to `b` the segment's point nearest to the origin is, in 0..=1.
@@ -70,30 +87,63 @@ fn fraction(a: DVec3, b: DVec3) -> f64 {
     if size > 0.0 { (-a.dot(ab) / size).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Where a ray meets a triangle.
+/// Where a line meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RayHit {
-    /// In lengths of the ray's direction, not negative.
+pub struct LineHit {
+    /// In lengths of the line's direction; negative behind its origin.
     pub distance: f64,
     /// Of the triangle's corners.
     pub barycentric: DVec3,
 }
 
-/// Where the ray meets the triangle, from either side; `None` where it misses, or where the triangle is edge-on.
-///
-/// Two triangles that share an edge leave no gap between them: the test of the edge is the same number for both, with
-/// opposite signs, and zero belongs to both.
-pub fn ray_hit([a, b, c]: [Vec3; 3], origin: DVec3, direction: DVec3) -> Option<RayHit> {
-    let [a, b, c] = [a, b, c].map(|q| q.as_dvec3() - origin);
-    let weights = DVec3::new(direction.dot(c.cross(b)), direction.dot(a.cross(c)), direction.dot(b.cross(a)));
-    let sum = weights.x + weights.y + weights.z;
-    if sum == 0.0 || weights.cmplt(DVec3::ZERO).any() && weights.cmpgt(DVec3::ZERO).any() {
-        return None;
+/// A line made ready for many triangles: seen along it, by a shear that takes it to the axis it is nearest to (Woop, Benthin
+/// & Wald, *Watertight ray/triangle intersection*, 2013).
+#[derive(Clone, Copy, Debug)]
+pub struct Line {
+    origin: DVec3,
+    /// Two axes across, and the one along.
+    axes: [usize; 3],
+    /// How far the line goes along the first two on its way by one along the third.
+    tilt: [f64; 2],
+    /// Lengths of the direction to one along the third.
+    scale: f64,
+}
+
+impl Line {
+    /// Through `origin`; `direction` is of any length but 0.
+    pub fn new(origin: DVec3, direction: DVec3) -> Self {
+        let along = direction.abs().max_position();
+        let axes = [(along + 1) % 3, (along + 2) % 3, along];
+        let scale = 1.0 / direction[along];
+        Self { origin, axes, tilt: [direction[axes[0]] * scale, direction[axes[1]] * scale], scale }
     }
-    let barycentric = weights / sum;
-    let point = a * barycentric.x + b * barycentric.y + c * barycentric.z;
-    let distance = point.dot(direction) / direction.length_squared();
-    (distance >= 0.0).then_some(RayHit { distance, barycentric })
+
+    /// Where the line meets the triangle, from either side, ahead or behind; `None` where it misses, or where the triangle
+    /// is edge-on.
+    ///
+    /// Two triangles that share an edge leave no gap between them: the test of the edge is the same number for both, with
+    /// opposite signs, and zero belongs to both.
+    #[inline]
+    pub fn hit(&self, triangle: [Vec3; 3]) -> Option<LineHit> {
+        let [a, b, c] = triangle.map(|q| self.seen(q));
+        let across = |p: [f64; 3], q: [f64; 3]| p[0] * q[1] - p[1] * q[0];
+        let (u, v, w) = (across(b, c), across(c, a), across(a, b));
+        let sum = u + v + w;
+        if sum == 0.0 || (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+            return None;
+        }
+        let barycentric = DVec3::new(u, v, w) / sum;
+        let way = a[2] * barycentric.x + b[2] * barycentric.y + c[2] * barycentric.z;
+        Some(LineHit { distance: way * self.scale, barycentric })
+    }
+
+    /// Beside the line, and along it.
+    #[inline]
+    fn seen(&self, q: Vec3) -> [f64; 3] {
+        let p = (q.as_dvec3() - self.origin).to_array();
+        let [i, j, along] = self.axes;
+        [p[i] - self.tilt[0] * p[along], p[j] - self.tilt[1] * p[along], p[along]]
+    }
 }
 
 #[cfg(test)]
@@ -103,6 +153,10 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     const T: [Vec3; 3] = [Vec3::new(0.0, 0.0, 0.0), Vec3::new(4.0, 0.0, 0.0), Vec3::new(0.0, 3.0, 0.0)];
+
+    fn ray_hit(triangle: [Vec3; 3], origin: DVec3, direction: DVec3) -> Option<LineHit> {
+        Line::new(origin, direction).hit(triangle).filter(|hit| hit.distance >= 0.0)
+    }
 
     #[test]
     fn area_and_normal() {
@@ -132,6 +186,24 @@ mod tests {
         ] {
             let found = at(T, closest(T, p));
             assert!((found - expected).length() < 1e-12, "{p}: {found}");
+        }
+    }
+
+    #[test]
+    fn no_point_is_nearer() {
+        let mut random = crate::math::Random::new(4);
+        let mut vector = || Vec3::from_array(std::array::from_fn(|_| 2.0 * random.unit() as f32 - 1.0));
+        for k in 0..2000 {
+            // Acute and obtuse ones, needles and slivers.
+            let squash = [1.0, 0.1, 1e-3, 1e-6][k % 4];
+            let triangle = [vector(), vector(), vector()].map(|p| p * Vec3::new(1.0, squash, squash));
+            let p = vector() * Vec3::new(2.0, 2.0 * squash, 2.0);
+            let found = at(triangle, closest(triangle, p)).distance(p.as_dvec3());
+            for (i, j) in (0..=20).flat_map(|i| (0..=20 - i).map(move |j| (i, j))) {
+                let (u, v) = (f64::from(i) / 20.0, f64::from(j) / 20.0);
+                let other = at(triangle, DVec3::new(u, v, 1.0 - u - v)).distance(p.as_dvec3());
+                assert!(found <= other + 1e-9, "{triangle:?} {p}: {found} {other}");
+            }
         }
     }
 

@@ -29,8 +29,9 @@ mod refine;
 mod report;
 mod ring;
 #[cfg(test)]
-mod shapes;
+pub(crate) mod shapes;
 mod surgery;
+mod texture;
 mod triangles;
 mod tube;
 mod weld;
@@ -48,6 +49,7 @@ pub use measure::{Measures, measure};
 pub use report::{MeshReport, report};
 pub use ring::Ring;
 pub use surgery::{Cut, Joint};
+pub use texture::{ImageKind, Texture};
 pub use triangles::TriangleMesh;
 
 use crate::math::Vec3;

@@ -1,9 +1,10 @@
 //! A plain indexed triangle list, as files and graphics cards hold it.
 
-use super::MeshError;
 use super::edge_table::edge_uses;
 use super::groups::Groups;
+use super::{MeshError, Texture};
 use crate::math::{DAffine3, DVec3, Vec2, Vec3, triangle};
+use std::sync::Arc;
 
 /// Positions and triangles with optional extras; promises nothing about closedness.
 ///
@@ -23,11 +24,13 @@ pub struct TriangleMesh {
     pub corner_uvs: Option<Vec<[Vec2; 3]>>,
     /// Colours per vertex, rgb in 0..1.
     pub colors: Option<Vec<Vec3>>,
+    /// The picture that `uvs` or `corner_uvs` lay on the surface; shared by the meshes made from this one.
+    pub texture: Option<Arc<Texture>>,
 }
 
 impl TriangleMesh {
-    /// Nothing, where every triangle names vertices that exist, every position is finite, and every extra has its
-    /// length.
+    /// Nothing, where every triangle names vertices that exist, every position is finite, every extra has its length,
+    /// and a texture has its coordinates.
     ///
     /// # Errors
     /// [`MeshError::InvalidArgument`] that names the array and the first bad entry.
@@ -58,7 +61,22 @@ impl TriangleMesh {
                 return invalid(name, format!("has {found} entries; {expected} are accepted"));
             }
         }
+        if self.texture.is_some() && !self.has_uvs() {
+            return invalid("texture", "there are no texture coordinates; a texture needs uvs".into());
+        }
         Ok(())
+    }
+
+    /// Whether there are texture coordinates of either kind.
+    pub fn has_uvs(&self) -> bool {
+        self.uvs.is_some() || self.corner_uvs.is_some()
+    }
+
+    /// Texture coordinates counted from the other edge of the picture, v as 1 − v, to single precision.
+    pub(crate) fn turn_v_over(&mut self) {
+        let turn = |uv: &mut Vec2| uv.y = 1.0 - uv.y;
+        self.uvs.iter_mut().flatten().for_each(turn);
+        self.corner_uvs.iter_mut().flatten().flatten().for_each(turn);
     }
 
     /// The corners of each triangle. Indices must exist, as [`TriangleMesh::validate`] makes sure.
@@ -127,6 +145,7 @@ impl TriangleMesh {
             uvs: self.uvs.as_ref().map(|all| gather(all, vertices)),
             corner_uvs: None,
             colors: self.colors.as_ref().map(|all| gather(all, vertices)),
+            texture: self.texture.clone(),
         }
     }
 
@@ -139,6 +158,17 @@ impl TriangleMesh {
             triangle.iter().for_each(|&v| sums[v as usize] += normal);
         }
         sums.into_iter().map(|sum| sum.normalize_or_zero().as_vec3()).collect()
+    }
+
+    /// Texture coordinates per vertex: at a seam those of one of its sides, which stretches the texture over the triangles
+    /// of the others. [`Self::split_at_seams`] has them right, with more vertices.
+    pub fn uvs_of_one_side(&self) -> Option<Vec<Vec2>> {
+        let Some(corner_uvs) = &self.corner_uvs else { return self.uvs.clone() };
+        let mut uvs = vec![Vec2::ZERO; self.positions.len()];
+        for (&v, &uv) in self.triangles.as_flattened().iter().zip(corner_uvs.as_flattened()) {
+            uvs[v as usize] = uv;
+        }
+        Some(uvs)
     }
 
     /// The mesh with as many vertices as texture needs: one for each different pair of position and texture

@@ -5,20 +5,26 @@
 //! (`edges`), vertices in contact are joined (`contact`), and again until all bounds hold; what is left after
 //! eight rounds stays queued for the next call. Small parts without volume are removed (`specks`).
 //!
-//! [`decimate`] makes a mesh at rest coarser, without a change of topology.
+//! [`decimate`] makes a mesh at rest coarser, [`remesh`] makes its triangles alike; neither changes its topology.
 
 mod changes;
 mod contact;
 mod decimate;
 mod edges;
 mod embedding;
+mod isotropic;
 mod obstacles;
 mod resolve;
+mod restructure;
 mod sampling;
 mod specks;
 
 pub use changes::Changes;
 pub use decimate::decimate;
 pub use embedding::Embedding;
-pub use resolve::{Resolver, Waiting};
+pub use isotropic::remesh;
+pub use resolve::{Contact, Resolver, Waiting};
+pub use restructure::{
+    EdgeBounds, Edits, Trusting, collapse_short, flip_for_valence, restructure, split_long,
+};
 pub use sampling::Sampling;

@@ -22,6 +22,7 @@ const LEAST_EFFORT: u64 = 100_000;
 #[derive(Clone, Debug)]
 pub struct Resolver {
     most_vertices: usize,
+    contact: Contact,
     full: bool,
     /// [`Embedding::effort`] at which this call ends.
     pub(super) most_effort: u64,
@@ -38,6 +39,16 @@ pub struct Resolver {
     pub(super) edited: Vec<VertexId>,
     pub(super) embedding: Embedding,
     pub(super) changes: Changes,
+}
+
+/// What becomes of vertices in contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Contact {
+    /// A tube is made between them.
+    #[default]
+    Join,
+    /// They press against each other.
+    Leave,
 }
 
 /// Vertices that the last call left over, in order.
@@ -62,6 +73,7 @@ impl Resolver {
     pub fn with_room_for(most_vertices: usize) -> Self {
         Self {
             most_vertices,
+            contact: Contact::Join,
             full: false,
             most_effort: 0,
             queue: VecDeque::new(),
@@ -74,6 +86,17 @@ impl Resolver {
             embedding: Embedding::default(),
             changes: Changes::default(),
         }
+    }
+
+    /// What becomes of vertices in contact from now on.
+    pub fn set_contact(&mut self, contact: Contact) {
+        self.contact = contact;
+    }
+
+    /// What keeps the mesh from crossing itself, for edits beside these.
+    pub fn guard(&mut self, mesh: &Mesh, sampling: Sampling) -> &mut Embedding {
+        self.embedding.follow_with(mesh, sampling.longest());
+        &mut self.embedding
     }
 
     /// The number of vertices from which on no edge is split.
@@ -111,9 +134,12 @@ impl Resolver {
         for _ in 0..PASSES {
             self.settle_edges(mesh, sampling);
             // Between edges out of bounds nearly every pair of vertices is in contact, and joins make it worse.
-            if self.is_waiting() || !self.join_contacts(mesh, sampling) {
+            if self.is_waiting() || self.contact == Contact::Leave || !self.join_contacts(mesh, sampling) {
                 break;
             }
+        }
+        if self.contact == Contact::Leave {
+            self.take_stirred();
         }
         self.note_small_parts(mesh, sampling);
         self.changes

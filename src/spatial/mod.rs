@@ -1,13 +1,17 @@
 //! Finding what is near: points by points, triangles by points, rays and planes, surfaces by surfaces.
 
 mod distance;
+mod march;
 mod points;
 mod section;
 mod stars;
+mod sweep;
 mod tree;
 
 pub use distance::{SurfaceDistance, surface_distance};
+pub use march::Terrain;
 pub use points::PointGrid;
 pub use section::cross_section;
 pub use stars::{Nearness, Star, StarGrid};
-pub use tree::{SurfacePoint, TriangleTree};
+pub use sweep::near_pairs;
+pub use tree::{FirstHit, SurfacePoint, TriangleTree};

@@ -18,11 +18,16 @@ const LOAD: usize = 2;
 /// The level of a vertex that is not in the grid.
 const ABSENT: u32 = u32::MAX;
 
+/// No vertex.
+const NONE: u32 = u32::MAX;
+
 /// Vertices in a hashed grid, each on a level of cells as coarse as its star: the longest edge at the vertex.
 ///
 /// A vertex is entered, moved and removed one at a time, so that the grid follows a mesh of which little changes. It may
 /// also lag behind: searches find what they should as long as no vertex is further than `blur` from where it was entered.
 /// What they find comes in an order that depends on what happened before; nobody may rely on it.
+///
+/// Where the whole mesh changes, cells are emptied first and filled when something is searched for, if ever.
 #[derive(Clone, Debug, Default)]
 pub struct StarGrid {
     blur: f32,
@@ -33,7 +38,10 @@ pub struct StarGrid {
     /// How many vertices are on each level.
     population: [u32; LEVELS],
     mask: u32,
-    buckets: Vec<Vec<Star>>,
+    /// By bucket, the vertex entered last.
+    heads: Vec<u32>,
+    /// Whether vertices are in their buckets.
+    filled: bool,
     /// By vertex slot.
     places: Vec<Place>,
 }
@@ -47,7 +55,6 @@ pub struct Star {
     pub longest: f32,
     /// Its name.
     pub vertex: VertexId,
-    key: u32,
 }
 
 /// The cell of a vertex: its level and the hash of its coordinates, of which the last bits name the bucket.
@@ -57,6 +64,8 @@ struct Place {
     key: u32,
     position: Vec3,
     longest: f32,
+    /// The vertex entered before it into the same bucket.
+    next: u32,
 }
 
 /// How near two stars are that are said to be near each other.
@@ -79,7 +88,7 @@ impl Nearness {
     }
 }
 
-const NOWHERE: Place = Place { level: ABSENT, key: 0, position: Vec3::ZERO, longest: 0.0 };
+const NOWHERE: Place = Place { level: ABSENT, key: 0, position: Vec3::ZERO, longest: 0.0, next: NONE };
 
 impl StarGrid {
     /// An empty grid, fastest for stars whose longest edge is somewhat below `edge` (positive), with room for
@@ -92,7 +101,7 @@ impl StarGrid {
             grid.inverse_cell[level] = 1.0 / (CELL * bound);
             bound *= FACTOR;
         }
-        grid.make_buckets(vertices);
+        grid.places = vec![NOWHERE; vertices];
         grid
     }
 
@@ -100,29 +109,59 @@ impl StarGrid {
     pub fn set(&mut self, v: VertexId, position: Vec3, longest: f32) {
         if v.index() >= self.places.len() {
             self.places.resize(v.index() + 1, NOWHERE);
-            if self.places.len() > 2 * LOAD * self.buckets.len() {
-                self.make_buckets(self.places.len());
-            }
+            // Chains got long: they are made anew when next needed.
+            self.filled &= self.places.len() <= 2 * LOAD * self.heads.len();
         }
         let level = self.level_of(longest);
-        if longest > self.reach[level] {
-            self.reach[level] = longest;
-        }
-        let key = self.key(self.cell(position, level), level);
-        let old = std::mem::replace(
-            &mut self.places[v.index()],
-            Place { level: level as u32, key, position, longest },
-        );
-        let entry = Star { position, longest, vertex: v, key };
-        if (old.level, old.key) == (level as u32, key) {
-            if let Some(there) = self.bucket_mut(key).iter_mut().find(|there| there.vertex == v) {
-                *there = entry;
+        let old = self.places[v.index()];
+        let mut place = Place { level: level as u32, position, longest, ..old };
+        if self.filled {
+            if longest > self.reach[level] {
+                self.reach[level] = longest;
             }
+            place.key = self.key(self.cell(position, level), level);
+            if (old.level, old.key) != (place.level, place.key) {
+                self.leave(v, old);
+                self.population[level] += 1;
+                let head = self.head_mut(place.key);
+                place.next = std::mem::replace(head, v.0);
+            }
+        }
+        self.places[v.index()] = place;
+    }
+
+    /// Takes all vertices out of their cells, until [`Self::fill_cells`]. So long they are entered and moved in no time, and
+    /// searches look at all of them.
+    pub fn empty_cells(&mut self) {
+        self.filled = false;
+    }
+
+    /// Puts all vertices into their cells, if they are not there.
+    pub fn fill_cells(&mut self) {
+        if self.filled {
             return;
         }
-        self.leave(v, old);
-        self.population[level] += 1;
-        self.bucket_mut(key).push(entry);
+        let count = (self.places.len() / LOAD).max(64).next_power_of_two();
+        self.mask = count as u32 - 1;
+        self.heads.clear();
+        self.heads.resize(count, NONE);
+        (self.population, self.reach) = ([0; LEVELS], [0.0; LEVELS]);
+        // Backwards, so that chains go on in the order of memory.
+        for i in (0..self.places.len()).rev() {
+            let Place { level, position, longest, .. } = self.places[i];
+            if level == ABSENT {
+                continue;
+            }
+            let level = level as usize;
+            self.population[level] += 1;
+            if longest > self.reach[level] {
+                self.reach[level] = longest;
+            }
+            let key = self.key(self.cell(position, level), level);
+            let next = std::mem::replace(self.head_mut(key), i as u32);
+            self.places[i] = Place { key, next, ..self.places[i] };
+        }
+        self.filled = true;
     }
 
     /// Tells that `v`, which is in the grid, has an edge as long as `edge`.
@@ -145,6 +184,13 @@ impl StarGrid {
         self.places[v.index()].longest
     }
 
+    /// `v`, which is in the grid, as it was entered.
+    #[inline]
+    pub fn star(&self, v: VertexId) -> Star {
+        let Place { position, longest, .. } = self.places[v.index()];
+        Star { position, longest, vertex: v }
+    }
+
     /// Takes `v` out, if it is in.
     pub fn remove(&mut self, v: VertexId) {
         if let Some(place) = self.places.get_mut(v.index()) {
@@ -153,14 +199,24 @@ impl StarGrid {
         }
     }
 
+    /// Takes `v` out of the bucket of `old`, its place there.
     fn leave(&mut self, v: VertexId, old: Place) {
-        if old.level == ABSENT {
+        if old.level == ABSENT || !self.filled {
             return;
         }
         self.population[old.level as usize] -= 1;
-        let bucket = self.bucket_mut(old.key);
-        if let Some(at) = bucket.iter().position(|entry| entry.vertex == v) {
-            bucket.swap_remove(at);
+        let mut at = *self.head_mut(old.key);
+        if at == v.0 {
+            *self.head_mut(old.key) = old.next;
+            return;
+        }
+        while at != NONE {
+            let entry = &mut self.places[at as usize];
+            if entry.next == v.0 {
+                entry.next = old.next;
+                return;
+            }
+            at = entry.next;
         }
     }
 
@@ -188,7 +244,7 @@ impl StarGrid {
         self.search(bounds, radius, &mut |star: &Star| found.push(*star));
     }
 
-    /// Names the cell of `v`, which is in the grid; others may have the same name.
+    /// Names the cell of `v`, which is in the grid with its cells filled; others may have the same name.
     #[inline]
     pub fn cell_name(&self, v: VertexId) -> u32 {
         self.places[v.index()].key
@@ -197,10 +253,23 @@ impl StarGrid {
     /// Calls `found` with every vertex that may be within `radius(longest edge of its level)` of the box, axis by axis.
     #[inline]
     fn search(&self, bounds: &Bounds, radius: impl Fn(f32) -> f32, found: &mut impl FnMut(&Star)) {
+        if !self.filled {
+            return self.search_unfilled(bounds, radius, found);
+        }
         for level in (0..LEVELS).filter(|&level| self.population[level] > 0) {
             let around = Vec3::splat(radius(self.reach[level]) + self.blur);
             let wide = Bounds { min: bounds.min - around, max: bounds.max + around };
             self.search_level(level, &wide, found);
+        }
+    }
+
+    fn search_unfilled(&self, bounds: &Bounds, radius: impl Fn(f32) -> f32, found: &mut impl FnMut(&Star)) {
+        for (i, place) in self.places.iter().enumerate().filter(|(_, place)| place.level != ABSENT) {
+            let around = Vec3::splat(radius(place.longest) + self.blur);
+            let wide = Bounds { min: bounds.min - around, max: bounds.max + around };
+            if wide.contains(place.position) {
+                found(&self.star(VertexId::from_index(i)));
+            }
         }
     }
 
@@ -224,15 +293,20 @@ impl StarGrid {
     /// Vertices of other cells in the same bucket are passed over, so that none is found twice.
     #[inline]
     fn search_cell(&self, key: u32, wide: &Bounds, found: &mut impl FnMut(&Star)) {
-        let bucket = &self.buckets[(key & self.mask) as usize];
-        bucket.iter().filter(|entry| entry.key == key && wide.contains(entry.position)).for_each(found);
+        let mut at = self.heads[(key & self.mask) as usize];
+        while at != NONE {
+            let &Place { position, longest, next, .. } = &self.places[at as usize];
+            if self.places[at as usize].key == key && wide.contains(position) {
+                found(&Star { position, longest, vertex: VertexId(at) });
+            }
+            at = next;
+        }
     }
 
     fn search_all(&self, level: usize, wide: &Bounds, found: &mut impl FnMut(&Star)) {
         for (i, place) in self.places.iter().enumerate() {
             if place.level as usize == level && wide.contains(place.position) {
-                let &Place { key, position, longest, .. } = place;
-                found(&Star { position, longest, vertex: VertexId::from_index(i), key });
+                found(&self.star(VertexId::from_index(i)));
             }
         }
     }
@@ -255,22 +329,8 @@ impl StarGrid {
     }
 
     #[inline]
-    fn bucket_mut(&mut self, key: u32) -> &mut Vec<Star> {
-        &mut self.buckets[(key & self.mask) as usize]
-    }
-
-    /// Buckets for so many vertices; those that are there are put into them.
-    fn make_buckets(&mut self, vertices: usize) {
-        let count = (vertices / LOAD).max(64).next_power_of_two();
-        self.mask = count as u32 - 1;
-        self.buckets = vec![Vec::new(); count];
-        for i in 0..self.places.len() {
-            let Place { level, key, position, longest } = self.places[i];
-            if level != ABSENT {
-                let vertex = VertexId::from_index(i);
-                self.bucket_mut(key).push(Star { position, longest, vertex, key });
-            }
-        }
+    fn head_mut(&mut self, key: u32) -> &mut u32 {
+        &mut self.heads[(key & self.mask) as usize]
     }
 }
 
@@ -297,11 +357,17 @@ mod tests {
     /// Where vertices are now, with their longest edges; `None` for those taken out.
     type Known = Vec<Option<(Vec3, f32)>>;
 
-    /// Enters, moves and takes out vertices at random; most stars are ordinary, some tiny, some huge.
+    /// Enters, moves and takes out vertices at random, with cells filled and empty; most stars are ordinary, some tiny, some
+    /// huge.
     fn shuffled(grid: &mut StarGrid, next: &mut impl FnMut() -> f32) -> Known {
         let mut known: Known = vec![None; 600];
         for _ in 0..3000 {
             let v = (next() * 600.0) as usize;
+            match next() {
+                x if x < 0.002 => grid.empty_cells(),
+                x if x < 0.01 => grid.fill_cells(),
+                _ => {}
+            }
             if next() < 0.2 {
                 grid.remove(VertexId::from_index(v));
                 known[v] = None;
@@ -332,7 +398,10 @@ mod tests {
         for edge in [0.01, 1.0, 30.0] {
             let mut grid = StarGrid::new(edge, 0.0, 10);
             let known = shuffled(&mut grid, &mut next);
-            for _ in 0..100 {
+            for turn in 0..100 {
+                if turn == 20 {
+                    grid.fill_cells();
+                }
                 let p = Vec3::new(next(), next(), next()) * 24.0 - 12.0;
                 let mut found = Vec::new();
                 grid.near_point(p, 1.5, |v| found.push(v.index()));
@@ -360,6 +429,7 @@ mod tests {
         let mut next = numbers(4);
         let mut grid = StarGrid::new(1.0, 0.25, 10);
         let mut known = shuffled(&mut grid, &mut next);
+        grid.fill_cells();
         for entry in known.iter_mut().flatten() {
             let shift = Vec3::new(next(), next(), next()) - 0.5;
             entry.0 += shift * (0.25 / shift.length());

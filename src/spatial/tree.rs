@@ -1,6 +1,7 @@
 //! The triangle nearest to a point, and the first one a ray meets.
 
-use crate::math::{Bounds, BoxTree, DVec3, Vec3, triangle};
+use crate::math::triangle::{self, Line, LineHit};
+use crate::math::{Bounds, BoxTree, DVec3, Ray, Vec3};
 use crate::mesh::{MeshError, TriangleMesh};
 
 /// A tree over the triangles of a mesh as it was when the tree was made.
@@ -35,6 +36,11 @@ impl TriangleTree {
         Ok(Self { boxes: BoxTree::new(&bounds), corners })
     }
 
+    /// A tree over nothing.
+    pub(super) fn empty() -> Self {
+        Self { boxes: BoxTree::default(), corners: Vec::new() }
+    }
+
     /// The point of the surface nearest to `p`; `None` where there are no triangles, or `p` is not finite.
     pub fn closest(&self, p: Vec3) -> Option<SurfacePoint> {
         if !p.is_finite() {
@@ -50,31 +56,80 @@ impl TriangleTree {
             }
             if distance < bound { distance } else { bound }
         });
-        best.map(|(squared, item, barycentric)| self.surface_point(item, barycentric, squared.sqrt()))
+        best.map(|(squared, item, barycentric)| {
+            SurfacePoint::on(item, self.corners[item as usize], barycentric, squared.sqrt())
+        })
     }
 
     /// Where the ray from `origin` along `direction` (of any length) first meets the surface, from either side;
     /// `None` where it does not, where `direction` is zero or where either is not finite.
     pub fn ray_hit(&self, origin: Vec3, direction: Vec3) -> Option<SurfacePoint> {
-        let (origin, direction) = (origin.as_dvec3(), direction.as_dvec3().try_normalize()?);
-        if !origin.is_finite() {
-            return None;
-        }
-        let mut best: Option<(f64, u32, DVec3)> = None;
-        self.boxes.along_ray(origin, direction, |item| {
-            if let Some(hit) = triangle::ray_hit(self.corners[item as usize], origin, direction)
-                && best.is_none_or(|(d, t, _)| (hit.distance, item) < (d, t))
-            {
-                best = Some((hit.distance, item, hit.barycentric));
-            }
-            best.map_or(f64::INFINITY, |(distance, ..)| distance)
+        let (origin, direction) = finite(origin, direction)?;
+        let (line, mut first) = (Line::new(origin, direction), FirstHit::within(f64::INFINITY));
+        self.boxes.along_ray(&Ray::new(origin, direction), |item| {
+            let hit = line.hit(self.corners[item as usize]);
+            first.look_at(item, hit.filter(|hit| hit.distance >= 0.0))
         });
-        best.map(|(distance, item, barycentric)| self.surface_point(item, barycentric, distance))
+        first.found(|item| self.corners[item as usize])
     }
 
-    fn surface_point(&self, item: u32, barycentric: DVec3, distance: f64) -> SurfacePoint {
-        let point = triangle::at(self.corners[item as usize], barycentric).as_vec3();
-        SurfacePoint { triangle: item, barycentric: barycentric.as_vec3(), point, distance }
+    /// Where the line through `origin` along `direction` meets the surface nearest to `origin`, no further than `most`
+    /// away; its `distance` is negative behind. Else as [`Self::ray_hit`].
+    pub fn line_hit(&self, origin: Vec3, direction: Vec3, most: f64) -> Option<SurfacePoint> {
+        let (origin, direction) = finite(origin, direction)?;
+        let (line, mut first) = (Line::new(origin, direction), FirstHit::within(most));
+        self.boxes.along_line(&Ray::new(origin, direction), most, |item| {
+            first.look_at(item, line.hit(self.corners[item as usize]))
+        });
+        first.found(|item| self.corners[item as usize])
+    }
+
+    /// Calls `visit` with every triangle that has a box with a point in common with `bounds`.
+    pub fn meeting(&self, bounds: &Bounds, visit: impl FnMut(u32)) {
+        self.boxes.meeting(bounds, visit);
+    }
+}
+
+impl SurfacePoint {
+    fn on(triangle: u32, corners: [Vec3; 3], barycentric: DVec3, distance: f64) -> Self {
+        let point = triangle::at(corners, barycentric).as_vec3();
+        Self { triangle, barycentric: barycentric.as_vec3(), point, distance }
+    }
+}
+
+/// Origin and direction of a ray, that of length 1; `None` where there is none.
+fn finite(origin: Vec3, direction: Vec3) -> Option<(DVec3, DVec3)> {
+    let direction = direction.as_dvec3().try_normalize()?;
+    origin.is_finite().then(|| (origin.as_dvec3(), direction))
+}
+
+/// The hit nearest to the origin so far; ties go to the lower index.
+pub struct FirstHit {
+    most: f64,
+    found: Option<(u32, LineHit)>,
+}
+
+impl FirstHit {
+    /// Of those no further away than `most`.
+    pub fn within(most: f64) -> Self {
+        Self { most, found: None }
+    }
+
+    /// Takes the hit of an item into account, and gives back how far away others are to be looked for.
+    #[inline]
+    pub fn look_at(&mut self, item: u32, hit: Option<LineHit>) -> f64 {
+        let Some(hit) = hit else { return self.most };
+        let distance = hit.distance.abs();
+        if distance < self.most || distance == self.most && self.found.is_none_or(|(first, _)| item < first) {
+            (self.most, self.found) = (distance, Some((item, hit)));
+        }
+        self.most
+    }
+
+    /// Where that is, on a triangle with those corners.
+    pub fn found(&self, corners: impl FnOnce(u32) -> [Vec3; 3]) -> Option<SurfacePoint> {
+        let (item, hit) = self.found?;
+        Some(SurfacePoint::on(item, corners(item), hit.barycentric, hit.distance))
     }
 }
 
@@ -123,11 +178,22 @@ mod tests {
         for pair in points.windows(2) {
             let (origin, direction) = (pair[0], pair[1] - pair[0]);
             let unit = direction.as_dvec3().normalize();
-            let distances = mesh.corners().filter_map(|c| triangle::ray_hit(c, origin.as_dvec3(), unit));
-            let expected = distances.map(|hit| hit.distance).min_by(f64::total_cmp);
+            let line = Line::new(origin.as_dvec3(), unit);
+            let distances = mesh.corners().filter_map(|c| line.hit(c)).map(|hit| hit.distance);
+            let expected = distances.filter(|&distance| distance >= 0.0).min_by(f64::total_cmp);
             let found = tree.ray_hit(origin, direction);
             assert_eq!(found.map(|hit| hit.distance), expected);
             hits += usize::from(found.is_some());
+
+            let behind = tree.ray_hit(origin, -direction);
+            let nearest =
+                [found, behind].into_iter().flatten().map(|hit| hit.distance).min_by(f64::total_cmp);
+            let on_line = tree.line_hit(origin, direction, f64::INFINITY);
+            assert_eq!(on_line.map(|hit| hit.distance.abs()), nearest);
+            let is_ahead = found.is_some() && found.map(|hit| hit.distance) == nearest;
+            assert!(on_line.is_none_or(|hit| (hit.distance > 0.0) == is_ahead));
+            let half = nearest.unwrap_or(1.0) * 0.5;
+            assert_eq!(tree.line_hit(origin, direction, half), None);
         }
         assert!(hits > 30, "{hits}");
     }
@@ -148,6 +214,20 @@ mod tests {
     }
 
     #[test]
+    fn boxes_that_meet_are_all_found() {
+        let (mesh, points) = scattered();
+        let tree = TriangleTree::new(&mesh).unwrap();
+        for pair in points.windows(2) {
+            let bounds = Bounds::of(pair);
+            let mut found = Vec::new();
+            tree.meeting(&bounds, |t| found.push(t));
+            found.sort_unstable();
+            let meets = |t: &u32| Bounds::of(&mesh.corners().nth(*t as usize).unwrap()).meets(&bounds);
+            assert_eq!(found, (0..mesh.triangles.len() as u32).filter(meets).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
     fn nothing_to_find() {
         let empty = TriangleTree::new(&TriangleMesh::default()).unwrap();
         assert_eq!(empty.closest(Vec3::ZERO), None);
@@ -156,6 +236,7 @@ mod tests {
         let tree = TriangleTree::new(&mesh).unwrap();
         assert_eq!(tree.ray_hit(Vec3::ZERO, Vec3::ZERO), None);
         assert_eq!(tree.ray_hit(Vec3::NAN, Vec3::X), None);
+        assert_eq!(tree.line_hit(Vec3::NAN, Vec3::X, 1.0), None);
         assert_eq!(tree.closest(Vec3::INFINITY), None);
     }
 }

@@ -2,6 +2,8 @@
 #![allow(dead_code, reason = "each test file uses a part of it")]
 #![allow(clippy::panic, clippy::print_stdout, reason = "the lints spare tests, but not their helpers")]
 
+pub mod skins;
+
 use std::f32::consts::TAU;
 use std::f64::consts::PI;
 use std::ops::Range;

@@ -8,8 +8,9 @@
 //! - a corner of one is a neighbour of a corner of the other: around each edge (`star`);
 //! - else two corners that are no neighbours are near each other: the end P of an edge of length `a` that meets a
 //!   triangle with edges up to `b` and that corner A of the triangle which is nearest to the meeting point have
-//!   |PA|² ≤ a²/4 + b²/3 for one of the two ends (`motion`).
+//!   |PA|² ≤ a²/4 + b²/3 for one of the two ends (`look`).
 
+mod look;
 mod motion;
 mod patch;
 mod refine;
@@ -17,7 +18,7 @@ mod star;
 
 use crate::mesh::{EditError, Mesh, VertexId};
 use crate::spatial::StarGrid;
-use motion::UNKNOWN;
+use look::UNKNOWN;
 use star::longest_edge;
 
 /// 1/√3, rounded up: the distance of a point of a triangle from its nearest corner, in the triangle's longest edge.
@@ -46,6 +47,8 @@ pub struct Embedding {
     doubtful: Vec<VertexId>,
     /// The version of the mesh's geometry that is known here.
     version: Option<u32>,
+    /// The version at which all of it was entered in the grid.
+    entered: Option<u32>,
     /// A vertex is marked where its entry is the newest mark.
     marks: Vec<u32>,
     newest: u32,
@@ -61,11 +64,17 @@ impl Embedding {
             self.edge = edge;
             self.version = None;
         }
-        self.follow(mesh);
+        self.know(mesh);
     }
 
     /// Follows `mesh`, whatever was done to it since the last time.
     pub fn follow(&mut self, mesh: &Mesh) {
+        self.know(mesh);
+        self.grid.fill_cells();
+    }
+
+    /// Follows `mesh`, without the cells of the grid, which a look at all of it does not need.
+    fn know(&mut self, mesh: &Mesh) {
         if self.version == Some(mesh.geometry_version()) {
             return;
         }
@@ -75,6 +84,7 @@ impl Embedding {
             self.grid.set(v, mesh.position(v), longest_edge(mesh, v));
         }
         self.version = Some(mesh.geometry_version());
+        self.entered = self.version;
     }
 
     /// Makes an edit, or several as one, and takes it back where triangles would cross.

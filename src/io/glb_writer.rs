@@ -1,0 +1,217 @@
+//! Writing of GLB: meshes and pictures as parts of one buffer, and the JSON that says where they are.
+
+use super::glb::container;
+use super::mesh_file::push_floats;
+use crate::math::{Bounds, Vec2, Vec3};
+use crate::mesh::{ImageKind, MeshError, Texture, TriangleMesh};
+use std::sync::Arc;
+
+/// What the arrays of vertices and of indices are for, in the words of WebGL.
+const VERTICES: Option<u32> = Some(34962);
+const INDICES: Option<u32> = Some(34963);
+
+/// One node with one primitive: positions, normals (made where there are none), and what else there is. Without
+/// triangles, a scene with an empty node.
+///
+/// # Errors
+/// [`MeshError::TooLarge`] where there is no memory for it.
+pub(super) fn write(mesh: &TriangleMesh) -> Result<Vec<u8>, MeshError> {
+    let mut parts = Parts::default();
+    let node = if mesh.triangles.is_empty() {
+        String::from("{}")
+    } else {
+        format!(r#"{{"mesh":{}}}"#, parts.mesh(mesh)?)
+    };
+    parts.nodes.push(node);
+    parts.finish("")
+}
+
+/// A document as far as it is written.
+#[derive(Default)]
+pub(super) struct Parts {
+    bytes: Vec<u8>,
+    views: Vec<String>,
+    accessors: Vec<String>,
+    meshes: Vec<String>,
+    pub(super) nodes: Vec<String>,
+    textures: Vec<Arc<Texture>>,
+    images: Vec<String>,
+}
+
+impl Parts {
+    /// Adds a mesh with its picture, and gives back its number.
+    ///
+    /// # Errors
+    /// [`MeshError::TooLarge`] where the file would pass 4 GiB, or there is no memory for it; no mesh is added then.
+    pub(super) fn mesh(&mut self, mesh: &TriangleMesh) -> Result<usize, MeshError> {
+        let material = mesh.texture.as_ref().map(|texture| self.material(texture)).transpose()?;
+        let mesh = mesh.split_at_seams();
+        self.reserve(44 * mesh.positions.len() + 12 * mesh.triangles.len())?;
+        let indices = self.indices(&mesh.triangles);
+        let attributes = self.attributes(&mesh);
+        let material = material.map_or(String::new(), |number| format!(r#","material":{number}"#));
+        self.meshes.push(format!(
+            r#"{{"primitives":[{{"attributes":{{{attributes}}},"indices":{indices},"mode":4{material}}}]}}"#
+        ));
+        Ok(self.meshes.len() - 1)
+    }
+
+    fn attributes(&mut self, mesh: &TriangleMesh) -> String {
+        let bounds = Bounds::of(&mesh.positions);
+        let [min, max] = [bounds.min, bounds.max].map(|p| format!("[{:?},{:?},{:?}]", p.x, p.y, p.z));
+        let position =
+            self.vectors(mesh.positions.iter().copied(), VERTICES, &format!(r#","min":{min},"max":{max}"#));
+        // The format wants unit normals: up, where a vertex has none.
+        let unit = |n: &Vec3| n.try_normalize().unwrap_or(Vec3::Z);
+        let made = mesh.normals.is_none().then(|| mesh.vertex_normals());
+        let normals = mesh.normals.as_ref().or(made.as_ref());
+        let normal = self.vectors(normals.map_or(&[][..], Vec::as_slice).iter().map(unit), VERTICES, "");
+        let mut attributes = format!(r#""POSITION":{position},"NORMAL":{normal}"#);
+        if let Some(uvs) = &mesh.uvs {
+            attributes += &format!(r#","TEXCOORD_0":{}"#, self.coordinates(uvs));
+        }
+        if let Some(colors) = &mesh.colors {
+            let clamped = colors.iter().map(|c| c.clamp(Vec3::ZERO, Vec3::ONE));
+            attributes += &format!(r#","COLOR_0":{}"#, self.vectors(clamped, VERTICES, ""));
+        }
+        attributes
+    }
+
+    fn indices(&mut self, triangles: &[[u32; 3]]) -> usize {
+        let start = self.bytes.len();
+        triangles.as_flattened().iter().for_each(|v| self.bytes.extend(v.to_le_bytes()));
+        self.accessor(start, INDICES, [5125, 3 * triangles.len()], "SCALAR", "")
+    }
+
+    fn coordinates(&mut self, uvs: &[Vec2]) -> usize {
+        let start = self.bytes.len();
+        uvs.iter().for_each(|uv| push_floats(&mut self.bytes, &uv.to_array()));
+        self.accessor(start, VERTICES, [5126, uvs.len()], "VEC2", "")
+    }
+
+    /// The number of an accessor of vectors; `more` is what its JSON says besides.
+    pub(super) fn vectors(
+        &mut self,
+        vectors: impl ExactSizeIterator<Item = Vec3>,
+        target: Option<u32>,
+        more: &str,
+    ) -> usize {
+        let (start, count) = (self.bytes.len(), vectors.len());
+        vectors.for_each(|v| push_floats(&mut self.bytes, &v.to_array()));
+        self.accessor(start, target, [5126, count], "VEC3", more)
+    }
+
+    /// The number of an accessor of numbers that go up.
+    pub(super) fn times(&mut self, times: &[f32]) -> usize {
+        let start = self.bytes.len();
+        push_floats(&mut self.bytes, times);
+        let [first, last] = [times.first(), times.last()].map(|time| time.copied().unwrap_or(0.0));
+        let bounds = format!(r#","min":[{first:?}],"max":[{last:?}]"#);
+        self.accessor(start, None, [5126, times.len()], "SCALAR", &bounds)
+    }
+
+    /// A view and an accessor from byte `start` to the end; gives back the accessor's number.
+    fn accessor(
+        &mut self,
+        start: usize,
+        target: Option<u32>,
+        [component, count]: [usize; 2],
+        kind: &str,
+        more: &str,
+    ) -> usize {
+        let view = self.view(start, target);
+        self.accessors.push(format!(
+            r#"{{"bufferView":{view},"componentType":{component},"count":{count},"type":"{kind}"{more}}}"#
+        ));
+        self.accessors.len() - 1
+    }
+
+    fn view(&mut self, start: usize, target: Option<u32>) -> usize {
+        let length = self.bytes.len() - start;
+        let target = target.map_or(String::new(), |target| format!(r#","target":{target}"#));
+        self.views.push(format!(r#"{{"buffer":0,"byteOffset":{start},"byteLength":{length}{target}}}"#));
+        self.views.len() - 1
+    }
+
+    /// The number of the material with that picture; each picture is stored once.
+    fn material(&mut self, texture: &Arc<Texture>) -> Result<usize, MeshError> {
+        if let Some(known) = self.textures.iter().position(|known| known == texture) {
+            return Ok(known);
+        }
+        self.reserve(texture.bytes().len() + 3)?;
+        let start = self.bytes.len();
+        self.bytes.extend(texture.bytes());
+        let view = self.view(start, None);
+        // Arrays of numbers begin at multiples of four bytes.
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        let kind = texture.kind().media_type();
+        self.images.push(format!(r#"{{"bufferView":{view},"mimeType":"{kind}"}}"#));
+        self.textures.push(Arc::clone(texture));
+        Ok(self.textures.len() - 1)
+    }
+
+    /// Room for more bytes, so that running out of memory is an error and no crash.
+    fn reserve(&mut self, more: usize) -> Result<(), MeshError> {
+        let bytes = self.bytes.len() as u64 + more as u64;
+        let fits = bytes <= u64::from(u32::MAX) && self.bytes.try_reserve(more).is_ok();
+        if fits { Ok(()) } else { Err(MeshError::TooLarge { bytes }) }
+    }
+
+    /// The file, with all nodes side by side in one scene; `more` is what the JSON holds besides.
+    ///
+    /// # Errors
+    /// [`MeshError::TooLarge`] where the file would pass 4 GiB, or there is no memory for it.
+    pub(super) fn finish(mut self, more: &str) -> Result<Vec<u8>, MeshError> {
+        let mut json = String::from(r#"{"asset":{"version":"2.0","generator":"vesicle"},"scene":0"#);
+        let nodes: Vec<String> = (0..self.nodes.len()).map(|node| node.to_string()).collect();
+        json += &format!(r#","scenes":[{{"nodes":[{}]}}]"#, nodes.join(","));
+        json += more;
+        json += &self.looks();
+        let buffers = [format!(r#"{{"byteLength":{}}}"#, self.bytes.len())];
+        let buffers = if self.bytes.is_empty() { &[][..] } else { &buffers };
+        for (name, entries) in [
+            ("nodes", self.nodes.as_slice()),
+            ("meshes", &self.meshes),
+            ("accessors", &self.accessors),
+            ("bufferViews", &self.views),
+            ("buffers", buffers),
+        ] {
+            json += &table(name, entries);
+        }
+        container(json + "}", std::mem::take(&mut self.bytes))
+    }
+
+    /// Materials and pictures. WebP is not in glTF itself, and said to be needed.
+    fn looks(&self) -> String {
+        let is_webp = |texture: &Arc<Texture>| texture.kind() == ImageKind::Webp;
+        let (mut materials, mut textures) = (Vec::new(), Vec::new());
+        for (number, texture) in self.textures.iter().enumerate() {
+            // A metal, as without the factor, shows little of its own colour.
+            materials.push(format!(
+                r#"{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":{number}}},"metallicFactor":0}}}}"#
+            ));
+            let source = format!(r#""source":{number}"#);
+            let webp = format!(r#""extensions":{{"EXT_texture_webp":{{{source}}}}}"#);
+            let source = if is_webp(texture) { webp } else { source };
+            textures.push(format!(r#"{{"sampler":0,{source}}}"#));
+        }
+        let repeat = [String::from(r#"{"wrapS":10497,"wrapT":10497}"#)];
+        let samplers = if textures.is_empty() { &[][..] } else { &repeat };
+        let names = [String::from(r#""EXT_texture_webp""#)];
+        let extensions = if self.textures.iter().any(is_webp) { &names[..] } else { &[] };
+        [
+            table("extensionsUsed", extensions),
+            table("extensionsRequired", extensions),
+            table("materials", &materials),
+            table("textures", &textures),
+            table("samplers", samplers),
+            table("images", &self.images),
+        ]
+        .concat()
+    }
+}
+
+/// A list in the JSON; none where it would be empty, which the format does not allow.
+pub(super) fn table(name: &str, entries: &[String]) -> String {
+    if entries.is_empty() { String::new() } else { format!(r#","{name}":[{}]"#, entries.join(",")) }
+}

@@ -1,0 +1,101 @@
+//! The base colour texture of a glTF primitive: the picture, and how its coordinates are found.
+
+use super::glb::FORMAT;
+use super::gltf::{Document, numbers, required, unsigned};
+use super::{FormatError, base64};
+use crate::math::Vec2;
+use crate::mesh::Texture;
+use serde_json::Value;
+
+/// What the material of a primitive says of its base colour.
+pub(super) struct BaseColor<'a> {
+    texture: &'a Value,
+    /// Which set of texture coordinates it goes by.
+    pub(super) set: u64,
+    placing: Option<Placing>,
+}
+
+/// What `KHR_texture_transform` does to coordinates: scales, turns, moves.
+struct Placing {
+    scale: [f64; 2],
+    /// Cosine and sine of an angle, against the clock as one looks at the picture.
+    turn: [f64; 2],
+    offset: [f64; 2],
+}
+
+impl<'a> BaseColor<'a> {
+    /// That of a primitive; `None` where it has no texture.
+    ///
+    /// # Errors
+    /// Indices of nothing, and a transform that is not of numbers.
+    pub(super) fn of(document: &Document<'a>, primitive: &Value) -> Result<Option<Self>, FormatError> {
+        let Some(material) = unsigned(primitive, "material")? else { return Ok(None) };
+        let info = &document.entry("materials", material)?["pbrMetallicRoughness"]["baseColorTexture"];
+        if info.is_null() {
+            return Ok(None);
+        }
+        let texture = document.entry("textures", required(info, "index", "baseColorTexture")?)?;
+        let transform = &info["extensions"]["KHR_texture_transform"];
+        let own_set = unsigned(transform, "texCoord")?;
+        let set = own_set.or(unsigned(info, "texCoord")?).unwrap_or(0);
+        let placing = (!transform.is_null()).then(|| Placing::parse(transform)).transpose()?;
+        Ok(Some(Self { texture, set, placing }))
+    }
+
+    /// Where in the picture the coordinates of a vertex lead.
+    pub(super) fn place(&self, uv: Vec2) -> Vec2 {
+        self.placing.as_ref().map_or(uv, |placing| placing.of(uv))
+    }
+
+    /// The picture; `None` where it is a file of its own, or in another encoding than PNG, JPEG and WebP.
+    ///
+    /// # Errors
+    /// Indices and ranges that are not there, and a data address that cannot be decoded.
+    pub(super) fn texture(&self, document: &Document<'a>) -> Result<Option<Texture>, FormatError> {
+        let webp = &self.texture["extensions"]["EXT_texture_webp"];
+        let Some(source) = unsigned(self.texture, "source")?.or(unsigned(webp, "source")?) else {
+            return Ok(None);
+        };
+        let image = document.entry("images", source)?;
+        let bytes = match (unsigned(image, "bufferView")?, image["uri"].as_str()) {
+            (Some(view), _) => document.view(view)?.bytes.to_vec(),
+            (None, Some(address)) if address.starts_with("data:") => inline(address, source)?,
+            _ => return Ok(None),
+        };
+        Ok(Texture::new(bytes).ok())
+    }
+}
+
+impl Placing {
+    fn parse(transform: &Value) -> Result<Self, FormatError> {
+        let field = |name: &str| format!("KHR_texture_transform.{name}");
+        let pair = |name: &str| numbers::<2>(&transform[name], || field(name));
+        let angle = transform["rotation"].as_f64().unwrap_or(0.0);
+        Ok(Self {
+            scale: pair("scale")?.unwrap_or([1.0; 2]),
+            turn: [libm::cos(angle), libm::sin(angle)],
+            offset: pair("offset")?.unwrap_or([0.0; 2]),
+        })
+    }
+
+    /// By the extension's first example, and as three.js and the Khronos viewer do it; the matrix in the draft of the
+    /// extension turns the other way.
+    fn of(&self, uv: Vec2) -> Vec2 {
+        let [u, v] = [f64::from(uv.x) * self.scale[0], f64::from(uv.y) * self.scale[1]];
+        let [cosine, sine] = self.turn;
+        let turned = [cosine * u + sine * v, cosine * v - sine * u];
+        Vec2::new((turned[0] + self.offset[0]) as f32, (turned[1] + self.offset[1]) as f32)
+    }
+}
+
+/// The bytes that a data address holds.
+fn inline(address: &str, image: u64) -> Result<Vec<u8>, FormatError> {
+    let coded = address.split_once(',').filter(|(head, _)| head.ends_with(";base64"));
+    coded.and_then(|(_, text)| base64::decode(text)).ok_or_else(|| {
+        FormatError::invalid(
+            FORMAT,
+            format!("images[{image}].uri"),
+            "is no base64; data of that kind is accepted",
+        )
+    })
+}

@@ -1,0 +1,56 @@
+//! How far triangles around a new place are from an old one.
+
+use crate::math::{Vec3, triangle};
+use smallvec::SmallVec;
+
+/// The squared cosine of the angle from the mean normal up to which triangles count as flat: they then cover what was
+/// there, and the distance from their planes is no less than that from them.
+const FLAT: f32 = 0.5;
+
+/// The triangles that would stand around `to` in place of others around `from`.
+pub(super) struct Fan {
+    from: Vec3,
+    to: Vec3,
+    /// The other two corners of each, and its normal.
+    sides: SmallVec<[(Vec3, Vec3, Vec3); 12]>,
+    sum: Vec3,
+}
+
+impl Fan {
+    pub fn new(from: Vec3, to: Vec3) -> Self {
+        Self { from, to, sides: SmallVec::new(), sum: Vec3::ZERO }
+    }
+
+    /// Adds a triangle and returns its normal, twice its area long.
+    pub fn push(&mut self, a: Vec3, b: Vec3) -> Vec3 {
+        let normal = (a - self.to).cross(b - self.to);
+        self.sides.push((a, b, normal));
+        self.sum += normal;
+        normal
+    }
+
+    /// How far the old place is from the triangles, or a little less than it may be.
+    pub fn gap(&self) -> f32 {
+        let (sum, squared) = (self.sum, self.sum.length_squared());
+        let mut most = 0.0;
+        for &(_, _, normal) in &self.sides {
+            let (cosine, size) = (normal.dot(sum), normal.length_squared());
+            if cosine <= 0.0 || cosine * cosine < FLAT * size * squared {
+                return self.exact_gap();
+            }
+            let height = normal.dot(self.from - self.to);
+            let square = height * height / size;
+            most = if square > most { square } else { most };
+        }
+        most.sqrt()
+    }
+
+    fn exact_gap(&self) -> f32 {
+        let distance = |&(a, b, _): &(Vec3, Vec3, Vec3)| {
+            let corners = [self.to, a, b];
+            triangle::at(corners, triangle::closest(corners, self.from))
+                .distance_squared(self.from.as_dvec3())
+        };
+        self.sides.iter().map(distance).fold(f64::INFINITY, f64::min).sqrt() as f32
+    }
+}

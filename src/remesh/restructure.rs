@@ -1,0 +1,325 @@
+//! Edges into bounds and valences towards six (Kobbelt, Bareuther & Seidel, *Multiresolution shape deformations for
+//! meshes with dynamic vertex connectivity*, section 4).
+//!
+//! Guarantees: closed, oriented and manifold stays so, with the same components and χ; no triangle turns by more than
+//! 78°; no collapse makes an edge longer than the upper bound, nor a vertex with fewer than four neighbours. Not
+//! guaranteed: that all edges come into bounds, nor, with [`Trusting`] edits, that nothing crosses.
+
+use super::{Changes, Embedding};
+use crate::math::{Vec3, triangle};
+use crate::mesh::{EditError, Mesh, MeshError, Opposite, VertexId};
+
+/// The least and the greatest length of an edge (ε_min and ε_max of the paper).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeBounds {
+    /// Shorter edges are drawn together.
+    pub min: f32,
+    /// Longer edges are split: more than twice `min`, so that halves stay in bounds.
+    pub max: f32,
+}
+
+impl EdgeBounds {
+    /// Both bounds `factor` times as long.
+    pub fn scaled(self, factor: f32) -> Self {
+        Self { min: self.min * factor, max: self.max * factor }
+    }
+}
+
+/// Vertices that a mesh may get, and the memory that one takes while they are made: what fits a browser.
+pub(super) const MOST_VERTICES: usize = 8_000_000;
+const BYTES_PER_VERTEX: f64 = 250.0;
+
+/// Vertices of equilateral triangles to an area, in squared edges: 2 / √3.
+const VERTICES_PER_AREA: f64 = 1.1547;
+
+impl EdgeBounds {
+    /// Tests the bounds against each other, and that a mesh with the shape of `mesh` and such edges can be held.
+    ///
+    /// # Errors
+    /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice as much;
+    /// [`MeshError::TooLarge`] where more than eight million vertices would be needed.
+    pub fn check_for(self, mesh: &Mesh) -> Result<(), MeshError> {
+        let Self { min, max } = self;
+        // Not so for NaN either.
+        if !(min > 0.0 && max > 2.0 * min && max.is_finite()) {
+            let problem = format!(
+                "min {min} and max {max}; a min above 0 and a finite max of more than twice as much are needed"
+            );
+            return Err(MeshError::InvalidArgument { parameter: "edge", problem });
+        }
+        let area: f64 = mesh.triangles().map(|corners| triangle::area(mesh.facet(corners).points)).sum();
+        // Needles have edges to be split and hardly an area.
+        let length = |(u, v)| mesh.position(u).as_dvec3().distance(mesh.position(v).as_dvec3());
+        let length: f64 = mesh.edges().map(length).sum();
+        let [min, max] = [min, max].map(f64::from);
+        let vertices = VERTICES_PER_AREA * area / (min * max) + length / max;
+        if vertices < MOST_VERTICES as f64 {
+            return Ok(());
+        }
+        Err(MeshError::TooLarge { bytes: bytes(vertices) })
+    }
+}
+
+/// The memory of so many vertices.
+pub(super) fn bytes(vertices: f64) -> u64 {
+    // Beyond the range it is the largest number.
+    (vertices * BYTES_PER_VERTEX) as u64
+}
+
+/// How edits are made: at once, or only where nothing would cross.
+pub trait Edits {
+    /// Makes an edit, or leaves the mesh as it was.
+    ///
+    /// # Errors
+    /// That of the edit, or why it was taken back.
+    fn attempt<T>(
+        &mut self,
+        mesh: &mut Mesh,
+        edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
+    ) -> Result<T, EditError>;
+
+    /// Whether `gone` may be drawn into `kept`, as far as the mesh's own tests allow it.
+    fn may_collapse(&mut self, _mesh: &Mesh, _kept: VertexId, _gone: VertexId) -> bool {
+        true
+    }
+
+    /// Whether the edge between `ends` may become the one `across`, as far as the mesh's own tests allow it.
+    fn may_flip(&mut self, _mesh: &Mesh, _ends: [VertexId; 2], _across: [VertexId; 2]) -> bool {
+        true
+    }
+
+    /// Hears that the edge that was asked about last was drawn together into `kept`.
+    fn collapsed(&mut self, _kept: VertexId) {}
+
+    /// Hears that `fresh` now stands between `u` and its other end.
+    fn was_split(&mut self, _fresh: VertexId, _u: VertexId) {}
+}
+
+/// Edits are made whatever they cross: ten times as fast as with an [`Embedding`]. Whoever takes it looks at the outcome.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Trusting;
+
+impl Edits for Trusting {
+    fn attempt<T>(
+        &mut self,
+        mesh: &mut Mesh,
+        edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
+    ) -> Result<T, EditError> {
+        edit(mesh)
+    }
+}
+
+impl Edits for Embedding {
+    fn attempt<T>(
+        &mut self,
+        mesh: &mut Mesh,
+        edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
+    ) -> Result<T, EditError> {
+        Self::attempt(self, mesh, edit)
+    }
+}
+
+/// The cosine of the angle that a triangle may turn by in an edit. With less, folds come up where many edits follow each
+/// other; with more, edges on ridges stay out of bounds.
+const LEAST_COSINE: f32 = 0.2;
+
+/// A collapse leaves no vertex with fewer neighbours: three would lie in the middle of a triangle.
+pub(super) const LEAST_VALENCE: usize = 4;
+
+/// No vertex gets more: among many short edges it would grow without a bound, and rings are searched linearly.
+const MOST_VALENCE: usize = 16;
+
+/// Passes of one kind in one call. Each halves the longest edges, so this many reach any bound there can be; flips never
+/// needed more than six.
+const PASSES: usize = 24;
+
+/// One round: short edges are drawn together, long ones split, edges flipped where that brings valences nearer to six.
+/// Edits refused for any reason are left out.
+pub fn restructure(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Edits) -> Changes {
+    let mut changes = collapse_short(mesh, bounds, edits);
+    changes += split_long(mesh, bounds, usize::MAX, edits);
+    changes += flip_for_valence(mesh, bounds, edits);
+    changes
+}
+
+/// Draws edges shorter than the lower bound together into the end of higher valence, else into the other (figure 4).
+pub fn collapse_short(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Edits) -> Changes {
+    let mut changes = Changes::default();
+    let shortest = bounds.min * bounds.min;
+    for slot in 0..mesh.slots() {
+        let u = VertexId::from_index(slot);
+        // Whoever stays is looked at again until none of its edges can be drawn together.
+        while let Some((kept, gone)) = short_edge(mesh, u, shortest, |kept, gone| {
+            may_collapse(mesh, bounds, kept, gone) && edits.may_collapse(mesh, kept, gone)
+        }) {
+            let place = mesh.position(kept);
+            if edits.attempt(mesh, |mesh| mesh.collapse(kept, gone, place)).is_err() {
+                break;
+            }
+            edits.collapsed(kept);
+            changes.deletions += 1;
+        }
+    }
+    changes
+}
+
+/// The first edge at `u` that is too short and may be drawn together: the end that stays, and the one that goes.
+fn short_edge(
+    mesh: &Mesh,
+    u: VertexId,
+    shortest: f32,
+    mut may: impl FnMut(VertexId, VertexId) -> bool,
+) -> Option<(VertexId, VertexId)> {
+    if !mesh.is_live(u) {
+        return None;
+    }
+    let from = mesh.position(u);
+    let short = |v: &&VertexId| from.distance_squared(mesh.position(**v)) < shortest;
+    mesh.ring(u).as_slice().iter().filter(short).find_map(|&v| {
+        let u_stays = mesh.ring(u).valence() >= mesh.ring(v).valence();
+        let (kept, gone) = if u_stays { (u, v) } else { (v, u) };
+        [(kept, gone), (gone, kept)].into_iter().find(|&(kept, gone)| may(kept, gone))
+    })
+}
+
+/// Whether `gone` may be drawn into `kept`.
+pub(super) fn may_collapse(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone: VertexId) -> bool {
+    let Ok(Opposite { left, right }) = mesh.can_collapse(kept, gone) else { return false };
+    let valences = mesh.ring(kept).valence() + mesh.ring(gone).valence() - 4;
+    let keeps_valences = (LEAST_VALENCE..=MOST_VALENCE).contains(&valences)
+        && [left, right].iter().all(|&w| mesh.ring(w).valence() > LEAST_VALENCE);
+    keeps_valences && may_move(mesh, bounds, kept, gone)
+}
+
+/// Whether the star of `gone` may be drawn to the place of `kept`: no edge gets too long and no triangle turns over.
+fn may_move(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone: VertexId) -> bool {
+    let (to, from) = (mesh.position(kept), mesh.position(gone));
+    let longest = bounds.max * bounds.max;
+    mesh.ring(gone).pairs().all(|(a, b)| {
+        if a == kept || b == kept {
+            return true;
+        }
+        let (p, q) = (mesh.position(a), mesh.position(b));
+        let fits = p.distance_squared(to) <= longest && q.distance_squared(to) <= longest;
+        fits && faces_alike((p - from).cross(q - from), (p - to).cross(q - to))
+    })
+}
+
+/// Whether two normals, of any length but 0, are within the angle that a triangle may turn by.
+pub(super) fn faces_alike(before: Vec3, after: Vec3) -> bool {
+    let cosine = before.dot(after);
+    // Squares instead of roots; the comparison fails for NaN.
+    cosine > 0.0
+        && cosine * cosine > LEAST_COSINE * LEAST_COSINE * before.length_squared() * after.length_squared()
+}
+
+/// Splits edges longer than the upper bound in the middle, longest first, until none is left (figure 5) or the mesh has
+/// `most` vertices.
+pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut impl Edits) -> Changes {
+    let mut changes = Changes::default();
+    let longest = bounds.max * bounds.max;
+    for _ in 0..PASSES {
+        let before = changes.creations;
+        let square = |(u, v): (VertexId, VertexId)| mesh.position(u).distance_squared(mesh.position(v));
+        let all = mesh.edges().map(|edge| (square(edge), edge));
+        let mut long: Vec<_> = all.filter(|&(square, _)| square > longest).collect();
+        long.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        for (_, (u, v)) in long {
+            if mesh.vertex_count() >= most {
+                return changes;
+            }
+            let middle = (mesh.position(u) + mesh.position(v)) * 0.5;
+            if let Ok(fresh) = edits.attempt(mesh, |mesh| mesh.split(u, v, middle)) {
+                edits.was_split(fresh, u);
+                changes.creations += 1;
+            }
+        }
+        if changes.creations == before {
+            break;
+        }
+    }
+    changes
+}
+
+/// Flips edges where Σ (valence − 6)² over the four corners around them falls (figure 6), again until none is left.
+pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Edits) -> Changes {
+    let mut changes = Changes::default();
+    // Vertices with an edge that may have become worth a flip since they were looked at.
+    let mut stale = vec![true; mesh.slots()];
+    for _ in 0..PASSES {
+        let before = changes.inversions;
+        for slot in 0..mesh.slots() {
+            if !std::mem::replace(&mut stale[slot], false) {
+                continue;
+            }
+            let u = VertexId::from_index(slot);
+            let mut k = 0;
+            while let Some(&v) = mesh.ring(u).as_slice().get(k) {
+                k += 1;
+                if u < v && flip_if_wanted(mesh, bounds, [u, v], edits, &mut stale) {
+                    changes.inversions += 1;
+                    k -= 1;
+                }
+            }
+        }
+        if changes.inversions == before {
+            break;
+        }
+    }
+    changes
+}
+
+/// Flips the edge where that is worth it, and marks the vertices of all edges whose four corners have changed.
+fn flip_if_wanted(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    [u, v]: [VertexId; 2],
+    edits: &mut impl Edits,
+    stale: &mut [bool],
+) -> bool {
+    let Ok(Opposite { left, right }) = mesh.opposite(u, v) else { return false };
+    if !wants_flip(mesh, bounds, [u, v], [left, right], edits)
+        || edits.attempt(mesh, |mesh| mesh.flip(u, v)).is_err()
+    {
+        return false;
+    }
+    for corner in [u, v, left, right] {
+        stale[corner.index()] = true;
+        mesh.ring(corner).as_slice().iter().for_each(|w| stale[w.index()] = true);
+    }
+    true
+}
+
+fn wants_flip(
+    mesh: &Mesh,
+    bounds: EdgeBounds,
+    [u, v]: [VertexId; 2],
+    [left, right]: [VertexId; 2],
+    edits: &mut impl Edits,
+) -> bool {
+    let excess = |w: VertexId, change: i32| {
+        let over = mesh.ring(w).valence() as i32 + change - 6;
+        over * over
+    };
+    let now = excess(u, 0) + excess(v, 0) + excess(left, 0) + excess(right, 0);
+    let then = excess(u, -1) + excess(v, -1) + excess(left, 1) + excess(right, 1);
+    then < now
+        && mesh.ring(u).valence() > LEAST_VALENCE
+        && mesh.ring(v).valence() > LEAST_VALENCE
+        && may_flip(mesh, bounds, [u, v], [left, right])
+        && edits.may_flip(mesh, [u, v], [left, right])
+}
+
+/// Whether the new edge is in bounds, or nearer to them than the old one, and neither triangle turns over.
+pub(super) fn may_flip(mesh: &Mesh, bounds: EdgeBounds, ends: [VertexId; 2], across: [VertexId; 2]) -> bool {
+    let [[p, q], [a, b]] = [ends, across].map(|pair| pair.map(|v| mesh.position(v)));
+    let (old, new) = (p.distance_squared(q), a.distance_squared(b));
+    let (shortest, longest) = (bounds.min * bounds.min, bounds.max * bounds.max);
+    if new > longest && new >= old || new < shortest && new <= old {
+        return false;
+    }
+    // p q a and q p b become p b a and q a b.
+    let before = [(q - p).cross(a - p), (b - p).cross(q - p)];
+    let after = [(b - p).cross(a - p), (a - q).cross(b - q)];
+    before.into_iter().all(|old| after.into_iter().all(|new| faces_alike(old, new)))
+}

@@ -1,0 +1,227 @@
+//! The nearest point of a closed surface, found by marching over it from a triangle that is near (Kobbelt, Bareuther &
+//! Seidel, *Multiresolution shape deformations for meshes with dynamic vertex connectivity*, section 8).
+
+use super::{SurfacePoint, TriangleTree};
+use crate::math::{DVec3, Vec3, triangle};
+use crate::mesh::{MeshError, TriangleMesh};
+use std::cell::OnceCell;
+
+/// A surface at rest that many points are projected onto, one near the other.
+///
+/// Marching goes to a neighbour as long as that is nearer, so it ends at a place that is nearer than all around it. That
+/// need not be the nearest of all: where it could not be, [`Self::closest`] asks a tree, which is made when first needed.
+#[derive(Clone, Debug)]
+pub struct Terrain {
+    mesh: TriangleMesh,
+    /// For each triangle the one across the edge opposite each corner.
+    across: Vec<[u32; 3]>,
+    tree: OnceCell<TriangleTree>,
+}
+
+impl Terrain {
+    /// The surface of a closed, oriented, manifold mesh.
+    ///
+    /// # Errors
+    /// As [`TriangleMesh::validate`]; [`MeshError::NotClosed`] where an edge has no triangle on its other side.
+    pub fn new(mesh: TriangleMesh) -> Result<Self, MeshError> {
+        mesh.validate()?;
+        let across = neighbours(&mesh)?;
+        Ok(Self { mesh, across, tree: OnceCell::new() })
+    }
+
+    /// The mesh it was made of.
+    pub fn mesh(&self) -> &TriangleMesh {
+        &self.mesh
+    }
+
+    /// The corners of a triangle.
+    #[inline]
+    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        self.mesh.triangles[triangle as usize].map(|v| self.mesh.positions[v as usize])
+    }
+
+    /// The value at a point of one that is given per vertex.
+    #[inline]
+    pub fn blend(&self, values: &[Vec3], at: &SurfacePoint) -> Vec3 {
+        let [a, b, c] = self.mesh.triangles[at.triangle as usize].map(|v| values[v as usize]);
+        a * at.barycentric.x + b * at.barycentric.y + c * at.barycentric.z
+    }
+
+    /// The point nearest to `p`; `None` where `p` is not finite.
+    pub fn closest(&self, p: Vec3) -> Option<SurfacePoint> {
+        self.tree().closest(p)
+    }
+
+    /// The tree over its triangles.
+    pub fn tree(&self) -> &TriangleTree {
+        // The mesh was found valid before.
+        self.tree.get_or_init(|| TriangleTree::new(&self.mesh).unwrap_or_else(|_| TriangleTree::empty()))
+    }
+
+    /// The nearest point by looking at every triangle: for one point, when there is no tree yet.
+    pub fn closest_of_all(&self, p: Vec3) -> Option<SurfacePoint> {
+        let found = |t: u32| self.nearest_on(t, p);
+        (0..self.mesh.triangles.len() as u32)
+            .map(found)
+            .min_by(|a, b| a.square.total_cmp(&b.square))
+            .filter(|found| found.square.is_finite())
+            .map(|found| self.point(&found))
+    }
+
+    /// A point that is nearer to `p` than all around it, by marching from `start`, the name of a triangle.
+    pub fn march(&self, start: u32, p: Vec3) -> SurfacePoint {
+        let mut here = self.nearest_on(start, p);
+        while let Some(next) = self.step(&here, p) {
+            here = next;
+        }
+        self.point(&here)
+    }
+
+    /// The nearest point of the triangles around the edge or corner that the nearest of this one is on, if that is nearer.
+    fn step(&self, here: &Nearest, p: Vec3) -> Option<Nearest> {
+        let weights = here.barycentric.to_array();
+        let zeros = weights.iter().filter(|&&weight| weight == 0.0).count();
+        let best = match zeros {
+            0 => return None,
+            1 => {
+                let k = weights.iter().position(|&weight| weight == 0.0)?;
+                self.nearest_on(self.across[here.triangle as usize][k], p)
+            }
+            _ => self.nearest_around(here.triangle, weights.iter().position(|&weight| weight > 0.0)?, p),
+        };
+        // Strictly, so that marching ends.
+        (best.square < here.square).then_some(best)
+    }
+
+    /// The nearest point of the triangles around a corner.
+    fn nearest_around(&self, start: u32, corner: usize, p: Vec3) -> Nearest {
+        let hub = self.mesh.triangles[start as usize][corner];
+        let mut best = self.nearest_on(start, p);
+        let (mut t, mut k) = (start, corner);
+        // On a manifold the way round is shorter.
+        for _ in 0..self.across.len() {
+            // Across the edge from the hub to the next corner.
+            t = self.across[t as usize][(k + 2) % 3];
+            if t == start {
+                break;
+            }
+            k = self.mesh.triangles[t as usize].iter().position(|&v| v == hub).unwrap_or(0);
+            let found = self.nearest_on(t, p);
+            if found.square < best.square {
+                best = found;
+            }
+        }
+        best
+    }
+
+    #[inline]
+    fn nearest_on(&self, triangle: u32, p: Vec3) -> Nearest {
+        let corners = self.corners(triangle);
+        let barycentric = triangle::closest(corners, p);
+        let square = triangle::at(corners, barycentric).distance_squared(p.as_dvec3());
+        Nearest { triangle, barycentric, square }
+    }
+
+    fn point(&self, found: &Nearest) -> SurfacePoint {
+        SurfacePoint {
+            triangle: found.triangle,
+            barycentric: found.barycentric.as_vec3(),
+            point: triangle::at(self.corners(found.triangle), found.barycentric).as_vec3(),
+            distance: found.square.sqrt(),
+        }
+    }
+}
+
+/// The nearest point of one triangle.
+#[derive(Clone, Copy, Debug)]
+struct Nearest {
+    triangle: u32,
+    barycentric: DVec3,
+    /// The squared distance.
+    square: f64,
+}
+
+/// For each triangle the one across the edge opposite each corner.
+fn neighbours(mesh: &TriangleMesh) -> Result<Vec<[u32; 3]>, MeshError> {
+    let (first, sides) = sides_by_start(mesh);
+    let across = |from: u32, to: u32| {
+        let around = &sides[first[from as usize] as usize..first[from as usize + 1] as usize];
+        around.iter().find(|side| side.0 == to).map(|side| side.1)
+    };
+    let all = mesh.triangles.iter().map(|&[a, b, c]| {
+        let beyond = [across(c, b), across(a, c), across(b, a)];
+        let [Some(x), Some(y), Some(z)] = beyond else {
+            let problem = format!("an edge of the triangle {:?} has no other side", [a, b, c]);
+            return Err(MeshError::NotClosed { problem });
+        };
+        Ok([x, y, z])
+    });
+    all.collect()
+}
+
+/// The end and the triangle of every side of a triangle, by the vertex it starts at: where those of each begin, and all.
+fn sides_by_start(mesh: &TriangleMesh) -> (Vec<u32>, Vec<(u32, u32)>) {
+    let mut first = vec![0_u32; mesh.positions.len() + 1];
+    mesh.triangles.iter().flatten().for_each(|&v| first[v as usize + 1] += 1);
+    for v in 0..mesh.positions.len() {
+        first[v + 1] += first[v];
+    }
+    let mut next = first.clone();
+    let mut sides = vec![(0, 0); 3 * mesh.triangles.len()];
+    for (&[a, b, c], triangle) in mesh.triangles.iter().zip(0..) {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            sides[next[from as usize] as usize] = (to, triangle);
+            next[from as usize] += 1;
+        }
+    }
+    (first, sides)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    use crate::mesh::Mesh;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn ball() -> Terrain {
+        Terrain::new(Mesh::icosphere(Vec3::new(1.0, 2.0, 3.0), 2.0, 0.2).unwrap().to_triangles()).unwrap()
+    }
+
+    #[test]
+    fn on_a_ball_marching_from_anywhere_ends_at_the_nearest_point() {
+        let terrain = ball();
+        let mut random = Random::new(5);
+        for start in 0..terrain.mesh().triangles.len() as u32 {
+            let way = Vec3::from_array(std::array::from_fn(|_| random.unit() as f32 - 0.5));
+            let p = Vec3::new(1.0, 2.0, 3.0) + way.normalize() * 2.5;
+            let (found, expected) = (terrain.march(start, p), terrain.closest(p).unwrap());
+            assert!((found.distance - expected.distance).abs() < 1e-6, "{start}");
+            assert_eq!(terrain.closest_of_all(p), Some(expected));
+            let again = terrain.blend(&terrain.mesh().positions, &found);
+            assert!(again.distance(found.point) < 1e-5);
+        }
+    }
+
+    #[test]
+    fn it_ends_on_edges_and_at_corners() {
+        let cube = crate::mesh::Mesh::icosahedron(Vec3::ZERO, 1.0).to_triangles();
+        let terrain = Terrain::new(cube.clone()).unwrap();
+        for start in 0..20 {
+            for &corner in &cube.positions {
+                assert!(terrain.march(start, corner * 3.0).point.distance(corner) < 1e-6);
+            }
+            let [a, b, _] = terrain.corners(7);
+            let middle = (a + b) * 0.5;
+            assert!(terrain.march(start, middle * 3.0).point.distance(middle) < 1e-6);
+        }
+    }
+
+    #[test]
+    fn an_open_surface_is_refused() {
+        let mut open = Mesh::icosahedron(Vec3::ZERO, 1.0).to_triangles();
+        open.triangles.pop();
+        assert!(matches!(Terrain::new(open), Err(MeshError::NotClosed { .. })));
+    }
+}

@@ -1,0 +1,314 @@
+//! All pairs of stars that are near each other, found in one sweep.
+//!
+//! Stars are put into classes by size. Those of a class are swept over each other, then over the smaller ones around them:
+//! so tiny stars beside a huge one are not compared with each other in cells made for it. In a class space is cut into
+//! columns as wide as its reach; stars are sorted by column and height, and of two columns side by side each star meets
+//! the few that are at its height. All of it lies in flat arrays, and each pair is met once.
+
+use super::stars::{Nearness, Star};
+
+/// The largest stars of the first class, in the star in the middle. With less, the few long edges of an ordinary mesh need
+/// a class of their own; with more, all of its columns are wide because of them.
+const FIRST: f32 = 1.6;
+
+/// From class to class, the largest stars in those of the class before. With less there are more classes to look through,
+/// with more the smallest stars of a class meet many in vain.
+const FACTOR: f32 = 4.0;
+
+/// Columns are so much wider than the reach of their class: stars further apart than one column are further apart than it,
+/// whatever rounding does to their places in columns.
+const WIDER: f64 = 1.001;
+
+/// Columns end here in both directions, so that all have neighbours. They are counted from the origin: at this distance a
+/// column is finer than the steps of single precision, unless its stars are smaller than them.
+const LAST: f64 = 1_073_741_824.0;
+
+/// Bits for each column around a large star, in the filter of small ones: fewer let more of the others through.
+const BITS: usize = 8;
+
+/// Calls `found` once with every pair of `stars` that are no further apart than [`Nearness::between`], in an order that
+/// follows from theirs, but says nothing.
+pub fn near_pairs(stars: Vec<Star>, near: Nearness, mut found: impl FnMut(&Star, &Star)) {
+    let mut bound = FIRST * middle(&stars);
+    let (mut smaller, mut left) = (Vec::new(), stars);
+    while !left.is_empty() {
+        let (class, larger): (Vec<Star>, Vec<Star>) =
+            left.into_iter().partition(|star| star.longest <= bound);
+        left = larger;
+        // An edge may be endless, where its square is more than single precision holds.
+        bound = if bound < f32::MAX / FACTOR { bound * FACTOR } else { f32::INFINITY };
+        if !class.is_empty() {
+            sweep_class(&class, &smaller, near, &mut found);
+            smaller.extend(class);
+        }
+    }
+}
+
+/// The longest edge of the star in the middle by size; some length above 0 where it has none.
+fn middle(stars: &[Star]) -> f32 {
+    let mut sizes: Vec<f32> = stars.iter().map(|star| star.longest).collect();
+    let half = sizes.len() / 2;
+    if sizes.is_empty() {
+        return 1.0;
+    }
+    let middle = *sizes.select_nth_unstable_by(half, f32::total_cmp).1;
+    if middle > f32::MIN_POSITIVE { middle } else { f32::MIN_POSITIVE }
+}
+
+/// Finds the pairs of a class, and those of one of it and one of the smaller stars.
+fn sweep_class(class: &[Star], smaller: &[Star], near: Nearness, found: &mut impl FnMut(&Star, &Star)) {
+    let largest = class.iter().fold(0.0, |most, star| if star.longest > most { star.longest } else { most });
+    let reach = near.between(largest, largest);
+    let width = Width(1.0 / (WIDER * f64::from(reach)));
+    let mut test = |a: &Star, b: &Star| {
+        let reach = near.between(a.longest, b.longest);
+        if a.position.distance_squared(b.position) <= reach * reach {
+            found(a, b);
+        }
+    };
+    let large = Columns::new(width, class.iter());
+    large.pairs(reach, &mut test);
+    if !smaller.is_empty() {
+        let filter = Filter::around(&large);
+        let around = smaller.iter().filter(|star| filter.lets_through(width.column(star)));
+        large.pairs_with(&Columns::new(width, around), reach, &mut test);
+    }
+}
+
+/// How wide columns are, as its inverse.
+#[derive(Clone, Copy)]
+struct Width(f64);
+
+impl Width {
+    #[inline]
+    fn column(self, star: &Star) -> [i32; 2] {
+        [star.position.x, star.position.y].map(|x| {
+            let scaled = f64::from(x) * self.0;
+            let clamped = if scaled > LAST { LAST } else { scaled };
+            floor(if clamped < -LAST { -LAST } else { clamped })
+        })
+    }
+}
+
+/// The next integer below; a call of `f64::floor` is slow on processors taken for older than they are.
+#[inline]
+fn floor(x: f64) -> i32 {
+    let whole = x as i32;
+    whole - i32::from(f64::from(whole) > x)
+}
+
+/// Stars sorted by column, and by height in each.
+struct Columns {
+    stars: Vec<Star>,
+    /// Where each column lies, sorted, and the first of its stars; one more at the end.
+    columns: Vec<([i32; 2], usize)>,
+}
+
+impl Columns {
+    fn new<'a>(width: Width, stars: impl Iterator<Item = &'a Star>) -> Self {
+        let stars: Vec<&Star> = stars.collect();
+        let mut order: Vec<u128> = (0u32..)
+            .zip(&stars)
+            .map(|(i, star)| {
+                let [x, y] = width.column(star).map(|k| u128::from(ascending(k)));
+                x << 96 | y << 64 | u128::from(ascending(height(star.position.z))) << 32 | u128::from(i)
+            })
+            .collect();
+        order.sort_unstable();
+        let mut columns: Vec<([i32; 2], usize)> = Vec::new();
+        let mut before = None;
+        for (k, key) in order.iter().enumerate() {
+            let column = key >> 64;
+            if before.replace(column) != Some(column) {
+                columns.push(([(column >> 32) as u32, column as u32].map(|k| (k ^ 1 << 31) as i32), k));
+            }
+        }
+        columns.push(([i32::MAX; 2], order.len()));
+        Self { stars: order.iter().map(|&key| *stars[key as u32 as usize]).collect(), columns }
+    }
+
+    fn count(&self) -> usize {
+        self.columns.len() - 1
+    }
+
+    #[inline]
+    fn place(&self, k: usize) -> [i32; 2] {
+        self.columns[k].0
+    }
+
+    #[inline]
+    fn stars(&self, k: usize) -> &[Star] {
+        &self.stars[self.columns[k].1..self.columns[k + 1].1]
+    }
+
+    /// Meets every pair within a column and of columns side by side, as far as their heights differ by `reach` at most.
+    fn pairs(&self, reach: f32, test: &mut impl FnMut(&Star, &Star)) {
+        let mut row = 0;
+        for k in 0..self.count() {
+            let [x, y] = self.place(k);
+            let own = self.stars(k);
+            for (i, a) in own.iter().enumerate() {
+                let top = a.position.z + reach;
+                own[i + 1..].iter().take_while(|b| b.position.z <= top).for_each(|b| test(a, b));
+            }
+            if self.place(k + 1) == [x, y + 1] {
+                meet(own, self.stars(k + 1), reach, test);
+            }
+            self.meet_row(own, [x + 1, y], &mut row, reach, test);
+        }
+    }
+
+    /// Meets every star of the columns with every one of those at `other`, in the same column or side by side.
+    fn pairs_with(&self, other: &Self, reach: f32, test: &mut impl FnMut(&Star, &Star)) {
+        let mut rows = [0; 3];
+        for k in 0..self.count() {
+            let [x, y] = self.place(k);
+            for (row, x) in rows.iter_mut().zip(x - 1..=x + 1) {
+                other.meet_row(self.stars(k), [x, y], row, reach, test);
+            }
+        }
+    }
+
+    /// Meets `stars` with those of the column at `[x, y]` and of the ones before and behind it. `row` is at or before the
+    /// first of the three, and is moved there: columns are gone through in order.
+    fn meet_row(
+        &self,
+        stars: &[Star],
+        [x, y]: [i32; 2],
+        row: &mut usize,
+        reach: f32,
+        test: &mut impl FnMut(&Star, &Star),
+    ) {
+        while self.place(*row) < [x, y - 1] {
+            *row += 1;
+        }
+        let mut k = *row;
+        while self.place(k) <= [x, y + 1] {
+            meet(stars, self.stars(k), reach, test);
+            k += 1;
+        }
+    }
+}
+
+/// Meets stars of one column with those of another, both sorted by height.
+#[inline]
+fn meet(stars: &[Star], others: &[Star], reach: f32, test: &mut impl FnMut(&Star, &Star)) {
+    let mut low = 0;
+    for a in stars {
+        let (bottom, top) = (a.position.z - reach, a.position.z + reach);
+        while low < others.len() && others[low].position.z < bottom {
+            low += 1;
+        }
+        others[low..].iter().take_while(|b| b.position.z <= top).for_each(|b| test(a, b));
+    }
+}
+
+/// An integer of the order of the number.
+#[inline]
+fn height(z: f32) -> i32 {
+    let bits = z.to_bits() as i32;
+    bits ^ ((bits >> 31) as u32 >> 1) as i32
+}
+
+/// An integer of the same order that is not negative.
+#[inline]
+fn ascending(k: i32) -> u32 {
+    k as u32 ^ 1 << 31
+}
+
+/// Tells most columns that are not beside any of some.
+struct Filter {
+    bits: Vec<u64>,
+    mask: u32,
+}
+
+impl Filter {
+    fn around(columns: &Columns) -> Self {
+        let count = (9 * BITS * columns.count()).next_power_of_two().max(64);
+        let mut filter = Self { bits: vec![0; count / 64], mask: count as u32 - 1 };
+        for k in 0..columns.count() {
+            let [x, y] = columns.place(k);
+            for x in x - 1..=x + 1 {
+                for y in y - 1..=y + 1 {
+                    let bit = filter.bit([x, y]);
+                    filter.bits[bit / 64] |= 1 << (bit % 64);
+                }
+            }
+        }
+        filter
+    }
+
+    fn lets_through(&self, column: [i32; 2]) -> bool {
+        let bit = self.bit(column);
+        self.bits[bit / 64] >> (bit % 64) & 1 == 1
+    }
+
+    #[inline]
+    fn bit(&self, [x, y]: [i32; 2]) -> usize {
+        let hash = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
+        ((hash ^ hash >> 15) & self.mask) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Random, Vec3};
+    use crate::mesh::VertexId;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Stars in a box or on a sheet, some far from the rest, some at the same place; ordinary ones, tiny ones, huge ones.
+    fn stars(random: &mut Random) -> Vec<Star> {
+        let middle = Vec3::splat([0.0, 5.0, 3e3, -2e6][random.below(4) as usize]);
+        let flat = [Vec3::ONE, Vec3::new(1.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)][random.below(3) as usize];
+        let sizes: &[f32] =
+            [&[1.0][..], &[1.0, 1.5], &[1e-3, 1.0, 8.0], &[0.0, 1e-30, 1.0, 1e9], &[f32::INFINITY, 1.0]]
+                [random.below(5) as usize];
+        let spread = [0.0, 3.0, 10.0][random.below(3) as usize];
+        let count = random.below(120);
+        let mut star = |i| {
+            let mut unit = || random.unit() as f32;
+            let mut position = middle + Vec3::new(unit(), unit(), unit()) * flat * spread;
+            let longest = sizes[(unit() * sizes.len() as f32) as usize] * (1.0 - 0.4 * unit());
+            if unit() < 0.02 {
+                position *= 1e12;
+            }
+            Star { position, longest, vertex: VertexId(i) }
+        };
+        (0..count).map(&mut star).collect()
+    }
+
+    #[test]
+    fn pairs_are_those_of_brute_force() {
+        let mut pairs = 0;
+        for seed in 0..2000 {
+            let random = &mut Random::new(seed);
+            let stars = stars(random);
+            let near = Nearness {
+                least: [0.0, 0.7][random.below(2) as usize],
+                margin: [0.0, 0.1][random.below(2) as usize],
+                share: 0.8,
+            };
+            let mut found = Vec::new();
+            near_pairs(stars.clone(), near, |a, b| {
+                found.push([a.vertex.min(b.vertex).0, a.vertex.max(b.vertex).0]);
+            });
+            found.sort_unstable();
+            let is_near = |a: &Star, b: &Star| {
+                let reach = near.between(a.longest, b.longest);
+                a.position.distance_squared(b.position) <= reach * reach
+            };
+            let mut expected = Vec::new();
+            for (i, a) in stars.iter().enumerate() {
+                expected.extend(
+                    stars[i + 1..].iter().filter(|b| is_near(a, b)).map(|b| [a.vertex.0, b.vertex.0]),
+                );
+            }
+            expected.sort_unstable();
+            assert_eq!(found, expected, "seed {seed}");
+            pairs += found.len();
+        }
+        assert!(pairs > 100_000, "only {pairs} pairs");
+    }
+}
