@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::rc::Rc;
+use std::sync::Arc;
 
 use js_sys::{Float32Array, Reflect, Uint8Array, Uint32Array};
 use serde::Serialize;
@@ -10,12 +11,14 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::convert::{bytes, coordinates, packed, point, points, to_js, triangles};
 use super::error::Failure;
 use super::volume::RawVolume;
-use crate::io::{MeshFormat, parse_mesh, write_mesh};
+use crate::io::{MeshFormat, parse_mesh, parse_textured_mesh, write_mesh};
 use crate::math::{DVec3, Vec3};
-use crate::mesh::{Measures, Mesh, MeshReport, TriangleMesh, curvature, geodesic, measure, report};
+use crate::mesh::{Measures, Mesh, MeshReport, Texture, TriangleMesh, curvature, geodesic, measure, report};
 use crate::methods::deformable::DeformableModel;
 use crate::methods::implicit::ImplicitSurface;
-use crate::remesh::decimate;
+use crate::remesh::{
+    Changes, EdgeBounds, Trusting, collapse_short, decimate, flip_for_valence, remesh, split_long,
+};
 use crate::spatial::{SurfaceDistance, SurfacePoint, TriangleTree, cross_section, surface_distance};
 use crate::volume::marching_cubes_world;
 
@@ -89,20 +92,26 @@ impl RawMesh {
         positions: &Float32Array,
         indices: &Uint32Array,
         uvs: Option<Float32Array>,
+        texture: Option<RawTexture>,
     ) -> Result<RawMesh, JsValue> {
         let mesh = TriangleMesh {
             positions: points(positions)?,
             triangles: triangles(indices)?,
             uvs: uvs.as_ref().map(coordinates).transpose()?,
+            texture: texture.map(|texture| texture.0),
             ..TriangleMesh::default()
         };
         Ok(RawMesh(loose(mesh)))
     }
 
     /// From the bytes of a file.
-    pub fn parse(file: &Uint8Array) -> Result<RawMesh, JsValue> {
-        let mesh = parse_mesh(&bytes(file)?).map_err(Failure::from)?;
-        Ok(RawMesh(loose(mesh)))
+    pub fn parse(file: &Uint8Array, texture: Option<RawTexture>) -> Result<RawMesh, JsValue> {
+        let file = bytes(file)?;
+        let mesh = match texture {
+            Some(texture) => parse_textured_mesh(&file, texture.0),
+            None => parse_mesh(&file),
+        };
+        Ok(RawMesh(loose(mesh.map_err(Failure::from)?)))
     }
 
     /// Iso-surface of one frame of a volume, in world space.
@@ -154,10 +163,10 @@ impl RawMesh {
 
     /// The arrays as they are now.
     pub fn arrays(&self) -> RawArrays {
-        let mut mesh = self.triangles();
-        if mesh.normals.is_none() {
-            let normals = mesh.vertex_normals();
-            Rc::make_mut(&mut mesh).normals = Some(normals);
+        let mut mesh = self.with_normals();
+        if mesh.corner_uvs.is_some() {
+            let uvs = mesh.uvs_of_one_side();
+            Rc::make_mut(&mut mesh).uvs = uvs;
         }
         RawArrays(mesh)
     }
@@ -173,6 +182,22 @@ impl RawMesh {
         Ok(to_js(&Report::from(report))?)
     }
 
+    /// The picture on the mesh, where there is one.
+    pub fn texture(&self) -> Option<RawTexture> {
+        let texture = match &self.0 {
+            // Edits have dropped it.
+            Body::Surface(_) => None,
+            Body::Triangles(_) | Body::Live(_) => self.triangles().texture.clone(),
+        };
+        texture.map(RawTexture)
+    }
+
+    /// As many vertices as texture needs; see [`TriangleMesh::split_at_seams`].
+    #[wasm_bindgen(js_name = splitAtSeams)]
+    pub fn split_at_seams(&self) -> RawMesh {
+        RawMesh(loose(self.triangles().split_at_seams()))
+    }
+
     /// One mesh a connected component.
     pub fn components(&self) -> Vec<RawMesh> {
         self.triangles().components().into_iter().map(|part| RawMesh(loose(part))).collect()
@@ -182,6 +207,24 @@ impl RawMesh {
     pub fn refine(&mut self) -> Result<(), JsValue> {
         self.editable()?.refine().map_err(Failure::from)?;
         Ok(())
+    }
+
+    /// One round of restructuring by passes: collapses (0), splits (1), flips (2); see [`restructure`].
+    ///
+    /// [`restructure`]: crate::remesh::restructure
+    pub fn restructure(&mut self, min: f64, max: f64, passes: &[u8]) -> Result<u32, JsValue> {
+        let bounds = EdgeBounds { min: min as f32, max: max as f32 };
+        let mesh = self.editable()?;
+        bounds.check_for(mesh).map_err(Failure::from)?;
+        let mut changes = Changes::default();
+        for pass in passes {
+            changes += match pass {
+                0 => collapse_short(mesh, bounds, &mut Trusting),
+                1 => split_long(mesh, bounds, usize::MAX, &mut Trusting),
+                _ => flip_for_valence(mesh, bounds, &mut Trusting),
+            };
+        }
+        Ok(changes.creations + changes.deletions + changes.inversions)
     }
 
     /// Quadric decimation; see [`decimate`].
@@ -196,6 +239,13 @@ impl RawMesh {
             return Ok(());
         }
         decimate(self.editable()?, target);
+        Ok(())
+    }
+
+    /// Edges into bounds; see [`remesh`].
+    pub fn remesh(&mut self, min: f64, max: f64) -> Result<(), JsValue> {
+        let bounds = EdgeBounds { min: min as f32, max: max as f32 };
+        remesh(self.editable()?, bounds).map_err(Failure::from)?;
         Ok(())
     }
 
@@ -247,7 +297,7 @@ impl RawMesh {
     pub fn to_bytes(&self, format: &str) -> Result<Vec<u8>, JsValue> {
         let format = MeshFormat::from_extension(format)
             .ok_or_else(|| Failure::invalid("format", "not one of glb, ply, stl, obj, vtp, mz3"))?;
-        Ok(write_mesh(&self.arrays().0, format).map_err(Failure::from)?)
+        Ok(write_mesh(&self.with_normals(), format).map_err(Failure::from)?)
     }
 
     /// A copy that nothing else changes.
@@ -257,6 +307,15 @@ impl RawMesh {
             Body::Surface(mesh) => RawMesh(Body::Surface(mesh.clone())),
             Body::Triangles(_) | Body::Live(_) => RawMesh(Body::Triangles(self.triangles())),
         }
+    }
+
+    fn with_normals(&self) -> Rc<TriangleMesh> {
+        let mut mesh = self.triangles();
+        if mesh.normals.is_none() {
+            let normals = mesh.vertex_normals();
+            Rc::make_mut(&mut mesh).normals = Some(normals);
+        }
+        mesh
     }
 
     pub(super) fn triangles(&self) -> Rc<TriangleMesh> {
@@ -276,6 +335,35 @@ impl RawMesh {
             Body::Surface(mesh) => Ok(mesh),
             _ => Err(Failure::invalid("mesh", "it belongs to a model that moves it: clone() it first")),
         }
+    }
+}
+
+/// A picture, to be copied in or out.
+#[wasm_bindgen]
+pub struct RawTexture(Arc<Texture>);
+
+#[wasm_bindgen]
+impl RawTexture {
+    /// From the bytes of an image file, which must be of the media type that is named.
+    #[wasm_bindgen(constructor)]
+    pub fn new(kind: &str, file: &Uint8Array) -> Result<RawTexture, JsValue> {
+        let texture = Texture::new(bytes(file)?).map_err(Failure::from)?;
+        let found = texture.kind().media_type();
+        if found != kind {
+            let problem = format!("is said to be {kind}; the bytes are of {found}");
+            return Err(Failure::invalid("texture", &problem).into());
+        }
+        Ok(RawTexture(Arc::new(texture)))
+    }
+
+    /// Its media type.
+    pub fn kind(&self) -> String {
+        self.0.kind().media_type().to_owned()
+    }
+
+    /// The image file.
+    pub fn bytes(&self) -> Vec<u8> {
+        self.0.bytes().to_vec()
     }
 }
 

@@ -3,11 +3,13 @@
 //! What is exported here is private to the npm package: the classes people use are the TypeScript ones in
 //! `js/`, which hold these as raw handles and check every argument first.
 
+mod animation;
 mod convert;
 mod deformable;
 mod error;
 mod implicit;
 mod mesh;
+mod multires;
 mod volume;
 
 use wasm_bindgen::prelude::wasm_bindgen;

@@ -22,7 +22,7 @@ pub enum MethodError {
     Volume(#[from] VolumeError),
     /// The surface has grown beyond what this image and sampling can need.
     #[error(
-        "the surface would have more than {most} vertices: take longer edges, a smaller volume, or forces that do not inflate it"
+        "the surface would have more than {most} vertices: take longer edges, a smaller volume or ellipsoids, or forces that do not inflate it"
     )]
     TooManyVertices {
         /// The number accepted.

@@ -3,6 +3,7 @@
 pub mod deformable;
 mod error;
 pub mod implicit;
+pub mod multires;
 mod saved;
 mod spec;
 mod step;

@@ -1,0 +1,448 @@
+//! Control ellipsoids: what is inside, the nearest point of the surface, and how what they touch moves with them
+//! (section 5).
+
+use crate::math::{DMat3, DVec3, Vec3};
+use crate::methods::MethodError;
+use serde::{Deserialize, Serialize};
+
+/// A solid ellipsoid as it is given.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ControlEllipsoid {
+    /// Its middle, in the mesh's units.
+    pub center: [f64; 3],
+    /// Three orthogonal semi-axes as vectors.
+    pub axes: [[f64; 3]; 3],
+}
+
+/// Cosine of the angle by which axes may be off the right one: rounding in `f32` stays far below.
+const ORTHOGONAL: f64 = 1e-3;
+
+/// Axes of one ellipsoid may differ by this factor: beyond, needles and plates are thinner than any triangle could follow.
+const MOST_SLENDER: f64 = 1e3;
+
+/// The lengths that are accepted, so that squares and cubes stay within `f32`.
+const SHORTEST: f64 = 1e-9;
+const LONGEST: f64 = 1e9;
+
+impl ControlEllipsoid {
+    /// Tests that the axes span an ellipsoid.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] naming `ellipsoids` and the one that is wrong.
+    pub(super) fn validate(&self, index: usize) -> Result<(), MethodError> {
+        let refuse =
+            |problem: String| Err(MethodError::invalid("ellipsoids", format!("number {index}: {problem}")));
+        let [x, y, z] = self.axes.map(DVec3::from);
+        let lengths = [x, y, z].map(DVec3::length);
+        if !DVec3::from(self.center).abs().cmple(DVec3::splat(LONGEST)).all() {
+            return refuse(format!("its center is {:?}; numbers up to {LONGEST} are accepted", self.center));
+        }
+        if let Some(length) = lengths.into_iter().find(|length| !(SHORTEST..=LONGEST).contains(length)) {
+            return refuse(format!("a semi-axis is {length} long; {SHORTEST} to {LONGEST} are accepted"));
+        }
+        let (least, most) =
+            (lengths.into_iter().fold(f64::MAX, f64::min), lengths.into_iter().fold(0.0, f64::max));
+        if most > MOST_SLENDER * least {
+            return refuse(format!(
+                "one semi-axis is {} times another; up to {MOST_SLENDER} is accepted",
+                most / least
+            ));
+        }
+        for (k, (a, b)) in [(x, y), (y, z), (z, x)].into_iter().enumerate() {
+            let cosine = a.dot(b).abs() / (a.length() * b.length());
+            if cosine > ORTHOGONAL {
+                let angle = libm::acos(cosine).to_degrees();
+                return refuse(format!("axes {k} and {} meet at {angle:.1}°; 90° is accepted", (k + 1) % 3));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Tests that there are some, and that each is one.
+///
+/// # Errors
+/// As [`ControlEllipsoid::validate`], and where there is none.
+pub(super) fn check_ellipsoids(given: &[ControlEllipsoid]) -> Result<(), MethodError> {
+    if given.is_empty() {
+        return Err(MethodError::invalid("ellipsoids", "none given; at least one is needed"));
+    }
+    given.iter().enumerate().try_for_each(|(k, e)| e.validate(k))
+}
+
+/// An ellipsoid ready for use: a rotation, lengths along its columns, and a middle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Shape", into = "Shape")]
+pub(super) struct Ellipsoid {
+    shape: Shape,
+    /// Takes what is seen from the middle to the frame in which the ellipsoid is the unit ball: divisions by
+    /// lengths were a large part of a frame.
+    to_unit: DMat3,
+    /// The longest semi-axis, squared: nothing inside is further from the middle.
+    square: f64,
+}
+
+/// What an ellipsoid is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Shape {
+    pub center: DVec3,
+    /// The directions of the axes as columns; right-handed.
+    pub rotation: DMat3,
+    /// Half the lengths of the axes.
+    pub lengths: DVec3,
+}
+
+impl From<Shape> for Ellipsoid {
+    fn from(shape: Shape) -> Self {
+        let to_unit = DMat3::from_diagonal(shape.lengths.recip()) * shape.rotation.transpose();
+        let longest = shape.lengths.max_element();
+        Self { shape, to_unit, square: longest * longest }
+    }
+}
+
+impl From<Ellipsoid> for Shape {
+    fn from(ellipsoid: Ellipsoid) -> Self {
+        ellipsoid.shape
+    }
+}
+
+impl std::ops::Deref for Ellipsoid {
+    type Target = Shape;
+
+    fn deref(&self) -> &Shape {
+        &self.shape
+    }
+}
+
+/// Newton's steps for the nearest point: from a point near the surface two or three are enough, from anywhere 60.
+const STEPS: usize = 100;
+
+/// Newton's steps end with one as small as this, in what it is a step of: the digits double with each, so twice as many
+/// are right.
+const LAST_STEP: f64 = 1e-5;
+
+impl Ellipsoid {
+    /// From axes that were found to span one. A left-handed set is one of the same ellipsoid with an axis turned round.
+    pub fn new(given: &ControlEllipsoid) -> Self {
+        let axes = given.axes.map(DVec3::from);
+        let x = axes[0].normalize();
+        // Exactly orthogonal, whatever rounding the given ones went through.
+        let y = (axes[1] - x * axes[1].dot(x)).normalize();
+        let lengths = DVec3::new(axes[0].length(), axes[1].length(), axes[2].length());
+        Shape { center: given.center.into(), rotation: DMat3::from_cols(x, y, x.cross(y)), lengths }.into()
+    }
+
+    /// The same with all lengths `factor` times as long.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Shape { lengths: self.lengths * factor, ..self.shape }.into()
+    }
+
+    /// As it would be given.
+    pub fn given(&self) -> ControlEllipsoid {
+        let axis = |k: usize| (self.rotation.col(k) * self.lengths[k]).to_array();
+        ControlEllipsoid { center: self.center.to_array(), axes: [axis(0), axis(1), axis(2)] }
+    }
+
+    /// In the frame in which the axes are those of space.
+    #[inline]
+    fn local(&self, p: DVec3) -> DVec3 {
+        self.rotation.transpose() * (p - self.center)
+    }
+
+    #[inline]
+    fn world(&self, local: DVec3) -> DVec3 {
+        self.center + self.rotation * local
+    }
+
+    /// In the frame in which the ellipsoid is the unit ball; the distance from the middle is 1 on the surface.
+    #[inline]
+    pub fn unit(&self, p: DVec3) -> DVec3 {
+        self.to_unit * (p - self.center)
+    }
+
+    /// Whether `p` is inside, and not but for a rounding on the surface.
+    #[inline]
+    pub fn contains(&self, p: DVec3) -> bool {
+        let seen = p - self.center;
+        // Most are far from most.
+        seen.length_squared() < self.square && (self.to_unit * seen).length_squared() < OUTSIDE * OUTSIDE
+    }
+
+    /// The point of the world at a place of that frame.
+    pub fn at_unit(&self, unit: DVec3) -> DVec3 {
+        self.world(unit * self.lengths)
+    }
+
+    /// The shortest semi-axis.
+    pub fn thinnest(&self) -> f64 {
+        self.lengths.min_element()
+    }
+
+    /// The least radius of curvature, that of the sharpest tip.
+    pub fn sharpest(&self) -> f64 {
+        self.thinnest() * self.thinnest() / self.lengths.max_element()
+    }
+
+    /// How far it is, about, from `p` to the surface along the ray from the middle; 0 inside.
+    pub fn clearance(&self, p: DVec3) -> f64 {
+        let size = self.unit(p).length();
+        if size > 1.0 { p.distance(self.center) * (1.0 - 1.0 / size) } else { 0.0 }
+    }
+
+    /// The point of the surface nearest to `p`, from inside or outside. From the middle, one end of the shortest axis.
+    ///
+    /// It is where a normal of the surface leads through p: with local coordinates y of p and semi-axes a, it is at
+    /// a²y/(a² + t) for the largest root t of Σ (a y/(a² + t))² = 1.
+    pub fn nearest(&self, p: DVec3) -> DVec3 {
+        if self.lengths.min_element() == self.lengths.max_element() {
+            return self.center + self.thinnest() * (p - self.center).normalize_or(self.rotation.x_axis);
+        }
+        let squares = self.lengths * self.lengths;
+        let least = squares.min_element();
+        let mut local = self.local(p);
+        // On the plane across the shortest axis the root may vanish; a little beside it, it does not.
+        for k in 0..3 {
+            if squares[k] == least && local[k].abs() < 1e-9 * self.lengths[k] {
+                local[k] = 1e-9 * self.lengths[k];
+                break;
+            }
+        }
+        let t = largest_root(local * self.lengths, squares, least);
+        let on = squares * local / (squares + DVec3::splat(t));
+        // Rounding leaves it a little off the surface.
+        let scaled = on / self.lengths;
+        self.world(on / scaled.length())
+    }
+}
+
+/// The largest t with Σ (w / (s + t))² = 1; the sum falls with t and is convex, from −`least` on.
+fn largest_root(weights: DVec3, squares: DVec3, least: f64) -> f64 {
+    // There the term of the shortest axis alone is 1 or less than the sum is.
+    let floor = (0..3).map(|k| weights[k].abs() - squares[k]).fold(-least, f64::max);
+    let mut t = if floor > 0.0 { floor } else { 0.0 };
+    for _ in 0..STEPS {
+        let reciprocals = (squares + DVec3::splat(t)).recip();
+        let ratios = weights * reciprocals;
+        let terms = ratios * ratios;
+        let slope = -2.0 * terms.dot(reciprocals);
+        let next = (t - (terms.element_sum() - 1.0) / slope).max(floor);
+        let settled = (next - t).abs() <= LAST_STEP * (least + t.abs());
+        t = next;
+        if settled {
+            break;
+        }
+    }
+    t
+}
+
+/// Tests that edges up to `longest` can hold each of the ellipsoids.
+///
+/// # Errors
+/// [`MethodError::InvalidArgument`] naming the first that the skin would slip off.
+pub(super) fn check_sizes(ellipsoids: &[Ellipsoid], longest: f64) -> Result<(), MethodError> {
+    let slips = |(k, e): (usize, &Ellipsoid)| (longest > BLUNT * e.sharpest()).then_some((k, e.sharpest()));
+    let Some((k, radius)) = ellipsoids.iter().enumerate().find_map(slips) else { return Ok(()) };
+    let problem = format!(
+        "number {k} has tips of radius {radius:.3}, where a skin with edges up to {longest:.3} would slip off: edgeMax up to \
+         {:.3}, or a rounder ellipsoid, is accepted",
+        BLUNT * radius
+    );
+    Err(MethodError::invalid("ellipsoids", problem))
+}
+
+/// The longest edge that holds on to a tip, in its radius. Vertices are held, triangles between them are not: with much
+/// longer ones the tip goes through a triangle, and the skin draws back from it.
+const BLUNT: f64 = 1.6;
+
+/// Where a point inside some of the ellipsoids is pushed to: out of the one it is deepest in, again until it is outside
+/// all. `p` itself where it is outside all from the beginning.
+///
+/// Out of one at a time: the first that contains it may be left through another's inside. In the crease between two, pushes
+/// out of one lead into the other by less and less; what is left then is left along a straight line.
+pub(super) fn pushed_out(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
+    let mut at = p;
+    for _ in 0..PUSHES {
+        match deepest(ellipsoids, at) {
+            None => return at,
+            Some((_, nearest)) => at = nearest,
+        }
+    }
+    straight_out(ellipsoids, at)
+}
+
+/// Pushes out of one ellipsoid after the other; a crease of 90° takes some three for each digit.
+const PUSHES: usize = 12;
+
+/// A point with this distance from the middle in the unit frame is outside: rounding puts it a little beside 1.
+const OUTSIDE: f64 = 1.0 - 1e-7;
+
+/// The ellipsoid that `p` is deepest inside of, and its nearest point.
+fn deepest(ellipsoids: &[Ellipsoid], p: DVec3) -> Option<(usize, DVec3)> {
+    let inside = ellipsoids.iter().enumerate().filter(|(_, e)| e.contains(p));
+    let nearest = inside.map(|(k, e)| (k, e.nearest(p)));
+    nearest.max_by(|a, b| a.1.distance_squared(p).total_cmp(&b.1.distance_squared(p)))
+}
+
+/// Along the sum of the normals of all that contain `p`, as far as it takes to be outside of every one.
+fn straight_out(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
+    let containing = ellipsoids.iter().filter(|e| e.contains(p));
+    let away = |e: &Ellipsoid| (e.rotation * (e.unit(p) / e.lengths)).normalize_or_zero();
+    let direction = containing.map(away).sum::<DVec3>().normalize_or(DVec3::Z);
+    let mut way = 0.0;
+    // Each is left for good, as it is convex, so there is an end.
+    while let Some(exit) = ellipsoids.iter().find_map(|e| exit_beyond(e, p, direction, way)) {
+        way = exit;
+    }
+    p + direction * way
+}
+
+/// Where the ray leaves the ellipsoid, if it is inside at `way`.
+fn exit_beyond(e: &Ellipsoid, p: DVec3, direction: DVec3, way: f64) -> Option<f64> {
+    if e.unit(p + direction * way).length_squared() >= OUTSIDE * OUTSIDE {
+        return None;
+    }
+    let (from, step) = (e.unit(p), e.rotation.transpose() * direction / e.lengths);
+    let (a, b, c) = (step.length_squared(), from.dot(step), from.length_squared() - 1.0);
+    let exit = (-b + (b * b - a * c).max(0.0).sqrt()) / a;
+    (exit > way).then_some(exit)
+}
+
+/// Where `p` goes as the ellipsoids go from `before` to `after`: with each by its own map, near ones counting more.
+///
+/// Where all move alike, so does everything. Else what is nearer to one than its size goes with it for the most part, and
+/// what is between two is stretched evenly.
+pub(super) fn carried(before: &[Ellipsoid], after: &[Ellipsoid], p: Vec3) -> Vec3 {
+    let p = p.as_dvec3();
+    let (mut sum, mut total) = (DVec3::ZERO, 0.0);
+    for (from, to) in before.iter().zip(after) {
+        let clearance = from.clearance(p) / from.thinnest();
+        let weight = 1.0 / (SOFTNESS + clearance * clearance);
+        sum += weight * (to.at_unit(from.unit(p)) - p);
+        total += weight;
+    }
+    if total > 0.0 { (p + sum / total).as_vec3() } else { p.as_vec3() }
+}
+/// How much an ellipsoid that a point lies on counts: ten times as much as one that is its own size away. With more, all
+/// stretching falls on the crease between two that part, and the map folds there; with less, detail slides on them.
+const SOFTNESS: f64 = 0.1;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn vector(random: &mut Random) -> DVec3 {
+        DVec3::from_array(std::array::from_fn(|_| 2.0 * random.unit() - 1.0))
+    }
+
+    fn random_ellipsoid(random: &mut Random) -> Ellipsoid {
+        let x = vector(random).normalize();
+        let y = vector(random).cross(x).normalize();
+        let lengths = DVec3::from_array(std::array::from_fn(|_| 0.2 + 2.0 * random.unit()));
+        Shape { center: vector(random), rotation: DMat3::from_cols(x, y, x.cross(y)), lengths }.into()
+    }
+
+    /// Points all over the surface.
+    fn spread(e: &Ellipsoid, count: usize) -> Vec<DVec3> {
+        let on = |i: usize| {
+            let (z, angle) = (1.0 - (2 * i + 1) as f64 / count as f64, 2.4 * i as f64);
+            let ring = (1.0 - z * z).sqrt();
+            e.at_unit(DVec3::new(ring * libm::cos(angle), ring * libm::sin(angle), z))
+        };
+        (0..count).map(on).collect()
+    }
+
+    #[test]
+    fn the_nearest_point_is_on_the_surface_and_nearer_than_any_other() {
+        let mut random = Random::new(11);
+        for _ in 0..200 {
+            let e = random_ellipsoid(&mut random);
+            let p = e.center + vector(&mut random) * 3.0 * random.unit();
+            let nearest = e.nearest(p);
+            assert!((e.unit(nearest).length() - 1.0).abs() < 1e-12);
+            let least = spread(&e, 2000).iter().map(|q| q.distance(p)).fold(f64::MAX, f64::min);
+            assert!(nearest.distance(p) <= least + 1e-9, "{} {least}", nearest.distance(p));
+            // And the normal there leads through p.
+            let normal = (e.rotation * (e.unit(nearest) / e.lengths)).normalize();
+            let way = p - nearest;
+            assert!((way - normal * way.dot(normal)).length() < 1e-7, "{:?} {p}", e);
+        }
+    }
+
+    #[test]
+    fn from_the_middle_and_from_a_plane_of_symmetry() {
+        let lengths = DVec3::new(3.0, 2.0, 1.0);
+        let e = Ellipsoid::from(Shape { center: DVec3::ONE, rotation: DMat3::IDENTITY, lengths });
+        assert!((e.nearest(DVec3::ONE).distance(DVec3::ONE) - 1.0).abs() < 1e-6);
+        // Far out along the longest axis the nearest point is its end, near the middle it is beside.
+        assert!(e.nearest(DVec3::new(3.9, 1.0, 1.0)).distance(DVec3::new(4.0, 1.0, 1.0)) < 1e-6);
+        let beside = e.nearest(DVec3::new(1.5, 1.0, 1.0));
+        assert!(beside.z > 1.9 && beside.distance(DVec3::new(1.5, 1.0, 1.0)) < 1.0);
+    }
+
+    #[test]
+    fn pushed_out_is_outside_all_and_not_far() {
+        let mut random = Random::new(12);
+        for seed in 0..300 {
+            let some: Vec<_> = (0..1 + seed % 5).map(|_| random_ellipsoid(&mut random)).collect();
+            let p = vector(&mut random) * 2.0;
+            let out = pushed_out(&some, p);
+            assert!(some.iter().all(|e| e.unit(out).length() > 1.0 - 1e-6), "{seed}");
+            if some.iter().all(|e| e.unit(p).length() >= 1.0) {
+                assert_eq!(out, p);
+            }
+        }
+    }
+
+    /// Stopping at the first ellipsoid that contains a point would leave it inside the second.
+    #[test]
+    fn nested_and_crossing_ones_are_left_together() {
+        let ball = |x: f64, r: f64| {
+            let center = DVec3::new(x, 0.0, 0.0);
+            Ellipsoid::from(Shape { center, rotation: DMat3::IDENTITY, lengths: DVec3::splat(r) })
+        };
+        let nested = pushed_out(&[ball(0.0, 1.0), ball(0.1, 2.0)], DVec3::new(0.3, 0.2, 0.0));
+        assert!((nested.distance(DVec3::new(0.1, 0.0, 0.0)) - 2.0).abs() < 1e-6);
+        let both = [ball(-0.5, 1.0), ball(0.5, 1.0)];
+        let crease = pushed_out(&both, DVec3::new(0.01, 0.6, 0.0));
+        assert!(both.iter().all(|e| e.unit(crease).length() > 1.0 - 1e-6));
+        assert!(crease.distance(DVec3::new(0.0, 0.75_f64.sqrt(), 0.0)) < 0.15, "{crease}");
+    }
+
+    #[test]
+    fn all_moved_alike_carry_everything_along() {
+        let mut random = Random::new(13);
+        let before: Vec<_> = (0..4).map(|_| random_ellipsoid(&mut random)).collect();
+        let turn = DMat3::from_rotation_y(0.7);
+        let moved = |e: &Ellipsoid| {
+            let (center, rotation) = (turn * e.center + DVec3::X, turn * e.rotation);
+            Ellipsoid::from(Shape { center, rotation, lengths: e.lengths })
+        };
+        let after: Vec<_> = before.iter().map(moved).collect();
+        let p = (vector(&mut random) * 3.0).as_vec3();
+        let expected = (turn * p.as_dvec3() + DVec3::X).as_vec3();
+        assert!(carried(&before, &after, p).distance(expected) < 1e-6);
+
+        assert_eq!(carried(&[], &[], Vec3::X), Vec3::X);
+    }
+
+    #[test]
+    fn what_spans_no_ellipsoid_is_named() {
+        let good =
+            ControlEllipsoid { center: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]] };
+        assert_eq!(good.validate(0), Ok(()));
+        assert_eq!(Ellipsoid::new(&good).given(), good);
+        let spoilt = |change: fn(&mut ControlEllipsoid)| {
+            let mut bad = good;
+            change(&mut bad);
+            bad.validate(4).unwrap_err().to_string()
+        };
+        assert!(spoilt(|e| e.axes[1] = [0.0; 3]).contains("number 4: a semi-axis is 0 long"));
+        assert!(spoilt(|e| e.axes[1] = [1.0, 1.0, 0.0]).contains("axes 0 and 1 meet at 45.0°"));
+        assert!(spoilt(|e| e.axes[0][0] = f64::NAN).contains("NaN"));
+        assert!(spoilt(|e| e.axes[0][0] = 1e8).contains("times another"));
+        assert!(spoilt(|e| e.center[2] = f64::INFINITY).contains("its center is"));
+    }
+}

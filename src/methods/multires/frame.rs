@@ -1,0 +1,243 @@
+//! One frame: the ellipsoids go on, the skin follows, its map is taken along, and the detail is put back.
+
+use super::ellipsoid::{Ellipsoid, carried};
+use super::holding::held;
+use super::link::{Before, Linked, distribute, project, unfold};
+use super::membrane::{freshen, hold, settle, unrest};
+use super::parting::{cut_threads, follow, ways_to};
+use super::setup::check_size;
+use super::{MOST_VERTICES, MultiresParams, MultiresolutionModel, REST, area, mean_edge, usual_edge};
+use crate::mesh::{Mesh, VertexId, measure};
+use crate::methods::{MethodError, Times};
+use crate::remesh::{Changes, EdgeBounds, Resolver};
+use crate::spatial::Terrain;
+
+/// By how much the resolution changes in one frame at most: far finer or coarser than its bounds, a mesh can neither be
+/// guarded nor solved in bounded time.
+const MOST_CHANGE: f64 = 2.0;
+
+/// What is as near to rest as this is freshened up on one level while the ellipsoids go on: three times as fast as solving
+/// for it.
+const NEARLY_AT_REST: f64 = 3.0 * REST;
+
+/// How deep rounding may take vertices into an ellipsoid, in the target edge: what moves as a whole goes no deeper.
+const ROUNDING: f64 = 1e-3;
+
+/// So many frames in a row: what wide saddles lag behind stays small.
+const MOST_PASSING: u32 = 3;
+
+impl MultiresolutionModel {
+    /// The parameters with bounds of edges that a frame can bring about: within a factor of the mean edge as it is.
+    pub(super) fn params_now(&self) -> MultiresParams {
+        let ratio = self.params.target() / mean_edge(&self.surface);
+        let factor = if ratio > MOST_CHANGE {
+            MOST_CHANGE / ratio
+        } else if ratio * MOST_CHANGE < 1.0 {
+            1.0 / (ratio * MOST_CHANGE)
+        } else {
+            1.0
+        };
+        let (edge_min, edge_max) = (factor * self.params.edge_min, factor * self.params.edge_max);
+        MultiresParams { edge_min, edge_max, ..self.params.clone() }
+    }
+
+    /// One frame; where it fails, nothing has changed.
+    pub(super) fn frame(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
+        let mut lap = Lap::new(self.clock, times);
+        let mut movers = self.movers.clone();
+        movers.advance();
+        let ahead = self.ahead(movers.now())?;
+        lap.ends("motion");
+        let changes = match self.followed(&ahead) {
+            Some(next) => {
+                self.surface = next;
+                lap.ends("membrane");
+                Changes::default()
+            }
+            None => self.solve(&ahead, &mut lap)?,
+        };
+        movers.drop_vanished();
+        self.movers = movers;
+        self.residual = self.unrest(&self.surface, &self.movers.now());
+        lap.ends("rest");
+        self.show();
+        lap.ends("detail");
+        Ok(changes)
+    }
+
+    fn unrest(&self, mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> f64 {
+        unrest(mesh, ellipsoids, self.params.energy) / self.params.target()
+    }
+
+    /// What lies ahead with the ellipsoids at their next places.
+    fn ahead(&self, are: Vec<Ellipsoid>) -> Result<Ahead, MethodError> {
+        let were = self.movers.now();
+        let mut carried_along = self.surface.clone();
+        if were != are {
+            carried_along.positions_mut().iter_mut().for_each(|p| *p = carried(&were, &are, *p));
+        }
+        let params = self.params_now();
+        check_size(area(&carried_along), &params)?;
+        let unrest = self.unrest(&carried_along, &are);
+        Ok(Ahead { were, are, carried: carried_along, unrest, params })
+    }
+
+    /// The surface carried along, where that is all there is to do: it is at rest there, and its edges fit. Then what moves
+    /// as a whole does so exactly.
+    fn followed(&mut self, ahead: &Ahead) -> Option<Mesh> {
+        // What is still passing when everything stands is solved for, even if it looks at rest.
+        let is_due = !ahead.moves() && self.passing > 0;
+        if is_due || ahead.unrest > REST || !fits(&ahead.carried, ahead.params.bounds()) {
+            return None;
+        }
+        let places = hold(&ahead.carried, &ahead.are);
+        let depth = |v: VertexId| ahead.carried.position(v).distance(places[v.index()]);
+        let deepest =
+            f64::from(ahead.carried.vertices().map(depth).fold(0.0, f32::max)) / self.params.target();
+        if deepest > REST {
+            return None;
+        }
+        let mut next = self.surface.clone();
+        let mut ways = ways_to(&next, ahead.carried.positions());
+        self.guard.follow_with(&next, usual_edge(&next));
+        if !self.guard.carry(&mut next, &mut ways).is_empty() {
+            return None;
+        }
+        if deepest > ROUNDING {
+            self.passing = self.passing.max(1);
+        }
+        Some(next)
+    }
+
+    /// A new skin over the ellipsoids, and its link.
+    fn solve(&mut self, ahead: &Ahead, lap: &mut Lap) -> Result<Changes, MethodError> {
+        let terrain = Terrain::new(ahead.carried.to_triangles())?;
+        let (next, changes) = self.solved(ahead);
+        lap.ends("membrane");
+        let linked: Vec<Linked> = self.surface.vertices().map(|v| self.link[v.index()]).collect();
+        let before = Before { terrain: &terrain, link: &linked };
+        let base = self.bands.base();
+        let mut link = project(&next, &before, &base.terrain, f64::MAX);
+        lap.ends("project");
+        for _ in 0..self.params.distribute {
+            distribute(&next, &base.terrain, &mut link);
+        }
+        unfold(&next, &base.terrain, &base.normals, &mut link);
+        lap.ends("distribute");
+        (self.surface, self.link) = (next, link);
+        Ok(changes)
+    }
+
+    /// The skin over the ellipsoids at their next places: freshened up where that is enough, else solved for, else followed
+    /// with care.
+    fn solved(&mut self, ahead: &Ahead) -> (Mesh, Changes) {
+        let (next, changes) = self
+            .freshened(ahead)
+            .or_else(|| self.settled(ahead))
+            .unwrap_or_else(|| self.followed_with_care(ahead));
+        if changes.changed_topology() {
+            self.components = measure(&next.to_triangles()).components as u32;
+        }
+        (next, changes)
+    }
+
+    /// The skin that was carried along, tidied up, where the ellipsoids go on and it is nearly at rest.
+    fn freshened(&mut self, ahead: &Ahead) -> Option<(Mesh, Changes)> {
+        let may_pass = ahead.moves() && ahead.params.levels > 0 && ahead.unrest <= NEARLY_AT_REST;
+        if !may_pass || self.passing >= MOST_PASSING {
+            return None;
+        }
+        let mut next = ahead.carried.clone();
+        let changes = freshen(&mut next, &ahead.are, &ahead.params);
+        let passed = self.with_threads_cut(next, changes, ahead)?;
+        self.passing += 1;
+        Some(passed)
+    }
+
+    fn settled(&mut self, ahead: &Ahead) -> Option<(Mesh, Changes)> {
+        self.passing = 0;
+        let mut next = ahead.carried.clone();
+        let changes = settle(&mut next, &ahead.are, &ahead.params, ahead.params.levels);
+        self.with_threads_cut(next, changes, ahead)
+    }
+
+    fn followed_with_care(&self, ahead: &Ahead) -> (Mesh, Changes) {
+        let mut next = self.surface.clone();
+        let resolver = &mut Resolver::with_room_for(MOST_VERTICES);
+        let changes = follow(&mut next, ahead.carried.positions(), &ahead.are, &ahead.params, resolver);
+        (next, changes)
+    }
+
+    /// A skin that was made without a look at what it crosses, with what has become a thread in it cut; nothing where it
+    /// crosses itself, or an ellipsoid is no longer inside.
+    fn with_threads_cut(
+        &mut self,
+        mut mesh: Mesh,
+        mut changes: Changes,
+        ahead: &Ahead,
+    ) -> Option<(Mesh, Changes)> {
+        let loses = |(before, now): (bool, bool)| before && !now;
+        if held(&self.surface, &ahead.were).into_iter().zip(held(&mesh, &ahead.are)).any(loses) {
+            return None;
+        }
+        self.guard.follow_with(&mesh, usual_edge(&mesh));
+        if !self.guard.is_embedded(&mesh) {
+            return None;
+        }
+        changes += cut_threads(&mut mesh, &ahead.params, MOST_VERTICES);
+        Some((mesh, changes))
+    }
+}
+
+/// What lies ahead of a frame.
+struct Ahead {
+    /// The ellipsoids before it.
+    were: Vec<Ellipsoid>,
+    /// The ellipsoids after it.
+    are: Vec<Ellipsoid>,
+    /// The surface where they carry it along to.
+    carried: Mesh,
+    /// How far from rest that is.
+    unrest: f64,
+    /// The parameters as far as one frame can bring them about.
+    params: MultiresParams,
+}
+
+impl Ahead {
+    fn moves(&self) -> bool {
+        self.were != self.are
+    }
+}
+
+/// Times the parts of a frame.
+struct Lap<'a> {
+    clock: fn() -> f64,
+    begun: f64,
+    times: &'a mut Times,
+}
+
+impl<'a> Lap<'a> {
+    fn new(clock: fn() -> f64, times: &'a mut Times) -> Self {
+        Self { clock, begun: clock(), times }
+    }
+
+    /// What was done since the last part ended is `part`.
+    fn ends(&mut self, part: &'static str) {
+        let now = (self.clock)();
+        self.times.add(part, now - self.begun);
+        self.begun = now;
+    }
+}
+
+/// Whether nearly all edges are in bounds.
+fn fits(mesh: &Mesh, bounds: EdgeBounds) -> bool {
+    let (shortest, longest) = (bounds.min * bounds.min, bounds.max * bounds.max);
+    let outside = mesh.edges().filter(|&(u, v)| {
+        let square = mesh.position(u).distance_squared(mesh.position(v));
+        square < shortest || square > longest
+    });
+    outside.count() as f64 <= MISFITS * mesh.edge_count() as f64
+}
+
+/// The share of edges out of bounds that a mesh is left with. Restructuring leaves some thousandths.
+const MISFITS: f64 = 0.02;

@@ -1,0 +1,78 @@
+//! Which ellipsoids a closed surface has inside.
+
+use super::ellipsoid::Ellipsoid;
+use crate::math::triangle::Line;
+use crate::math::{DVec3, Vec3};
+use crate::mesh::Mesh;
+
+/// For each ellipsoid, whether its middle is inside the mesh: a ray from it leaves more often than it enters.
+pub(super) fn held(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<bool> {
+    let middles: Vec<[f32; 2]> = ellipsoids.iter().map(|e| seen_along_ray(e.center.as_vec3())).collect();
+    let places: Vec<[f32; 2]> = mesh.positions().iter().map(|&p| seen_along_ray(p)).collect();
+    let rays: Vec<Line> = ellipsoids.iter().map(|e| Line::new(e.center, RAY)).collect();
+    let mut inside = vec![false; ellipsoids.len()];
+    for corners in mesh.triangles() {
+        let seen = corners.map(|v| places[v.index()]);
+        for (k, middle) in middles.iter().enumerate() {
+            if may_cover(&seen, middle) {
+                inside[k] ^= rays[k].hit(mesh.facet(corners).points).is_some_and(|hit| hit.distance >= 0.0);
+            }
+        }
+    }
+    inside
+}
+
+/// Any direction will do; along this one a ray seldom meets an edge of a regular mesh, which would count twice.
+const RAY: DVec3 = DVec3::new(0.5772, 0.6929, 0.4318);
+
+/// Two directions across the ray.
+const ACROSS: [Vec3; 2] = [Vec3::new(-0.6929, 0.5772, 0.0), Vec3::new(-0.2492, -0.2992, 0.8132)];
+
+/// Where a point is, to somebody who looks along the ray.
+fn seen_along_ray(p: Vec3) -> [f32; 2] {
+    ACROSS.map(|axis| axis.dot(p))
+}
+
+/// Whether the box around a triangle, as it is seen, is at most a rounding off the point.
+fn may_cover(corners: &[[f32; 2]; 3], point: &[f32; 2]) -> bool {
+    (0..2).all(|k| {
+        let [a, b, c] = corners.map(|corner| corner[k]);
+        let (least, most) = (a.min(b).min(c), a.max(b).max(c));
+        let rounding = ROUNDING * (least.abs() + most.abs() + point[k].abs());
+        least - rounding <= point[k] && point[k] <= most + rounding
+    })
+}
+
+const ROUNDING: f32 = 1e-5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    use crate::methods::multires::ControlEllipsoid;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn those_in_a_ball_are_held() {
+        let mesh = Mesh::icosphere(Vec3::new(50.0, 0.0, 0.0), 1.0, 0.1).unwrap();
+        let mut random = Random::new(3);
+        let middles: Vec<[f64; 3]> =
+            (0..400).map(|_| [50.0 + 4.0 * random.unit() - 2.0, 4.0 * random.unit() - 2.0, 0.0]).collect();
+        let tiny = |&center: &[f64; 3]| ControlEllipsoid {
+            center,
+            axes: [[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01]],
+        };
+        let ellipsoids: Vec<Ellipsoid> = middles.iter().map(|at| Ellipsoid::new(&tiny(at))).collect();
+        let far = |e: &Ellipsoid| (e.center.distance(DVec3::new(50.0, 0.0, 0.0)) - 1.0).abs() > 0.01;
+        for (e, is_held) in ellipsoids.iter().zip(held(&mesh, &ellipsoids)).filter(|(e, _)| far(e)) {
+            assert_eq!(is_held, e.center.distance(DVec3::new(50.0, 0.0, 0.0)) < 1.0, "{}", e.center);
+        }
+    }
+
+    #[test]
+    fn the_directions_are_across_the_ray() {
+        assert!(ACROSS.iter().all(|axis| axis.as_dvec3().dot(RAY).abs() < 1e-4));
+        assert!(ACROSS[0].dot(ACROSS[1]).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,263 @@
+//! Parameters of the multiresolution model, their ranges and their words.
+
+use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, ParamSpec};
+use crate::remesh::EdgeBounds;
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the multiresolution model. All can be changed while it runs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub struct MultiresParams {
+    /// ε_min: shorter edges are drawn together, in the mesh's units.
+    pub edge_min: f64,
+    /// ε_max: longer edges are split; more than twice `edge_min`.
+    pub edge_max: f64,
+    /// Levels of the solver above the target resolution; 0 solves at that alone.
+    pub levels: u32,
+    /// q: from level to level, bounds of edges shrink by this factor.
+    pub refine_factor: f64,
+    /// Umbrella iterations a level.
+    pub smoothing: u32,
+    /// Applications of the operator D a step.
+    pub distribute: u32,
+    /// How often edges of the base are halved for the detail, at the most.
+    pub supersample: u32,
+    /// What the surface makes least.
+    pub energy: Energy,
+    /// What becomes of necks and contacts.
+    pub topology: Topology,
+}
+
+/// What the surface between the ellipsoids makes least.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Energy {
+    /// Its area, as a skin does.
+    Membrane,
+    /// Its bending, as a plate does: smooth where it leaves an ellipsoid.
+    ThinPlate,
+}
+
+/// What becomes of necks and contacts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Topology {
+    /// Threads stay, parts never meet: one surface, as in the paper.
+    Never,
+    /// A neck that has become a thread is cut.
+    Split,
+    /// And parts in contact are joined.
+    SplitAndJoin,
+}
+
+/// The share of the target edge that the bounds are by default: their ratio, 2.23, leaves no short edges behind.
+const MIN_SHARE: f64 = 0.65;
+const MAX_SHARE: f64 = 1.45;
+
+impl Default for MultiresParams {
+    fn default() -> Self {
+        Self {
+            edge_min: 0.0,
+            edge_max: 0.0,
+            levels: 2,
+            refine_factor: 0.5,
+            smoothing: 10,
+            distribute: 3,
+            supersample: 0,
+            energy: Energy::Membrane,
+            topology: Topology::Split,
+        }
+    }
+}
+
+impl MultiresParams {
+    /// Tests every value against its range, and the bounds of edges against each other.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] with the name of the first parameter that is wrong and what it accepts.
+    pub fn validate(&self) -> Result<(), MethodError> {
+        let numbers = [
+            self.edge_min,
+            self.edge_max,
+            f64::from(self.levels),
+            self.refine_factor,
+            f64::from(self.smoothing),
+            f64::from(self.distribute),
+            f64::from(self.supersample),
+        ];
+        let specs = SPECS.iter().filter(|spec| spec.kind != ParamKind::Choice);
+        specs.zip(numbers).try_for_each(|(spec, value)| spec.check(value))?;
+        if self.edge_max > 2.0 * self.edge_min {
+            return Ok(());
+        }
+        let problem = format!(
+            "{} given with edgeMin {}: more than twice that is accepted",
+            self.edge_max, self.edge_min
+        );
+        Err(MethodError::invalid("edgeMax", problem))
+    }
+
+    /// With bounds around a mean edge where none are given: one of them gives the other.
+    pub fn with_target(mut self, edge: f64) -> Self {
+        match (self.edge_min > 0.0, self.edge_max > 0.0) {
+            (true, false) => self.edge_max = self.edge_min * (MAX_SHARE / MIN_SHARE),
+            (false, true) => self.edge_min = self.edge_max * (MIN_SHARE / MAX_SHARE),
+            (false, false) => (self.edge_min, self.edge_max) = (MIN_SHARE * edge, MAX_SHARE * edge),
+            (true, true) => {}
+        }
+        self
+    }
+
+    /// ε_min and ε_max.
+    pub fn bounds(&self) -> EdgeBounds {
+        EdgeBounds { min: self.edge_min as f32, max: self.edge_max as f32 }
+    }
+
+    /// The mean edge that the bounds stand for.
+    pub fn target(&self) -> f64 {
+        0.5 * (self.edge_min + self.edge_max) / (0.5 * (MIN_SHARE + MAX_SHARE))
+    }
+}
+
+/// The parameters of the multiresolution model, in the order a page should show them.
+pub fn param_specs() -> Vec<ParamSpec> {
+    SPECS.to_vec()
+}
+
+const EDGE: ParamSpec = ParamSpec {
+    default: ParamDefault::FromData,
+    min: Some(1e-9),
+    max: Some(1e9),
+    scale: Some(ParamScale::Log),
+    ..ParamSpec::NUMBER
+};
+
+const COUNT: ParamSpec = ParamSpec { kind: ParamKind::Integer, step: Some(1.0), ..ParamSpec::NUMBER };
+
+const SPECS: [ParamSpec; 9] = [
+    ParamSpec {
+        name: "edgeMin",
+        label: "Shortest edge",
+        help: "Shorter edges are drawn together; half as long, and the surface has four times as many triangles.",
+        symbol: Some("ε_min"),
+        ..EDGE
+    },
+    ParamSpec {
+        name: "edgeMax",
+        label: "Longest edge",
+        help: "Longer edges are split; it has to be more than twice the shortest, or halves would be too short.",
+        symbol: Some("ε_max"),
+        ..EDGE
+    },
+    ParamSpec {
+        name: "levels",
+        label: "Coarse levels",
+        help: "How many coarser meshes the skin is solved on first: far pulls come through in fewer iterations.",
+        default: ParamDefault::Number(2.0),
+        min: Some(0.0),
+        max: Some(6.0),
+        ..COUNT
+    },
+    ParamSpec {
+        name: "refineFactor",
+        label: "Step between levels",
+        help: "By how much edges shrink from one level to the next finer one.",
+        symbol: Some("q"),
+        default: ParamDefault::Number(0.5),
+        min: Some(0.3),
+        max: Some(0.9),
+        step: Some(0.05),
+        ..ParamSpec::NUMBER
+    },
+    ParamSpec {
+        name: "smoothing",
+        label: "Iterations a level",
+        help: "How often each vertex goes to the middle of its neighbours on each level: more, and the skin is tighter.",
+        default: ParamDefault::Number(10.0),
+        min: Some(1.0),
+        max: Some(200.0),
+        ..COUNT
+    },
+    ParamSpec {
+        name: "distribute",
+        label: "Distribution",
+        help: "How often the points where detail is looked up are spread out evenly; without it they fold over each other.",
+        symbol: Some("D"),
+        default: ParamDefault::Number(3.0),
+        min: Some(0.0),
+        max: Some(50.0),
+        ..COUNT
+    },
+    ParamSpec {
+        name: "supersample",
+        label: "Super-sampling",
+        help: "How often edges are halved, at the most, where the detail is finer than the skin or stretches it: the skin stays as it is.",
+        default: ParamDefault::Number(0.0),
+        min: Some(0.0),
+        max: Some(4.0),
+        ..COUNT
+    },
+    ParamSpec {
+        name: "energy",
+        label: "Skin",
+        help: "A membrane makes its area least, like a soap film; a thin plate its bending, like sheet metal.",
+        kind: ParamKind::Choice,
+        default: ParamDefault::Choice("membrane"),
+        scale: None,
+        choices: Some(&["membrane", "thin-plate"]),
+        ..ParamSpec::NUMBER
+    },
+    ParamSpec {
+        name: "topology",
+        label: "Necks and contacts",
+        help: "Whether a neck that has become a thread is cut, and whether parts that meet again are joined.",
+        kind: ParamKind::Choice,
+        default: ParamDefault::Choice("split"),
+        scale: None,
+        choices: Some(&["never", "split", "split-and-join"]),
+        ..ParamSpec::NUMBER
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn good() -> MultiresParams {
+        MultiresParams::default().with_target(1.0)
+    }
+
+    #[test]
+    fn bounds_of_edges_need_a_ratio_above_two() {
+        assert_eq!(good().validate(), Ok(()));
+        assert!((good().target() - 1.0).abs() < 1e-12);
+        for edge_max in [1.3, 1.0, 0.1, f64::NAN] {
+            let error = MultiresParams { edge_max, ..good() }.validate().unwrap_err().to_string();
+            assert!(error.starts_with("edgeMax"), "{error}");
+        }
+    }
+
+    #[test]
+    fn one_bound_gives_the_other() {
+        let from_min = MultiresParams { edge_min: 2.0, ..Default::default() }.with_target(7.0);
+        let from_max = MultiresParams { edge_max: from_min.edge_max, ..Default::default() }.with_target(7.0);
+        assert_eq!(from_min.validate(), Ok(()));
+        assert!((from_max.edge_min - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn every_number_is_checked_by_name() {
+        for (name, params) in [
+            ("edgeMin", MultiresParams { edge_min: -1.0, ..good() }),
+            ("levels", MultiresParams { levels: 7, ..good() }),
+            ("refineFactor", MultiresParams { refine_factor: 1.0, ..good() }),
+            ("smoothing", MultiresParams { smoothing: 0, ..good() }),
+            ("distribute", MultiresParams { distribute: 51, ..good() }),
+            ("supersample", MultiresParams { supersample: 5, ..good() }),
+        ] {
+            assert!(params.validate().unwrap_err().to_string().starts_with(name), "{name}");
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Which triangles of the finer surface the normals of each triangle of the coarser one can meet near it: a line is tried
+//! against these few instead of looked up in a tree, which took half of the time of a frame with much detail.
+
+use super::detail::Band;
+use super::link::{Linked, normal_at};
+use crate::math::triangle::Line;
+use crate::math::{Bounds, DVec3, Vec3};
+use crate::spatial::{FirstHit, SurfacePoint};
+
+/// For each triangle of a surface, the triangles of another that its prism meets: its own points moved along its
+/// interpolated normals by up to its depth, to either side.
+#[derive(Clone, Debug)]
+pub(super) struct Prisms {
+    /// Where the list of each begins, and the end of the last one.
+    first: Vec<u32>,
+    met: Vec<u32>,
+    depths: Vec<f32>,
+}
+
+/// The depth of a prism in the largest distance that its corners and its middle are from the other surface. With less,
+/// normals between them go on in the tree; with more, lists grow long.
+const DEPTH: f64 = 1.5;
+
+/// By how much a prism is widened for rounding, in its size.
+const ROUNDING: f64 = 1e-5;
+
+/// The least cosine between normals at two corners: between sharper ones the prism would be much too wide.
+const LEAST_COSINE: f32 = 0.1;
+
+impl Prisms {
+    /// Of the triangles of `from` among those of `to`; no deeper than `reach`.
+    pub fn new(from: &Band, to: &Band, reach: f64) -> Self {
+        let count = from.terrain.mesh().triangles.len();
+        let mut prisms = Self { first: vec![0], met: Vec::new(), depths: Vec::with_capacity(count) };
+        for t in 0..count as u32 {
+            let depth = depth(from, to, reach, t).min(reach);
+            prisms.depths.push(depth as f32);
+            if depth > 0.0 {
+                let prism = Prism::new(from, t, depth);
+                to.terrain.tree().meeting(&prism.bounds(), |other| {
+                    if prism.meets(to.terrain.corners(other)) {
+                        prisms.met.push(other);
+                    }
+                });
+            }
+            prisms.first.push(prisms.met.len() as u32);
+        }
+        prisms
+    }
+
+    /// Where the line from a place along its normal meets the other surface nearest, no further away than `reach`.
+    pub fn line_hit(&self, to: &Band, at: &Linked, normal: Vec3, reach: f64) -> Option<SurfacePoint> {
+        let t = at.triangle as usize;
+        let line = Line::new(at.point.as_dvec3(), normal.as_dvec3().try_normalize()?);
+        let mut nearest = FirstHit::within(f64::from(self.depths[t]));
+        for &other in &self.met[self.first[t] as usize..self.first[t + 1] as usize] {
+            nearest.look_at(other, line.hit(to.terrain.corners(other)));
+        }
+        let found = nearest.found(|other| to.terrain.corners(other));
+        found.or_else(|| to.terrain.tree().line_hit(at.point, normal, reach))
+    }
+}
+
+/// How deep the prism of a triangle is to be; 0 for none.
+fn depth(from: &Band, to: &Band, reach: f64, t: u32) -> f64 {
+    let third = Vec3::splat(1.0 / 3.0);
+    let farthest = [Vec3::X, Vec3::Y, Vec3::Z, third].into_iter().filter_map(|weights| {
+        let at = Linked::at(&from.terrain, t, weights);
+        let normal = normal_at(&from.terrain, &from.normals, &at);
+        to.terrain.tree().line_hit(at.point, normal, reach).map(|hit| hit.distance.abs())
+    });
+    let normals = corner_normals(from, t);
+    let bends = (0..3).any(|k| normals[k].dot(normals[(k + 1) % 3]) < LEAST_COSINE);
+    if bends { 0.0 } else { DEPTH * farthest.fold(0.0, f64::max) }
+}
+
+fn corner_normals(from: &Band, t: u32) -> [Vec3; 3] {
+    from.terrain.mesh().triangles[t as usize].map(|v| from.normals[v as usize])
+}
+
+/// A convex body around all places of a triangle moved along its normals.
+///
+/// A normal is n = Σ wᵢ nᵢ / s with the weights of its place and s² = |Σ wᵢ nᵢ|² ≥ min nᵢ·nⱼ. Moved by d, a place is at
+/// Σ wᵢ (cᵢ + (d/s) nᵢ): between the corners, each moved along its own normal by no more than d/s.
+struct Prism {
+    /// The corners moved to either side.
+    points: [DVec3; 6],
+    /// Across the sides.
+    axes: [DVec3; 3],
+    margin: f64,
+}
+
+impl Prism {
+    fn new(from: &Band, t: u32, depth: f64) -> Self {
+        let corners = from.terrain.corners(t).map(Vec3::as_dvec3);
+        let normals = corner_normals(from, t).map(Vec3::as_dvec3);
+        let square = (0..3).map(|k| normals[k].dot(normals[(k + 1) % 3])).fold(1.0, f64::min);
+        let way = depth / square.sqrt();
+        let points = std::array::from_fn(|i| {
+            let side = if i < 3 { way } else { -way };
+            corners[i % 3] + normals[i % 3] * side
+        });
+        let normal = normals[0] + normals[1] + normals[2];
+        let axes =
+            std::array::from_fn(|k| (corners[(k + 1) % 3] - corners[k]).cross(normal).normalize_or_zero());
+        let size = corners.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max) + way;
+        Self { points, axes, margin: ROUNDING * size }
+    }
+
+    fn bounds(&self) -> Bounds {
+        let (mut min, mut max) = (self.points[0], self.points[0]);
+        self.points.iter().for_each(|&p| (min, max) = (min.min(p), max.max(p)));
+        let margin = DVec3::splat(self.margin);
+        Bounds { min: (min - margin).as_vec3(), max: (max + margin).as_vec3() }
+    }
+
+    /// Whether a triangle, whose box meets the prism's, is on the inner side of all sides.
+    fn meets(&self, corners: [Vec3; 3]) -> bool {
+        self.axes.iter().all(|axis| {
+            let (least, most) = extent(axis, &self.points);
+            let (low, high) = extent(axis, &corners.map(Vec3::as_dvec3));
+            low <= most + self.margin && least - self.margin <= high
+        })
+    }
+}
+
+fn extent(axis: &DVec3, points: &[DVec3]) -> (f64, f64) {
+    points.iter().map(|p| axis.dot(*p)).fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    use crate::mesh::Mesh;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// A ball with waves, and a smooth one.
+    fn pair() -> (Band, Band) {
+        let ball = |edge: f32| Mesh::icosphere(Vec3::new(3.0, 0.0, 0.0), 1.0, edge).unwrap().to_triangles();
+        let mut wavy = ball(0.07);
+        let wave = |p: &Vec3| 1.0 + 0.1 * libm::sin(f64::from(p.x * 9.0)) * libm::cos(f64::from(p.y * 7.0));
+        let middle = Vec3::new(3.0, 0.0, 0.0);
+        wavy.positions.iter_mut().for_each(|p| *p = middle + (*p - middle) * wave(p) as f32);
+        let band = |mesh| std::rc::Rc::try_unwrap(Band::of(mesh).unwrap()).unwrap();
+        (band(ball(0.12)), band(wavy))
+    }
+
+    #[test]
+    fn lines_meet_what_they_meet_in_the_tree() {
+        let (from, to) = pair();
+        let prisms = Prisms::new(&from, &to, 0.5);
+        let count = from.terrain.mesh().triangles.len();
+        let mut random = Random::new(8);
+        for k in 0..20_000 {
+            let (u, v) = (random.unit() as f32, random.unit() as f32);
+            let weights = if u + v < 1.0 {
+                Vec3::new(1.0 - u - v, u, v)
+            } else {
+                Vec3::new(u + v - 1.0, 1.0 - u, 1.0 - v)
+            };
+            let triangle = (k % count) as u32;
+            let at = Linked::at(&from.terrain, triangle, weights);
+            let normal = normal_at(&from.terrain, &from.normals, &at);
+            let expected = to.terrain.tree().line_hit(at.point, normal, 0.5);
+            assert_eq!(prisms.line_hit(&to, &at, normal, 0.5), expected, "{triangle} {weights}");
+            assert!(expected.is_some());
+        }
+        // And few go on in the tree, or are tried in vain.
+        let mean = prisms.met.len() as f64 / count as f64;
+        assert!(mean < 20.0, "{mean}");
+        assert!(prisms.depths.iter().all(|&depth| depth > 0.0));
+    }
+}

@@ -1,0 +1,95 @@
+//! What a model is made of: its surfaces and all parameters from what is given, tested.
+
+use super::base::{check_embedded, decomposition, edge_for, skin};
+use super::detail::Band;
+use super::ellipsoid::{Ellipsoid, check_sizes};
+use super::link::{Linked, NOWHERE};
+use super::{MOST_VERTICES, MultiresParams};
+use crate::math::{DVec3, Vec3};
+use crate::mesh::{Mesh, TriangleMesh, measure};
+use crate::methods::MethodError;
+use crate::spatial::Terrain;
+use std::rc::Rc;
+
+/// Triangles of the base where no bounds of edges are given: the paper's "moderately complex models".
+const DEFAULT_TRIANGLES: f64 = 10_000.0;
+
+/// The bands from coarse to fine, and all parameters.
+pub(super) fn set_up(
+    detail: Option<TriangleMesh>,
+    base: Option<TriangleMesh>,
+    ellipsoids: &[Ellipsoid],
+    params: MultiresParams,
+) -> Result<(Vec<Rc<Band>>, MultiresParams), MethodError> {
+    let sized = |area: f64| {
+        let params = params.clone().with_target(edge_for(area, DEFAULT_TRIANGLES));
+        params.validate()?;
+        check_sizes(ellipsoids, params.edge_max)?;
+        check_size(area, &params).map(|()| params)
+    };
+    let bands = match (detail, base) {
+        (detail, Some(base)) => {
+            let base = closed(base)?;
+            check_embedded(&base)?;
+            let params = sized(measure(&base).area)?;
+            let mut bands = vec![Band::of(base)?];
+            if let Some(detail) = detail {
+                bands.push(Band::of(closed(detail)?)?);
+            }
+            (bands, params)
+        }
+        (Some(detail), None) => {
+            let detail = closed(detail)?;
+            let params = sized(measure(&detail).area)?;
+            (decomposition(detail, ellipsoids, &params)?, params)
+        }
+        (None, None) => {
+            let ball = |e: &Ellipsoid| 4.0 * std::f64::consts::PI * e.lengths.length_squared() / 3.0;
+            let params = sized(ellipsoids.iter().map(ball).sum())?;
+            (vec![Band::of(skin(ellipsoids, &params)?)?], params)
+        }
+    };
+    touches(ellipsoids, &bands.0[0].terrain, bands.1.target())?;
+    Ok(bands)
+}
+
+/// The mesh, with vertices of no triangle left out.
+fn closed(mesh: TriangleMesh) -> Result<TriangleMesh, MethodError> {
+    mesh.validate()?;
+    Ok(mesh.welded()).and_then(|mesh| Mesh::from_triangles(&mesh).map(|_| mesh).map_err(MethodError::from))
+}
+
+/// Tests that an ellipsoid reaches the base: else nothing would hold it.
+fn touches(ellipsoids: &[Ellipsoid], base: &Terrain, target: f64) -> Result<(), MethodError> {
+    let near = |p: &Vec3| {
+        let p: DVec3 = p.as_dvec3();
+        ellipsoids.iter().any(|e| e.unit(p).length_squared() <= 1.0 || e.nearest(p).distance(p) <= target)
+    };
+    if base.mesh().positions.iter().any(near) {
+        return Ok(());
+    }
+    Err(MethodError::invalid("ellipsoids", "none touches the base; at least one has to, or nothing holds it"))
+}
+
+/// Tests that the surface will not have too many vertices.
+pub(super) fn check_size(area: f64, params: &MultiresParams) -> Result<(), MethodError> {
+    let triangle = 0.25 * 3.0_f64.sqrt() * params.target() * params.target();
+    if area / triangle <= 2.0 * MOST_VERTICES as f64 {
+        return Ok(());
+    }
+    Err(MethodError::TooManyVertices { most: MOST_VERTICES })
+}
+
+/// The link of every vertex of the base to itself.
+pub(super) fn on_itself(terrain: &Terrain) -> Vec<Linked> {
+    let mut link = vec![NOWHERE; terrain.mesh().positions.len()];
+    for (t, corners) in terrain.mesh().triangles.iter().enumerate() {
+        for (k, &v) in corners.iter().enumerate() {
+            let mut weights = Vec3::ZERO;
+            weights[k] = 1.0;
+            link[v as usize] =
+                Linked { triangle: t as u32, weights, point: terrain.mesh().positions[v as usize] };
+        }
+    }
+    link
+}

@@ -1,0 +1,73 @@
+//! Texture coordinates of the deformed surface: those of the place on the finest one, seams respected (section 7).
+
+use super::link::{Link, Linked};
+use crate::math::{Vec2, Vec3};
+use crate::mesh::{Mesh, TriangleMesh, VertexId};
+use crate::spatial::Terrain;
+
+/// Coordinates at the corners of a triangle that lie further apart than this many times what its size in space calls for
+/// belong to two sides of a seam. With less, stretched texture is taken for a seam; with much more, narrow strips of the
+/// whole texture show along it.
+const JUMP: f32 = 6.0;
+
+/// Texture coordinates by corner of each triangle, in the order of [`Mesh::triangles`]; nothing where the finest surface
+/// has none.
+pub(super) fn corner_uvs(mesh: &Mesh, places: &Link, finest: &Terrain) -> Option<Vec<[Vec2; 3]>> {
+    let source = finest.mesh();
+    if source.uvs.is_none() && source.corner_uvs.is_none() {
+        return None;
+    }
+    Some(mesh.triangles().map(|corners| of_triangle(corners, places, finest)).collect())
+}
+
+fn of_triangle(corners: [VertexId; 3], places: &Link, finest: &Terrain) -> [Vec2; 3] {
+    let at = corners.map(|v| places[v.index()]);
+    let own = at.map(|at| uv_at(finest.mesh(), &at));
+    let [a, b, c] = own;
+    let spread = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    let [p, q, r] = at.map(|at| at.point);
+    let size = p.distance(q).max(q.distance(r)).max(r.distance(p));
+    if spread <= JUMP * size * density(finest, at[0].triangle) {
+        return own;
+    }
+    // All three from one side of the seam, that of the middle.
+    let middle: Linked = finest.march(at[0].triangle, (p + q + r) * (1.0 / 3.0)).into();
+    at.map(|at| continued(finest, middle.triangle, at.point))
+}
+
+fn triangle_uvs(mesh: &TriangleMesh, triangle: u32) -> [Vec2; 3] {
+    match (&mesh.corner_uvs, &mesh.uvs) {
+        (Some(corners), _) => corners[triangle as usize],
+        (None, Some(uvs)) => mesh.triangles[triangle as usize].map(|v| uvs[v as usize]),
+        (None, None) => [Vec2::ZERO; 3],
+    }
+}
+
+fn blend([a, b, c]: [Vec2; 3], weights: Vec3) -> Vec2 {
+    a * weights.x + b * weights.y + c * weights.z
+}
+
+fn uv_at(mesh: &TriangleMesh, at: &Linked) -> Vec2 {
+    blend(triangle_uvs(mesh, at.triangle), at.weights)
+}
+
+/// Length in the texture for a length in space, at a triangle.
+fn density(finest: &Terrain, triangle: u32) -> f32 {
+    let [a, b, c] = triangle_uvs(finest.mesh(), triangle);
+    let [p, q, r] = finest.corners(triangle);
+    let in_texture = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    in_texture / p.distance(q).max(q.distance(r)).max(r.distance(p)).max(f32::MIN_POSITIVE)
+}
+
+/// The coordinates that a triangle's own would have at a point beside it.
+fn continued(finest: &Terrain, triangle: u32, p: Vec3) -> Vec2 {
+    let [a, b, c] = finest.corners(triangle);
+    let normal = (b - a).cross(c - a);
+    let size = normal.length_squared();
+    if size == 0.0 {
+        return triangle_uvs(finest.mesh(), triangle)[0];
+    }
+    let v = normal.dot((p - a).cross(c - a)) / size;
+    let w = normal.dot((b - a).cross(p - a)) / size;
+    blend(triangle_uvs(finest.mesh(), triangle), Vec3::new(1.0 - v - w, v, w))
+}

@@ -1,0 +1,467 @@
+//! The multiresolution model against what is known: spheres, rigid motion, necks, contacts, and bad input.
+#![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
+
+mod common;
+
+use common::skins::{assert_held, assert_sound, ball, ellipsoid, settle, turned};
+use vesicle::math::{DVec3, Vec3};
+use vesicle::mesh::{Mesh, MeshError, TriangleMesh, measure};
+use vesicle::methods::MethodError;
+use vesicle::methods::multires::{
+    ControlEllipsoid, Energy, MultiresOptions, MultiresParams, MultiresolutionModel, Topology,
+};
+use vesicle::spatial::surface_distance;
+#[cfg(target_arch = "wasm32")]
+use wasm_bindgen_test::wasm_bindgen_test as test;
+
+/// A coarse skin, so that every frame can be looked at.
+fn coarse(edge: f64) -> MultiresParams {
+    MultiresParams { edge_min: 0.65 * edge, edge_max: 1.45 * edge, ..Default::default() }
+}
+
+fn lamp(ellipsoids: &[ControlEllipsoid], params: MultiresParams) -> MultiresolutionModel {
+    let options = MultiresOptions { ellipsoids: ellipsoids.to_vec(), params, ..Default::default() };
+    MultiresolutionModel::new(options).unwrap()
+}
+
+/// A ball with bumps all over.
+fn bumpy(edge: f32) -> TriangleMesh {
+    let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, edge).unwrap().to_triangles();
+    for p in &mut mesh.positions {
+        let q = p.as_dvec3();
+        let bump = libm::sin(7.0 * q.x) * libm::sin(6.0 * q.y + 1.0) * libm::sin(5.0 * q.z + 2.0);
+        *p = (q * (1.05 + 0.06 * bump)).as_vec3();
+    }
+    mesh.normals = None;
+    mesh
+}
+
+fn bumpy_model(params: MultiresParams) -> MultiresolutionModel {
+    let options = MultiresOptions {
+        detail: Some(bumpy(0.06)),
+        base: Some(Mesh::icosphere(Vec3::ZERO, 1.0, 0.1).unwrap().to_triangles()),
+        ellipsoids: vec![ball(0.0, 0.0, 0.0, 0.995), ball(0.2, 0.0, 0.0, 0.5)],
+        params,
+    };
+    MultiresolutionModel::new(options).unwrap()
+}
+
+#[test]
+fn a_skin_over_one_ball_is_that_ball() {
+    for energy in [Energy::Membrane, Energy::ThinPlate] {
+        let mut model = lamp(&[ball(1.0, 2.0, 3.0, 2.0)], MultiresParams { energy, ..coarse(0.3) });
+        settle(&mut model, 20);
+        assert_held(&model);
+        for v in model.base_mesh().vertices() {
+            let radius = model.base_mesh().position(v).distance(Vec3::new(1.0, 2.0, 3.0));
+            // A plate lies on the ball less closely than a film.
+            assert!((radius - 2.0).abs() < if energy == Energy::Membrane { 0.01 } else { 0.05 }, "{radius}");
+        }
+    }
+}
+
+/// The soap film between two balls is thinner in the middle than the balls, and nowhere inside them.
+#[test]
+fn a_skin_over_two_balls_has_a_neck() {
+    let mut model = lamp(&[ball(-1.0, 0.0, 0.0, 1.0), ball(1.0, 0.0, 0.0, 1.0)], coarse(0.12));
+    let report = settle(&mut model, 20);
+    assert_held(&model);
+    assert_eq!((report.components, report.euler), (1, 2));
+    let waist = model.base_mesh().positions().iter().filter(|p| p.x.abs() < 0.05);
+    let radii: Vec<f32> = waist.map(|p| (p.y * p.y + p.z * p.z).sqrt()).collect();
+    assert!(radii.iter().all(|r| *r > 0.3 && *r < 0.9), "{radii:?}");
+}
+
+#[test]
+fn edges_are_in_bounds_after_every_frame() {
+    let mut model = lamp(&[ball(-0.5, 0.0, 0.0, 1.0), ball(0.5, 0.0, 0.0, 0.8)], coarse(0.12));
+    for k in 0..6 {
+        model
+            .set_ellipsoids(&[ball(-0.5, 0.0, 0.0, 1.0), ball(0.5 + 0.12 * f64::from(k), 0.0, 0.0, 0.8)])
+            .unwrap();
+        let report = model.step().unwrap();
+        assert_sound(&model, &report);
+        let mesh = model.base_mesh();
+        let length = |(u, v)| f64::from(mesh.position(u).distance(mesh.position(v)));
+        let outside = mesh.edges().map(length).filter(|l| *l < 0.65 * 0.12 || *l > 1.45 * 0.12).count();
+        assert!(outside * 50 < mesh.edge_count(), "{outside} of {}", mesh.edge_count());
+    }
+}
+
+/// Overlapping, nested, crossing and parting ones, turned and resized: none is ever left by the skin, or entered.
+#[test]
+fn every_ellipsoid_stays_covered_and_is_never_entered() {
+    let thin = ellipsoid([0.0, 0.0, 0.0], [1.2, 0.4, 0.6]);
+    for topology in [Topology::Never, Topology::Split, Topology::SplitAndJoin] {
+        let start = [ball(-0.6, 0.0, 0.0, 0.8), thin, ball(-0.6, 0.1, 0.0, 0.4)];
+        let mut model = lamp(&start, MultiresParams { topology, ..coarse(0.14) });
+        for k in 0..12 {
+            let t = f64::from(k) / 11.0;
+            let crossing =
+                turned(&ControlEllipsoid { center: [1.4 * t - 0.2, 0.3 * t, 0.0], ..thin }, 2.5 * t);
+            // From inside of the first through the second, and out beyond it.
+            let nested = ball(-0.6 + 2.0 * t, 0.1, 0.2 * t, 0.4 + 0.1 * t);
+            model.set_ellipsoids(&[ball(-0.6, 0.0, 0.0, 0.8 - 0.2 * t), crossing, nested]).unwrap();
+            let report = model.step().unwrap();
+            assert_sound(&model, &report);
+            assert_held(&model);
+        }
+    }
+}
+
+#[test]
+fn a_neck_parts_and_the_parts_meet_again() {
+    let apart = |gap: f64| [ball(-0.8 - gap, 0.0, 0.0, 0.8), ball(0.8 + gap, 0.0, 0.0, 0.8)];
+    let mut model = lamp(&apart(-0.2), MultiresParams { topology: Topology::SplitAndJoin, ..coarse(0.14) });
+    let mut components = vec![];
+    for k in 0..10 {
+        model.set_ellipsoids(&apart(-0.2 + 0.1 * f64::from(k))).unwrap();
+        let report = model.step().unwrap();
+        assert_sound(&model, &report);
+        components.push(report.components);
+    }
+    settle(&mut model, 20);
+    assert_held(&model);
+    assert_eq!((components[0], model.step().unwrap().components), (1, 2), "{components:?}");
+    for k in 0..14 {
+        model.set_ellipsoids(&apart(0.7 - 0.08 * f64::from(k))).unwrap();
+        let report = model.step().unwrap();
+        assert_sound(&model, &report);
+    }
+    let report = settle(&mut model, 20);
+    assert_eq!((report.components, report.euler), (1, 2));
+}
+
+#[test]
+fn parts_that_may_not_join_press_on_each_other() {
+    let apart = |gap: f64| [ball(-0.8 - gap, 0.0, 0.0, 0.8), ball(0.8 + gap, 0.0, 0.0, 0.8)];
+    let mut model = lamp(&apart(0.3), coarse(0.16));
+    settle(&mut model, 10);
+    for k in 0..8 {
+        model.set_ellipsoids(&apart(0.3 - 0.06 * f64::from(k))).unwrap();
+        let report = model.step().unwrap();
+        assert_sound(&model, &report);
+        assert_eq!(report.components, 2);
+    }
+}
+
+#[test]
+fn without_topology_a_thread_stays() {
+    let apart = |gap: f64| [ball(-0.8 - gap, 0.0, 0.0, 0.8), ball(0.8 + gap, 0.0, 0.0, 0.8)];
+    let mut model = lamp(&apart(-0.2), MultiresParams { topology: Topology::Never, ..coarse(0.16) });
+    for k in 0..9 {
+        model.set_ellipsoids(&apart(-0.2 + 0.1 * f64::from(k))).unwrap();
+        let report = model.step().unwrap();
+        assert_sound(&model, &report);
+        assert_eq!((report.components, report.euler), (1, 2));
+    }
+}
+
+#[test]
+fn rigid_motion_moves_the_detail_exactly_with_it() {
+    let mut model = bumpy_model(coarse(0.12));
+    settle(&mut model, 20);
+    let before = model.mesh().to_triangles();
+    let at = |k: f64, e: ControlEllipsoid| {
+        let turned = turned(&ControlEllipsoid { center: [0.0; 3], ..e }, 0.2 * k);
+        let (sine, cosine) = (0.2 * k).sin_cos();
+        let [x, y, z] = e.center;
+        let center = [cosine * x - sine * y + 0.3 * k, sine * x + cosine * y, z];
+        ControlEllipsoid { center, axes: turned.axes }
+    };
+    let start = model.ellipsoids();
+    for k in 1..=10 {
+        model.set_ellipsoids(&start.iter().map(|e| at(f64::from(k), *e)).collect::<Vec<_>>()).unwrap();
+        settle(&mut model, 10);
+    }
+    let turn = vesicle::math::DAffine3::from_mat3_translation(
+        vesicle::math::DMat3::from_rotation_z(2.0),
+        DVec3::new(3.0, 0.0, 0.0),
+    );
+    let distance = surface_distance(&model.mesh().to_triangles(), &before.transformed(&turn)).unwrap();
+    assert!(distance.hausdorff < 1e-3 * 2.0, "{}", distance.hausdorff);
+}
+
+#[test]
+fn the_detail_is_that_of_the_surface_and_stays_so_when_pulled() {
+    let mut model = bumpy_model(MultiresParams { supersample: 1, ..coarse(0.1) });
+    let detail = bumpy(0.06);
+    let report = model.step().unwrap();
+    assert_sound(&model, &report);
+    let distance = surface_distance(&model.mesh().to_triangles(), &detail).unwrap();
+    // The chord of an edge that is no longer than the longest over bumps of curvature 4.
+    assert!(distance.mean < 0.5 * 4.0 * 0.145 * 0.145 / 8.0, "{}", distance.mean);
+    for k in 1..=6 {
+        model
+            .set_ellipsoids(&[ball(0.0, 0.0, 0.0, 0.995), ball(0.2 + 0.2 * f64::from(k), 0.0, 0.0, 0.5)])
+            .unwrap();
+        let report = model.step().unwrap();
+        assert_sound(&model, &report);
+        assert_eq!((report.components, model.folded()), (1, 0));
+    }
+    // The far side has not moved.
+    let far = |p: &&Vec3| p.x < -0.4;
+    let tree = vesicle::spatial::TriangleTree::new(&detail).unwrap();
+    let moved = model.mesh().to_triangles();
+    let distances: Vec<f64> =
+        moved.positions.iter().filter(far).map(|p| tree.closest(*p).unwrap().distance).collect();
+    let mean = distances.iter().sum::<f64>() / distances.len() as f64;
+    assert!(distances.len() > 50 && mean < 0.02, "{mean}");
+}
+
+#[test]
+fn the_map_keeps_areas_and_does_not_fold_before_a_pinch() {
+    let globe = Mesh::icosphere(Vec3::ZERO, 1.0, 0.1).unwrap().to_triangles();
+    let mut model = MultiresolutionModel::new(MultiresOptions {
+        base: Some(globe),
+        ellipsoids: vec![ball(0.0, 0.0, 0.0, 0.999), ball(0.3, 0.0, 0.0, 0.6)],
+        params: coarse(0.1),
+        ..Default::default()
+    })
+    .unwrap();
+    for k in 0..16 {
+        let x = 0.3 + 1.1 * f64::from(k) / 15.0;
+        model.set_ellipsoids(&[ball(0.0, 0.0, 0.0, 0.999), ball(x, 0.0, 0.0, 0.6)]).unwrap();
+        let report = model.step().unwrap();
+        assert_sound(&model, &report);
+        assert_eq!(model.folded(), 0, "at {x}");
+        let mut areas = model.distortion().area;
+        areas.sort_by(f64::total_cmp);
+        let [low, high] = [areas[areas.len() / 20], areas[areas.len() - 1 - areas.len() / 20]];
+        assert!(low > 0.4 && high < 2.2, "{low} {high} at {x}");
+        // The link lies on the base.
+        let on_base = |p: &Vec3| (f64::from(p.length()) - 1.0).abs() < 0.01;
+        assert!(model.link_mesh().positions.iter().all(on_base));
+    }
+}
+
+#[test]
+fn a_state_goes_on_bit_for_bit() {
+    let params = MultiresParams { topology: Topology::SplitAndJoin, ..coarse(0.14) };
+    let mut model = bumpy_model(params.clone());
+    let goal = [ball(0.0, 0.0, 0.0, 0.995), ball(1.6, 0.4, 0.0, 0.6)];
+    model.set_ellipsoids(&goal).unwrap();
+    for _ in 0..3 {
+        model.step().unwrap();
+    }
+    let state = model.save();
+    let mut other = bumpy_model(params);
+    other.restore(&state).unwrap();
+    assert_eq!(other.surface(), model.surface());
+    for _ in 0..4 {
+        let (a, b) = (model.step().unwrap(), other.step().unwrap());
+        assert_eq!((a.iteration, a.done, a.residual, a.events), (b.iteration, b.done, b.residual, b.events));
+        assert_eq!(other.mesh().positions(), model.mesh().positions());
+        assert_eq!(other.save(), model.save());
+    }
+    let mut damaged = state.clone();
+    damaged[40] ^= 1;
+    assert!(matches!(other.restore(&damaged), Err(MethodError::BadState { .. })));
+    let mut another = lamp(&goal, coarse(0.2));
+    assert!(matches!(another.restore(&state), Err(MethodError::BadState { .. })));
+}
+
+#[test]
+fn ellipsoids_come_and_go() {
+    let mut model = lamp(&[ball(0.0, 0.0, 0.0, 1.0)], coarse(0.16));
+    let volume = |model: &MultiresolutionModel| measure(&model.base_mesh().to_triangles()).volume;
+    let before = volume(&model);
+    model.set_ellipsoids(&[ball(0.0, 0.0, 0.0, 1.0), ball(0.9, 0.0, 0.0, 0.5)]).unwrap();
+    settle(&mut model, 40);
+    assert_held(&model);
+    assert!(volume(&model) > 1.03 * before);
+    model.set_ellipsoids(&[ball(0.0, 0.0, 0.0, 1.0)]).unwrap();
+    settle(&mut model, 40);
+    assert_eq!(model.ellipsoids().len(), 1);
+    assert!((volume(&model) / before - 1.0).abs() < 0.02);
+}
+
+/// One that grew outside would push the skin away, and tear its map.
+#[test]
+fn one_that_is_new_outside_comes_out_of_its_neighbour() {
+    let old = [ball(0.0, 0.0, 0.0, 1.0), ball(-0.8, 0.0, 0.0, 0.7)];
+    let mut model = lamp(&old, coarse(0.16));
+    settle(&mut model, 20);
+    let before = measure(&model.base_mesh().to_triangles()).volume;
+    let fresh = ellipsoid([1.6, 0.3, 0.0], [0.5, 0.6, 0.4]);
+    model.set_ellipsoids(&[old[0], old[1], fresh]).unwrap();
+    settle(&mut model, 60);
+    assert_held(&model);
+    assert_eq!(model.folded(), 0);
+    assert!(measure(&model.base_mesh().to_triangles()).volume > before + 0.5);
+}
+
+/// Frames on the way may only freshen the skin up; what stands was solved for.
+#[test]
+fn many_small_moves_end_as_one_place() {
+    let at = |way: f64| [ball(-0.7, 0.0, 0.0, 0.8), ball(0.5 + way, 0.2 * way, 0.0, 0.7)];
+    let mut dragged = lamp(&at(0.0), coarse(0.1));
+    settle(&mut dragged, 20);
+    for k in 1..=30 {
+        dragged.set_ellipsoids(&at(0.008 * f64::from(k))).unwrap();
+        let report = dragged.step().unwrap();
+        assert_sound(&dragged, &report);
+    }
+    settle(&mut dragged, 20);
+    assert_held(&dragged);
+    let mut placed = lamp(&at(0.24), coarse(0.1));
+    settle(&mut placed, 20);
+    let [dragged, placed] = [dragged, placed].map(|model| model.base_mesh().to_triangles());
+    let apart = surface_distance(&dragged, &placed).unwrap().hausdorff;
+    // At rest either is within an edge of where it would go.
+    assert!(apart < 0.15, "{apart}");
+}
+
+#[test]
+fn edges_forty_times_as_long_are_come_by_frame_by_frame() {
+    let mut model = lamp(&[ball(0.0, 0.0, 0.0, 20.0)], coarse(0.5));
+    model.set_params(coarse(20.0)).unwrap();
+    for _ in 0..8 {
+        let report = model.step().unwrap();
+        assert_sound(&model, &report);
+    }
+    assert!(model.base_mesh().vertex_count() < 100);
+}
+
+#[test]
+fn parameters_are_live() {
+    let mut model = lamp(&[ball(-0.5, 0.0, 0.0, 1.0), ball(0.5, 0.0, 0.0, 0.8)], coarse(0.2));
+    settle(&mut model, 20);
+    let vertices = model.base_mesh().vertex_count();
+    model.set_params(MultiresParams { levels: 3, ..coarse(0.1) }).unwrap();
+    settle(&mut model, 20);
+    let finer = model.base_mesh().vertex_count();
+    assert!(finer > 3 * vertices && finer < 6 * vertices, "{vertices} {finer}");
+    assert!(model.set_params(coarse(1e-4)).is_err());
+    assert_eq!(model.params().levels, 3);
+}
+
+#[test]
+fn super_sampling_shows_at_once_and_moves_nothing() {
+    let mut model = bumpy_model(coarse(0.12));
+    settle(&mut model, 20);
+    let (base, vertices) = (model.base_mesh().clone(), model.mesh().vertex_count());
+    model.set_params(MultiresParams { supersample: 2, ..coarse(0.12) }).unwrap();
+    assert!(model.mesh().vertex_count() > vertices);
+    let report = model.step().unwrap();
+    assert_sound(&model, &report);
+    assert!(report.done && model.base_mesh().positions() == base.positions());
+}
+
+#[test]
+fn levels_go_from_coarse_to_fine() {
+    let model = lamp(&[ball(-0.5, 0.0, 0.0, 1.0), ball(0.5, 0.0, 0.0, 0.8)], coarse(0.08));
+    let levels = model.levels();
+    assert_eq!(levels.len(), 3);
+    assert!(levels.windows(2).all(|pair| pair[1].triangles.len() > 2 * pair[0].triangles.len()));
+}
+
+/// A base made of the detail: with its detail back it is the surface that was given.
+#[test]
+fn a_base_is_made_where_none_is_given() {
+    let detail = bumpy(0.06);
+    let model = MultiresolutionModel::new(MultiresOptions {
+        detail: Some(detail.clone()),
+        ellipsoids: vec![ball(0.0, 0.0, 0.0, 0.9)],
+        params: MultiresParams { supersample: 1, ..coarse(0.1) },
+        ..Default::default()
+    })
+    .unwrap();
+    let distance = surface_distance(&model.mesh().to_triangles(), &detail).unwrap();
+    assert!(distance.mean < 0.01, "{}", distance.mean);
+    // Its base has lost the bumps.
+    let base = model.base_mesh().to_triangles();
+    let radii: Vec<f32> = base.positions.iter().map(|p| p.length()).collect();
+    let [low, high] = [f32::min, f32::max].map(|pick| radii.iter().copied().reduce(pick).unwrap());
+    assert!(high - low < 0.02, "{low} {high}");
+}
+
+fn refusal(options: MultiresOptions) -> MethodError {
+    MultiresolutionModel::new(options).err().unwrap()
+}
+
+#[test]
+fn bad_input_is_named() {
+    let good = || MultiresOptions {
+        detail: Some(bumpy(0.2)),
+        ellipsoids: vec![ball(0.0, 0.0, 0.0, 0.9)],
+        ..Default::default()
+    };
+    let message = |options: MultiresOptions| refusal(options).to_string();
+    assert!(message(MultiresOptions { ellipsoids: vec![], ..good() }).starts_with("ellipsoids: none given"));
+    assert!(
+        message(MultiresOptions { ellipsoids: vec![ball(9.0, 0.0, 0.0, 0.5)], ..good() })
+            .contains("none touches the base")
+    );
+    assert!(
+        message(MultiresOptions { ellipsoids: vec![ball(0.0, 0.0, 0.0, 0.0)], ..good() })
+            .contains("a semi-axis is 0 long")
+    );
+    assert!(
+        message(MultiresOptions { ellipsoids: vec![ball(f64::NAN, 0.0, 0.0, 1.0)], ..good() })
+            .contains("its center")
+    );
+    let sharp = ellipsoid([0.0; 3], [1.0, 0.2, 0.2]);
+    assert!(
+        message(MultiresOptions { ellipsoids: vec![sharp], ..good() })
+            .contains("number 0 has tips of radius 0.040")
+    );
+    let narrow = MultiresParams { edge_min: 0.1, edge_max: 0.2, ..Default::default() };
+    assert!(message(MultiresOptions { params: narrow, ..good() }).starts_with("edgeMax: 0.2 given"));
+    let mut open = bumpy(0.2);
+    open.triangles.pop();
+    let not_closed = |error| matches!(error, MethodError::Mesh(MeshError::NotClosed { .. }));
+    assert!(not_closed(refusal(MultiresOptions { detail: Some(open.clone()), ..good() })));
+    assert!(not_closed(refusal(MultiresOptions { base: Some(open), ..good() })));
+    let mut crossing = bumpy(0.2);
+    crossing.positions[0] *= -3.0;
+    let error = refusal(MultiresOptions { base: Some(crossing), ..good() });
+    assert!(matches!(error, MethodError::Mesh(MeshError::SelfIntersecting { .. })), "{error}");
+    let error = refusal(MultiresOptions { params: coarse(1e-5), ..good() });
+    assert!(matches!(error, MethodError::TooManyVertices { .. }), "{error}");
+}
+
+/// Grown a million times with edges as they are, the skin would need more vertices than there is memory for.
+#[test]
+fn a_skin_that_gets_too_large_is_refused_and_stays() {
+    let mut model = lamp(&[ball(0.0, 0.0, 0.0, 1.0)], coarse(0.2));
+    model.set_ellipsoids(&[ball(0.0, 0.0, 0.0, 1e5)]).unwrap();
+    let mut frames = 0;
+    let error = loop {
+        match model.step() {
+            Ok(_) => frames += 1,
+            Err(error) => break error,
+        }
+        assert!(frames < 30);
+    };
+    assert!(matches!(error, MethodError::TooManyVertices { .. }));
+    assert_eq!(model.base_mesh().check(), Ok(()));
+    model.set_ellipsoids(&[ball(0.0, 0.0, 0.0, 1.0)]).unwrap();
+    model.step().unwrap();
+    assert_eq!(model.base_mesh().check(), Ok(()));
+}
+
+/// The same as `tests/js/lamp.ts` makes in Node and in the browser.
+#[test]
+fn bits_are_the_same_everywhere() {
+    let params = MultiresParams {
+        edge_min: 0.125,
+        edge_max: 0.28125,
+        topology: Topology::SplitAndJoin,
+        ..Default::default()
+    };
+    let mut model = lamp(&[ball(-0.75, 0.0, 0.0, 0.75), ball(0.5, 0.0, 0.0, 0.75)], params);
+    for frame in 1..=16 {
+        let shift = 0.125 * f64::from(if frame <= 10 { frame } else { 20 - frame });
+        model.set_ellipsoids(&[ball(-0.75, 0.0, 0.0, 0.75), ball(0.5 + shift, 0.0, 0.0, 0.75)]).unwrap();
+        model.step().unwrap();
+    }
+    let bytes = model.surface().positions.into_iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes);
+    let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    assert_eq!(format!("{hash:016x}"), LAMP_BITS);
+}
+
+/// After a change of the core that is meant, take what the test finds, here and in `tests/js/lamp.ts`.
+const LAMP_BITS: &str = "82280a25d547c21c";
