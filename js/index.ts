@@ -9,6 +9,7 @@
 import { call } from './runtime.js';
 import { version as rawVersion } from './vesicle.js';
 
+export { animationGlb } from './animation.js';
 export {
   type Attractor,
   DeformableModel,
@@ -34,8 +35,17 @@ export {
   type MeshHit,
   type MeshInfo,
   type MeshReport,
+  type MeshTexture,
+  type RestructurePass,
   type SurfaceDistance,
+  type TextureType,
 } from './mesh.js';
+export {
+  type ControlEllipsoid,
+  type MultiresOptions,
+  MultiresolutionModel,
+  type MultiresParams,
+} from './multires.js';
 export { type ParamSpec, paramSpecs } from './params.js';
 export { type InitInput, init as default, initSync } from './runtime.js';
 export type { RunOptions, Stepper, StepReport } from './stepper.js';

@@ -1,6 +1,6 @@
-import { choice, finite, invalid, number, options, positive, typed, vec3, whole } from './check.js';
+import { choice, finite, invalid, list, number, options, plain, positive, typed, vec3, whole } from './check.js';
 import { call, Handle } from './runtime.js';
-import { type RawArrays, RawMesh } from './vesicle.js';
+import { type RawArrays, RawMesh, RawTexture } from './vesicle.js';
 import { type Vec3, type Volume, volumeHandle } from './volume.js';
 
 /** A mesh's vertices and triangles, packed. */
@@ -11,10 +11,24 @@ export interface MeshArrays {
   normals: Float32Array;
   /** abc of each triangle, counter-clockwise seen from outside. */
   indices: Uint32Array;
-  /** Texture coordinates of each vertex, where the mesh has them. */
+  /** Texture coordinates of each vertex, where the mesh has them; at a seam those of one side: see `splitAtSeams`. */
   uvs?: Float32Array;
   /** Colour of each vertex, rgb, 0..1, where the mesh has them. */
   colors?: Float32Array;
+}
+
+/** Encodings of a picture that {@link MeshTexture} may have. */
+export type TextureType = 'image/png' | 'image/jpeg' | 'image/webp';
+
+/**
+ * The picture on a mesh, as an image file. Texture coordinates count from its upper left corner, u to the right and v
+ * downwards, 1 at the far edges, and it repeats beyond, as in glTF: in three.js, with `flipY = false`.
+ */
+export interface MeshTexture {
+  /** How the picture is encoded. */
+  type: TextureType;
+  /** The image file. */
+  bytes: Uint8Array;
 }
 
 /** Measures of a mesh. Those of the enclosed solid mean something for a closed mesh only. */
@@ -93,7 +107,14 @@ export interface SurfaceDistance {
   hausdorff: number;
 }
 
+/** A pass of {@link Mesh.restructure}. */
+export type RestructurePass = 'collapse' | 'split' | 'flip';
+
+const RESTRUCTURE_PASSES: readonly RestructurePass[] = ['collapse', 'split', 'flip'];
+
 const CURVATURES: readonly CurvatureKind[] = ['mean', 'gaussian'];
+
+const TEXTURES: readonly TextureType[] = ['image/png', 'image/jpeg', 'image/webp'];
 
 const FORMATS: readonly MeshFormat[] = ['glb', 'ply', 'stl', 'obj', 'vtp', 'mz3'];
 
@@ -148,27 +169,42 @@ export class Mesh {
    *
    * @param positions - xyz of each vertex.
    * @param indices - abc of each triangle, counter-clockwise seen from outside.
-   * @param extra - `uvs`: texture coordinates of each vertex.
-   * @throws {@link VesicleError} `invalid-argument`: a wrong length, a number that is not finite, an index of no vertex.
+   * @param extra - `uvs`: texture coordinates of each vertex; `texture`: the picture they lie in.
+   * @throws {@link VesicleError} `invalid-argument`: a wrong length, a number that is not finite, an index of no vertex,
+   *   a texture without `uvs`, bytes that are no picture of the type that is named.
    */
-  static fromArrays(positions: Float32Array, indices: Uint32Array, extra: { uvs?: Float32Array } = {}): Mesh {
-    const { uvs } = options('extra', extra, ['uvs']);
+  static fromArrays(
+    positions: Float32Array,
+    indices: Uint32Array,
+    extra: { uvs?: Float32Array; texture?: MeshTexture } = {},
+  ): Mesh {
+    const { uvs, texture } = options('extra', extra, ['uvs', 'texture']);
     const vertices = finite('positions', positions, 3).length / 3;
     checkIndices(typed('indices', indices, Uint32Array, 3), vertices);
     if (uvs !== undefined && finite('uvs', uvs, 2).length !== 2 * vertices) {
       throw invalid('uvs', `length ${uvs.length}; two numbers a vertex are needed, ${2 * vertices}`);
     }
-    return made(() => RawMesh.fromArrays(positions, indices, uvs));
+    if (texture !== undefined && uvs === undefined) throw invalid('texture', 'needs texture coordinates, uvs');
+    checkTexture(texture);
+    return made(() => RawMesh.fromArrays(positions, indices, uvs, rawTexture(texture)));
   }
 
   /**
    * The mesh in a file: glb, ply, stl or obj, detected from the bytes. Duplicate positions are welded.
    *
-   * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`.
+   * A glb that has its base colour texture in it (png, jpeg or webp) brings it along as {@link Mesh.texture}. Texture
+   * coordinates are as in the file: v counts from above in glb, and from below in obj and ply.
+   *
+   * @param options - `texture`: the picture for a file that has it beside it (obj, ply). Then v counts from above in all
+   *   of them: that of an obj or ply becomes 1 - v. It takes the place of a glb's own.
+   * @throws {@link VesicleError} `bad-file` naming the format and the field, also for a texture where the file has no
+   *   texture coordinates; `too-large`; `invalid-argument`.
    */
-  static parse(bytes: Uint8Array): Mesh {
+  static parse(bytes: Uint8Array, options_: { texture?: MeshTexture } = {}): Mesh {
     typed('bytes', bytes, Uint8Array);
-    return made(() => RawMesh.parse(bytes));
+    const { texture } = options('options', options_, ['texture']);
+    checkTexture(texture);
+    return made(() => RawMesh.parse(bytes, rawTexture(texture)));
   }
 
   /**
@@ -206,6 +242,19 @@ export class Mesh {
     return this.#handle.use((raw) => raw.geometryVersion());
   }
 
+  /**
+   * The picture on the mesh, a copy of the caller's own, or nothing. Edits take it away, as they do texture coordinates.
+   */
+  get texture(): MeshTexture | undefined {
+    const raw = this.#handle.use((mesh) => mesh.texture());
+    if (!raw) return undefined;
+    try {
+      return call(() => ({ type: raw.kind() as TextureType, bytes: raw.bytes() }));
+    } finally {
+      raw.free();
+    }
+  }
+
   /** The mesh as it is now, in arrays of the caller's own. */
   arrays(): MeshArrays {
     const arrays = { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() };
@@ -239,6 +288,15 @@ export class Mesh {
     return this.#handle.use((raw) => raw.check() as MeshReport);
   }
 
+  /**
+   * The mesh to be drawn with its texture: along the seams of the texture a vertex has several texture coordinates, and
+   * becomes as many vertices, so that {@link Mesh.arrays} has `uvs`. It is open there. A mesh without seams comes back
+   * as it is.
+   */
+  splitAtSeams(): Mesh {
+    return this.#handle.use((raw) => made(() => raw.splitAtSeams()));
+  }
+
   /** The connected parts, each as a mesh of its own. */
   components(): Mesh[] {
     return this.#handle.use((raw) => raw.components()).map((part) => made(() => part));
@@ -252,6 +310,24 @@ export class Mesh {
    */
   refine(): void {
     this.#handle.use((raw) => raw.refine());
+  }
+
+  /**
+   * One round of restructuring, pass by pass: edges shorter than `min` are drawn together, those longer than `max` split, and
+   * edges flipped where that brings valences nearer to six. The mesh stays closed, with the same components and genus; its
+   * shape suffers a little, and it may come to cross itself: {@link Mesh.remesh} keeps both.
+   *
+   * @param edge - Bounds of edges, `max` more than twice `min`.
+   * @param passes - In the order they are to run; default all three once.
+   * @returns How many edges were drawn together, split or flipped.
+   * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first; `too-large`.
+   */
+  restructure(edge: { min: number; max: number }, passes: readonly RestructurePass[] = RESTRUCTURE_PASSES): number {
+    const [min, max] = edgeBounds(edge);
+    const codes = list('passes', passes).map((pass) =>
+      RESTRUCTURE_PASSES.indexOf(choice('passes', pass, RESTRUCTURE_PASSES)),
+    );
+    return this.#handle.use((raw) => raw.restructure(min, max, Uint8Array.from(codes)));
   }
 
   /**
@@ -269,6 +345,25 @@ export class Mesh {
   decimate(targetTriangles: number): void {
     number('targetTriangles', targetTriangles, { min: 1 });
     this.#handle.use((raw) => raw.decimate(targetTriangles));
+  }
+
+  /**
+   * Brings the lengths of edges into bounds and the number of edges at each vertex towards six, so that triangles become
+   * alike, with edges of about √(min · max): by collapse, split and flip, and by moves along the surface. The shape is
+   * kept, mostly to within a quarter of such an edge. The mesh stays closed, keeps its components and their genus, and
+   * where it did not cross itself it does not afterwards.
+   *
+   * Some edges stay shorter than `min` where parts are thinner than that, or the shape would be lost. What crosses itself
+   * already is left much as it is. Vertices are numbered anew, and all of them may move. Texture coordinates and colours
+   * are not kept.
+   *
+   * @param edge - Lengths, world units: `min` above 0, `max` more than twice as much.
+   * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first;
+   *   `too-large` where more than eight million vertices would be needed.
+   */
+  remesh(edge: { min: number; max: number }): void {
+    const [min, max] = edgeBounds(edge);
+    this.#handle.use((raw) => raw.remesh(min, max));
   }
 
   /**
@@ -339,7 +434,8 @@ export class Mesh {
   }
 
   /**
-   * The mesh as the bytes of a file: glb (binary glTF), ply and stl (binary), obj, vtp or mz3.
+   * The mesh as the bytes of a file: glb (binary glTF), ply and stl (binary), obj, vtp or mz3. Only a glb has the
+   * texture in it; obj, ply and vtp of a mesh with one have its texture coordinates as programs expect them, 1 - v.
    *
    * @throws {@link VesicleError} `invalid-argument`: no such format.
    */
@@ -367,6 +463,13 @@ export class Mesh {
   }
 }
 
+function edgeBounds(edge: { min: number; max: number }): [number, number] {
+  const { min, max } = options('edge', plain('edge', edge), ['min', 'max']);
+  positive('edge.min', min);
+  if (number('edge.max', max) > 2 * (min as number)) return [min as number, max as number];
+  throw invalid('edge.max', `${max}; more than twice edge.min, ${min}, is needed`);
+}
+
 function made(make: () => RawMesh): Mesh {
   return wrapMesh(new Handle('Mesh', make));
 }
@@ -375,6 +478,18 @@ function checkIndices(indices: Uint32Array, vertices: number): void {
   const wrong = indices.findIndex((index) => index >= vertices);
   if (wrong < 0) return;
   throw invalid('indices', `${indices[wrong]} at index ${wrong}; there are ${vertices} vertices`);
+}
+
+function checkTexture(texture: MeshTexture | undefined): void {
+  if (texture === undefined) return;
+  const { type, bytes } = options('texture', texture, ['type', 'bytes']);
+  choice('texture.type', type, TEXTURES);
+  typed('texture.bytes', bytes, Uint8Array);
+}
+
+/** A copy inside the module, which takes it over. */
+function rawTexture(texture: MeshTexture | undefined): RawTexture | undefined {
+  return texture && new RawTexture(texture.type, texture.bytes);
 }
 
 function nonZero(parameter: string, vector: Float64Array<ArrayBuffer>): Float64Array<ArrayBuffer> {

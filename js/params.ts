@@ -1,6 +1,6 @@
 import { choice } from './check.js';
 import { call } from './runtime.js';
-import { deformableParamSpecs, implicitParamSpecs } from './vesicle.js';
+import { deformableParamSpecs, implicitParamSpecs, multiresParamSpecs } from './vesicle.js';
 
 /** One parameter of a method, described so that a page can build a control for it. */
 export interface ParamSpec {
@@ -30,7 +30,9 @@ export interface ParamSpec {
  *
  * @throws {@link VesicleError} `invalid-argument`: no such method.
  */
-export function paramSpecs(method: 'deformable' | 'implicit'): ParamSpec[] {
-  choice('method', method, ['deformable', 'implicit']);
-  return call(() => (method === 'deformable' ? deformableParamSpecs() : implicitParamSpecs()) as ParamSpec[]);
+export function paramSpecs(method: keyof typeof SPECS): ParamSpec[] {
+  choice('method', method, Object.keys(SPECS));
+  return call(() => SPECS[method]() as ParamSpec[]);
 }
+
+const SPECS = { deformable: deformableParamSpecs, implicit: implicitParamSpecs, multires: multiresParamSpecs };

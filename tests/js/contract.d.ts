@@ -134,6 +134,8 @@ export class Mesh {
   components(): Mesh[];
   /** One sqrt(3) refinement pass. */
   refine(): void;
+  /** Edge lengths into [min, max], valences towards 6, by collapse, split and flip; shape kept. */
+  remesh(edge: { min: number; max: number }): void;
   /** Quadric decimation that keeps the mesh closed and its topology unchanged. */
   decimate(targetTriangles: number): void;
   /** Per vertex. */
@@ -212,7 +214,7 @@ export interface ParamSpec {
   unit?: string;
   choices?: string[];
 }
-export function paramSpecs(method: 'deformable' | 'implicit'): ParamSpec[];
+export function paramSpecs(method: 'deformable' | 'implicit' | 'multires'): ParamSpec[];
 
 // ── 1. deformable model with automatic topology changes ──────────────────
 export interface DeformableParams {
@@ -318,6 +320,48 @@ export class ImplicitSurface implements Stepper {
   /** f sampled on a grid around the object, so that the deformable model can take over. */
   toVolume(dims: Vec3): Volume;
   colorize(cameras: Camera[]): void;
+  save(): Uint8Array;
+  restore(state: Uint8Array): void;
+  free(): void;
+  [Symbol.dispose](): void;
+}
+
+// ── 4. multiresolution deformation ───────────────────────────────────────
+export interface ControlEllipsoid {
+  center: Vec3;
+  /** Three orthogonal semi-axes as vectors. */
+  axes: [Vec3, Vec3, Vec3];
+}
+export interface MultiresParams {
+  edgeMin?: number; // ε_min, target resolution
+  edgeMax?: number; // ε_max, more than twice ε_min
+  levels?: number; // of the multi-level solver
+  refineFactor?: number; // q
+  smoothing?: number; // umbrella iterations per level
+  distribute?: number; // applications of the D operator per level
+  supersample?: number; // halvings of edges for the detail
+  energy?: 'membrane' | 'thin-plate';
+  topology?: 'never' | 'split' | 'split-and-join';
+}
+export class MultiresolutionModel implements Stepper {
+  constructor(options: {
+    /** The detailed surface; left out: a bare membrane (lava lamp). */
+    detail?: Mesh;
+    /** Its low-frequency approximation; default: made by smoothing and coarsening. */
+    base?: Mesh;
+    ellipsoids: ControlEllipsoid[];
+    params?: MultiresParams;
+  });
+  setEllipsoids(list: ControlEllipsoid[]): void;
+  step(iterations?: number): StepReport; // one animation frame towards the ellipsoids
+  run(options?: RunOptions): Promise<StepReport>;
+  readonly mesh: Mesh; // with detail (and uvs where the detail has them)
+  readonly baseMesh: Mesh; // the deformed low-frequency surface
+  readonly linkMesh: Mesh; // same connectivity, on the undeformed base: the map T
+  /** Ratio of areas and angles across T, for showing distortion. */
+  distortion(): { area: Float32Array; angle: Float32Array };
+  readonly params: Required<MultiresParams>;
+  setParams(params: MultiresParams): void;
   save(): Uint8Array;
   restore(state: Uint8Array): void;
   free(): void;

@@ -144,8 +144,41 @@ test('decimation: nothing to do, nothing left to do, nothing closed to do it to'
   for (const target of [1, 2, 3, 1000]) expect(failure(() => open().decimate(target)).code).toBe('not-closed');
 });
 
-test('decimation takes texture coordinates away, as refining does', () => {
-  for (const edit of [(mesh: Mesh) => mesh.decimate(100), (mesh: Mesh) => mesh.refine()]) {
+test('remeshing: triangles alike, the shape kept', () => {
+  for (const [mesh, euler] of [
+    [sphere(2, 0.2), 2],
+    [torus(120, 20), 0],
+  ] as const) {
+    const before = mesh.clone();
+    const [topology, geometry] = [mesh.topologyVersion, mesh.geometryVersion];
+    mesh.remesh({ min: 0.2, max: 0.45 });
+    expect(mesh.check()).toEqual(HEALTHY);
+    const { edge, minAngleDegrees, euler: after, components } = mesh.info();
+    expect([after, components]).toEqual([euler, 1]);
+    expect(edge.mean).toBeGreaterThan(0.2);
+    expect(edge.max).toBeLessThanOrEqual(0.45 * 1.000001);
+    expect(minAngleDegrees).toBeGreaterThan(25);
+    expect(mesh.distanceTo(before).hausdorff).toBeLessThan(0.15);
+    expect(mesh.topologyVersion).toBeGreaterThan(topology);
+    expect(mesh.geometryVersion).toBeGreaterThan(geometry);
+  }
+});
+
+test('remeshing: what is open and what would be too large stays as it was', () => {
+  expect(failure(() => open().remesh({ min: 0.1, max: 0.3 })).code).toBe('not-closed');
+  const mesh = sphere();
+  const before = mesh.arrays();
+  expect(failure(() => mesh.remesh({ min: 1e-7, max: 1e-6 })).code).toBe('too-large');
+  expect(mesh.arrays()).toEqual(before);
+});
+
+test('decimation takes texture coordinates away, as refining and remeshing do', () => {
+  const edits = [
+    (mesh: Mesh) => mesh.decimate(100),
+    (mesh: Mesh) => mesh.refine(),
+    (mesh: Mesh) => mesh.remesh({ min: 0.2, max: 0.5 }),
+  ];
+  for (const edit of edits) {
     const { positions, indices } = sphere().arrays();
     const mesh = Mesh.fromArrays(positions, indices, { uvs: new Float32Array((2 * positions.length) / 3) });
     edit(mesh);
@@ -321,6 +354,16 @@ const REFUSED: [string, string, () => unknown][] = [
   ['less than none as a target', 'targetTriangles', () => sphere().decimate(-4)],
   ['NaN as a target', 'targetTriangles', () => sphere().decimate(Number.NaN)],
   ['no target', 'targetTriangles', () => sphere().decimate(wrong(undefined))],
+  ['a lower bound of 0', 'edge.min', () => sphere().remesh({ min: 0, max: 1 })],
+  ['a lower bound below 0', 'edge.min', () => sphere().remesh({ min: -1, max: 1 })],
+  ['NaN as a lower bound', 'edge.min', () => sphere().remesh({ min: Number.NaN, max: 1 })],
+  ['no upper bound', 'edge.max', () => sphere().remesh(wrong({ min: 1 }))],
+  ['an endless upper bound', 'edge.max', () => sphere().remesh({ min: 1, max: Number.POSITIVE_INFINITY })],
+  ['bounds too near each other', 'edge.max', () => sphere().remesh({ min: 1, max: 2 })],
+  ['bounds too near each other when rounded', 'edge', () => sphere().remesh({ min: 1, max: 2 + 1e-12 })],
+  ['bounds of another name', 'least', () => sphere().remesh(wrong({ least: 1, max: 3 }))],
+  ['a number as bounds', 'edge', () => sphere().remesh(wrong(1))],
+  ['no bounds', 'edge', () => sphere().remesh(wrong(undefined))],
   ['another curvature', 'kind', () => sphere().curvature(wrong('principal'))],
   ['half a vertex as a start', 'fromVertex', () => sphere().geodesic(0.5)],
   ['a vertex too far', 'fromVertex', () => sphere().geodesic(sphere().vertexCount)],
@@ -356,6 +399,7 @@ test('use after free', () => {
     () => mesh.clone(),
     () => mesh.toBytes('ply'),
     () => mesh.decimate(10),
+    () => mesh.remesh({ min: 1, max: 3 }),
     () => mesh.curvature('mean'),
     () => mesh.geodesic(0),
     () => mesh.distanceTo(sphere()),

@@ -24,6 +24,8 @@ same<Same<built.DeformableParams, contract.DeformableParams>>(true);
 same<Same<built.Attractor, contract.Attractor>>(true);
 same<Same<built.Camera, contract.Camera>>(true);
 same<Same<built.ImplicitParams, contract.ImplicitParams>>(true);
+same<Same<built.ControlEllipsoid, contract.ControlEllipsoid>>(true);
+same<Same<built.MultiresParams, contract.MultiresParams>>(true);
 
 /** The functions of a class itself, without its constructor. */
 type Statics<C> = Omit<C, 'prototype'>;
@@ -56,3 +58,8 @@ export const newModel = (options: Own<ModelOptions>) => new built.DeformableMode
 
 type SurfaceOptions = ConstructorParameters<typeof contract.ImplicitSurface>[0];
 export const newSurface = (options: SurfaceOptions) => new built.ImplicitSurface(options);
+
+export const multires = (model: built.MultiresolutionModel): contract.MultiresolutionModel & built.Stepper => model;
+
+type MultiresOptions = ConstructorParameters<typeof contract.MultiresolutionModel>[0];
+export const newMultires = (options: Own<MultiresOptions>) => new built.MultiresolutionModel(options);

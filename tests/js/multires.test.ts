@@ -1,0 +1,189 @@
+import { afterEach, expect, test } from 'vitest';
+import * as vesicle from '../../pkg/index.js';
+import { type ControlEllipsoid, Mesh, MultiresolutionModel, paramSpecs, type StepReport } from '../../pkg/index.js';
+import { failure, HEALTHY, rejection, wrong } from './helpers.js';
+import { LAMP_BITS, lampBits } from './lamp.js';
+
+type Options = ConstructorParameters<typeof MultiresolutionModel>[0];
+
+const EDGES = { edgeMin: 0.12, edgeMax: 0.26 };
+const models: MultiresolutionModel[] = [];
+
+function ball(x: number, radius: number): ControlEllipsoid {
+  return {
+    center: [x, 0, 0],
+    axes: [
+      [radius, 0, 0],
+      [0, radius, 0],
+      [0, 0, radius],
+    ],
+  };
+}
+
+function model(more: Partial<Options> = {}): MultiresolutionModel {
+  const made = new MultiresolutionModel({ ellipsoids: [ball(-0.5, 1), ball(0.5, 0.8)], params: EDGES, ...more });
+  models.push(made);
+  return made;
+}
+
+/** A ball with waves on it. */
+function wavy(edge = 0.15): Mesh {
+  const { positions, indices } = Mesh.icosphere([0, 0, 0], 1, edge).arrays();
+  for (let at = 0; at < positions.length; at += 3) {
+    const height = 1.05 + 0.04 * Math.sin(6 * (positions[at] as number)) * Math.cos(5 * (positions[at + 2] as number));
+    for (let k = 0; k < 3; k++) positions[at + k] = (positions[at + k] as number) * height;
+  }
+  return Mesh.fromArrays(positions, indices);
+}
+
+afterEach(() => {
+  for (const made of models.splice(0)) made.free();
+});
+
+test('a bare skin comes to rest over its ellipsoids', async () => {
+  const skin = model();
+  const report = await skin.run();
+  expect(report).toMatchObject({ done: true, components: 1, euler: 2, triangles: skin.mesh.triangleCount });
+  expect(report.residual).toBeLessThanOrEqual(report.tolerance);
+  for (const mesh of [skin.mesh, skin.baseMesh]) expect(mesh.check()).toEqual(HEALTHY);
+  expect(skin.linkMesh.triangleCount).toBe(skin.baseMesh.triangleCount);
+  expect(skin.bands).toBe(1);
+});
+
+test('pulled apart it splits, and each frame is sound', () => {
+  const skin = model({ params: { ...EDGES, topology: 'split' } });
+  let annular = 0;
+  let report: StepReport | undefined;
+  for (let frame = 0; frame < 16; frame++) {
+    skin.setEllipsoids([ball(-0.5, 1), ball(0.5 + 0.14 * frame, 0.8)]);
+    report = skin.step();
+    annular += report.events.annular;
+    expect(skin.mesh.check()).toEqual(HEALTHY);
+  }
+  expect(report).toMatchObject({ components: 2, euler: 4 });
+  expect(annular).toBeGreaterThan(0);
+});
+
+test('detail is kept, and told how far it is distorted', () => {
+  const detail = wavy();
+  const base = Mesh.icosphere([0, 0, 0], 1, 0.2);
+  const deformed = model({
+    detail,
+    base,
+    ellipsoids: [ball(0, 0.99), ball(0.3, 0.6)],
+    params: { ...EDGES, supersample: 1 },
+  });
+  expect(deformed.mesh.distanceTo(detail).mean).toBeLessThan(0.02);
+  for (let frame = 1; frame <= 6; frame++) {
+    deformed.setEllipsoids([ball(0, 0.99), ball(0.3 + 0.1 * frame, 0.6)]);
+    deformed.step();
+  }
+  expect(deformed.mesh.check()).toEqual(HEALTHY);
+  expect(deformed.mesh.triangleCount).toBeGreaterThan(deformed.baseMesh.triangleCount);
+  const { area, angle } = deformed.distortion();
+  expect(area).toHaveLength(deformed.baseMesh.vertexCount);
+  expect(angle.every((ratio) => ratio >= 0.999)).toBe(true);
+  expect(deformed.bands).toBe(2);
+  expect([deformed.folded, deformed.missed]).toEqual([0, 0]);
+});
+
+test('texture travels with the surface', () => {
+  const globe = Mesh.icosphere([0, 0, 0], 1, 0.15).arrays();
+  const uvs = new Float32Array((globe.positions.length / 3) * 2);
+  for (let v = 0; v < uvs.length / 2; v++) {
+    const [x = 0, y = 0, z = 0] = globe.positions.subarray(3 * v, 3 * v + 3);
+    uvs.set([0.5 + Math.atan2(y, x) / (2 * Math.PI), 0.5 + Math.asin(Math.max(-1, Math.min(1, z))) / Math.PI], 2 * v);
+  }
+  const base = Mesh.fromArrays(globe.positions, globe.indices, { uvs });
+  const textured = model({ base, ellipsoids: [ball(0, 0.99), ball(0.3, 0.6)] });
+  textured.setEllipsoids([ball(0, 0.99), ball(0.7, 0.6)]);
+  textured.step();
+  const found = textured.mesh.arrays();
+  expect(found.uvs).toHaveLength((found.positions.length / 3) * 2);
+  // Latitude is that of the place on the globe.
+  const link = textured.linkMesh.arrays().positions;
+  for (let v = 0; v < link.length / 3; v++) {
+    const latitude = 0.5 + Math.asin(Math.max(-1, Math.min(1, link[3 * v + 2] as number))) / Math.PI;
+    expect(Math.abs((found.uvs?.[2 * v + 1] as number) - latitude)).toBeLessThan(0.05);
+  }
+});
+
+test('a state is restored bit for bit', () => {
+  const skin = model();
+  skin.setEllipsoids([ball(-0.5, 1), ball(1.4, 0.8)]);
+  skin.step();
+  const state = skin.save();
+  const goals = skin.goals;
+  skin.step(3);
+  const expected = Buffer.from(skin.mesh.arrays().positions.buffer);
+  skin.setEllipsoids([ball(0, 1)]);
+  skin.step();
+  skin.restore(state);
+  expect(skin.goals).toEqual(goals);
+  skin.step(3);
+  expect(Buffer.from(skin.mesh.arrays().positions.buffer).equals(expected)).toBe(true);
+  expect(failure(() => skin.restore(state.slice(0, 100))).code).toBe('bad-file');
+});
+
+test('levels and restructuring can be looked at one by one', () => {
+  const levels = model({ params: { edgeMin: 0.06, edgeMax: 0.13 } }).levelMeshes();
+  expect(levels.length).toBeGreaterThan(1);
+  const mesh = Mesh.icosphere([0, 0, 0], 1, 0.2);
+  const before = mesh.triangleCount;
+  expect(mesh.restructure({ min: 0.2, max: 0.5 }, ['collapse'])).toBeGreaterThan(0);
+  expect(mesh.triangleCount).toBeLessThan(before);
+  expect(mesh.restructure({ min: 0.02, max: 0.1 })).toBeGreaterThan(0);
+  expect(mesh.triangleCount).toBeGreaterThan(before);
+});
+
+test('a run can be aborted, and goes on', async () => {
+  const skin = model();
+  skin.setEllipsoids([ball(-0.5, 1), ball(6, 0.8)]);
+  const abort = new AbortController();
+  const stopped = skin.run({ signal: abort.signal, onStep: () => abort.abort(new Error('enough')) });
+  await expect(stopped).rejects.toThrow('enough');
+  expect(skin.mesh.check()).toEqual(HEALTHY);
+  expect((await skin.run()).done).toBe(true);
+});
+
+test('wrong arguments are named', async () => {
+  const code = (work: () => unknown) => failure(work).code;
+  const message = (work: () => unknown) => failure(work).message;
+  expect(message(() => model({ ellipsoids: [] }))).toContain('ellipsoids');
+  expect(message(() => model({ ellipsoids: wrong([{ center: [0, 0, 0] }]) }))).toContain('ellipsoids[0].axes');
+  expect(message(() => model({ ellipsoids: [ball(Number.NaN, 1)] }))).toContain('ellipsoids[0].center');
+  expect(message(() => model({ ellipsoids: [ball(0, 0)] }))).toContain('semi-axis is 0 long');
+  expect(message(() => model({ params: { edgeMin: 1, edgeMax: 2 } }))).toContain('edgeMax');
+  expect(message(() => model({ params: { levels: 2.5 } }))).toContain('levels');
+  expect(message(() => model({ params: wrong({ colour: 1 }) }))).toContain('colour');
+  expect(message(() => model({ detail: wavy(), ellipsoids: [ball(9, 1)] }))).toContain('touches');
+  expect(code(() => model({ params: { edgeMin: 1e-5, edgeMax: 3e-5 } }))).toBe('too-large');
+  const open = Mesh.icosphere([0, 0, 0], 1, 0.5).arrays();
+  const hole = Mesh.fromArrays(open.positions, open.indices.slice(3));
+  expect(code(() => model({ detail: hole }))).toBe('not-closed');
+  expect(code(() => model({ base: hole }))).toBe('not-closed');
+  for (let k = 0; k < 3; k++) open.positions[k] = -3 * (open.positions[k] as number);
+  expect(code(() => model({ base: Mesh.fromArrays(open.positions, open.indices) }))).toBe('self-intersecting');
+  const skin = model();
+  expect(code(() => skin.setEllipsoids([]))).toBe('invalid-argument');
+  expect(code(() => skin.setParams({ edgeMin: 0.2, edgeMax: 0.3 }))).toBe('invalid-argument');
+  skin.setEllipsoids([ball(-0.5, 1), ball(6, 0.8)]);
+  const running = skin.run({ budgetMs: 1 });
+  expect(code(() => skin.step())).toBe('invalid-argument');
+  await running;
+  expect((await rejection(skin.run(wrong({ budget: 1 })))).code).toBe('invalid-argument');
+  skin.free();
+  expect(code(() => skin.step())).toBe('freed');
+  expect(code(() => skin.mesh.info())).toBe('freed');
+  models.pop();
+});
+
+test('parameters describe themselves', () => {
+  const specs = paramSpecs('multires');
+  expect(specs.map(({ name }) => name).sort()).toEqual(Object.keys(model().params).sort());
+  for (const { help } of specs) expect(help.length).toBeGreaterThan(20);
+});
+
+test('the bits are those of every other platform', () => {
+  expect(lampBits(vesicle)).toBe(LAMP_BITS);
+});
