@@ -5,6 +5,9 @@ import { launchChromium } from '../../scripts/chromium.mjs';
 import { serve } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
 
+/** Milliseconds until something on the page is given up. */
+const PATIENCE = 120_000;
+
 export interface App {
   page: Page;
   address: string;
@@ -19,6 +22,8 @@ export async function openApp(viewport = { width: 1280, height: 800 }): Promise<
   const server = await serve(at('dist'), 0);
   const browser = await launchChromium();
   const page = await browser.newPage({ viewport });
+  // A machine that draws in software, and is busy, is slow, not wrong.
+  page.setDefaultTimeout(PATIENCE);
   const complaints = listen(page, server.address);
   await page.goto(server.address);
   return { page, address: server.address, complaints, close: () => closeAll(browser, server) };
@@ -46,7 +51,7 @@ function listen(page: Page, address: string): string[] {
 /** Waits until the lab is in one of the states; an error that is not among them fails with its message. */
 export async function reach(page: Page, ...states: string[]): Promise<string> {
   const selector = [...new Set([...states, 'error'])].map((state) => `[data-state=${state}]`).join(', ');
-  const lab = await page.waitForSelector(selector, { timeout: 50_000 });
+  const lab = await page.waitForSelector(selector, { timeout: 2 * PATIENCE });
   const state = (await lab.getAttribute('data-state')) ?? '';
   if (!states.includes(state)) throw new Error(`the lab is in error: ${await page.textContent('.banner')}`);
   return state;
@@ -60,6 +65,18 @@ export async function recordStates(page: Page): Promise<() => Promise<string[]>>
     const note = () => states.push(lab?.dataset.state ?? '');
     if (lab) new MutationObserver(note).observe(lab, { attributeFilter: ['data-state'] });
     return states;
+  });
+  return () => list.jsonValue();
+}
+
+/** Writes down everything the status line says from now on: the next news may come before anybody has read it. */
+export async function recordNews(page: Page): Promise<() => Promise<string[]>> {
+  const list = await page.evaluateHandle(() => {
+    const news: string[] = [];
+    const line = document.querySelector('.status');
+    const note = () => news.push(line?.textContent ?? '');
+    if (line) new MutationObserver(note).observe(line, { childList: true, characterData: true, subtree: true });
+    return news;
   });
   return () => list.jsonValue();
 }

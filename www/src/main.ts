@@ -2,6 +2,7 @@ import './style.css';
 import { ExtractLab } from './labs/extract';
 import type { Lab, LabKind, PassedOn } from './labs/labs';
 import { ReconstructLab } from './labs/reconstruct';
+import { SculptLab } from './labs/sculpt';
 import { h } from './ui/dom';
 
 /** The first is what an empty or unknown address opens. */
@@ -10,13 +11,19 @@ const LABS: [LabKind, ...LabKind[]] = [
     id: 'extract',
     name: 'Extract',
     tagline: 'A closed surface that splits and merges as it grows onto your data. Nothing leaves this machine.',
-    open: (root, help) => new ExtractLab(root, help),
+    open: (root, help, passOn) => new ExtractLab(root, help, passOn),
   },
   {
     id: 'reconstruct',
     name: 'Reconstruct',
     tagline: 'A smooth closed surface through sparse and noisy points. Nothing leaves this machine.',
     open: (root, help, passOn) => new ReconstructLab(root, help, passOn),
+  },
+  {
+    id: 'sculpt',
+    name: 'Sculpt',
+    tagline: 'A detailed surface that follows ellipsoids, as far as you like. Nothing leaves this machine.',
+    open: (root, help) => new SculptLab(root, help),
   },
 ];
 
@@ -55,7 +62,7 @@ class Labs {
     this.#present(kind);
     this.#root.dataset.state = 'loading';
     try {
-      this.#lab = kind.open(this.#root, this.#help, (volume) => this.#passOn(volume));
+      this.#lab = kind.open(this.#root, this.#help, (passedOn) => this.#passOn(passedOn));
       void this.#lab.start(passedOn);
     } catch (error) {
       this.#root.dataset.state = 'error';
@@ -63,11 +70,12 @@ class Labs {
     }
   }
 
-  #passOn(volume: PassedOn): void {
+  #passOn(passedOn: PassedOn): void {
     this.#remember();
-    // Without a hashchange: the lab is opened here, on the volume.
-    history.pushState(null, '', `#${LABS[0].id}`);
-    this.#open(LABS[0], volume);
+    const kind = LABS.find(({ id }) => id === passedOn.lab) ?? LABS[0];
+    // Without a hashchange: the lab is opened here, on what it is given.
+    history.pushState(null, '', `#${kind.id}`);
+    this.#open(kind, passedOn);
   }
 
   #remember(): void {
@@ -78,8 +86,11 @@ class Labs {
   #present({ id, name, tagline }: LabKind): void {
     document.title = `Vesicle: ${name}`;
     for (const [one, link] of this.#links) {
-      if (one === id) link.setAttribute('aria-current', 'page');
-      else link.removeAttribute('aria-current');
+      if (one === id) {
+        link.setAttribute('aria-current', 'page');
+        // Where there is no room for all of them.
+        link.scrollIntoView({ block: 'nearest', inline: 'center' });
+      } else link.removeAttribute('aria-current');
     }
     const title = document.getElementById('lab-name');
     if (title) title.textContent = name;

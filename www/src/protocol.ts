@@ -93,6 +93,8 @@ export interface Surface extends SurfaceBuffers {
   values?: Float32Array;
   /** rgb of each vertex, 0..1, where it has one of its own. */
   colors?: Float32Array;
+  /** Place of each vertex in a picture, where one was asked for. */
+  uvs?: Float32Array;
 }
 
 /** `report` is there when the surface was checked, which costs time and is done only when it stands still. */

@@ -23,6 +23,7 @@ export interface Parts {
   drop: HTMLElement;
   measures: HTMLElement;
   exports: HTMLElement;
+  sculpt: HTMLElement;
   link: HTMLElement;
   plots: HTMLElement;
   csv: HTMLElement;
@@ -54,7 +55,7 @@ export function layOut(root: HTMLElement, parts: Parts): void {
       'div',
       { class: 'column results' },
       section('Surface', parts.measures),
-      section('Save', parts.exports, parts.link),
+      section('Save', parts.exports, parts.sculpt, parts.link),
       section('Progress', parts.plots, parts.csv),
       section('Events', parts.log),
       section('Time per part', parts.times),

@@ -6,6 +6,7 @@ import type {
   ParamValues,
   Plane,
   Ready,
+  SavedRun,
   Setup,
   Shade,
   SnapshotEvent,
@@ -39,7 +40,7 @@ import { ViewOptionControls, type ViewOptions } from '../ui/view-options';
 import { Stage } from '../view/stage';
 import { Attracting } from './attracting';
 import { DataPanel, folded, layOut } from './extract-page';
-import type { PassedOn } from './labs';
+import type { PassedOn, PassOn } from './labs';
 import { ADDRESS, fromHash, type Linked, linkOf, toHash, withLink } from './link';
 import { type Moment, type PageState, Rewinder } from './rewinder';
 import { Saving } from './saving';
@@ -114,13 +115,18 @@ export class ExtractLab {
     { type: 'button', onclick: () => this.#saving.plots(this.#history), disabled: true },
     'Plot data (CSV)',
   );
-  readonly #rewinder = new Rewinder(
+  readonly #rewinder = new Rewinder<PageState, SavedRun>(
     this.#client,
     () => this.#pageState(),
     (undoable, redoable) => this.#transport.showUndo(undoable, redoable),
   );
   readonly #paramsHolder = h('div');
   readonly #measures = new MeasurePanel();
+  readonly #sculpt = h(
+    'button',
+    { type: 'button', class: 'wide', 'data-action': 'sculpt', onclick: () => void this.#toSculpt() },
+    'Open in Sculpt',
+  );
   readonly #exports = new ExportButtons((format, type) => void this.#export(format, type));
   readonly #plots = new Plots(this.#history, ENERGY_PLOTS, true);
   readonly #times = new TimeTable();
@@ -170,9 +176,11 @@ export class ExtractLab {
   #engineBroken = false;
   #snapshot: SnapshotEvent | undefined;
   #framePending = 0;
+  readonly #passOn: PassOn;
 
-  constructor(root: HTMLElement, help: HTMLElement) {
+  constructor(root: HTMLElement, help: HTMLElement, passOn: PassOn) {
     this.#root = root;
+    this.#passOn = passOn;
     const chooser = fileChooser((files) => void this.#openFiles(files));
     this.#data = new DataPanel(EXAMPLES, PRESETS, chooser, (example) => void this.#openExample(example));
     this.#stage.onMoved = () => this.#pyramid.redraw();
@@ -229,6 +237,7 @@ export class ExtractLab {
       drop: this.#drop,
       measures: this.#measures.element,
       exports: this.#exports.element,
+      sculpt: this.#sculpt,
       link: h(
         'button',
         { type: 'button', class: 'wide', onclick: () => void this.#copyLink() },
@@ -725,6 +734,7 @@ export class ExtractLab {
     const ready = this.#volume !== undefined;
     this.#transport.showState(this.#modelState, ready);
     this.#exports.enabled = ready && state !== 'loading';
+    this.#sculpt.disabled = !ready || state === 'loading';
     this.#compare.enabled = ready && state !== 'loading';
   }
 
@@ -749,6 +759,15 @@ export class ExtractLab {
   #calmDown(): void {
     this.#state.value = this.#calm;
     if (this.#calm !== 'loading') this.#status.say(describe(this.#calm, this.#history.reports.at(-1)));
+  }
+
+  async #toSculpt(): Promise<void> {
+    try {
+      const bytes = await this.#client.request('export', { format: 'ply' });
+      this.#passOn({ lab: 'sculpt', name: `${this.#saving.name} (surface)`, bytes, params: {} });
+    } catch (error) {
+      this.#fail('The surface could not be passed on.', error);
+    }
   }
 
   async #export(format: MeshFormat, type: string): Promise<void> {

@@ -1,9 +1,12 @@
 /** What the page and its labs have to do with each other. */
 import type { ParamValues } from '../protocol';
 
-/** A volume that one lab passes on to the Extract lab, with the parameters that suit it. */
+/** What one lab passes on to another: a volume to Extract, with the parameters that suit it, or a mesh to Sculpt. */
 export interface PassedOn {
+  /** Its address, without the hash. */
+  lab: 'extract' | 'sculpt';
   name: string;
+  /** A file. */
   bytes: Uint8Array;
   params: ParamValues;
 }
@@ -14,8 +17,8 @@ export interface Lab {
   close(): void;
 }
 
-/** Opens the Extract lab on a volume. */
-export type PassOn = (volume: PassedOn) => void;
+/** Opens another lab on it. */
+export type PassOn = (passedOn: PassedOn) => void;
 
 export interface LabKind {
   /** As the address has it after the hash. */

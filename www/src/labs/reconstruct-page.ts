@@ -25,6 +25,7 @@ export interface Parts {
   exports: HTMLElement;
   volume: HTMLElement;
   extract: HTMLElement;
+  sculpt: HTMLElement;
   link: HTMLElement;
   plots: HTMLElement;
   kernel: HTMLElement;
@@ -60,7 +61,7 @@ export function layOut(root: HTMLElement, parts: Parts): void {
       { class: 'column results' },
       section('Progress', parts.phases),
       section('Surface', parts.measures),
-      section('Save', parts.exports, parts.volume, parts.extract, parts.link),
+      section('Save', parts.exports, parts.volume, parts.extract, parts.sculpt, parts.link),
       section('Plots', parts.plots, parts.kernel, parts.csv),
       folded('Time against number of constraints', parts.timing),
       folded('Exercise', parts.exercises),

@@ -51,6 +51,7 @@ export interface PartEvents extends TransportEvents {
   onDismiss: () => void;
   onSaveVolume: () => void;
   onPassOn: () => void;
+  onSculpt: () => void;
   onCopyLink: () => void;
   onError: (title: string, error: unknown) => void;
 }
@@ -86,6 +87,7 @@ export class ReconstructParts {
   readonly #exports: ExportButtons;
   readonly #volume: HTMLButtonElement;
   readonly #extract: HTMLButtonElement;
+  readonly #sculpt: HTMLButtonElement;
   readonly #paramsHolder = h('div');
   #params: ParamControls | undefined;
   #photographs: readonly Photograph[] = [];
@@ -116,6 +118,7 @@ export class ReconstructParts {
     this.view.onLeave = () => this.photos.choose(undefined);
     this.#volume = button('Volume (NIfTI)', events.onSaveVolume, 'volume');
     this.#extract = button('Open as a volume in Extract', events.onPassOn, 'extract');
+    this.#sculpt = button('Open in Sculpt', events.onSculpt, 'sculpt');
     this.csv = h(
       'button',
       { type: 'button', onclick: () => this.saving.plots(history, 'residual'), disabled: true },
@@ -148,6 +151,7 @@ export class ReconstructParts {
       exports: this.#exports.element,
       volume: this.#volume,
       extract: this.#extract,
+      sculpt: this.#sculpt,
       link: button('Copy link to these settings', this.#events.onCopyLink, 'link'),
       plots: this.plots.element,
       kernel: this.#kernel.element,
@@ -203,6 +207,7 @@ export class ReconstructParts {
     this.#exports.enabled = surface;
     this.#volume.disabled = !surface;
     this.#extract.disabled = !surface;
+    this.#sculpt.disabled = !surface;
     this.timing.enabled = ready && state !== 'loading';
   }
 

@@ -76,11 +76,19 @@ export class Sharing {
     this.#ui.status.say('Making a volume.');
     this.#tryTo(async () => {
       const { bytes, level } = await this.#client.request('volume', { size: VOLUME_SIZE });
-      passOn({ name: `${this.#ui.saving.name} (volume)`, bytes, params: { iso: level, isoForce: -1 } });
+      passOn({ lab: 'extract', name: `${this.#ui.saving.name} (volume)`, bytes, params: { iso: level, isoForce: -1 } });
     });
   }
 
-  #tryTo(work: () => Promise<void>): void {
-    work().catch((error) => this.#states.fail('The volume could not be made.', error));
+  /** The surface as a mesh to be deformed. */
+  toSculpt(passOn: PassOn): void {
+    this.#tryTo(async () => {
+      const bytes = await this.#client.request('export', { format: 'ply' });
+      passOn({ lab: 'sculpt', name: `${this.#ui.saving.name} (surface)`, bytes, params: {} });
+    }, 'The surface could not be passed on.');
+  }
+
+  #tryTo(work: () => Promise<void>, title = 'The volume could not be made.'): void {
+    work().catch((error) => this.#states.fail(title, error));
   }
 }

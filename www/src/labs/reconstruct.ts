@@ -112,6 +112,7 @@ export class ReconstructLab implements Lab {
       onDismiss: () => this.#dismiss(),
       onSaveVolume: () => this.#sharing.saveVolume(),
       onPassOn: () => this.#sharing.toExtract(this.#passOn),
+      onSculpt: () => this.#sharing.toSculpt(this.#passOn),
       onCopyLink: () => void this.#sharing.copyLink(),
       onError: (title, error) => this.#states.fail(title, error),
     };

@@ -1,4 +1,3 @@
-import type { Client } from '../client';
 import type { Attractor, ParamValues, SavedRun } from '../protocol';
 import type { HistoryMark } from '../ui/history';
 import type { StartChoice } from '../ui/start';
@@ -18,17 +17,24 @@ export interface PageState {
 }
 
 /** A moment one can go back to. */
-export interface Moment {
-  saved: SavedRun;
-  page: PageState;
+export interface Moment<Page = PageState, Saved = SavedRun> {
+  saved: Saved;
+  page: Page;
+}
+
+/** A worker whose model can be saved, and brought back. */
+export interface SavingWorker<Saved> {
+  request(kind: 'save', body: undefined): Promise<Saved>;
+  request(kind: 'pause', body: undefined): Promise<undefined>;
+  request(kind: 'restore', body: Saved): Promise<unknown>;
 }
 
 /** Undo and redo of everything that changes the model: the worker's saved states, kept by the page. */
-export class Rewinder {
-  readonly #client: Client;
-  readonly #page: () => PageState;
+export class Rewinder<Page = PageState, Saved extends { state: Uint8Array } = SavedRun> {
+  readonly #client: SavingWorker<Saved>;
+  readonly #page: () => Page;
   readonly #onChange: (undoable: string | undefined, redoable: string | undefined) => void;
-  readonly #stack = new UndoStack<Moment>(LIMITS);
+  readonly #stack = new UndoStack<Moment<Page, Saved>>(LIMITS);
   /** Resolves when all that was to be remembered is. */
   #ready: Promise<void> = Promise.resolve();
   #last = { together: '', at: 0 };
@@ -36,8 +42,8 @@ export class Rewinder {
   #volume = 0;
 
   constructor(
-    client: Client,
-    page: () => PageState,
+    client: SavingWorker<Saved>,
+    page: () => Page,
     onChange: (undoable: string | undefined, redoable: string | undefined) => void,
   ) {
     this.#client = client;
@@ -86,7 +92,7 @@ export class Rewinder {
   }
 
   /** Goes back, or forth again; gives the moment the model is now in, or nothing where there is none. */
-  async travel(way: 'undo' | 'redo'): Promise<Moment | undefined> {
+  async travel(way: 'undo' | 'redo'): Promise<Moment<Page, Saved> | undefined> {
     await this.#ready;
     if ((way === 'undo' ? this.#stack.undoable : this.#stack.redoable) === undefined) return undefined;
     this.#last.together = '';

@@ -53,6 +53,22 @@ export const RECONSTRUCT_EXERCISES: Exercise[] = [
   },
 ];
 
+/** Of the Sculpt lab. */
+export const SCULPT_EXERCISES: Exercise[] = [
+  {
+    title: 'How far may one pull?',
+    example: 'figure-10',
+    steps: [
+      'Open the globe, colour it by distortion of angles, and note area under T (5 and 95 %), stretch of T and folded.',
+      'Choose ellipsoid 3, east, and move its centre along x to 1.2, 1.7 and 2.2; note the same each time. Add a keyframe at each.',
+      'Reset, set D to 0, and play the film of your keyframes; then with 10. The paper says that D takes distortion away: where does it here, and where not?',
+      'Do the same with the bust and its crown. Show all five meshes: which one shows first that something is wrong?',
+    ],
+    look: 'Which number grows first, area or stretch? Where on the surface is T worst, and why there? Does the way to a pose matter, or only the pose?',
+    handIn: 'A table of the place of the ellipsoid and D against the four numbers; two pictures of T; three sentences.',
+  },
+];
+
 /** Exercises for a lab course, each with a button that opens what it begins with. */
 export function exercises(list: Exercise[], onOpen: (example: string) => void): HTMLElement {
   return h('div', { class: 'exercises' }, ...list.map((exercise) => exerciseOf(exercise, onOpen)));

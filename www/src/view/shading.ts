@@ -2,7 +2,7 @@
 import type { Shade } from '../protocol';
 
 /** Numbers at the vertices that have colours of their own. */
-export type ValueShade = Shade | 'distance';
+export type ValueShade = Shade | 'distance' | 'area distortion' | 'angle distortion';
 
 type Rgb = readonly [number, number, number];
 
@@ -33,6 +33,19 @@ export const SHADES: Record<ValueShade, ShadeText> = {
     below: 'at a point',
     above: 'far',
     least: 1e-9,
+    positive: true,
+  },
+  'area distortion': {
+    title: 'Area on the base over area here, as a power of two',
+    below: 'stretched here',
+    above: 'squeezed here',
+    least: 0.1,
+  },
+  'angle distortion': {
+    title: 'Longest over shortest stretch, as a power of two',
+    below: 'angles kept',
+    above: 'sheared',
+    least: 0.1,
     positive: true,
   },
 };

@@ -10,6 +10,7 @@ import {
   MeshBasicMaterial,
   MeshStandardMaterial,
   Sphere,
+  type Texture,
   Vector3,
 } from 'three';
 import type { Surface } from '../protocol';
@@ -23,8 +24,8 @@ const BONE: ColorRepresentation = '#e9dcc3';
 /** Colours from photographs hold their light already: lit once more as they are, white comes out grey. */
 const OWN_GAIN = 1.6;
 
-/** What the colour of a surface tells; 'own' are the colours that its vertices came with. */
-export type SurfaceColor = ColorMode | ValueShade | 'own';
+/** What the colour of a surface tells; 'own' are the colours that its vertices came with, 'texture' a picture on it. */
+export type SurfaceColor = ColorMode | ValueShade | 'own' | 'texture';
 
 /** A surface whose vertices and triangles change every frame: over-allocated GPU buffers, drawn as far as they are filled. */
 export class SurfaceObject {
@@ -48,6 +49,9 @@ export class SurfaceObject {
   #vertices = 0;
   #corners = 0;
   #color: SurfaceColor = 'plain';
+  #texture: Texture | null = null;
+  /** The surface shown has places in the picture. */
+  #hasUvs = false;
   /** The numbers at the vertices, where the surface came with some. */
   #values: Float32Array = new Float32Array(0);
   /** rgb of the vertices, where the surface came with them. */
@@ -73,6 +77,8 @@ export class SurfaceObject {
     fill(geometry, 'normal', surface.normals, 3 * this.#vertices);
     fillIndex(geometry, surface.indices, this.#corners);
     if (this.#edges.visible) this.#fillEdges();
+    this.#hasUvs = surface.uvs !== undefined;
+    if (surface.uvs) fill(geometry, 'uv', surface.uvs, 2 * this.#vertices);
     this.#values = surface.values ?? new Float32Array(0);
     this.#colors = surface.colors ?? new Float32Array(0);
     this.#fillColors();
@@ -95,6 +101,12 @@ export class SurfaceObject {
 
   set edgeColor(color: ColorRepresentation) {
     this.#edgeMaterial.color.set(color);
+  }
+
+  /** The picture on the surface; it belongs to whoever gives it. */
+  set texture(texture: Texture | null) {
+    this.#texture = texture;
+    this.#fillColors();
   }
 
   /** Whether colours of the surface's own are lit. */
@@ -150,12 +162,14 @@ export class SurfaceObject {
     const shaded = isShade(mode) && this.#values.length === this.#vertices;
     const own = mode === 'own' && this.#colors.length === 3 * this.#vertices;
     const on = shaded || own || mode === 'component';
+    const map = mode === 'texture' && this.#hasUvs ? this.#texture : null;
     this.#mesh.material = own && !this.#lit ? this.#plainMaterial : this.#material;
-    if (this.#material.vertexColors !== on) {
+    if (this.#material.vertexColors !== on || this.#material.map !== map) {
       this.#material.vertexColors = on;
+      this.#material.map = map;
       this.#material.needsUpdate = true;
     }
-    this.#material.color.set(on ? '#ffffff' : BONE).multiplyScalar(own ? OWN_GAIN : 1);
+    this.#material.color.set(on || map ? '#ffffff' : BONE).multiplyScalar(own ? OWN_GAIN : 1);
     this.#range = shaded ? robustRange(this.#values, SHADES[mode].least) : 0;
     const { geometry } = this.#mesh;
     if (!on || !geometry.index) return;
@@ -173,6 +187,7 @@ function allocate(vertices: number, triangles: number): BufferGeometry {
   for (const name of ['position', 'normal', 'color']) {
     geometry.setAttribute(name, new BufferAttribute(new Float32Array(3 * vertices), 3));
   }
+  geometry.setAttribute('uv', new BufferAttribute(new Float32Array(2 * vertices), 2));
   geometry.setIndex(new BufferAttribute(new Uint32Array(3 * triangles), 1));
   geometry.boundingSphere = new Sphere(new Vector3(), Number.POSITIVE_INFINITY);
   geometry.setDrawRange(0, 0);

@@ -14,6 +14,7 @@ import {
   WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { TransformControls } from 'three/addons/controls/TransformControls.js';
 import { anatomicalSigns, type Grid } from './anatomy';
 import { type PinholeCamera, placeEye } from './eye';
 
@@ -43,6 +44,8 @@ export class Viewport {
   onDraw: (viewer: Vector3) => void = () => undefined;
   /** Called with the ray through the place that was clicked. */
   onClick: (ray: Raycaster) => void = () => undefined;
+  /** Asked about a key first; true where it was meant for something else than the view. */
+  takesKey: (event: KeyboardEvent) => boolean = () => false;
   /** Called when the view is no longer that of a photograph. */
   onLeave: () => void = () => undefined;
   #through: PinholeCamera | undefined;
@@ -77,6 +80,26 @@ export class Viewport {
 
   remove(object: Object3D): void {
     this.#world.remove(object);
+  }
+
+  /** Handles to move, turn and scale something that is shown; the view stands still while one is dragged. */
+  addHandles(): TransformControls {
+    const handles = new TransformControls(this.#camera, this.canvas);
+    handles.addEventListener('change', () => this.invalidate());
+    handles.addEventListener('dragging-changed', ({ value }) => {
+      this.#controls.enabled = value !== true;
+    });
+    this.#scene.add(handles.getHelper());
+    return handles;
+  }
+
+  /** The camera's own directions in the coordinates of what is shown: to the right, upwards, towards the viewer. */
+  directions(): [Vector3, Vector3, Vector3] {
+    this.#camera.updateMatrixWorld();
+    const inverse = this.#world.matrixWorld.clone().invert();
+    const axis = (index: number) =>
+      new Vector3().setFromMatrixColumn(this.#camera.matrixWorld, index).transformDirection(inverse);
+    return [axis(0), axis(1), axis(2)];
   }
 
   /** Which axis of what is shown points upwards. */
@@ -122,8 +145,13 @@ export class Viewport {
    * Looks at the whole of a box in the coordinates of what is shown, a little from above and from the side. `front`: the
    * side that is seen, along the horizontal axis towards the viewer.
    */
-  frameBox(box: Box3, front: 1 | -1): void {
-    this.#frame(box.clone().applyMatrix4(this.#world.matrixWorld), new Vector3(-0.7 * front, -front, 0.32));
+  frameBox(box: Box3, front: 1 | -1, aside = 0.7): void {
+    this.#frame(box.clone().applyMatrix4(this.#world.matrixWorld), new Vector3(-aside * front, -front, 0.32));
+  }
+
+  /** Width by height. */
+  get aspect(): number {
+    return this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
   }
 
   #frame(box: Box3, towards: Vector3): void {
@@ -238,6 +266,11 @@ export class Viewport {
 
   #onKey(event: KeyboardEvent): void {
     if (event.altKey || event.ctrlKey || event.metaKey) return;
+    if (this.takesKey(event)) {
+      event.preventDefault();
+      event.stopPropagation();
+      return;
+    }
     const moves: Record<string, () => void> = {
       ArrowLeft: () => this.#turn(-KEY_TURN, 0),
       ArrowRight: () => this.#turn(KEY_TURN, 0),

@@ -1,0 +1,174 @@
+/** Parts of the Sculpt lab that need no browser. */
+import { beforeAll, describe, expect, test } from 'vitest';
+import init, { type ControlEllipsoid, Mesh, MultiresolutionModel } from '../../pkg/index.js';
+import { Answers } from '../../www/src/labs/answers';
+import { filmOf, fromHash, linkOf, toHash } from '../../www/src/labs/sculpt-link';
+import {
+  ball,
+  between,
+  boxOf,
+  lengthsOf,
+  moved,
+  samePose,
+  scaled,
+  turned,
+  turnedAbout,
+  upright,
+} from '../../www/src/sculpt/ellipsoids';
+import { SCENES } from '../../www/src/sculpt/examples';
+import { type Film, lastFrame, poseAt } from '../../www/src/sculpt/film';
+import { fitted, principalAxes } from '../../www/src/sculpt/fit';
+import { Preview } from '../../www/src/sculpt/preview';
+
+beforeAll(() => init());
+
+const LONG = upright([1, 2, 3], [3, 2, 1]);
+
+function expectClose(one: ControlEllipsoid, other: ControlEllipsoid): void {
+  const numbers = ({ center, axes }: ControlEllipsoid) => [...center, ...axes.flat()];
+  const [a, b] = [numbers(one), numbers(other)];
+  for (const [i, value] of a.entries()) expect(value).toBeCloseTo(b[i] ?? Number.NaN, 9);
+}
+
+describe('ellipsoids', () => {
+  test('turned all the way round are as they were, and axes keep their lengths', () => {
+    const about: [number, number, number] = [0.6, 0, 0.8];
+    expect(lengthsOf(turned(LONG, about, 1)).map((x) => Number(x.toFixed(9)))).toEqual([3, 2, 1]);
+    expectClose(turned(LONG, about, 2 * Math.PI), LONG);
+    expectClose(turnedAbout(turnedAbout(LONG, [5, 0, 1], about, 0.7), [5, 0, 1], about, -0.7), LONG);
+  });
+
+  test('between two is half the way, half the turn and the geometric mean of lengths', () => {
+    const end = scaled(turned(moved(LONG, [2, 0, 0]), [0, 0, 1], 1.2), [4, 1, 1]);
+    expectClose(between(LONG, end, 0.5), scaled(turned(moved(LONG, [1, 0, 0]), [0, 0, 1], 0.6), [2, 1, 1]));
+    for (const half of [Math.PI, -Math.PI])
+      expectClose(between(LONG, turned(LONG, [0, 1, 0], half), 1), turned(LONG, [0, 1, 0], half));
+    expect(lengthsOf(between(LONG, turned(LONG, [0, 1, 0], Math.PI), 0.5))[0]).toBeCloseTo(3, 9);
+  });
+
+  test('their box touches them', () => {
+    expect(boxOf([LONG, ball(-5, 0, 0, 1)])).toEqual({ min: [-6, -1, -1], max: [4, 4, 4] });
+  });
+
+  test('rounded as a link rounds them are still the same to the eye, moved by a hundredth are not', () => {
+    expect(samePose([LONG], [moved(LONG, [1e-6, 0, 0])])).toBe(true);
+    expect(samePose([LONG], [moved(LONG, [0.01, 0, 0])])).toBe(false);
+    expect(samePose([LONG], [LONG, LONG])).toBe(false);
+  });
+});
+
+describe('films', () => {
+  const film: Film = { keys: [[LONG], [moved(LONG, [1, 0, 0])], [ball(0, 0, 0, 1)]], between: 10, loop: false };
+
+  test('pass through their keyframes, and a loop comes back to the first', () => {
+    expect(lastFrame(film)).toBe(20);
+    for (const [k, key] of film.keys.entries()) expect(poseAt(film, 10 * k)).toEqual(key);
+    const loop = { ...film, loop: true };
+    expect(lastFrame(loop)).toBe(30);
+    expect(poseAt(loop, 30)).toEqual(film.keys[0]);
+  });
+
+  test('of lava end where they began, and never jump', () => {
+    const lava: Film = { motion: 'lava', loop: false };
+    const last = lastFrame(lava);
+    expect(samePose(poseAt(lava, 0), poseAt(lava, last))).toBe(true);
+    for (let frame = 0; frame < last; frame++) {
+      const [now, next] = [poseAt(lava, frame), poseAt(lava, frame + 1)];
+      for (const [k, { center }] of now.entries())
+        expect(Math.hypot(...center.map((x, i) => x - (next[k]?.center[i] ?? 0)))).toBeLessThan(0.12);
+    }
+  });
+});
+
+describe('ellipsoids that fit', () => {
+  test('a rod lie in a row along it, inside, and a model of it can be made', () => {
+    const round = Mesh.icosphere([0, 0, 0], 1, 0.2);
+    const { positions, indices } = round.arrays();
+    const rod = Mesh.fromArrays(
+      positions.map((x, i) => (i % 3 === 1 ? 4 * x : x)),
+      indices,
+    );
+    const row = fitted(rod);
+    expect(row.length).toBeGreaterThan(2);
+    const { min, max } = boxOf(row);
+    for (let k = 0; k < 3; k++) {
+      expect(min[k]).toBeGreaterThan(k === 1 ? -4.3 : -1.2);
+      expect(max[k]).toBeLessThan(k === 1 ? 4.3 : 1.2);
+    }
+    expect(max[1] - min[1]).toBeGreaterThan(6);
+    const model = new MultiresolutionModel({ detail: rod, ellipsoids: row });
+    expect(model.step(1).components).toBe(1);
+    for (const one of [model, rod, round]) one.free();
+  });
+
+  test('principal axes are at right angles, the longest first', () => {
+    const [a, b, c] = principalAxes([2, 1, 0, 1, 3, 0.5, 0, 0.5, 9]);
+    expect(Math.abs(a?.[2] ?? 0)).toBeGreaterThan(0.9);
+    const dot = (x = [0], y = [0]) => x.reduce((sum, value, k) => sum + value * (y[k] ?? 0), 0);
+    for (const [x, y] of [
+      [a, b],
+      [b, c],
+      [c, a],
+    ] as const)
+      expect(dot(x, y)).toBeCloseTo(0, 9);
+    for (const x of [a, b, c]) expect(dot(x, x)).toBeCloseTo(1, 9);
+  });
+});
+
+describe('links', () => {
+  const settings = { file: '', usual: { smoothing: 10 }, params: { smoothing: 10 }, color: 'plain', layout: 'result' };
+  const [bust] = SCENES;
+
+  test('of the first scene as it opens say nothing', () => {
+    expect(toHash(linkOf({ ...settings, example: bust, pose: undefined, film: bust.film }))).toBe('#sculpt');
+  });
+
+  test('bring pose, film and parameters back', () => {
+    const film: Film = { keys: [[LONG], [ball(0, 1, 0, 2)]], between: 12, loop: true };
+    const pose = [turned(LONG, [0, 1, 0], 0.3), ball(0, 0, 0, 1)];
+    const hash = toHash(linkOf({ ...settings, params: { smoothing: 4 }, example: bust, pose, film }));
+    const linked = fromHash(hash);
+    expect(linked?.params).toEqual({ smoothing: 4 });
+    expect(linked?.pose?.length).toBe(2);
+    expect(linked?.pose?.[0]?.axes[0][0]).toBeCloseTo(3 * Math.cos(0.3), 3);
+    expect(linked && filmOf(linked, bust.film)).toEqual(film);
+  });
+
+  test('that make no sense are read as far as they do', () => {
+    expect(fromHash('#sculpt?pose=1,2;3&key=x&between=-4&layout=row')).toEqual({ params: {}, layout: 'row' });
+    expect(fromHash('#extract?example=bust')).toBeUndefined();
+  });
+});
+
+describe('answers to the hand', () => {
+  test('count from the oldest pose that a frame follows', () => {
+    const answers = new Answers();
+    answers.sent(1, 100);
+    answers.sent(2, 110);
+    expect(answers.drawn(0, 120)).toBe(false);
+    expect(answers.drawn(2, 150)).toBe(true);
+    expect(answers.last).toEqual({ milliseconds: 50, frames: 2 });
+    expect(answers.drawn(2, 160)).toBe(false);
+  });
+});
+
+describe('the preview', () => {
+  test('is coarse only while a hand drags and frames are slow, and puts everything back', () => {
+    const set = { edgeMin: 0.1, edgeMax: 0.25, supersample: 2 };
+    const model = new MultiresolutionModel({ ellipsoids: [ball(0, 0, 0, 1)], params: set });
+    const preview = new Preview();
+    preview.prepare(model, 'course', 200);
+    expect(model.params).toMatchObject({ ...set, supersample: 0 });
+    preview.prepare(model, 'none', 10);
+    expect(preview.on).toBe(false);
+    expect(model.params).toMatchObject(set);
+    preview.prepare(model, 'hand', 10);
+    expect(model.params).toMatchObject({ ...set, supersample: 0 });
+    preview.prepare(model, 'hand', 200);
+    preview.prepare(model, 'hand', 200);
+    expect(model.params).toMatchObject({ edgeMin: 0.2, edgeMax: 0.5, supersample: 0 });
+    preview.prepare(model, 'none', 10);
+    expect(model.params).toMatchObject(set);
+    model.free();
+  });
+});

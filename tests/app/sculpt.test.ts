@@ -1,0 +1,253 @@
+/** The Sculpt lab: ellipsoids move, a detailed surface follows. */
+import { readFile } from 'node:fs/promises';
+import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
+import init, { Mesh } from '../../pkg/index.js';
+import { at } from '../../scripts/shell.mjs';
+import { type App, drop, openApp, overflow, reach, recordNews, unnamedControls } from './browser';
+
+let app: App;
+
+beforeAll(async () => {
+  await init();
+  app = await openApp();
+});
+afterAll(() => app.close());
+afterEach(() => {
+  expect(app.complaints.splice(0)).toEqual([]);
+});
+
+async function openAt(hash: string, ...states: string[]): Promise<void> {
+  await app.page.goto('about:blank');
+  await app.page.goto(app.address + hash);
+  await reach(app.page, ...states);
+}
+
+async function measured(): Promise<Record<string, number | boolean>> {
+  return JSON.parse((await app.page.getAttribute('[data-measures]', 'data-measures')) ?? '{}');
+}
+
+const text = (selector: string) => app.page.locator(selector).first().textContent();
+const hash = () => app.page.evaluate(() => location.hash);
+const view = () => app.page.locator('.scene > canvas');
+
+/** A skin on few triangles, so that a software-rendered page is quick. */
+const SMALL = '#sculpt?example=globe&p.edgeMin=0.09&p.edgeMax=0.2';
+
+/** Waits for what a change has begun, to its end. */
+async function atRest(): Promise<void> {
+  await app.page.waitForTimeout(100);
+  await reach(app.page, 'done');
+}
+
+/** A place in the view where a handle is. */
+async function findHandle(): Promise<{ x: number; y: number }> {
+  const box = await view().boundingBox();
+  if (!box) throw new Error('there is no view');
+  for (let ring = 0; ring < 12; ring++) {
+    for (let at = 0; at < 16; at++) {
+      const angle = (2 * Math.PI * at) / 16;
+      const x = box.x + box.width * (0.5 + 0.03 * ring * Math.cos(angle));
+      const y = box.y + box.height * (0.5 + 0.03 * ring * Math.sin(angle));
+      await app.page.mouse.move(x, y);
+      if (await view().evaluate((canvas) => canvas.hasAttribute('data-handle'))) return { x, y };
+    }
+  }
+  throw new Error('no handle was found');
+}
+
+describe('the built-in example', () => {
+  test('plays to its end by itself: a bust of one piece, closed, without crossings', async () => {
+    await openAt('#sculpt', 'done');
+    expect(await measured()).toMatchObject({ components: 1, genus: 0, closed: true, oriented: true, crossings: 0 });
+    expect(await measured()).toMatchObject({ bands: 2, folded: 0 });
+    expect(await app.page.title()).toBe('Vesicle: Sculpt');
+    expect(await hash()).toBe('#sculpt');
+  });
+
+  test('tells in words what the plots show', async () => {
+    const captions = await app.page.locator('.plots figcaption').allTextContents();
+    expect(captions[0]).toMatch(/^After \d+ frames one more iteration would move the skin by /);
+    expect(captions[2]).toMatch(/^Half of the frames took less than /);
+  });
+
+  test('all controls have names, and a phone is wide enough', async () => {
+    expect(await unnamedControls(app.page)).toEqual([]);
+    expect(await overflow(app.page, 360, 720)).toBeLessThanOrEqual(0);
+    await app.page.setViewportSize({ width: 1280, height: 800 });
+  });
+});
+
+describe('the hand', () => {
+  beforeAll(() => openAt(SMALL, 'done'));
+
+  test('drags a handle, and each move is on the screen with the next frame but one at the latest', async () => {
+    await app.page.click('[data-ellipsoid="1"]');
+    const { x, y } = await findHandle();
+    await app.page.mouse.move(x, y);
+    await app.page.mouse.down();
+    for (let i = 1; i <= 8; i++) await app.page.mouse.move(x + 4 * i, y - 3 * i);
+    await app.page.mouse.up();
+    await atRest();
+    const { answerFrames, closed, crossings } = await measured();
+    expect(answerFrames).toBeGreaterThan(0);
+    expect(answerFrames).toBeLessThanOrEqual(2);
+    expect({ closed, crossings }).toEqual({ closed: true, crossings: 0 });
+    expect(await hash()).toContain('pose=');
+    expect(await app.page.locator('[data-transport=undo]').isEnabled()).toBe(true);
+  });
+
+  test('undo brings back the surface as it was, and redo what was done', async () => {
+    const { volume: dragged } = await measured();
+    await app.page.click('[data-transport=undo]');
+    await atRest();
+    await expect.poll(async () => (await measured()).volume).not.toBe(dragged);
+    const { volume: before } = await measured();
+    await app.page.click('[data-transport=redo]');
+    await atRest();
+    await expect.poll(async () => (await measured()).volume).toBe(dragged);
+    await app.page.click('[data-transport=undo]');
+    await atRest();
+    await expect.poll(async () => (await measured()).volume).toBe(before);
+  });
+
+  test('keys choose, move and turn, and say so', async () => {
+    await view().press('2');
+    expect(await text('.status')).toBe('Ellipsoid 2, small is chosen.');
+    const before = await app.page.inputValue('[aria-label="Centre, x"]');
+    const news = await recordNews(app.page);
+    await view().press('ArrowRight');
+    const moved = /^Ellipsoid 2, small: moved; its centre is /;
+    await expect.poll(news).toContainEqual(expect.stringMatching(moved));
+    expect(await app.page.inputValue('[aria-label="Centre, x"]')).not.toBe(before);
+    await view().press('t');
+    await view().press('ArrowLeft');
+    await expect.poll(news).toContainEqual(expect.stringMatching(/small: turned/));
+    await view().press('Escape');
+    expect(await app.page.locator('.numbers').isVisible()).toBe(false);
+    await atRest();
+  });
+
+  test('numbers are taken, or refused beside their field', async () => {
+    await app.page.click('[data-ellipsoid="1"]');
+    await app.page.fill('[aria-label="Semi-axis 1"]', '-1');
+    await app.page.keyboard.press('Enter');
+    expect(await text('.ellipsoids .field-error')).toBe('A length above 0 is needed.');
+    await app.page.fill('[aria-label="Semi-axis 1"]', '0.95');
+    await app.page.keyboard.press('Enter');
+    await atRest();
+    expect(await hash()).toMatch(/pose=[^;]*,0\.95,/);
+  });
+
+  test('an ellipsoid more grows, and goes when it is removed', async () => {
+    await app.page.click('[data-ellipsoid=add]');
+    await atRest();
+    expect(await app.page.locator('.chips [data-ellipsoid]').count()).toBe(3);
+    await app.page.click('[data-ellipsoid=remove]');
+    await atRest();
+    expect(await app.page.locator('.chips [data-ellipsoid]').count()).toBe(2);
+  });
+});
+
+describe('a film', () => {
+  beforeAll(() => openAt(SMALL, 'done'));
+
+  test('of two keyframes plays from one to the other, and a link brings it back', async () => {
+    await app.page.click('[data-film=add]');
+    await app.page.click('[data-ellipsoid="2"]');
+    await app.page.fill('[aria-label="Centre, y"]', '0.5');
+    await app.page.keyboard.press('Enter');
+    await atRest();
+    await app.page.click('[data-film=add]');
+    await app.page.fill('.film input[type=number]', '6');
+    await app.page.keyboard.press('Enter');
+    await app.page.click('.play');
+    await atRest();
+    await expect.poll(() => text('.film output')).toBe('6 of 6');
+    const address = await hash();
+    expect(address.match(/key=/g)).toHaveLength(2);
+    await openAt(address, 'done');
+    expect(await app.page.locator('[data-key]').count()).toBe(2);
+    expect(await text('.film output')).toBe('6 of 6');
+  });
+
+  test('is recorded as an animated GLB', async () => {
+    const [download] = await Promise.all([app.page.waitForEvent('download'), app.page.click('[data-film=record]')]);
+    const bytes = await readFile(await download.path());
+    expect(bytes.toString('latin1', 0, 4)).toBe('glTF');
+    const json = JSON.parse(bytes.toString('utf8', 20, 20 + bytes.readUInt32LE(12)));
+    expect(json.animations).toHaveLength(1);
+    expect(json.meshes.length).toBeGreaterThanOrEqual(5);
+    expect(json.images).toHaveLength(1);
+  });
+});
+
+describe('the view', () => {
+  test('shows all five meshes with their names, and distortion with its legend', async () => {
+    await openAt(`${SMALL}&layout=row&color=area+distortion`, 'done');
+    await expect.poll(() => app.page.locator('.captions span').count()).toBe(5);
+    await expect.poll(() => app.page.locator('.color-legend').isVisible()).toBe(true);
+    expect(await hash()).toContain('layout=row');
+  });
+
+  test('shows the stages of a figure, and what came', async () => {
+    await openAt('#sculpt?example=figure-6&p.edgeMin=0.1&p.edgeMax=0.25', 'done');
+    await expect.poll(() => app.page.locator('.captions span').count()).toBe(5);
+    expect(await text('.figure')).toContain('Paper:');
+  });
+
+  test('the texture has seas and lands', async () => {
+    await openAt(SMALL, 'done');
+    await app.page.uncheck('[data-view=ellipsoids]');
+    const png = await view().screenshot();
+    const shares = await app.page.evaluate(async (base64) => {
+      const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
+      const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+      const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+      context?.drawImage(image, 0, 0);
+      const { data } = context?.getImageData(0, 0, image.width, image.height) ?? { data: [] };
+      const counts = { sea: 0, land: 0 };
+      for (let i = 0; i < data.length; i += 4) {
+        const [r = 0, g = 0, b = 0] = [data[i], data[i + 1], data[i + 2]];
+        if (b > r + 50) counts.sea += 1;
+        if (g > b + 25) counts.land += 1;
+      }
+      return counts;
+    }, png.toString('base64'));
+    expect(shares.sea).toBeGreaterThan(1000);
+    expect(shares.land).toBeGreaterThan(1000);
+  });
+});
+
+describe('a file', () => {
+  test('opens with ellipsoids that fit it', async () => {
+    const mesh = Mesh.icosphere([3, 0, 0], 2, 0.5);
+    await drop(app.page, [{ name: 'ball.ply', bytes: mesh.toBytes('ply') }]);
+    await expect.poll(() => text('.facts dd')).toBe('ball.ply');
+    await reach(app.page, 'done');
+    expect(await measured()).toMatchObject({ components: 1, closed: true, crossings: 0 });
+    expect(await hash()).toContain('file=ball.ply');
+    mesh.free();
+  });
+
+  test('that takes its time can be cancelled, and what was there comes back', async () => {
+    const bytes = new Uint8Array(await readFile(at('www/public/data/nefertiti.ply')));
+    await openAt(SMALL, 'done');
+    await drop(app.page, [{ name: 'bust.ply', bytes }]);
+    await expect.poll(() => text('.status')).toMatch(/^Making the base of bust\.ply/);
+    await app.page.click('[data-action=cancel]');
+    await reach(app.page, 'done');
+    expect(await text('.facts dd')).toMatch(/^Globe/);
+    expect(await measured()).toMatchObject({ components: 1, closed: true });
+  });
+
+  test('that is open is refused in words, and what was there stays', async () => {
+    const open = Mesh.fromArrays(Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0), Uint32Array.of(0, 1, 2));
+    await drop(app.page, [{ name: 'open.ply', bytes: open.toBytes('ply') }]);
+    await app.page.waitForSelector('[data-state=error]');
+    expect(await text('.banner')).toMatch(/open\.ply could not be opened\..*not a closed surface/);
+    await app.page.click('.banner button');
+    expect(await app.page.getAttribute('#lab', 'data-state')).toBe('done');
+    expect(await text('.facts dd')).toMatch(/^Globe/);
+    open.free();
+  });
+});

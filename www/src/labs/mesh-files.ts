@@ -1,0 +1,46 @@
+/** Meshes from an example or from files of the user's. */
+import { dataUrl } from '../reconstruct/examples';
+import type { ExampleMesh, SculptExample } from '../sculpt/examples';
+import type { MeshSource, MeshTexture, SceneSource } from '../sculpt/protocol';
+import { readFiles } from '../ui/files';
+
+export const ACCEPT = '.glb,.obj,.ply,.stl,.png,.jpg,.jpeg,.webp';
+
+const PICTURES: [RegExp, MeshTexture['type']][] = [
+  [/\.png$/i, 'image/png'],
+  [/\.jpe?g$/i, 'image/jpeg'],
+  [/\.webp$/i, 'image/webp'],
+];
+
+export async function fromExample({ detail, base }: SculptExample): Promise<SceneSource> {
+  const [finest, coarse] = await Promise.all([detail && fetchMesh(detail), base && fetchMesh(base)]);
+  return { ...(finest && { detail: finest }), ...(coarse && { base: coarse }) };
+}
+
+async function fetchMesh(mesh: ExampleMesh): Promise<MeshSource> {
+  if ('shape' in mesh) return mesh;
+  const response = await fetch(dataUrl(mesh.file));
+  if (!response.ok) throw new Error(`The server answered ${response.status} for ${mesh.file}.`);
+  return { file: { name: mesh.file, bytes: new Uint8Array(await response.arrayBuffer()) } };
+}
+
+/** The detailed surface, with the picture on it where one comes along; of two, the larger one with the smaller one as its base. */
+export async function fromFiles(files: File[]): Promise<SceneSource> {
+  const pictures = files.filter(({ name }) => typeOf(name));
+  const meshes = files.filter((file) => !pictures.includes(file));
+  if (meshes.length === 0) throw new Error('A picture needs its mesh: choose or drop both together.');
+  if (meshes.length > 2 || pictures.length > 1)
+    throw new Error('One mesh at a time, please, or two: a detailed one and its base; and one picture at most.');
+  const [detail, base] = (await readFiles(meshes)).sort((a, b) => b.bytes.length - a.bytes.length);
+  const [picture] = await readFiles(pictures);
+  const type = picture && typeOf(picture.name);
+  const texture = picture && type && { type, bytes: picture.bytes };
+  return {
+    ...(detail && { detail: { file: detail, ...(texture && { texture }) } }),
+    ...(base && { base: { file: base } }),
+  };
+}
+
+function typeOf(name: string): MeshTexture['type'] | undefined {
+  return PICTURES.find(([ending]) => ending.test(name))?.[1];
+}

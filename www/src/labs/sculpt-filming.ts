@@ -1,0 +1,83 @@
+import type { SculptClient } from '../sculpt/client';
+import type { Film } from '../sculpt/film';
+import { poseAt } from '../sculpt/film';
+import type { LabStates } from './lab-states';
+import type { SculptParts } from './sculpt-parts';
+import type { ModelSettings } from './sculpt-settings';
+
+/** How long each frame of a recording is seen. */
+const FRAME_SECONDS = 1 / 25;
+
+/** Makes films of keyframes, and files of films. */
+export class Filming {
+  readonly #client: SculptClient;
+  readonly #ui: SculptParts;
+  readonly #states: LabStates;
+  readonly #settings: ModelSettings;
+
+  constructor(client: SculptClient, ui: SculptParts, states: LabStates, settings: ModelSettings) {
+    this.#client = client;
+    this.#ui = ui;
+    this.#states = states;
+    this.#settings = settings;
+  }
+
+  /** The present pose as the last keyframe. */
+  addKey(): void {
+    const { film, pose } = this.#settings;
+    const known =
+      film && 'keys' in film ? film : { keys: [], between: this.#ui.film.between, loop: film?.loop ?? false };
+    const keys = [...known.keys, pose];
+    this.#change({ ...known, keys }, 'new keyframe', known.between * (keys.length - 1));
+    this.#ui.status.say(`Keyframe ${keys.length} is the present pose.`);
+  }
+
+  removeKey(index: number): void {
+    const { film } = this.#settings;
+    if (!film || !('keys' in film)) return;
+    const keys = film.keys.filter((_, k) => k !== index);
+    this.#change(keys.length > 0 ? { ...film, keys } : undefined, 'removed keyframe', 0);
+  }
+
+  setBetween(between: number): void {
+    const { film, frame } = this.#settings;
+    if (!film || !('keys' in film)) return;
+    const at = Math.round((frame / film.between) * between);
+    this.#change({ ...film, between }, 'change of the frames between', at);
+  }
+
+  setLoop(loop: boolean): void {
+    const { film, frame } = this.#settings;
+    if (film) this.#change({ ...film, loop }, 'change of the loop', frame);
+  }
+
+  /** To a frame, without playing: the ellipsoids go there. */
+  seek(frame: number): void {
+    const { film } = this.#settings;
+    if (!film || !this.#states.canChange) return;
+    this.#settings.remember(`frame ${frame}`, 'seek');
+    this.#settings.send(poseAt(film, frame), false);
+    void this.#settings.setFilm(film, frame).catch((error) => this.#states.fail('That did not work.', error));
+  }
+
+  /** The whole film as one file. */
+  async record(): Promise<void> {
+    if (!this.#states.canChange) return;
+    this.#ui.film.showRecording(0);
+    this.#ui.status.say('Recording.');
+    try {
+      const bytes = await this.#client.request('record', { frameSeconds: FRAME_SECONDS });
+      if (bytes) this.#ui.saving.bytes('film.glb', bytes, 'model/gltf-binary');
+      else this.#ui.status.say('The recording was cancelled.');
+    } catch (error) {
+      this.#states.fail('The film could not be recorded.', error);
+    }
+    this.#ui.film.showRecording(undefined);
+  }
+
+  #change(film: Film | undefined, what: string, frame: number): void {
+    if (!this.#states.canChange) return;
+    this.#settings.remember(what);
+    void this.#settings.setFilm(film, frame).catch((error) => this.#states.fail('That did not work.', error));
+  }
+}

@@ -1,0 +1,183 @@
+import { moved, scaled, turned } from '../sculpt/ellipsoids';
+import type { ControlEllipsoid, Pose, Vec3 } from '../sculpt/protocol';
+import { figure } from '../ui/format';
+import type { HandleMode } from '../view/handles';
+import type { SculptParts } from './sculpt-parts';
+import type { ModelSettings } from './sculpt-settings';
+
+/** One press of a key: a share of the size of the scene, radians, and a factor. */
+const MOVE = 0.02;
+const TURN = 0.1;
+const GROW = 1.06;
+/** With Shift, so much of it. */
+const FINE = 0.2;
+
+/** Of a new ellipsoid: a share of the size of the scene. */
+const NEW = 0.12;
+
+/** Milliseconds after the last press of a key until the hand is at rest. */
+const REST = 350;
+
+const MODE_KEYS: Record<string, HandleMode> = { m: 'move', t: 'turn', e: 'size' };
+const DONE: Record<HandleMode, string> = { move: 'moved', turn: 'turned', size: 'sized' };
+
+/** Chooses ellipsoids and moves, turns and sizes them: by handles, keys and numbers. */
+export class Posing {
+  readonly #ui: SculptParts;
+  readonly #settings: ModelSettings;
+  #mode: HandleMode = 'move';
+  /** Runs while keys are pressed one after the other. */
+  #resting = 0;
+
+  constructor(ui: SculptParts, settings: ModelSettings) {
+    this.#ui = ui;
+    this.#settings = settings;
+    ui.view.onPick = (index) => settings.choose(index);
+    ui.view.handles.onGrab = () => this.#remember(DONE[this.#mode], false);
+    ui.view.handles.onDrag = (ellipsoid, dragging) => this.#drag(ellipsoid, dragging);
+    ui.view.takesKey = (event, directions) => this.#key(event, directions);
+  }
+
+  set mode(mode: HandleMode) {
+    this.#mode = mode;
+    this.#ui.ellipsoids.mode = mode;
+    this.#ui.view.mode = mode;
+    this.#ui.status.say(`Handles and arrow keys ${mode === 'size' ? 'change the size' : mode}.`);
+  }
+
+  /** By numbers. */
+  change(ellipsoid: ControlEllipsoid, what: string): void {
+    this.#remember(what, true);
+    this.#send(ellipsoid, false);
+    this.#tell(what);
+  }
+
+  /** One more, where one is chosen beside it, else in the middle; it grows from nothing. */
+  add(): void {
+    const { pose, chosen, names } = this.#settings;
+    const size = NEW * this.#ui.view.size;
+    const near = chosen === undefined ? undefined : pose[chosen];
+    const center: Vec3 = near ? moved(near, [size, size, 0]).center : this.#ui.view.middle;
+    const [x, y, z]: [Vec3, Vec3, Vec3] = [
+      [size, 0, 0],
+      [0, size, 0],
+      [0, 0, size],
+    ];
+    this.#settings.remember('new ellipsoid');
+    this.#settings.send([...pose, { center, axes: [x, y, z] }], false, [...names, '']);
+    this.#settings.choose(pose.length);
+  }
+
+  /** The chosen one shrinks and is gone. */
+  remove(): void {
+    const { pose, chosen, names } = this.#settings;
+    if (chosen === undefined || pose.length < 2) return;
+    const name = this.#settings.nameOf(chosen);
+    const others = <T>(list: T[]) => list.filter((_, index) => index !== chosen);
+    this.#settings.remember('removed ellipsoid');
+    this.#settings.send(others(pose), false, others(names));
+    this.#settings.choose(undefined);
+    this.#ui.status.say(`${name} is removed.`);
+    this.#ui.ellipsoids.focus();
+  }
+
+  /** Nothing is sent any more. */
+  close(): void {
+    clearTimeout(this.#resting);
+  }
+
+  #drag(ellipsoid: ControlEllipsoid, dragging: boolean): void {
+    this.#send(ellipsoid, dragging);
+    if (!dragging) this.#tell(DONE[this.#mode]);
+  }
+
+  #send(ellipsoid: ControlEllipsoid, dragging: boolean): void {
+    const { pose, chosen } = this.#settings;
+    const next: Pose = pose.map((one, index) => (index === chosen ? ellipsoid : one));
+    this.#settings.send(next, dragging);
+  }
+
+  #remember(what: string, together: boolean): void {
+    const { chosen } = this.#settings;
+    if (chosen === undefined) return;
+    const label = `${this.#settings.nameOf(chosen)} ${what}`;
+    this.#settings.remember(label, together ? label : '');
+  }
+
+  /** Says where it is now, when the hand rests. */
+  #tell(what: string): void {
+    const { pose, chosen } = this.#settings;
+    const ellipsoid = chosen === undefined ? undefined : pose[chosen];
+    if (chosen === undefined || !ellipsoid) return;
+    const place = ellipsoid.center.map((x) => figure(Number(x.toPrecision(3)))).join(', ');
+    this.#ui.status.say(`${this.#settings.nameOf(chosen)}: ${what}; its centre is ${place}.`);
+  }
+
+  /** Keys in the view; true where one was for an ellipsoid. */
+  #key({ key, shiftKey }: KeyboardEvent, directions: Vec3[]): boolean {
+    const mode = MODE_KEYS[key];
+    const number = /^[1-9]$/.test(key) ? Number(key) : 0;
+    const { pose, chosen } = this.#settings;
+    if (number > 0 && number <= pose.length) this.#settings.choose(number - 1);
+    else if (mode) this.mode = mode;
+    else if (chosen === undefined) return false;
+    else if (key === 'Escape') this.#settings.choose(undefined);
+    else if (key === 'Delete') this.remove();
+    else return this.#nudge(key, shiftKey ? FINE : 1, directions);
+    return true;
+  }
+
+  /** The hand has left the keys: what was a preview gets fine. */
+  #rest(): void {
+    this.#settings.send(this.#settings.pose, false);
+    this.#tell(DONE[this.#mode]);
+  }
+
+  #nudge(key: string, much: number, [right, up, near]: Vec3[]): boolean {
+    const step = STEPS[key];
+    const { pose, chosen } = this.#settings;
+    const ellipsoid = chosen === undefined ? undefined : pose[chosen];
+    if (!step || !ellipsoid || !right || !up || !near) return false;
+    const axis = [right, up, near][step.axis] ?? right;
+    const change = {
+      move: () => moved(ellipsoid, scaledBy(axis, step.sign * much * MOVE * this.#ui.view.size)),
+      turn: () =>
+        turned(ellipsoid, [up, right, near][step.axis] ?? up, TURN * much * TURN_SIGNS[step.axis] * step.sign),
+      size: () => sized(ellipsoid, step, much),
+    };
+    this.#remember(DONE[this.#mode], true);
+    this.#send(change[this.#mode](), true);
+    clearTimeout(this.#resting);
+    this.#resting = window.setTimeout(() => this.#rest(), REST);
+    return true;
+  }
+}
+
+interface Step {
+  /** 0 to the right, 1 upwards, 2 towards the viewer. */
+  axis: 0 | 1 | 2;
+  sign: 1 | -1;
+}
+
+const STEPS: Record<string, Step> = {
+  ArrowRight: { axis: 0, sign: 1 },
+  ArrowLeft: { axis: 0, sign: -1 },
+  ArrowUp: { axis: 1, sign: 1 },
+  ArrowDown: { axis: 1, sign: -1 },
+  PageUp: { axis: 2, sign: 1 },
+  PageDown: { axis: 2, sign: -1 },
+};
+
+/** Its front goes where the arrow points. */
+const TURN_SIGNS = [1, -1, 1] as const;
+
+/** Up and down for all axes, left and right for the first, and the third by the page keys. */
+function sized(ellipsoid: ControlEllipsoid, { axis, sign }: Step, much: number): ControlEllipsoid {
+  const factor = GROW ** (sign * much);
+  const factors: Vec3 = axis === 1 ? [factor, factor, factor] : [axis === 0 ? factor : 1, 1, axis === 2 ? factor : 1];
+  return scaled(ellipsoid, factors);
+}
+
+function scaledBy(vector: Vec3, factor: number): Vec3 {
+  return vector.map((x) => x * factor) as Vec3;
+}

@@ -1,0 +1,161 @@
+import type { SculptClient } from '../sculpt/client';
+import type { FrameEvent, MeasuredEvent, StageKind } from '../sculpt/protocol';
+import type { LabState } from '../state';
+import { count, plural } from '../ui/format';
+import type { History } from '../ui/history';
+import type { LabStates } from './lab-states';
+import type { SculptParts } from './sculpt-parts';
+
+/** Milliseconds between two looks at what takes time to show, such as plots. */
+const SHOW_EVERY = 250;
+
+/** What comes of the steps, on the screen: frames, measures and plots as the worker tells them. */
+export class Results {
+  readonly #client: SculptClient;
+  readonly #ui: SculptParts;
+  readonly #states: LabStates;
+  readonly #history: History;
+  readonly #follow: (frame: FrameEvent) => void;
+  #frame: FrameEvent | undefined;
+  #framePending = 0;
+  /** Waits for the frame that it tells of. */
+  #measured: MeasuredEvent | undefined;
+  #shownAt = 0;
+  #more: Record<string, unknown> = {};
+  /** The undeformed meshes are shown, or on their way. */
+  #originals = false;
+  /** Counts scenes: what is on its way from the one before is not shown. */
+  #scene = 0;
+
+  /** `follow` hears of each frame when it is on the screen. */
+  constructor(
+    client: SculptClient,
+    ui: SculptParts,
+    states: LabStates,
+    history: History,
+    follow: (frame: FrameEvent) => void,
+  ) {
+    this.#client = client;
+    this.#ui = ui;
+    this.#states = states;
+    this.#history = history;
+    this.#follow = follow;
+  }
+
+  /** Another scene: nothing is known of it. */
+  clear(): void {
+    this.#scene += 1;
+    this.#frame = undefined;
+    this.#measured = undefined;
+    this.#originals = false;
+    this.#more = {};
+    this.#ui.answer.clear();
+    this.#ui.measures.clear();
+    this.startOver();
+  }
+
+  /** A new run of the same scene. */
+  startOver(): void {
+    this.#history.clear();
+    this.#showHistory();
+  }
+
+  /** Shows a frame at the next animation frame; only then the worker goes on. */
+  take(frame: FrameEvent): void {
+    this.#history.add(frame.reports);
+    this.#frame = frame;
+    this.#framePending ||= requestAnimationFrame(() => {
+      this.#framePending = 0;
+      if (this.#frame) this.#show(this.#frame);
+      this.#frame = undefined;
+      this.#showMeasured();
+      this.#client.shown();
+    });
+  }
+
+  /** Shown after the frame that it tells of. */
+  measured(measured: MeasuredEvent): void {
+    this.#measured = measured;
+    if (this.#framePending === 0) this.#showMeasured();
+  }
+
+  #showMeasured(): void {
+    if (!this.#measured) return;
+    const { measures, facts } = this.#measured;
+    this.#measured = undefined;
+    Object.assign(this.#more, facts);
+    this.#ui.measures.showMeasures(measures);
+    this.#ui.measures.showMore(this.#more);
+  }
+
+  showState(state: LabState): void {
+    this.#showHistory();
+    this.#ui.status.say(this.describe(state));
+  }
+
+  /** In words, for the status line. */
+  describe(state: LabState): string {
+    const last = this.#history.reports.at(-1);
+    if (state === 'running') return 'Running.';
+    if (!last) return 'Ready.';
+    const { vertices, components } = last;
+    const what = `${count(vertices)} vertices in ${plural(components, 'component')}`;
+    return state === 'done' ? `At rest: ${what}.` : `Paused at iteration ${count(last.iteration)}: ${what}.`;
+  }
+
+  /** The undeformed meshes, where the layout shows them. */
+  showOriginals(): void {
+    if (this.#originals || this.#ui.options.value.layout !== 'row' || !this.#states.ready) return;
+    this.#originals = true;
+    const scene = this.#scene;
+    this.#client.request('originals', undefined).then(
+      ({ base, detail }) => {
+        if (scene !== this.#scene) return;
+        this.#ui.view.show('S0', base);
+        this.#ui.view.show('S1', detail ?? base);
+      },
+      (error) => this.#states.fail('The undeformed meshes could not be shown.', error),
+    );
+  }
+
+  /** Meshes that no model is needed for. */
+  showStages(kind: StageKind): void {
+    const scene = this.#scene;
+    this.#client.request('stages', kind).then(
+      (stages) => {
+        if (scene === this.#scene) this.#ui.view.showStages(stages);
+      },
+      (error) => this.#states.fail('The meshes could not be made.', error),
+    );
+  }
+
+  close(): void {
+    cancelAnimationFrame(this.#framePending);
+  }
+
+  #show(frame: FrameEvent): void {
+    const { view, answer, measures, coarse } = this.#ui;
+    view.show('S1dash', frame.result);
+    view.show('S0dash', frame.base);
+    view.show('T', frame.link);
+    if (frame.levels) view.showStages(frame.levels);
+    coarse.hidden = !frame.coarse;
+    this.#follow(frame);
+    if (answer.drawn(frame.turn, performance.now()) && answer.last) {
+      this.#more.answerMs = Math.round(answer.last.milliseconds);
+      this.#more.answerFrames = answer.last.frames;
+    }
+    this.#more.frameMs = frame.took;
+    const last = frame.reports.at(-1);
+    if (last) measures.showReport({ ...last, vertices: frame.result.vertices, triangles: frame.result.triangles });
+    measures.showMore(this.#more);
+    if (performance.now() - this.#shownAt > SHOW_EVERY) this.#showHistory();
+  }
+
+  #showHistory(): void {
+    this.#shownAt = performance.now();
+    this.#ui.transport.showReport(this.#history.reports.at(-1));
+    this.#ui.plots.update();
+    this.#ui.csv.disabled = this.#history.reports.length === 0;
+  }
+}

@@ -1,0 +1,309 @@
+import { RequestError } from '../channel';
+import { SculptClient } from '../sculpt/client';
+import { SCENES } from '../sculpt/examples';
+import { lastFrame } from '../sculpt/film';
+import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
+import type { FrameEvent, Opened, ParamValues, SculptShade, Shown, WorkerEvent } from '../sculpt/protocol';
+import type { LabState } from '../state';
+import { History } from '../ui/history';
+import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
+import type { SculptViewOptions } from '../view/sculpture';
+import { LabStates } from './lab-states';
+import type { Lab, PassedOn } from './labs';
+import { Filming } from './sculpt-filming';
+import { filmOf, linkOf, toHash } from './sculpt-link';
+import { Opening, type Source } from './sculpt-opening';
+import { type PartEvents, SculptParts } from './sculpt-parts';
+import { Posing } from './sculpt-posing';
+import { Results } from './sculpt-results';
+import { ModelSettings } from './sculpt-settings';
+
+const SHADES: readonly string[] = ['area distortion', 'angle distortion', 'mean curvature'] satisfies SculptShade[];
+
+/**
+ * The Sculpt lab: a detailed surface deformed by ellipsoids. Here its parts are put together; what is opened, set,
+ * posed, filmed and shown is each in a file of its own.
+ */
+export class SculptLab implements Lab {
+  readonly #root: HTMLElement;
+  readonly #closing = new AbortController();
+  readonly #client = new SculptClient((event) => this.#onEvent(event));
+  readonly #ui: SculptParts;
+  readonly #states: LabStates;
+  readonly #results: Results;
+  readonly #settings: ModelSettings;
+  readonly #posing: Posing;
+  readonly #filming: Filming;
+  readonly #opening: Opening;
+  /** The parameters as the scene was opened, with what the model chose. */
+  #usual: ParamValues = {};
+  #shown: Shown = { layout: 'result', shade: undefined, textured: false };
+
+  constructor(root: HTMLElement, help: HTMLElement) {
+    this.#root = root;
+    const { signal } = this.#closing;
+    const client = this.#client;
+    const history = new History();
+    const ui = new SculptParts(root, history, client, signal, this.#events());
+    const states = new LabStates(ui.banner, ui.status, signal);
+    this.#ui = ui;
+    this.#states = states;
+    this.#results = new Results(client, ui, states, history, (frame) => this.#follow(frame));
+    this.#settings = new ModelSettings(client, ui, states, history, () => this.#showSettings());
+    this.#posing = new Posing(ui, this.#settings);
+    this.#filming = new Filming(client, ui, states, this.#settings);
+    this.#opening = new Opening(client, ui, states, (opened, source) => this.#adopt(opened, source));
+    states.follow((state) => this.#showState(state));
+    offerShortcuts(this.#shortcuts(), help, signal);
+  }
+
+  /** Opens what the address says, or else the built-in example, and runs it. */
+  async start(passedOn?: PassedOn): Promise<void> {
+    try {
+      const { specs } = await this.#client.request('hello', undefined);
+      this.#ui.makeParams(specs);
+    } catch (error) {
+      this.#states.fail('Vesicle could not start.', error);
+      return;
+    }
+    const { signal } = this.#closing;
+    if (signal.aborted) return;
+    window.addEventListener('hashchange', () => void this.#followLink(), { signal });
+    if (passedOn) await this.#opening.bytes(passedOn.name, passedOn.bytes);
+    else await this.#opening.link(SCENES[0]);
+  }
+
+  close(): void {
+    this.#closing.abort();
+    this.#posing.close();
+    this.#opening.close();
+    this.#client.close();
+    this.#results.close();
+    this.#ui.dispose();
+    this.#root.replaceChildren();
+  }
+
+  /** Also where a link could not be followed the address is that of what is open. */
+  async #followLink(): Promise<void> {
+    await this.#opening.link();
+    this.#updateAddress();
+  }
+
+  /** What is asked for on the page, and who does it. */
+  #events(): PartEvents {
+    return {
+      onFiles: (files) => void this.#opening.files(files),
+      onExample: (example) => void this.#opening.example(example),
+      onExampleId: (id) => this.#opening.byId(id),
+      onVariant: (preset, variant) => this.#openVariant(preset, variant),
+      onChoose: (index) => this.#settings.choose(index),
+      onMode: (mode) => {
+        this.#posing.mode = mode;
+      },
+      onChange: (ellipsoid, what) => this.#posing.change(ellipsoid, what),
+      onAdd: () => this.#posing.add(),
+      onRemove: () => this.#posing.remove(),
+      onAddKey: () => this.#filming.addKey(),
+      onRemoveKey: (index) => this.#filming.removeKey(index),
+      onBetween: (frames) => this.#filming.setBetween(frames),
+      onLoop: (loop) => this.#filming.setLoop(loop),
+      onSeek: (frame) => this.#filming.seek(frame),
+      onRecord: () => void this.#filming.record(),
+      onCancelRecord: () => void this.#client.request('cancelRecord', undefined),
+      onParam: (name, value) => void this.#settings.setParams({ [name]: value }, this.#ui.labelOf(name)),
+      onOptions: (options) => this.#setOptions(options),
+      onCancel: () => void this.#opening.cancel(),
+      onToggle: () => this.#toggle(),
+      onStep: (steps) => this.#step(steps),
+      onReset: () => void this.#reset(),
+      onUndo: () => void this.#settings.travel('undo'),
+      onRedo: () => void this.#settings.travel('redo'),
+      onDismiss: () => this.#dismiss(),
+      onCopyLink: () => void this.#copyLink(),
+      onError: (title, error) => this.#states.fail(title, error),
+    };
+  }
+
+  #shortcuts(): Shortcut[] {
+    const redo = () => void this.#settings.travel('redo');
+    return [
+      { key: ' ', shown: 'Space', text: 'play or pause', act: () => this.#toggle() },
+      { key: 's', shown: 's', text: 'one step', act: () => this.#step(1) },
+      { key: 'd', shown: 'd', text: 'ten steps', act: () => this.#step(10) },
+      { key: 'r', shown: 'r', text: 'reset', act: () => void this.#reset() },
+      { key: 'k', shown: 'k', text: 'add a keyframe', act: () => this.#filming.addKey() },
+      { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#settings.travel('undo') },
+      { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: redo },
+      { key: 'y', ctrl: true, shown: 'Ctrl Y', text: 'redo', act: redo },
+      {
+        key: 'Escape',
+        shown: 'Esc',
+        text: 'away with the message, or let the ellipsoid go',
+        act: () => this.#putAway(),
+      },
+    ];
+  }
+
+  /** Shows a scene that has been opened, as its example or link wants it, and plays it. */
+  async #adopt(opened: Opened, { name, example, linked }: Source): Promise<void> {
+    this.#states.ready = true;
+    this.#usual = { ...opened.params };
+    for (const [name, value] of Object.entries(linked?.params ?? {}))
+      if (example?.params[name] === undefined) delete this.#usual[name];
+      else if (Object.is(opened.params[name], value)) this.#usual[name] = example.params[name];
+    this.#results.clear();
+    this.#ui.adopt(opened, example, name);
+    const film = filmOf(linked ?? { params: {} }, example?.film);
+    const { pose, params } = opened;
+    this.#settings.adopt({ pose, names: example?.names ?? [], posed: linked?.pose !== undefined, film, params });
+    const color = (linked?.color ?? example?.color ?? 'plain') as SculptViewOptions['color'];
+    const layout = (linked?.layout ?? example?.layout ?? 'result') as SculptViewOptions['layout'];
+    const preset = isSculptPreset(example) ? example : undefined;
+    this.#ui.options.staged = preset?.stages !== undefined;
+    this.#ui.options.set({
+      color,
+      layout: layout === 'stages' && !preset?.stages ? 'result' : layout,
+      edges: false,
+      ellipsoids: true,
+      ...preset?.view,
+    });
+    if (preset?.stages) this.#results.showStages(preset.stages);
+    await this.#settings.setFilm(film, 0);
+    await this.#client.request('show', this.#shown);
+    await this.#client.request(film && !linked?.pose ? 'play' : 'settle', undefined);
+  }
+
+  #openVariant(preset: SculptPreset, { name, params, pose }: SculptVariant): void {
+    const values = { ...this.#usual, ...params };
+    const differs = Object.entries(values).some(([key, value]) => !Object.is(this.#settings.params[key], value));
+    if (differs) void this.#settings.setParams(values, `figure ${name}`);
+    this.#settings.remember(`figure ${name}`);
+    this.#settings.send(pose ?? preset.start ?? this.#settings.pose, false);
+  }
+
+  #follow(frame: FrameEvent): void {
+    this.#settings.follow(frame, this.#states.beneath === 'running');
+  }
+
+  #showSettings(): void {
+    const { params, pose } = this.#settings;
+    const example = this.#opening.source?.example;
+    const preset = isSculptPreset(example) ? example : undefined;
+    this.#ui.showParams(params, preset, preset && variantInForce(preset, pose, params, this.#usual));
+    this.#ui.showState(this.#states.beneath, this.#states.ready, this.#canPlay);
+    this.#updateAddress();
+  }
+
+  get #canPlay(): boolean {
+    const { film } = this.#settings;
+    return film !== undefined && lastFrame(film) > 0;
+  }
+
+  #setOptions({ layout, color }: SculptViewOptions): void {
+    const shade = SHADES.includes(color) ? (color as SculptShade) : undefined;
+    const textured = color === 'texture';
+    const before = this.#shown;
+    const changed = layout !== before.layout || shade !== before.shade || textured !== before.textured;
+    this.#shown = { layout, shade, textured };
+    if (!this.#states.ready) return;
+    if (changed) this.#ask(this.#client.request('show', this.#shown));
+    this.#results.showOriginals();
+    this.#updateAddress();
+  }
+
+  #toggle(): void {
+    const { value, canChange } = this.#states;
+    if (!canChange) return;
+    this.#ui.banner.hide();
+    if (value === 'running') this.#ask(this.#client.request('pause', undefined));
+    else if (this.#canPlay || this.#states.beneath === 'paused') {
+      this.#settings.remember('Play');
+      this.#ask(this.#client.request('play', undefined));
+    }
+  }
+
+  #step(steps: number): void {
+    if (!this.#states.canChange || this.#states.value === 'running') return;
+    this.#ui.banner.hide();
+    this.#settings.remember(steps === 1 ? '1 step' : `${steps} steps`);
+    this.#ask(this.#client.request('step', { count: steps }));
+  }
+
+  /** Starts over, with the ellipsoids where the scene began. */
+  async #reset(): Promise<void> {
+    const { ready, value, engineBroken } = this.#states;
+    if (!ready || value === 'loading') return;
+    if (engineBroken) return this.#opening.again();
+    this.#states.load('Starting over.');
+    try {
+      await this.#settings.rebuild(undefined);
+      this.#results.startOver();
+      await this.#client.request('show', this.#shown);
+      this.#states.stand('Ready to start.');
+    } catch (error) {
+      this.#states.fail('The model could not be built.', error);
+    }
+  }
+
+  /** Waits for nothing; tells when it fails. */
+  #ask(request: Promise<unknown>): void {
+    request.catch((error) => this.#states.fail('That did not work.', error));
+  }
+
+  /** The page's address says what is open and how it is set. */
+  #updateAddress(): void {
+    const { source } = this.#opening;
+    if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
+    const { params, pose, posed, film } = this.#settings;
+    const { color, layout } = this.#ui.options.value;
+    const { example, name: file } = source;
+    const linked = linkOf({
+      example,
+      file,
+      params,
+      usual: this.#usual,
+      pose: posed ? pose : undefined,
+      film,
+      color,
+      layout,
+    });
+    const hash = toHash(linked);
+    if (hash !== location.hash) window.history.replaceState(null, '', hash);
+  }
+
+  async #copyLink(): Promise<void> {
+    this.#updateAddress();
+    const lacks = this.#opening.source?.example ? '' : ' Your file is not in it: whoever opens it needs the file too.';
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.#ui.status.say(`Link copied.${lacks}`);
+    } catch {
+      this.#ui.status.say(`The link is in the address bar.${lacks}`);
+    }
+  }
+
+  #onEvent(event: WorkerEvent): void {
+    if (event.event === 'recorded') this.#ui.film.showRecording(event.part);
+    else if (event.event === 'failure') this.#states.fail('The run has stopped.', new RequestError(event.failure));
+    else if (event.event === 'frame') this.#results.take(event);
+    else if (event.event === 'measured') this.#results.measured(event);
+    else if (event.event === 'refused') this.#settings.refuse(event.pose, event.failure.message);
+    else if (this.#states.enter(event.state)) this.#results.showState(event.state);
+  }
+
+  #showState(state: LabState): void {
+    const { beneath, ready } = this.#states;
+    this.#root.dataset.state = state;
+    this.#ui.showState(beneath, ready, this.#canPlay);
+    if (state === 'done' || state === 'paused') this.#updateAddress();
+  }
+
+  #putAway(): void {
+    if (this.#ui.banner.shown) this.#dismiss();
+    else this.#settings.choose(undefined);
+  }
+
+  #dismiss(): void {
+    if (this.#states.dismiss()) this.#ui.status.say(this.#results.describe(this.#states.value));
+  }
+}

@@ -1,0 +1,107 @@
+import type { Vec3 } from '../protocol';
+import type { SurfaceColor } from '../view/surface';
+import { ball, moved, turnedAbout, upright } from './ellipsoids';
+import { type Film, poseAt } from './film';
+import type { Layout, ParamValues, Pose } from './protocol';
+import type { ComputedMesh } from './shapes';
+
+/** A mesh beside the page, or one to compute. */
+export type ExampleMesh = { file: string } | { shape: ComputedMesh };
+
+/** What comes with the page: meshes, ellipsoids that fit them, what they do, and whom to thank. */
+export interface SculptExample {
+  id: string;
+  name: string;
+  detail?: ExampleMesh;
+  base?: ExampleMesh;
+  up: 'y' | 'z';
+  /** Without, they are made to fit. */
+  start?: Pose;
+  /** What each ellipsoid is called. */
+  names?: string[];
+  /** Where they go when it is opened, where no film plays. */
+  pose?: Pose;
+  film?: Film;
+  params: ParamValues;
+  color: SurfaceColor;
+  layout: Layout;
+  credit: string;
+}
+
+export const NEFERTITI =
+  'Bust of Nefertiti: scan by Nora Al-Badri and Jan Nikolai Nelles, public domain; 70,000 triangles, from odedstein-meshes.';
+
+/** Crown, head, neck and chest. */
+export const BUST: Pose = [
+  {
+    center: [0, 125, 0],
+    axes: [
+      [95, 0, 0],
+      [0, 60.75, -44.25],
+      [0, 64.9, 89.1],
+    ],
+  },
+  upright([0, 0, 60], [58, 75, 72]),
+  upright([0, -110, 40], [42, 70, 42]),
+  upright([0, -205, 5], [92, 42, 60]),
+];
+export const BUST_NAMES = ['crown', 'head', 'neck', 'chest'];
+export const BUST_MESHES = { detail: { file: 'nefertiti.ply' }, base: { file: 'nefertiti-base.ply' } } as const;
+
+/** Where head and neck meet. */
+const NAPE: Vec3 = [0, -40, 20];
+
+/** Crown and head together: turned about the nape, then lifted. */
+function headTurned(about: Vec3, angle: number, by: Vec3): Pose {
+  const [crown, head, ...others] = BUST;
+  const turn = (one: Pose[number]) => moved(turnedAbout(one, NAPE, about, angle), by);
+  return [...[crown, head].flatMap((one) => (one ? [turn(one)] : [])), ...others];
+}
+
+/** The head looks aside on a longer neck. */
+export const LOOKING_ASIDE: Pose = headTurned([0, 1, 0], 0.5, [8, 26, 0]);
+
+export const LAVA: Film = { motion: 'lava', loop: false };
+
+/** The first is shown when the lab opens. */
+export const SCENES: [SculptExample, ...SculptExample[]] = [
+  {
+    id: 'bust',
+    name: 'Bust of Nefertiti',
+    ...BUST_MESHES,
+    up: 'y',
+    start: BUST,
+    names: BUST_NAMES,
+    film: { keys: [BUST, LOOKING_ASIDE], between: 24, loop: false },
+    params: { supersample: 2 },
+    color: 'plain',
+    layout: 'result',
+    credit: NEFERTITI,
+  },
+  {
+    id: 'lava',
+    name: 'Lava lamp',
+    up: 'y',
+    start: poseAt(LAVA, 0),
+    names: ['pool', 'large blob', 'small blob', 'middle blob', 'drop'],
+    film: LAVA,
+    params: { edgeMin: 0.07, edgeMax: 0.16, topology: 'split-and-join' },
+    color: 'component',
+    layout: 'result',
+    credit: 'Computed: five ellipsoids that rise and sink, after the lamp that the paper was inspired by.',
+  },
+  {
+    id: 'globe',
+    name: 'Globe with longitudes and latitudes',
+    base: { shape: 'globe' },
+    up: 'y',
+    // Both in the same place: what parts from the other carries its half of the map along.
+    start: [ball(0, 0, 0, 0.98), ball(0, 0, 0, 0.97)],
+    names: ['large', 'small'],
+    pose: [ball(-0.6, 0, 0, 0.85), ball(0.75, 0.3, 0, 0.6)],
+    params: {},
+    color: 'texture',
+    layout: 'result',
+    credit: 'Computed: a ball with its longitude and latitude as texture coordinates.',
+  },
+];

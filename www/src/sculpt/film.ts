@@ -1,0 +1,81 @@
+/** Films: where the ellipsoids are at each frame, by keyframes or by a formula. */
+import type { ControlEllipsoid } from 'vesicle';
+import { ball, between, lengthsOf } from './ellipsoids';
+
+/** Keyframes with so many frames from each to the next, or motion that is computed. */
+export type Film = { keys: ControlEllipsoid[][]; between: number; loop: boolean } | { motion: 'lava'; loop: boolean };
+
+/** Frames of the lava lamp until it is where it began. */
+const LAVA_FRAMES = 300;
+
+/** The last frame; the first is 0. In a loop it is the first again. */
+export function lastFrame(film: Film): number {
+  if ('motion' in film) return LAVA_FRAMES;
+  return film.between * (film.loop ? film.keys.length : film.keys.length - 1);
+}
+
+export function poseAt(film: Film, frame: number): ControlEllipsoid[] {
+  return 'motion' in film ? lavaAt(frame) : keyedAt(film.keys, film.between, frame);
+}
+
+function keyedAt(keys: ControlEllipsoid[][], step: number, frame: number): ControlEllipsoid[] {
+  const at = Math.floor(frame / step);
+  const [from, to] = [keys[at % keys.length] ?? [], keys[(at + 1) % keys.length] ?? []];
+  const t = (frame - at * step) / step;
+  if (t === 0) return from;
+  const eased = t * t * (3 - 2 * t);
+  return to.map((ellipsoid, k) => between(from[k] ?? ellipsoid, ellipsoid, eased));
+}
+
+/** A frame of a glide takes no ellipsoid farther than this share of its shortest semi-axis: the model's own steps are longer. */
+const GLIDE = 0.4;
+/** With more, a small ellipsoid that goes far would keep all others waiting. */
+const MOST_GLIDES = 40;
+
+/**
+ * The poses on the way to another, all arriving together: what stays in one piece goes as one. Left to themselves, large
+ * ellipsoids run ahead of small ones, and tear at the skin between.
+ */
+export function glide(from: ControlEllipsoid[], to: ControlEllipsoid[]): ControlEllipsoid[][] {
+  const ways = to.map((one, k) => {
+    const { center } = from[k] ?? one;
+    return Math.hypot(...one.center.map((x, i) => x - (center[i] ?? 0))) / Math.min(...lengthsOf(from[k] ?? one));
+  });
+  const frames = Math.min(MOST_GLIDES, Math.max(1, Math.ceil(Math.max(0, ...ways) / GLIDE)));
+  return Array.from({ length: frames }, (_, i) => to.map((one, k) => between(from[k] ?? one, one, (i + 1) / frames)));
+}
+
+/** Blobs that rise and sink past each other: how often in a whole film, from where, how far aside, and how large. */
+const BLOBS = [
+  { rounds: 1, phase: 0, aside: -0.35, radius: 0.62 },
+  { rounds: 2, phase: 1.9, aside: 0.4, radius: 0.42 },
+  { rounds: 1, phase: 3.4, aside: 0.12, radius: 0.5 },
+  { rounds: 3, phase: 4.6, aside: -0.1, radius: 0.34 },
+];
+
+/** A pool at the foot, and blobs that part from it and come back; stretched while they are fast. */
+function lavaAt(frame: number): ControlEllipsoid[] {
+  const turn = (2 * Math.PI * frame) / LAVA_FRAMES;
+  const pool = ball(0, -1.35, 0, 1);
+  const [x, y, z] = pool.axes;
+  pool.axes = [x, [0, 0.45 * y[1], 0], z];
+  return [pool, ...BLOBS.map((blob) => blobAt(blob, turn))];
+}
+
+function blobAt({ rounds, phase, aside, radius }: (typeof BLOBS)[number], turn: number): ControlEllipsoid {
+  const angle = rounds * turn + phase;
+  const blob = ball(
+    aside + 0.12 * Math.sin(2 * turn + phase),
+    0.1 - 1.45 * Math.cos(angle),
+    0.25 * Math.sin(turn + phase),
+    radius,
+  );
+  const tall = 1 + 0.25 * Math.sin(angle) ** 2;
+  const wide = 1 / Math.sqrt(tall);
+  blob.axes = [
+    [radius * wide, 0, 0],
+    [0, radius * tall, 0],
+    [0, 0, radius * wide],
+  ];
+  return blob;
+}

@@ -1,0 +1,120 @@
+/** Meshes and models as the page asks for them. Used by the worker only. */
+import { Mesh, MultiresolutionModel, type MultiresParams } from 'vesicle';
+import type { Surface } from '../protocol';
+import { scaled } from './ellipsoids';
+import { fitted } from './fit';
+import type { Facts, MeshSource, Pose, SceneSource, SculptShade, Setup } from './protocol';
+import { computedMesh } from './shapes';
+
+/** Around nothing a bare skin needs something to be spanned over. */
+const ALONE: Pose = [
+  {
+    center: [0, 0, 0],
+    axes: [
+      [1, 0, 0],
+      [0, 1, 0],
+      [0, 0, 1],
+    ],
+  },
+];
+
+/** The meshes of a scene; whoever has them frees them. */
+export interface Scene {
+  detail: Mesh | undefined;
+  base: Mesh | undefined;
+}
+
+export async function sceneFrom({ detail, base }: SceneSource): Promise<Scene> {
+  const finest = detail && (await meshFrom(detail));
+  try {
+    return { detail: finest, base: base && (await meshFrom(base)) };
+  } catch (error) {
+    finest?.free();
+    throw error;
+  }
+}
+
+async function meshFrom(source: MeshSource): Promise<Mesh> {
+  if ('shape' in source) return computedMesh(source.shape);
+  return Mesh.parse(source.file.bytes, source.texture && { texture: source.texture });
+}
+
+export function freeScene({ detail, base }: Scene): void {
+  detail?.free();
+  base?.free();
+}
+
+/** Sizes of fitted ellipsoids: the largest that a base can be made over holds the shape best. */
+const SIZES = [1, 0.8, 0.6, 0.4];
+
+/** The first model of a scene, and the ellipsoids it begins with: those given, else some that fit. */
+export function firstModel(scene: Scene, setup: Setup): { model: MultiresolutionModel; start: Pose } {
+  const mesh = scene.detail ?? scene.base;
+  if (setup.start || !mesh) {
+    const start = setup.start ?? ALONE;
+    return { model: buildModel(scene, start, setup), start };
+  }
+  const row = fitted(mesh);
+  let refusal: unknown;
+  for (const size of SIZES) {
+    const start = row.map((one) => scaled(one, [size, size, size]));
+    try {
+      return { model: buildModel(scene, start, setup), start };
+    } catch (error) {
+      refusal = error;
+    }
+  }
+  throw refusal;
+}
+
+/** At its start; where its ellipsoids are to go is for later. */
+export function buildModel({ detail, base }: Scene, start: Pose, { params }: Setup): MultiresolutionModel {
+  return new MultiresolutionModel({
+    ellipsoids: start,
+    params: params as MultiresParams,
+    ...(detail && { detail }),
+    ...(base && { base }),
+  });
+}
+
+/** A mesh as the page draws it, in arrays of its own. */
+export function surfaceOf(mesh: Mesh, values?: Float32Array): Surface {
+  const { positions, normals, indices } = mesh.arrays();
+  const surface = { positions, normals, indices, vertices: positions.length / 3, triangles: indices.length / 3 };
+  // Numbers of other vertices would be nonsense.
+  return values?.length === surface.vertices ? { ...surface, values: values.slice() } : surface;
+}
+
+/** A mesh as the page draws it with a picture on it: vertices on seams of the picture are there more than once. */
+export function texturedSurfaceOf(mesh: Mesh): Surface {
+  const split = mesh.splitAtSeams();
+  try {
+    const { uvs } = split.arrays();
+    return { ...surfaceOf(split), ...(uvs && { uvs }) };
+  } finally {
+    split.free();
+  }
+}
+
+/** One number a vertex of the base, or of the result for curvature. Distortions as powers of two: 0 where there is none. */
+export function valuesFor(model: MultiresolutionModel, shade: SculptShade): Float32Array {
+  if (shade === 'mean curvature') return model.mesh.curvature('mean');
+  const { area, angle } = model.distortion();
+  return (shade === 'area distortion' ? area : angle).map(Math.log2);
+}
+
+export function factsOf(model: MultiresolutionModel): Facts {
+  const { bands, folded, missed, held } = model;
+  const { area, angle } = model.distortion();
+  return {
+    ...{ bands, folded, missed, held },
+    areaLow: quantile(area, 0.05),
+    areaHigh: quantile(area, 0.95),
+    angleHigh: quantile(angle, 0.95),
+  };
+}
+
+function quantile(values: Float32Array, part: number): number {
+  const sorted = values.slice().sort();
+  return sorted[Math.round(part * (sorted.length - 1))] ?? Number.NaN;
+}

@@ -1,0 +1,53 @@
+/** Meshes that are computed. Used by the worker only. */
+import { Mesh } from 'vesicle';
+import { drawnMap } from './map';
+
+export type ComputedMesh = 'globe' | 'ball';
+
+/** Meridians of the globe, and circles of latitude between the poles. */
+const MERIDIANS = 96;
+const CIRCLES = 47;
+
+export async function computedMesh(shape: ComputedMesh): Promise<Mesh> {
+  if (shape === 'ball') return plainMesh(shape);
+  return Mesh.parse(globeAsObj(), { texture: { type: 'image/png', bytes: await drawnMap() } });
+}
+
+/** Without a picture on it. */
+export function plainMesh(shape: ComputedMesh): Mesh {
+  return shape === 'ball' ? Mesh.icosphere([0, 0, 0], 1, 0.08) : Mesh.parse(globeAsObj());
+}
+
+/**
+ * A ball of radius 1 with y up and texture coordinates by longitude and latitude, u from west to east, v from the south.
+ * As a file, since only there a vertex on the seam can have two of them.
+ */
+function globeAsObj(): Uint8Array {
+  const lines: string[] = [];
+  const rings = CIRCLES + 1;
+  for (let ring = 1; ring < rings; ring++) for (let m = 0; m < MERIDIANS; m++) lines.push(place(ring, m, rings));
+  lines.push('v 0 1 0', 'v 0 -1 0');
+  for (let ring = 0; ring <= rings; ring++)
+    for (let m = 0; m <= MERIDIANS; m++) lines.push(`vt ${m / MERIDIANS} ${1 - ring / rings}`);
+  const north = CIRCLES * MERIDIANS + 1;
+  const at = (ring: number, m: number) => `${vertex(ring, m, rings, north)}/${ring * (MERIDIANS + 1) + m + 1}`;
+  for (let m = 0; m < MERIDIANS; m++) {
+    for (let ring = 0; ring < rings; ring++) {
+      const [a, b, c, d] = [at(ring, m), at(ring, m + 1), at(ring + 1, m), at(ring + 1, m + 1)];
+      if (ring < rings - 1) lines.push(`f ${a} ${c} ${d}`);
+      if (ring > 0) lines.push(`f ${a} ${d} ${b}`);
+    }
+  }
+  return new TextEncoder().encode(`${lines.join('\n')}\n`);
+}
+
+function place(ring: number, m: number, rings: number): string {
+  const [down, around] = [(Math.PI * ring) / rings, (2 * Math.PI * m) / MERIDIANS];
+  const out = Math.sin(down);
+  return `v ${-out * Math.cos(around)} ${Math.cos(down)} ${out * Math.sin(around)}`;
+}
+
+function vertex(ring: number, m: number, rings: number, north: number): number {
+  if (ring === 0) return north;
+  return ring === rings ? north + 1 : (ring - 1) * MERIDIANS + (m % MERIDIANS) + 1;
+}

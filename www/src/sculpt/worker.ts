@@ -1,0 +1,350 @@
+/** The worker of the Sculpt lab: it holds the meshes and one model of them, and does what the page asks. */
+import init, { paramSpecs, type StepReport, version } from 'vesicle';
+import { Refusal, toFailure } from '../worker/refusal';
+import { answer, buffersOf, stop, type Work } from '../worker/serving';
+import { Course } from './course';
+import {
+  buildModel,
+  factsOf,
+  firstModel,
+  freeScene,
+  type Scene,
+  sceneFrom,
+  surfaceOf,
+  texturedSurfaceOf,
+  valuesFor,
+} from './model';
+import { Preview } from './preview';
+import type {
+  FrameEvent,
+  Opened,
+  ParamValues,
+  Pose,
+  PoseMessage,
+  Ready,
+  RequestKind,
+  Requests,
+  SavedPose,
+  Setup,
+  Shown,
+  Surface,
+  ToWorker,
+  WorkerEvent,
+} from './protocol';
+import { recorded } from './recording';
+import { levelsOf, stagesOf } from './stages';
+
+type Model = ReturnType<typeof buildModel>;
+type Handlers = {
+  [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
+};
+
+function send(event: WorkerEvent, transfer: Transferable[] = []): void {
+  self.postMessage(event, { transfer });
+}
+
+class Session {
+  #scene: Scene = { detail: undefined, base: undefined };
+  #model: Model | undefined;
+  #preview = new Preview();
+  #start: Pose = [];
+  #view: Shown = { layout: 'result', shade: undefined, textured: false };
+  readonly #course = new Course();
+  #dragging = false;
+  #turn = 0;
+  /** Steps the page has not heard of yet. */
+  #reports: StepReport[] = [];
+  #last: StepReport | undefined;
+  #took = 0;
+  /** The page has drawn what it was sent. */
+  #shown = true;
+  #run: Work | undefined;
+  #recording: Work | undefined;
+  /** Lets a run go on that waits for the page. */
+  #wake: () => void = () => undefined;
+
+  readonly handlers: Handlers = {
+    hello: async () => {
+      await init();
+      return { version: version(), specs: paramSpecs('multires') };
+    },
+    open: (body) => this.#open(body),
+    rebuild: (setup) => this.#rebuild(setup),
+    film: ({ film, frame }) => {
+      this.#course.setFilm(film, frame);
+      return undefined;
+    },
+    play: () => this.#play(),
+    settle: () => this.#settle(),
+    pause: () => stop(this.#run),
+    step: ({ count }) => this.#steps(count),
+    setParams: (params) => this.#setParams(params),
+    show: (view) => this.#show(view),
+    originals: () => this.#originals(),
+    save: () => this.#save(),
+    restore: (saved) => this.#restore(saved),
+    stages: (kind) => stagesOf(kind),
+    record: (body) => this.#record(body.frameSeconds),
+    cancelRecord: () => stop(this.#recording),
+    export: ({ format }) => this.#current().mesh.toBytes(format),
+  };
+
+  shown(): void {
+    this.#shown = true;
+    this.#wake();
+  }
+
+  /** Only the newest pose is on the model when its next step begins. */
+  pose({ pose, turn, dragging }: PoseMessage): void {
+    if (!this.#model) return;
+    try {
+      if (dragging) this.#course.goTo(this.#model, pose);
+      else this.#course.glideTo(this.#model, pose);
+    } catch (error) {
+      send({ event: 'refused', failure: toFailure(error), pose: this.#course.goalOf(this.#model) });
+    }
+    this.#turn = turn;
+    this.#dragging = dragging;
+    this.#last = undefined;
+    if (this.#run) this.#wake();
+    else this.#begin();
+  }
+
+  async #open({ source, setup }: Requests['open']['body']): Promise<Opened> {
+    await stop(this.#run);
+    await stop(this.#recording);
+    const scene = await sceneFrom(source);
+    const began = performance.now();
+    try {
+      const { model, start } = firstModel(scene, setup);
+      const ready = this.#adopt(model, start, setup.pose);
+      freeScene(this.#scene);
+      this.#scene = scene;
+      const { bands, mesh } = this.#current();
+      const detail = scene.detail?.triangleCount;
+      const { texture } = mesh;
+      return { ...ready, box: mesh.info().bounds, detail, bands, texture, made: performance.now() - began };
+    } catch (error) {
+      freeScene(scene);
+      throw error;
+    }
+  }
+
+  async #rebuild(setup: Setup): Promise<Ready> {
+    await stop(this.#run);
+    const start = setup.start ?? this.#start;
+    return this.#adopt(buildModel(this.#scene, start, setup), start, setup.pose);
+  }
+
+  #adopt(model: Model, start: Pose, pose: Pose | undefined): Ready {
+    this.#model?.free();
+    this.#model = model;
+    this.#start = start;
+    this.#preview = new Preview();
+    this.#dragging = false;
+    this.#course.rewind(0);
+    this.#forget();
+    if (pose) this.#course.glideTo(model, pose);
+    return { params: { ...model.params }, start, pose: pose ?? start };
+  }
+
+  /** The steps so far are those of another run. */
+  #forget(): void {
+    this.#reports = [];
+    this.#last = undefined;
+    this.#shown = true;
+  }
+
+  #current(): Model {
+    if (!this.#model) throw new Refusal('invalid-argument', 'nothing is open: open a mesh first');
+    return this.#model;
+  }
+
+  #play(): undefined {
+    this.#current();
+    this.#course.play();
+    this.#last = undefined;
+    this.#begin();
+  }
+
+  #settle(): undefined {
+    this.#current();
+    this.#last = undefined;
+    this.#begin();
+  }
+
+  #begin(): void {
+    if (this.#run) return;
+    const abort = new AbortController();
+    abort.signal.addEventListener('abort', () => this.#wake());
+    this.#run = { abort, ended: this.#runToRest(abort.signal) };
+  }
+
+  async #runToRest(signal: AbortSignal): Promise<void> {
+    send({ event: 'state', state: 'running' });
+    try {
+      await this.#frames(signal);
+    } catch (error) {
+      // After the state: the page shows the failure on top of it.
+      queueMicrotask(() => send({ event: 'failure', failure: toFailure(error) }));
+    }
+    this.#run = undefined;
+    this.#course.stop();
+    this.#standStill();
+  }
+
+  /** A frame after the other, each when the page has drawn the one before; while a hand holds still, none. */
+  async #frames(signal: AbortSignal): Promise<void> {
+    while (!signal.aborted && (this.#dragging || !this.#isAtRest())) {
+      if (this.#isAtRest()) await this.#until(() => !this.#isAtRest() || !this.#dragging, signal);
+      else {
+        this.#next();
+        this.#sendFrame();
+        await this.#until(() => this.#shown, signal);
+      }
+    }
+  }
+
+  #isAtRest(): boolean {
+    return this.#last?.done === true && !this.#course.isUnderWay && !(this.#preview.on && !this.#dragging);
+  }
+
+  async #until(holds: () => boolean, signal: AbortSignal): Promise<void> {
+    while (!holds() && !signal.aborted) {
+      await new Promise<void>((resolve) => {
+        this.#wake = resolve;
+      });
+    }
+  }
+
+  /** One step of the model, and of the film while it plays. */
+  #next(): void {
+    const model = this.#current();
+    this.#course.next(model);
+    this.#preview.prepare(model, this.#motion(), this.#took);
+    const began = performance.now();
+    const report = model.step(1);
+    this.#took = performance.now() - began;
+    if (report.iteration !== this.#last?.iteration) this.#reports.push(report);
+    this.#last = report;
+  }
+
+  #motion(): 'none' | 'course' | 'hand' {
+    if (this.#dragging) return 'hand';
+    return this.#course.isUnderWay || !this.#last?.done ? 'course' : 'none';
+  }
+
+  async #steps(count: number): Promise<undefined> {
+    await stop(this.#run);
+    for (let i = 0; i < count; i++) {
+      this.#course.playOne();
+      if (this.#isAtRest()) break;
+      this.#next();
+    }
+    this.#course.stop();
+    this.#preview.end(this.#current());
+    this.#sendFrame();
+    this.#standStill();
+  }
+
+  #standStill(): void {
+    const model = this.#model;
+    if (!model) return;
+    const measures = { info: model.mesh.info(), report: model.mesh.check() };
+    send({ event: 'measured', measures, facts: factsOf(model) });
+    send({ event: 'state', state: this.#last?.done ? 'done' : 'paused' });
+  }
+
+  /** The parameters as they are set, whatever a preview has made of them. */
+  #setParams(params: ParamValues): ParamValues {
+    const model = this.#current();
+    this.#preview.end(model);
+    model.setParams(params);
+    this.#last = undefined;
+    return { ...model.params };
+  }
+
+  #show(view: Shown): undefined {
+    this.#view = view;
+    if (!this.#run && this.#model) this.#sendFrame();
+  }
+
+  #sendFrame(): void {
+    const model = this.#current();
+    const { layout, shade, textured } = this.#view;
+    const values = shade && valuesFor(model, shade);
+    const result = textured ? texturedSurfaceOf(model.mesh) : surfaceOf(model.mesh, values);
+    const frame: FrameEvent = {
+      event: 'frame',
+      result,
+      ...(layout !== 'result' && { base: surfaceOf(model.baseMesh, values) }),
+      ...(layout === 'row' && { link: surfaceOf(model.linkMesh, values) }),
+      ...(layout === 'levels' && { levels: levelsOf(model) }),
+      reports: this.#reports,
+      pose: this.#course.goalOf(model),
+      ...{ turn: this.#turn, frame: this.#course.frame, took: this.#took, coarse: this.#preview.on },
+    };
+    this.#reports = [];
+    this.#shown = false;
+    send(
+      frame,
+      [frame.result, frame.base, frame.link].flatMap((one) => (one ? buffersOfSurface(one) : [])),
+    );
+  }
+
+  #originals(): Requests['originals']['reply'] {
+    const model = buildModel(this.#scene, this.#start, { start: undefined, params: {}, pose: undefined });
+    const { detail } = this.#scene;
+    try {
+      return { base: surfaceOf(model.baseMesh), detail: detail && surfaceOf(detail) };
+    } finally {
+      model.free();
+    }
+  }
+
+  /** The model is afterwards as it was before. */
+  async #record(frameSeconds: number): Promise<Requests['record']['reply']> {
+    await stop(this.#run);
+    await stop(this.#recording);
+    const model = this.#current();
+    const { film } = this.#course;
+    if (!film) throw new Refusal('invalid-argument', 'there is no film: add two keyframes first');
+    const before = model.save();
+    const abort = new AbortController();
+    const result = recorded(model, film, frameSeconds, abort.signal, (part) => send({ event: 'recorded', part }));
+    this.#recording = { abort, ended: result };
+    try {
+      return await result;
+    } finally {
+      this.#recording = undefined;
+      model.restore(before);
+    }
+  }
+
+  #save(): SavedPose {
+    this.#preview.end(this.#current());
+    return { state: this.#current().save(), iteration: this.#last?.iteration ?? 0, frame: this.#course.frame };
+  }
+
+  async #restore({ state, frame }: SavedPose): Promise<Ready> {
+    await stop(this.#run);
+    const model = this.#current();
+    model.restore(state);
+    this.#preview = new Preview();
+    this.#course.rewind(frame);
+    this.#forget();
+    return { params: { ...model.params }, start: this.#start, pose: model.goals };
+  }
+}
+
+function buffersOfSurface({ positions, normals, indices, values, uvs }: Surface): Transferable[] {
+  return buffersOf([positions, normals, indices, ...(values ? [values] : []), ...(uvs ? [uvs] : [])]);
+}
+
+const session = new Session();
+
+self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
+  if (data.kind === 'shown') session.shown();
+  else if (data.kind === 'pose') session.pose(data);
+  else void answer(session.handlers, data);
+};

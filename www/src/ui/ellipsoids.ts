@@ -1,0 +1,241 @@
+import { lengthsOf, turned, withLengths } from '../sculpt/ellipsoids';
+import type { ControlEllipsoid, Vec3 } from '../sculpt/protocol';
+import type { HandleMode } from '../view/handles';
+import { h, uniqueId } from './dom';
+
+const MODES: { mode: HandleMode; label: string; key: string; help: string }[] = [
+  {
+    mode: 'move',
+    label: 'Move',
+    key: 'm',
+    help: 'Arrow keys move it across the view, Page Up and Page Down towards you and away.',
+  },
+  {
+    mode: 'turn',
+    label: 'Turn',
+    key: 't',
+    help: 'Arrow keys turn it as they turn the view, Page Up and Page Down like a steering wheel.',
+  },
+  {
+    mode: 'size',
+    label: 'Size',
+    key: 'e',
+    help: 'Up and down change its size, left and right its first axis, Page Up and Page Down its third.',
+  },
+];
+const AXES = ['x', 'y', 'z'] as const;
+const DIRECTIONS: Vec3[] = [
+  [1, 0, 0],
+  [0, 1, 0],
+  [0, 0, 1],
+];
+
+export interface EllipsoidEvents {
+  onChoose: (index: number | undefined) => void;
+  onMode: (mode: HandleMode) => void;
+  /** The chosen one in its new form; `what` names the change. */
+  onChange: (ellipsoid: ControlEllipsoid, what: string) => void;
+  onAdd: () => void;
+  onRemove: () => void;
+}
+
+/** The ellipsoids by name, and the numbers of the chosen one. */
+export class EllipsoidControls {
+  readonly element: HTMLElement;
+  readonly #events: EllipsoidEvents;
+  readonly #list = h('div', { class: 'buttons chips', role: 'group', 'aria-label': 'Ellipsoids' });
+  readonly #modes = new Map<HandleMode, HTMLButtonElement>();
+  readonly #help = h('p', { class: 'help' });
+  readonly #error = h('p', { class: 'field-error', role: 'alert' });
+  readonly #center: HTMLInputElement[];
+  readonly #lengths: HTMLInputElement[];
+  readonly #degrees: HTMLInputElement;
+  readonly #numbers: HTMLElement;
+  readonly #remove: HTMLButtonElement;
+  readonly #add: HTMLButtonElement;
+  #pose: ControlEllipsoid[] = [];
+  #names: string[] = [];
+  #chosen: number | undefined;
+
+  constructor(events: EllipsoidEvents) {
+    this.#events = events;
+    this.#center = AXES.map((axis, k) => this.#field(`Centre, ${axis}`, (value) => this.#setCenter(k, value)));
+    this.#lengths = AXES.map((_, k) => this.#field(`Semi-axis ${k + 1}`, (value) => this.#setLength(k, value)));
+    this.#degrees = h('input', {
+      type: 'number',
+      value: 15,
+      min: -180,
+      max: 180,
+      step: 'any',
+      'aria-label': 'Degrees to turn by',
+    });
+    this.#add = h('button', { type: 'button', 'data-ellipsoid': 'add', onclick: events.onAdd }, 'Add');
+    this.#remove = h('button', { type: 'button', 'data-ellipsoid': 'remove', onclick: events.onRemove }, 'Remove');
+    this.#numbers = this.#layOutNumbers();
+    const modes = h('div', { class: 'buttons', role: 'group', 'aria-label': 'What handles and arrow keys do' });
+    modes.append(...MODES.map(({ mode, label, key }) => this.#modeButton(mode, label, key)));
+    this.element = h(
+      'div',
+      { class: 'ellipsoids' },
+      h(
+        'p',
+        { class: 'help' },
+        'Choose one by clicking it, here, or by its number key in the view; then drag its handles. Esc lets it go.',
+      ),
+      this.#list,
+      h('div', { class: 'buttons' }, this.#add, this.#remove),
+      modes,
+      this.#help,
+      this.#numbers,
+      this.#error,
+    );
+    this.mode = 'move';
+    this.show([], [], undefined);
+  }
+
+  set mode(mode: HandleMode) {
+    for (const [one, button] of this.#modes) button.setAttribute('aria-pressed', String(one === mode));
+    this.#help.textContent = `In the view: ${MODES.find((one) => one.mode === mode)?.help ?? ''} With Shift a fifth as far.`;
+  }
+
+  show(pose: ControlEllipsoid[], names: string[], chosen: number | undefined): void {
+    this.#pose = pose;
+    this.#chosen = chosen;
+    this.#showNames(names);
+    for (const [index, button] of [...this.#list.children].entries())
+      button.setAttribute('aria-pressed', String(index === chosen));
+    const ellipsoid = chosen === undefined ? undefined : pose[chosen];
+    this.#numbers.hidden = ellipsoid === undefined;
+    this.#remove.disabled = ellipsoid === undefined || pose.length < 2;
+    this.#error.textContent = '';
+    if (ellipsoid) this.#showNumbers(ellipsoid);
+  }
+
+  complain(message: string): void {
+    this.#error.textContent = message;
+  }
+
+  /** The button of an ellipsoid has the focus, as the one that was pressed may be gone. */
+  focus(): void {
+    const button = this.#list.children[this.#chosen ?? 0];
+    if (button instanceof HTMLElement) button.focus();
+  }
+
+  /** Buttons that are there already stay, and with them the focus. */
+  #showNames(names: string[]): void {
+    if (names.length === this.#names.length && names.every((name, k) => name === this.#names[k])) return;
+    this.#names = names;
+    const button = (name: string, index: number) =>
+      h(
+        'button',
+        { type: 'button', 'data-ellipsoid': index + 1, onclick: () => this.#choose(index) },
+        `${index + 1} ${name}`.trim(),
+      );
+    this.#list.replaceChildren(...names.map(button));
+  }
+
+  #choose(index: number): void {
+    this.#events.onChoose(index === this.#chosen ? undefined : index);
+  }
+
+  #showNumbers(ellipsoid: ControlEllipsoid): void {
+    const lengths = lengthsOf(ellipsoid);
+    for (let k = 0; k < 3; k++) {
+      const [center, length] = [this.#center[k], this.#lengths[k]];
+      if (center && center !== document.activeElement) center.value = short(ellipsoid.center[k] ?? 0);
+      if (length && length !== document.activeElement) length.value = short(lengths[k] ?? 0);
+    }
+  }
+
+  #layOutNumbers(): HTMLElement {
+    const row = (label: string, fields: HTMLElement[]) =>
+      h('div', { class: 'triple' }, h('span', {}, label), ...fields);
+    const turns = AXES.map((axis, k) =>
+      h(
+        'button',
+        { type: 'button', 'aria-label': `Turn about ${axis}`, 'data-turn': axis, onclick: () => this.#turn(k) },
+        axis,
+      ),
+    );
+    return h(
+      'div',
+      { class: 'numbers' },
+      row('Centre x, y, z', this.#center),
+      row('Semi-axes', this.#lengths),
+      h('div', { class: 'triple' }, h('span', {}, 'Turn by', this.#degrees, '° about'), ...turns),
+    );
+  }
+
+  #modeButton(mode: HandleMode, label: string, key: string): HTMLButtonElement {
+    const button = h(
+      'button',
+      { type: 'button', 'data-mode': mode, title: `Key ${key}`, onclick: () => this.#events.onMode(mode) },
+      label,
+    );
+    this.#modes.set(mode, button);
+    return button;
+  }
+
+  #field(label: string, onValue: (value: number) => void): HTMLInputElement {
+    const input = h('input', { type: 'number', id: uniqueId('ellipsoid'), step: 'any', 'aria-label': label });
+    input.addEventListener('change', () => onValue(input.valueAsNumber));
+    return input;
+  }
+
+  get #ellipsoid(): ControlEllipsoid | undefined {
+    return this.#chosen === undefined ? undefined : this.#pose[this.#chosen];
+  }
+
+  #setCenter(k: number, value: number): void {
+    const ellipsoid = this.#ellipsoid;
+    if (!ellipsoid) return;
+    if (!Number.isFinite(value)) {
+      this.#refuse('A number is needed.');
+      return;
+    }
+    const center: Vec3 = [...ellipsoid.center];
+    center[k] = value;
+    this.#events.onChange({ ...ellipsoid, center }, 'move');
+  }
+
+  #setLength(k: number, value: number): void {
+    const ellipsoid = this.#ellipsoid;
+    if (!ellipsoid) return;
+    if (!(value > 0)) {
+      this.#refuse('A length above 0 is needed.');
+      return;
+    }
+    const lengths = lengthsOf(ellipsoid);
+    lengths[k] = value;
+    this.#events.onChange(withLengths(ellipsoid, lengths), 'size');
+  }
+
+  #turn(k: number): void {
+    const [ellipsoid, about, degrees] = [this.#ellipsoid, DIRECTIONS[k], this.#degrees.valueAsNumber];
+    if (!ellipsoid || !about) return;
+    if (!Number.isFinite(degrees)) {
+      this.#refuse('A number of degrees is needed.');
+      return;
+    }
+    this.#events.onChange(turned(ellipsoid, about, (degrees * Math.PI) / 180), 'turn');
+  }
+
+  #refuse(message: string): void {
+    const ellipsoid = this.#ellipsoid;
+    if (ellipsoid) {
+      const lengths = lengthsOf(ellipsoid);
+      this.#center.forEach((field, k) => {
+        field.value = short(ellipsoid.center[k] ?? 0);
+      });
+      this.#lengths.forEach((field, k) => {
+        field.value = short(lengths[k] ?? 0);
+      });
+    }
+    this.complain(message);
+  }
+}
+
+/** As many digits as a hand can place. */
+function short(value: number): string {
+  return String(Number(value.toPrecision(4)));
+}

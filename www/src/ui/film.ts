@@ -1,0 +1,162 @@
+import { type Film, lastFrame } from '../sculpt/film';
+import { h, uniqueId } from './dom';
+import { plural } from './format';
+
+/** Frames from one keyframe to the next at first, and at most. */
+export const FRAMES_BETWEEN = 24;
+const MOST_BETWEEN = 600;
+
+export interface FilmEvents {
+  /** The present pose as one more keyframe. */
+  onAddKey: () => void;
+  /** The keyframe is no more. */
+  onRemoveKey: (index: number) => void;
+  onBetween: (frames: number) => void;
+  onLoop: (loop: boolean) => void;
+  /** Goes to a frame, without playing. */
+  onSeek: (frame: number) => void;
+  onRecord: () => void;
+  onCancelRecord: () => void;
+}
+
+/** The keyframes of the film, and where it is. */
+export class FilmControls {
+  readonly element: HTMLElement;
+  readonly #events: FilmEvents;
+  readonly #keys = h('div', { class: 'buttons chips', role: 'group', 'aria-label': 'Keyframes' });
+  readonly #says = h('p', { class: 'help', role: 'status' });
+  readonly #between: HTMLInputElement;
+  readonly #loop: HTMLInputElement;
+  readonly #seek: HTMLInputElement;
+  readonly #at = h('output', { 'aria-live': 'off' });
+  readonly #record: HTMLButtonElement;
+  readonly #cancel: HTMLButtonElement;
+  readonly #progress = h('progress', { max: 1, value: 0, hidden: true, 'aria-label': 'Progress of the recording' });
+  readonly #error = h('p', { class: 'field-error', role: 'alert' });
+  readonly #remove: HTMLButtonElement;
+  #film: Film | undefined;
+  #frame = 0;
+
+  constructor(events: FilmEvents) {
+    this.#events = events;
+    const [between, seek] = [uniqueId('between'), uniqueId('frame')];
+    this.#between = h('input', {
+      type: 'number',
+      id: between,
+      min: 1,
+      max: MOST_BETWEEN,
+      step: 1,
+      value: FRAMES_BETWEEN,
+    });
+    this.#between.addEventListener('change', () => this.#setBetween());
+    this.#loop = h('input', { type: 'checkbox', 'data-film': 'loop' });
+    this.#loop.addEventListener('change', () => events.onLoop(this.#loop.checked));
+    this.#seek = h('input', { type: 'range', id: seek, min: 0, max: 1, value: 0, step: 1 });
+    this.#seek.addEventListener('input', () => events.onSeek(this.#seek.valueAsNumber));
+    this.#remove = filmButton('remove', 'Remove keyframe', () => this.#removeKey());
+    this.#record = filmButton('record', 'Record as GLB', events.onRecord);
+    this.#cancel = filmButton('cancel', 'Cancel', events.onCancelRecord);
+    this.#cancel.hidden = true;
+    this.element = h(
+      'div',
+      { class: 'film' },
+      h(
+        'p',
+        { class: 'help' },
+        'Place the ellipsoids, add a keyframe, place them anew, add another: Play goes from one to the next.',
+      ),
+      this.#keys,
+      h('div', { class: 'buttons' }, filmButton('add', 'Add keyframe', events.onAddKey), this.#remove),
+      h('div', { class: 'row' }, h('label', { for: seek }, 'Frame'), this.#at),
+      this.#seek,
+      h('div', { class: 'row' }, h('label', { for: between }, 'Frames between keyframes'), this.#between),
+      h('label', { class: 'check' }, this.#loop, 'Loop: from the last keyframe back to the first, for ever'),
+      h('div', { class: 'buttons' }, this.#record, this.#cancel),
+      this.#progress,
+      this.#error,
+      this.#says,
+    );
+    this.show(undefined, 0);
+  }
+
+  get between(): number {
+    return this.#between.checkValidity() ? this.#between.valueAsNumber : FRAMES_BETWEEN;
+  }
+
+  show(film: Film | undefined, frame: number): void {
+    this.#film = film;
+    this.#frame = frame;
+    const last = film ? Math.max(1, lastFrame(film)) : 1;
+    this.#seek.max = String(last);
+    this.#seek.valueAsNumber = frame;
+    this.#seek.disabled = !film || lastFrame(film) < 1;
+    this.#record.disabled = this.#seek.disabled;
+    this.#at.value = film ? `${frame} of ${last}` : '–';
+    this.#loop.checked = film?.loop ?? false;
+    this.#loop.disabled = !film;
+    this.#between.disabled = film !== undefined && 'motion' in film;
+    if (film && 'keys' in film) this.#between.valueAsNumber = film.between;
+    this.#error.textContent = '';
+    this.#showKeys(film);
+  }
+
+  /** How far a recording is, 0 to 1; undefined when there is none. */
+  showRecording(part: number | undefined): void {
+    const recording = part !== undefined;
+    this.#progress.hidden = !recording;
+    this.#progress.value = part ?? 0;
+    if (this.#cancel.hidden === recording) {
+      this.#cancel.hidden = !recording;
+      this.#record.hidden = recording;
+    }
+  }
+
+  #showKeys(film: Film | undefined): void {
+    const keys = film && 'keys' in film ? film.keys.length : 0;
+    while (this.#keys.children.length > keys) this.#keys.lastElementChild?.remove();
+    while (this.#keys.children.length < keys) this.#keys.append(this.#keyButton(this.#keys.children.length));
+    for (const [index, button] of [...this.#keys.children].entries())
+      button.setAttribute('aria-pressed', String(index === this.#present));
+    this.#remove.disabled = this.#present === undefined;
+    this.#says.textContent =
+      film && 'motion' in film
+        ? 'The motion is computed. A keyframe of your own takes its place.'
+        : keys === 0
+          ? 'No keyframe yet.'
+          : `${plural(keys, 'keyframe')}${keys === 1 ? '; a film needs two' : ''}.`;
+  }
+
+  /** The keyframe that the film is at, if it is at one. */
+  get #present(): number | undefined {
+    const film = this.#film;
+    if (!film || !('keys' in film) || this.#frame % film.between !== 0) return undefined;
+    return (this.#frame / film.between) % film.keys.length;
+  }
+
+  #keyButton(index: number): HTMLButtonElement {
+    const go = () => {
+      if (this.#film && 'keys' in this.#film) this.#events.onSeek(index * this.#film.between);
+    };
+    const label = `Keyframe ${index + 1}`;
+    return h(
+      'button',
+      { type: 'button', 'aria-label': label, title: label, 'data-key': index + 1, onclick: go },
+      `${index + 1}`,
+    );
+  }
+
+  #removeKey(): void {
+    if (this.#present !== undefined) this.#events.onRemoveKey(this.#present);
+  }
+
+  #setBetween(): void {
+    const valid = this.#between.checkValidity() && this.#between.value !== '';
+    this.#error.textContent = valid ? '' : `A whole number from 1 to ${MOST_BETWEEN} is needed.`;
+    if (valid) this.#events.onBetween(this.#between.valueAsNumber);
+    else this.#between.valueAsNumber = this.#film && 'keys' in this.#film ? this.#film.between : FRAMES_BETWEEN;
+  }
+}
+
+function filmButton(name: string, text: string, onclick: () => void): HTMLButtonElement {
+  return h('button', { type: 'button', 'data-film': name, onclick }, text);
+}

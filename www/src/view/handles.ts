@@ -1,0 +1,165 @@
+import {
+  Group,
+  LineBasicMaterial,
+  LineSegments,
+  Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  Object3D,
+  Quaternion,
+  type Raycaster,
+  SphereGeometry,
+  Vector3,
+  WireframeGeometry,
+} from 'three';
+import type { TransformControls } from 'three/addons/controls/TransformControls.js';
+import type { ControlEllipsoid } from '../sculpt/protocol';
+
+/** What dragging a handle does. */
+export type HandleMode = 'move' | 'turn' | 'size';
+
+const MODES = { move: 'translate', turn: 'rotate', size: 'scale' } as const;
+/** Opacities: enough to find them by, little enough to see the surface through them. */
+const GHOST = 0.05;
+const CHOSEN = 0.16;
+const NET = 0.13;
+
+/** Ellipsoids as ghosts that are seen through the surface, and handles on the one that is chosen. */
+export class EllipsoidHandles {
+  readonly object = new Group();
+  /** Called while a handle is dragged, and once more when it is let go. */
+  onDrag: (ellipsoid: ControlEllipsoid, dragging: boolean) => void = () => undefined;
+  /** Called before the first move of a drag. */
+  onGrab: () => void = () => undefined;
+  /** Called when the pointer comes upon a handle, or leaves it. */
+  onHover: (hovered: boolean) => void = () => undefined;
+  readonly #handles: TransformControls;
+  readonly #ball = new SphereGeometry(1, 32, 20);
+  readonly #net = new WireframeGeometry(new SphereGeometry(1, 16, 8));
+  readonly #ghost = ghostMaterial(GHOST);
+  readonly #bright = ghostMaterial(CHOSEN);
+  readonly #lines = new LineBasicMaterial({ transparent: true, opacity: NET, depthTest: false });
+  /** What the handles are on: it is given the place, the turn and the size of the chosen one. */
+  readonly #proxy = new Object3D();
+  readonly #marks = new Group();
+  #ellipsoids: ControlEllipsoid[] = [];
+  #chosen: number | undefined;
+
+  constructor(handles: TransformControls) {
+    this.#handles = handles;
+    this.object.add(this.#proxy, this.#marks);
+    handles.setSpace('local');
+    handles.addEventListener('axis-changed', () => this.onHover(handles.axis !== null));
+    handles.addEventListener('objectChange', () => this.#moved(true));
+    handles.addEventListener('mouseDown', () => this.onGrab());
+    handles.addEventListener('mouseUp', () => this.#moved(false));
+    this.#placeHandles();
+  }
+
+  set mode(mode: HandleMode) {
+    this.#handles.setMode(MODES[mode]);
+    // Along the axes of the view's world an ellipsoid that was turned is easier to move.
+    this.#handles.setSpace(mode === 'move' ? 'world' : 'local');
+  }
+
+  set color(color: string) {
+    for (const material of [this.#ghost, this.#bright, this.#lines]) material.color.set(color);
+  }
+
+  /** A drag is under way. */
+  get dragging(): boolean {
+    return this.#handles.dragging;
+  }
+
+  /** Whether the pointer is on a handle: a click there chooses nothing. */
+  get hovered(): boolean {
+    return this.#handles.axis !== null;
+  }
+
+  set visible(visible: boolean) {
+    this.object.visible = visible;
+    this.#placeHandles();
+  }
+
+  /** Shows ellipsoids where they are; the handles stay on the chosen one. */
+  show(ellipsoids: ControlEllipsoid[], chosen: number | undefined): void {
+    this.#ellipsoids = ellipsoids;
+    this.#chosen = chosen !== undefined && chosen < ellipsoids.length ? chosen : undefined;
+    while (this.#marks.children.length > ellipsoids.length) this.#marks.children.pop();
+    while (this.#marks.children.length < ellipsoids.length) this.#marks.add(this.#mark());
+    ellipsoids.forEach((ellipsoid, index) => {
+      const mark = this.#marks.children[index];
+      const solid = mark?.children[0] as Mesh | undefined;
+      if (!mark || !solid) return;
+      mark.matrix.copy(matrixOf(ellipsoid));
+      mark.matrixWorldNeedsUpdate = true;
+      solid.material = index === this.#chosen ? this.#bright : this.#ghost;
+    });
+    if (!this.dragging) this.#placeHandles();
+  }
+
+  /** The first that a ray meets. */
+  pick(ray: Raycaster): number | undefined {
+    if (!this.object.visible) return undefined;
+    const solids = this.#marks.children.flatMap(({ children: [solid] }) => (solid ? [solid] : []));
+    const [hit] = ray.intersectObjects(solids, false);
+    const index = hit ? solids.indexOf(hit.object) : -1;
+    return index < 0 ? undefined : index;
+  }
+
+  dispose(): void {
+    this.#handles.detach();
+    this.#handles.dispose();
+    for (const part of [this.#ball, this.#net, this.#ghost, this.#bright, this.#lines]) part.dispose();
+  }
+
+  #mark(): Group {
+    const mark = new Group();
+    mark.matrixAutoUpdate = false;
+    const solid = new Mesh(this.#ball, this.#ghost);
+    const net = new LineSegments(this.#net, this.#lines);
+    // After the surface, which does not hide them.
+    solid.renderOrder = 1;
+    net.renderOrder = 2;
+    mark.add(solid, net);
+    return mark;
+  }
+
+  #placeHandles(): void {
+    const ellipsoid = this.#chosen === undefined ? undefined : this.#ellipsoids[this.#chosen];
+    if (!ellipsoid || !this.object.visible) {
+      this.#handles.detach();
+      return;
+    }
+    matrixOf(ellipsoid).decompose(this.#proxy.position, this.#proxy.quaternion, this.#proxy.scale);
+    this.#handles.attach(this.#proxy);
+  }
+
+  #moved(dragging: boolean): void {
+    if (this.#chosen === undefined) return;
+    // Scaled through the centre it would be inside out.
+    const { scale } = this.#proxy;
+    scale.set(Math.abs(scale.x), Math.abs(scale.y), Math.abs(scale.z)).max(TINY);
+    this.onDrag(ellipsoidOf(this.#proxy), dragging);
+  }
+}
+
+const TINY = new Vector3(1, 1, 1).multiplyScalar(1e-6);
+
+function ghostMaterial(opacity: number): MeshBasicMaterial {
+  return new MeshBasicMaterial({ transparent: true, opacity, depthTest: false, depthWrite: false });
+}
+
+function matrixOf({ center, axes }: ControlEllipsoid): Matrix4 {
+  const [x, y, z] = axes.map((axis) => new Vector3(...axis)) as [Vector3, Vector3, Vector3];
+  return new Matrix4().makeBasis(x, y, z).setPosition(...center);
+}
+
+function ellipsoidOf({ position, quaternion, scale }: Object3D): ControlEllipsoid {
+  const axis = (x: number, y: number, z: number, length: number) =>
+    new Vector3(x, y, z).applyQuaternion(new Quaternion().copy(quaternion)).multiplyScalar(length).toArray();
+  return {
+    center: position.toArray(),
+    axes: [axis(1, 0, 0, scale.x), axis(0, 1, 0, scale.y), axis(0, 0, 1, scale.z)],
+  };
+}

@@ -1,0 +1,15 @@
+import { RepeatWrapping, SRGBColorSpace, Texture } from 'three';
+import type { MeshTexture } from '../sculpt/protocol';
+
+/** The picture on a mesh, decoded; v counts from above, as in glTF. */
+export async function pictureOf({ type, bytes }: MeshTexture): Promise<Texture> {
+  const blob = new Blob([bytes as Uint8Array<ArrayBuffer>], { type });
+  const texture = new Texture(await createImageBitmap(blob));
+  texture.flipY = false;
+  texture.colorSpace = SRGBColorSpace;
+  texture.wrapS = RepeatWrapping;
+  texture.wrapT = RepeatWrapping;
+  texture.anisotropy = 4;
+  texture.needsUpdate = true;
+  return texture;
+}

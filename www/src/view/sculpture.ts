@@ -1,0 +1,253 @@
+import { Box3, Group, type Raycaster, type Texture, Vector3 } from 'three';
+import type { Surface, Vec3 } from '../protocol';
+import { boxOf } from '../sculpt/ellipsoids';
+import type { ControlEllipsoid, Layout, Pose } from '../sculpt/protocol';
+import { onSchemeChange, token } from '../ui/dom';
+import { Legend } from '../ui/legend';
+import { EllipsoidHandles, type HandleMode } from './handles';
+import { diverging, isShade, SHADES, shadeTitle } from './shading';
+import { type SurfaceColor, SurfaceObject } from './surface';
+import { Viewport } from './viewport';
+
+/** From middle to middle of meshes beside each other, in their width. */
+const APART = 1.25;
+/** Turned so far to the side at first: a face is seen from before. */
+const ASIDE = 0.35;
+
+export interface SculptViewOptions {
+  layout: Layout;
+  edges: boolean;
+  ellipsoids: boolean;
+  color: SurfaceColor;
+}
+
+/** The meshes that can be shown: as in the paper, with a dash for those that are deformed; and up to five stages of something. */
+const MESHES = ['S1', 'S0', 'T', 'S0dash', 'S1dash', 'A', 'B', 'C', 'D', 'E'] as const;
+type MeshName = (typeof MESHES)[number];
+
+/** From left to right. */
+const STAGES: readonly MeshName[] = ['A', 'B', 'C', 'D', 'E'];
+const ROWS: Record<Exclude<Layout, 'stages' | 'levels'>, readonly MeshName[]> = {
+  result: ['S1dash'],
+  base: ['S0dash'],
+  pair: ['S0dash', 'S1dash'],
+  row: ['S1', 'S0', 'T', 'S0dash', 'S1dash'],
+};
+
+/** What stands under each mesh. */
+const CAPTIONS: Partial<Record<MeshName, string>> = {
+  S1: 'S₁ original',
+  S0: 'S₀ its base',
+  T: 'T link, on the base',
+  S0dash: 'S₀′ deformed base',
+  S1dash: 'S₁′ result',
+};
+
+/** The 3D view of the Sculpt lab: the surface with its ellipsoids, or the meshes it is made of, beside each other. */
+export class SculptureView {
+  readonly legend = new Legend(diverging);
+  readonly handles: EllipsoidHandles;
+  /** Called with the ellipsoid that was clicked, or with nothing. */
+  onPick: (index: number | undefined) => void = () => undefined;
+  /** Called when the view has other meshes beside each other, with what stands under them. */
+  onCaptions: (captions: string[]) => void = () => undefined;
+  readonly #viewport: Viewport;
+  readonly #meshes = new Map<MeshName, { holder: Group; surface: SurfaceObject; has: boolean }>();
+  #options: SculptViewOptions;
+  /** What stands under the stages. */
+  #stages: string[] = [];
+  /** y points upwards. */
+  #upright = false;
+  #box = new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
+
+  constructor(canvas: HTMLCanvasElement, options: SculptViewOptions) {
+    this.#viewport = new Viewport(canvas);
+    this.#options = options;
+    for (const name of MESHES) {
+      const mesh = { holder: new Group(), surface: new SurfaceObject(), has: false };
+      mesh.holder.add(mesh.surface.object);
+      this.#meshes.set(name, mesh);
+      this.#viewport.add(mesh.holder);
+    }
+    this.handles = new EllipsoidHandles(this.#viewport.addHandles());
+    this.handles.onHover = (hovered) => canvas.toggleAttribute('data-handle', hovered);
+    this.#viewport.add(this.handles.object);
+    this.#viewport.onClick = (ray) => this.#pick(ray);
+    this.#viewport.onDraw = () => this.#placeInRow();
+    this.#recolor();
+    onSchemeChange(() => this.#recolor());
+  }
+
+  /** Asked about keys first, with the directions to the right, upwards and towards the viewer. */
+  set takesKey(takes: (event: KeyboardEvent, directions: Vec3[]) => boolean) {
+    this.#viewport.takesKey = (event) =>
+      takes(
+        event,
+        this.#viewport.directions().map((direction) => direction.toArray()),
+      );
+  }
+
+  /** Another scene: everything of the former is gone. There is room for the surface in all of `poses`, too. */
+  setScene(box: { min: Vec3; max: Vec3 }, up: 'y' | 'z', start: Pose, poses: Pose[]): void {
+    this.#box = roomFor(box, start, poses);
+    this.#viewport.up = up;
+    this.#upright = up === 'y';
+    for (const mesh of this.#meshes.values()) mesh.has = false;
+    this.#stages = [];
+    this.setOptions(this.#options);
+    this.#frame();
+  }
+
+  /** Copies a surface; its arrays may be given away at once. */
+  show(name: MeshName, surface: Surface | undefined): void {
+    const mesh = this.#meshes.get(name);
+    if (!mesh || !surface) return;
+    mesh.surface.show(surface);
+    if (!mesh.has) {
+      mesh.has = true;
+      this.#apply();
+    }
+    this.#showLegend();
+    this.#viewport.invalidate();
+  }
+
+  /** Stages of something beside each other, with what stands under each. */
+  showStages(stages: { caption: string; surface: Surface }[]): void {
+    const reframe = stages.length !== this.#stages.length;
+    this.#stages = stages.map(({ caption }) => caption);
+    for (const [index, name] of STAGES.entries()) {
+      const mesh = this.#meshes.get(name);
+      if (mesh) mesh.has = index < stages.length;
+      this.show(name, stages[index]?.surface);
+    }
+    this.#apply();
+    if (reframe) this.#frame();
+  }
+
+  /** The picture on the result, or none. */
+  set texture(texture: Texture | null) {
+    for (const { surface } of this.#meshes.values()) surface.texture = texture;
+    this.#viewport.invalidate();
+  }
+
+  showEllipsoids(ellipsoids: ControlEllipsoid[], chosen: number | undefined): void {
+    this.handles.show(ellipsoids, chosen);
+    this.#viewport.invalidate();
+  }
+
+  set mode(mode: HandleMode) {
+    this.handles.mode = mode;
+    this.#viewport.invalidate();
+  }
+
+  setOptions(options: SculptViewOptions): void {
+    const reframe = options.layout !== this.#options.layout;
+    this.#options = { ...options };
+    this.#apply();
+    if (reframe) this.#frame();
+  }
+
+  /** Diagonal of the box of the scene as it was opened. */
+  get size(): number {
+    return this.#box.getSize(new Vector3()).length();
+  }
+
+  /** Of that box. */
+  get middle(): Vec3 {
+    return this.#box.getCenter(new Vector3()).toArray();
+  }
+
+  dispose(): void {
+    this.handles.dispose();
+    for (const { surface } of this.#meshes.values()) surface.dispose();
+    this.#viewport.dispose();
+  }
+
+  #apply(): void {
+    const { layout, edges, ellipsoids, color } = this.#options;
+    const row = this.#row;
+    const staged = layout === 'stages' || layout === 'levels';
+    for (const [name, { surface, has }] of this.#meshes) {
+      const on = has && row.includes(name);
+      // The base in all its forms is for its triangles to be seen.
+      const isBase = name === 'S0' || name === 'T' || name === 'S0dash' || staged;
+      surface.solid = on;
+      surface.edges = on && (edges || (isBase && layout !== 'result'));
+      surface.color = name === 'S1' || name === 'S0' ? 'plain' : color;
+    }
+    this.handles.visible = ellipsoids && !staged;
+    this.onCaptions(staged ? this.#stages : row.length > 1 ? row.map((name) => CAPTIONS[name] ?? '') : []);
+    this.#showLegend();
+    this.#viewport.invalidate();
+  }
+
+  /** Meshes beside each other run across the view, however it is turned. */
+  #placeInRow(): void {
+    const row = this.#row;
+    const [right] = this.#viewport.directions();
+    const apart = APART * this.#width;
+    for (const [name, { holder }] of this.#meshes) {
+      const at = row.indexOf(name) - (row.length - 1) / 2;
+      holder.position.copy(right).multiplyScalar(row.includes(name) ? at * apart : 0);
+    }
+    const carrier = row.includes('S1dash') ? 'S1dash' : 'S0dash';
+    const place = this.#meshes.get(carrier)?.holder.position;
+    if (place) this.handles.object.position.copy(place);
+  }
+
+  get #row(): readonly MeshName[] {
+    const { layout } = this.#options;
+    return layout === 'stages' || layout === 'levels'
+      ? STAGES.slice(0, Math.max(1, this.#stages.length))
+      : ROWS[layout];
+  }
+
+  get #width(): number {
+    const size = this.#box.getSize(new Vector3());
+    // As an ellipse seen a little from the side.
+    const turn = Math.atan(ASIDE);
+    return Math.hypot(size.x * Math.cos(turn), (this.#upright ? size.z : size.y) * Math.sin(turn));
+  }
+
+  #frame(): void {
+    const { length } = this.#row;
+    const box = this.#box.clone();
+    const { aspect } = this.#viewport;
+    // A row is as much wider as the view is; what is left has to be stood off from.
+    const wider = Math.max(1, (APART * length * this.#width) / (this.size * Math.max(1, aspect)));
+    const [middle, half] = [box.getCenter(new Vector3()), box.getSize(new Vector3()).multiplyScalar(wider / 2)];
+    box.set(middle.clone().sub(half), middle.clone().add(half));
+    this.#viewport.frameBox(box, 1, ASIDE);
+  }
+
+  #pick(ray: Raycaster): void {
+    if (!this.handles.hovered) this.onPick(this.handles.pick(ray));
+  }
+
+  #showLegend(): void {
+    const { color } = this.#options;
+    const ranges = this.#row.map((name) => this.#meshes.get(name)?.surface.range ?? 0);
+    const range = Math.max(...ranges);
+    if (range > 0 && isShade(color)) this.legend.show({ ...SHADES[color], title: shadeTitle(color, '') }, range);
+    else this.legend.hide();
+  }
+
+  #recolor(): void {
+    for (const { surface } of this.#meshes.values()) surface.edgeColor = token('--wire');
+    this.handles.color = token('--attractor');
+    this.#viewport.invalidate();
+  }
+}
+
+/** The box of a surface, and of where it goes: as far beyond its ellipsoids as it is at the start. */
+function roomFor(box: { min: Vec3; max: Vec3 }, start: Pose, poses: Pose[]): Box3 {
+  const room = new Box3(new Vector3(...box.min), new Vector3(...box.max));
+  const first = boxOf(start);
+  for (const pose of poses) {
+    const { min, max } = boxOf(pose);
+    const corner = (at: Vec3, from: Vec3, of: Vec3) =>
+      new Vector3(...of.map((x, k) => x + (at[k] ?? 0) - (from[k] ?? 0)));
+    room.expandByPoint(corner(min, first.min, box.min)).expandByPoint(corner(max, first.max, box.max));
+  }
+  return room;
+}
