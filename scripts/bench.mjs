@@ -1,5 +1,5 @@
-// Times points to a surface and the head CT, in Node and in Chromium; prints tables and writes bench.json. `npm run bench --
-// points` does one of the two, and writes nothing.
+// Times points to a surface, remeshing, sculpting and the head CT, in Node and in Chromium; prints tables and writes bench.json.
+// `npm run bench -- points` does one of them, and writes nothing.
 import { readFile, writeFile } from 'node:fs/promises';
 import { cpus } from 'node:os';
 import { build } from './build.mjs';
@@ -9,6 +9,7 @@ import { setup } from './setup.mjs';
 import { at, root, script } from './shell.mjs';
 
 const SCAN = 'www/public/data/visible-human-head-full.nii.gz';
+const BUST = 'www/public/data/nefertiti.ply';
 const REPEATS = 3;
 
 /** What can be measured, and how each is printed. Each has a module of its own, with nothing in its memory yet. */
@@ -17,7 +18,17 @@ const BENCHES = {
     inNode: async () => (await import('../bench/points.mjs')).measure(REPEATS),
     rows: pointRows,
   },
+  remesh: {
+    inNode: async () => (await import('../bench/remesh.mjs')).measure(REPEATS),
+    rows: remeshRows,
+  },
+  skin: {
+    file: BUST,
+    inNode: async () => (await import('../bench/skin.mjs')).measure(new Uint8Array(await readFile(at(BUST))), REPEATS),
+    rows: skinRows,
+  },
   head: {
+    file: SCAN,
     inNode: async () => (await import('../bench/head.mjs')).measure(new Uint8Array(await readFile(at(SCAN))), REPEATS),
     rows: headRows,
   },
@@ -30,8 +41,8 @@ async function inChromium(name) {
     const page = await browser.newPage();
     await page.goto(`${server.address}bench/index.html`);
     await page.waitForFunction(() => 'measure' in window);
-    const given = [name, REPEATS, `/${SCAN}`];
-    const measured = await page.evaluate(([what, repeats, scan]) => window.measure[what](repeats, scan), given);
+    const given = [name, REPEATS, `/${BENCHES[name].file}`];
+    const measured = await page.evaluate(([what, repeats, file]) => window.measure[what](repeats, file), given);
     return { host: `Chromium ${browser.version()}`, ...measured };
   } finally {
     await browser.close();
@@ -71,6 +82,30 @@ function pointRows({ host, few, many, perConstraint, edit, bytes }) {
     ['  solve, one point by hand', edit.toFixed(2), 'of the solve of many'],
     ['  memory', `${(bytes / 1e6).toFixed(0)} MB`, 'of the module, at the end'],
   ];
+}
+
+function remeshRows({ host, rows }) {
+  const row = ({ name, factor, milliseconds, before, triangles, minAngleDegrees, selfIntersections, distance }) => [
+    `  ${name}, edges x ${factor}`,
+    `${((1000 * milliseconds) / triangles).toFixed(2)} µs`,
+    `a triangle, ${before} to ${triangles}; ${minAngleDegrees.toFixed(0)}° at least, ${distance.toFixed(2)} edges away, ` +
+      `${selfIntersections} crossings`,
+  ];
+  return [[host, '', `best of ${REPEATS}`], ...rows.map(row)];
+}
+
+function skinRows({ host, rows }) {
+  const row = ({ name, milliseconds, mean, longest, triangles, parts }) => {
+    const most = Object.entries(parts).toSorted(([, a], [, b]) => b - a);
+    const named = most.slice(0, 3).map(([part, took]) => `${part} ${took.toFixed(0)}`);
+    return [
+      `  ${name}, ${triangles}`,
+      `${(1000 / milliseconds).toFixed(1)} /s`,
+      `frames; ${milliseconds.toFixed(0)} ms in the middle, ${mean.toFixed(0)} in the mean, ${longest.toFixed(0)} the longest; ` +
+        `${named.join(', ')}`,
+    ];
+  };
+  return [[host, '', `the middle of ${20 * REPEATS} frames`], ...rows.map(row)];
 }
 
 function print(rows) {

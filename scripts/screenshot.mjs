@@ -9,6 +9,7 @@ const SIZE = { width: 1440, height: 900 };
 const PICTURES = [
   { file: 'docs/extract.png', hash: '#extract' },
   { file: 'docs/reconstruct.jpg', hash: '#reconstruct', type: 'jpeg', quality: 85 },
+  { file: 'docs/sculpt.jpg', hash: '#sculpt', type: 'jpeg', quality: 85 },
 ];
 
 /** Waits for the example to be done, then for the frame that shows it. */

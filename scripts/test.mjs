@@ -1,19 +1,23 @@
 // Every check there is, one after the other. Goes on after a failure; the last line is the sum.
-// `npm test -- build package` runs the stages of these names only.
+// `npm test -- build package` runs the stages of these names only. On a terminal everything is shown as it comes;
+// elsewhere only what failed, and all of it is in `target/test-logs`.
 import { existsSync } from 'node:fs';
-import { readFile, rm } from 'node:fs/promises';
+import { mkdir, readFile, rm, writeFile } from 'node:fs/promises';
 import { buildApp } from './app.mjs';
 import { build } from './build.mjs';
 import { setup } from './setup.mjs';
 import { at, run, say, tool } from './shell.mjs';
 
+const LOGS = 'target/test-logs';
 const WASM = ['--target', 'wasm32-unknown-unknown'];
 const DENY = ['--', '-D', 'warnings'];
 
+const echo = Boolean(process.stdout.isTTY);
+
 /** A command that passes or fails as a whole. */
 const check = (command, args, options) => async () => {
-  const { code } = await run(command, args, options);
-  return code === 0 ? { passed: 1, failed: 0 } : { passed: 0, failed: 1 };
+  const { code, output } = await run(command, args, { echo, ...options });
+  return code === 0 ? { passed: 1, failed: 0, output } : { passed: 0, failed: 1, output };
 };
 
 /** A function of ours that throws when it fails. */
@@ -35,30 +39,26 @@ export function countCargo(output) {
 const cargoTests =
   (...args) =>
   async () => {
-    const { code, output } = await run('cargo', ['test', '--locked', '-p', 'vesicle', '--no-fail-fast', ...args]);
-    return atLeastOneFailed(code, countCargo(output));
+    const { code, output } = await run('cargo', ['test', '--locked', '-p', 'vesicle', '--no-fail-fast', ...args], {
+      echo,
+    });
+    return { output, ...atLeastOneFailed(code, countCargo(output)) };
   };
 
 const vitest = (folder) => async () => {
   const report = at('target', `${folder.replace('/', '-')}.json`);
   await rm(report, { force: true });
   const config = at(folder, 'vitest.config.ts');
-  const { code } = await run(tool('vitest'), [
+  const args = [
+    ...['run', '--dir', at(folder)],
+    ...['--reporter=default', '--reporter=json', `--outputFile.json=${report}`],
     // A busy machine is slow, not wrong.
-    ...[
-      'run',
-      '--testTimeout=60000',
-      '--dir',
-      at(folder),
-      '--reporter=default',
-      '--reporter=json',
-      `--outputFile.json=${report}`,
-    ],
-    ...(existsSync(config) ? ['--config', config] : []),
-  ]);
-  if (!existsSync(report)) return { passed: 0, failed: 1 };
+    ...(existsSync(config) ? ['--config', config] : ['--testTimeout=300000']),
+  ];
+  const { code, output } = await run(tool('vitest'), args, { echo });
+  if (!existsSync(report)) return { passed: 0, failed: 1, output };
   const { numPassedTests, numFailedTests } = JSON.parse(await readFile(report, 'utf8'));
-  return atLeastOneFailed(code, { passed: numPassedTests, failed: numFailedTests });
+  return { output, ...atLeastOneFailed(code, { passed: numPassedTests, failed: numFailedTests }) };
 };
 
 // A run that does not compile, or crashes, fails without saying how many tests it took with it.
@@ -75,7 +75,7 @@ const STAGES = [
     'rust docs',
     check('cargo', ['doc', '--locked', '-p', 'vesicle', '--no-deps'], { env: { RUSTDOCFLAGS: '-D warnings' } }),
   ],
-  // With the counts of crossing triangles that the scenes print.
+  // With what the tests measure, for the log.
   ['native', cargoTests('--', '--show-output')],
   ['wasm', cargoTests('--lib', '--tests', ...WASM)],
   ['build', works(build)],
@@ -91,12 +91,25 @@ const STAGES = [
 async function attempt([name, work]) {
   const started = performance.now();
   process.stdout.write(`\n── ${name}\n`);
-  const counts = await work().catch((error) => {
+  const { output = '', ...counts } = await work().catch((error) => {
     process.stderr.write(`${error.message}\n`);
     return { passed: 0, failed: 1 };
   });
+  await writeFile(at(LOGS, `${name.replace(' ', '-')}.log`), output);
+  if (counts.failed && !echo) process.stdout.write(`${failuresIn(output)}\n`);
   const seconds = ((performance.now() - started) / 1000).toFixed(1);
   return { name, seconds, ...counts };
+}
+
+/** The part of a stage's output that says what went wrong: the lines that tell of failures with those after them, and the end. */
+function failuresIn(output) {
+  const lines = output.split('\n');
+  const tells = lines.map((line) => /FAIL|panicked|^failures:|^error|✗|×/.test(line));
+  const near = (i) => i >= lines.length - 40 || tells.slice(Math.max(i - 12, 0), i + 1).includes(true);
+  return lines
+    .filter((_, i) => near(i))
+    .slice(-400)
+    .join('\n');
 }
 
 function chosen(names) {
@@ -107,6 +120,7 @@ function chosen(names) {
 
 async function all(names) {
   const results = [];
+  await mkdir(at(LOGS), { recursive: true });
   for (const stage of [['set-up', works(setup)], ...chosen(names)]) {
     results.push(await attempt(stage));
     // Without tools and packages nothing else can tell anything.
