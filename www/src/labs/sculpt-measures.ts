@@ -8,15 +8,21 @@ import type { PlotKind } from '../ui/plots';
 export const SCULPT_ROWS: MoreMeasure[] = [
   { name: 'frameMs', label: 'Time of a frame', help: 'Work of the last frame in the worker', text: milliseconds },
   {
-    name: 'answerMs',
+    name: 'alongMs',
     label: 'Answer to the hand',
-    help: 'From the last move of an ellipsoid to the frame on the screen that follows it',
+    help: 'From the last move by hand to the surface on the screen that goes along, until the model has followed',
+    text: milliseconds,
+  },
+  {
+    name: 'answerMs',
+    label: 'Answer of the model',
+    help: 'From the last move of an ellipsoid to the frame of the model on the screen that follows it',
     text: milliseconds,
   },
   {
     name: 'answerFrames',
-    label: 'Answer, frames',
-    help: 'Frames drawn until the move was followed; 1 is at once, 2 where one was under way',
+    label: 'The same, in frames',
+    help: 'Frames of the model drawn until the move was followed; 1 is at once, 2 where one was under way',
     text: count,
   },
   { name: 'bands', label: 'Bands', help: 'Surfaces from the base to the detail, both among them', text: count },

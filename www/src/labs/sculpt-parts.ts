@@ -23,6 +23,7 @@ import { SculptureView, type SculptViewOptions } from '../view/sculpture';
 import { Answers } from './answers';
 import { ACCEPT } from './mesh-files';
 import { Saving } from './saving';
+import { Ahead } from './sculpt-ahead';
 import { SCULPT_PLOTS, SCULPT_ROWS } from './sculpt-measures';
 import { layOut, ScenePanel } from './sculpt-page';
 
@@ -50,6 +51,7 @@ export class SculptParts {
       '3D view of the surface and its ellipsoids. Number keys choose an ellipsoid; arrow keys and Page Up and Down then move, turn or size it, by the keys m, t and e; Escape lets it go. Without one, arrow keys turn the view, plus and minus zoom.',
   });
   readonly view = new SculptureView(this.#canvas, INITIAL_VIEW);
+  readonly ahead = new Ahead(this.view);
   readonly answer = new Answers();
   readonly status = new StatusLine();
   readonly measures = new MeasurePanel(SCULPT_ROWS);

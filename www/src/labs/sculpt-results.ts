@@ -17,7 +17,7 @@ export class Results {
   readonly #history: History;
   readonly #follow: (frame: FrameEvent) => void;
   #frame: FrameEvent | undefined;
-  #framePending = 0;
+  #framePending = false;
   /** Waits for the frame that it tells of. */
   #measured: MeasuredEvent | undefined;
   #shownAt = 0;
@@ -49,6 +49,7 @@ export class Results {
     this.#measured = undefined;
     this.#originals = false;
     this.#more = {};
+    this.#ui.ahead.clear();
     this.#ui.answer.clear();
     this.#ui.measures.clear();
     this.startOver();
@@ -64,8 +65,10 @@ export class Results {
   take(frame: FrameEvent): void {
     this.#history.add(frame.reports);
     this.#frame = frame;
-    this.#framePending ||= requestAnimationFrame(() => {
-      this.#framePending = 0;
+    if (this.#framePending) return;
+    this.#framePending = true;
+    this.#ui.view.change(() => {
+      this.#framePending = false;
       if (this.#frame) this.#show(this.#frame);
       this.#frame = undefined;
       this.#showMeasured();
@@ -76,7 +79,7 @@ export class Results {
   /** Shown after the frame that it tells of. */
   measured(measured: MeasuredEvent): void {
     this.#measured = measured;
-    if (this.#framePending === 0) this.#showMeasured();
+    if (!this.#framePending) this.#showMeasured();
   }
 
   #showMeasured(): void {
@@ -89,6 +92,7 @@ export class Results {
   }
 
   showState(state: LabState): void {
+    if (state === 'paused' || state === 'done') this.#ui.ahead.rest();
     this.#showHistory();
     this.#ui.status.say(this.describe(state));
   }
@@ -129,27 +133,29 @@ export class Results {
     );
   }
 
-  close(): void {
-    cancelAnimationFrame(this.#framePending);
-  }
-
   #show(frame: FrameEvent): void {
-    const { view, answer, measures, coarse } = this.#ui;
+    const { view, ahead, measures, coarse } = this.#ui;
     view.show('S1dash', frame.result);
     view.show('S0dash', frame.base);
+    ahead.shown(frame);
     view.show('T', frame.link);
     if (frame.levels) view.showStages(frame.levels);
     coarse.hidden = !frame.coarse;
     this.#follow(frame);
-    if (answer.drawn(frame.turn, performance.now()) && answer.last) {
-      this.#more.answerMs = Math.round(answer.last.milliseconds);
-      this.#more.answerFrames = answer.last.frames;
-    }
+    this.#tellAnswer(frame.turn);
     this.#more.frameMs = frame.took;
     const last = frame.reports.at(-1);
     if (last) measures.showReport({ ...last, vertices: frame.result.vertices, triangles: frame.result.triangles });
     measures.showMore(this.#more);
     if (performance.now() - this.#shownAt > SHOW_EVERY) this.#showHistory();
+  }
+
+  #tellAnswer(turn: number): void {
+    const { answer } = this.#ui;
+    if (!answer.drawn(turn, performance.now()) || !answer.last) return;
+    if (answer.alongMs !== undefined) this.#more.alongMs = Math.round(answer.alongMs);
+    this.#more.answerMs = Math.round(answer.last.milliseconds);
+    this.#more.answerFrames = answer.last.frames;
   }
 
   #showHistory(): void {

@@ -125,10 +125,20 @@ export class ModelSettings {
     this.#names = named(names, pose.length);
     this.#posed = true;
     this.#turn = this.#client.pose(pose, dragging);
-    this.#ui.answer.sent(this.#turn, performance.now());
+    this.#answer(dragging);
     if (this.#chosen !== undefined && this.#chosen >= pose.length) this.#chosen = undefined;
     this.#showPose();
     if (!dragging) this.#onChange();
+  }
+
+  /** Under a hand the surface on the screen goes along at once; the model follows. */
+  #answer(dragging: boolean): void {
+    const { ahead, answer } = this.#ui;
+    const at = performance.now();
+    answer.sent(this.#turn, at);
+    // After the drawing, which asked for the same animation frame before.
+    if (dragging && ahead.follow(this.#pose, this.#turn))
+      requestAnimationFrame(() => answer.along(performance.now() - at));
   }
 
   get names(): string[] {

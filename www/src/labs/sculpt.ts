@@ -78,7 +78,6 @@ export class SculptLab implements Lab {
     this.#posing.close();
     this.#opening.close();
     this.#client.close();
-    this.#results.close();
     this.#ui.dispose();
     this.#root.replaceChildren();
   }

@@ -174,7 +174,9 @@ export interface FrameEvent {
   /** The solver's meshes from coarse to fine, where the layout shows them. */
   levels?: Stage[];
   reports: StepReport[];
-  /** Where the ellipsoids are to be. */
+  /** Where the ellipsoids are now; some more may be vanishing. */
+  ellipsoids: Pose;
+  /** Where they are to be. */
   pose: Pose;
   /** The last pose that came before this step. */
   turn: number;

@@ -281,6 +281,7 @@ class Session {
       ...(layout === 'row' && { link: surfaceOf(model.linkMesh, values) }),
       ...(layout === 'levels' && { levels: levelsOf(model) }),
       reports: this.#reports,
+      ellipsoids: model.ellipsoids,
       pose: this.#course.goalOf(model),
       ...{ turn: this.#turn, frame: this.#course.frame, took: this.#took, coarse: this.#preview.on },
     };

@@ -111,6 +111,12 @@ export class SculptureView {
     this.#viewport.invalidate();
   }
 
+  /** Other places for the vertices of a surface that is shown. */
+  move(name: MeshName, positions: Float32Array): void {
+    this.#meshes.get(name)?.surface.move(positions);
+    this.#viewport.invalidate();
+  }
+
   /** Stages of something beside each other, with what stands under each. */
   showStages(stages: { caption: string; surface: Surface }[]): void {
     const reframe = stages.length !== this.#stages.length;
@@ -122,6 +128,11 @@ export class SculptureView {
     }
     this.#apply();
     if (reframe) this.#frame();
+  }
+
+  /** At the next animation frame, which then shows what was changed. */
+  change(change: () => void): void {
+    this.#viewport.changeAndDraw(change);
   }
 
   /** The picture on the result, or none. */

@@ -84,6 +84,11 @@ export class SurfaceObject {
     this.#fillColors();
   }
 
+  /** Other places for the vertices that are shown. What light they had they keep: it is for a moment. */
+  move(positions: Float32Array): void {
+    fill(this.#mesh.geometry, 'position', positions, 3 * this.#vertices);
+  }
+
   /** The number that the strongest colours stand for; 0 where colours stand for no number. */
   get range(): number {
     return this.#range;

@@ -53,6 +53,8 @@ export class Viewport {
   #dragged = false;
   #disposed = false;
   #pending = 0;
+  /** To be done before the next drawing. */
+  readonly #changes: (() => void)[] = [];
   #home = { position: new Vector3(), target: new Vector3() };
   /** Width by height of the view, at most 1: in a narrow view the camera stands farther off. */
   #narrowness = 1;
@@ -130,9 +132,17 @@ export class Viewport {
   invalidate(): void {
     if (this.#disposed) return;
     this.#pending ||= requestAnimationFrame(() => {
+      // Still pending: what they change is drawn in this frame.
+      for (const change of this.#changes.splice(0)) change();
       this.#pending = 0;
       this.#draw();
     });
+  }
+
+  /** Draws at the next animation frame, after what is called then. Asked for in that frame, a drawing would be in the one after. */
+  changeAndDraw(change: () => void): void {
+    this.#changes.push(change);
+    this.invalidate();
   }
 
   /** Looks at the whole of a volume, from before and a little to the patient's left and above. */
