@@ -203,6 +203,21 @@ export class Volume {
     return this.#handle.use((raw) => raw.pyramid(levels, factor)).map((level) => wrap(() => level));
   }
 
+  /**
+   * In-between slices along the axis of the largest spacing, by symmetric optical flow between neighbours, for all frames.
+   * The slices that were there stay as they are, at their places; voxels keep their type.
+   *
+   * @param options - `factor`: so many slices for one, 1 to 16; default the whole number that brings the voxels nearest to
+   *   cubes, 1 changes nothing. `method`: `'linear'` takes weighted means instead.
+   * @throws {@link VesicleError} `invalid-argument`: factor out of range, or a single slice; `too-large`.
+   */
+  enrichSlices(options_: { factor?: number; method?: 'flow' | 'linear' } = {}): Volume {
+    const { factor, method = 'flow' } = options('options', options_, ['factor', 'method']);
+    if (factor !== undefined) whole('factor', factor, { min: 1 });
+    choice('method', method, ['flow', 'linear']);
+    return wrap(() => this.#handle.use((raw) => raw.enrichSlices(factor, method === 'flow')));
+  }
+
   /** Gives the memory back; the volume cannot be used afterwards. What was made from it stays. */
   free(): void {
     this.#handle.free();

@@ -10,7 +10,7 @@ use super::convert::{bytes, copied, point};
 use super::error::Failure;
 use crate::io::{parse_volume, write_nifti};
 use crate::math::DAffine3;
-use crate::volume::{Space, Volume, VolumeInit, Voxels};
+use crate::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
 
 /// A volume.
 #[wasm_bindgen]
@@ -119,6 +119,13 @@ impl RawVolume {
     pub fn pyramid(&self, levels: usize, factor: f64) -> Result<Vec<RawVolume>, JsValue> {
         let levels = self.0.pyramid(levels, factor).map_err(Failure::from)?;
         Ok(levels.into_iter().map(RawVolume).collect())
+    }
+
+    /// In-between slices, by optical flow or as means.
+    #[wasm_bindgen(js_name = enrichSlices)]
+    pub fn enrich_slices(&self, factor: Option<usize>, flow: bool) -> Result<RawVolume, JsValue> {
+        let method = if flow { Enrichment::Flow } else { Enrichment::Linear };
+        Ok(RawVolume(self.0.enrich_slices(factor, method).map_err(Failure::from)?))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Eigenvalues and eigenvectors of symmetric 3×3 matrices.
+//! Eigenvalues and eigenvectors of symmetric matrices, 3×3 and, for the least one, 4×4.
 
 use super::{DMat3, DVec3};
 
@@ -52,6 +52,53 @@ fn sorted(values: DVec3, vectors: DMat3) -> (DVec3, DMat3) {
     (DVec3::from_array(order.map(|i| values[i])), DMat3::from_cols(x, y, x.cross(y)))
 }
 
+/// The eigenvector of length 1 of the least eigenvalue of a symmetric 4×4 matrix. Only its upper half is looked at.
+pub fn least_of_four(mut a: [[f64; 4]; 4]) -> [f64; 4] {
+    let mut vectors = [[0.0; 4]; 4];
+    for (k, row) in vectors.iter_mut().enumerate() {
+        row[k] = 1.0;
+    }
+    for _ in 0..SWEEPS {
+        if (0..4).all(|p| (p + 1..4).all(|q| a[p][q] == 0.0)) {
+            break;
+        }
+        for p in 0..3 {
+            for q in p + 1..4 {
+                rotate(&mut a, &mut vectors, p, q);
+            }
+        }
+    }
+    let least = (0..4).fold(0, |least, k| if a[k][k] < a[least][least] { k } else { least });
+    vectors[least]
+}
+
+/// Clears the entry `(p, q)`; `vectors` has an eigenvector a row.
+fn rotate(a: &mut [[f64; 4]; 4], vectors: &mut [[f64; 4]; 4], p: usize, q: usize) {
+    let off = a[p][q];
+    let gap = a[q][q] - a[p][p];
+    if off.abs() <= f64::EPSILON * 1e-3 * (a[p][p].abs() + a[q][q].abs()) {
+        a[p][q] = 0.0;
+        return;
+    }
+    let ratio = gap / (2.0 * off);
+    let sign = if ratio < 0.0 { -1.0 } else { 1.0 };
+    let tangent = sign / (ratio.abs() + (ratio * ratio + 1.0).sqrt());
+    let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
+    let sine = tangent * cosine;
+    a[p][p] -= tangent * off;
+    a[q][q] += tangent * off;
+    a[p][q] = 0.0;
+    for k in (0..4).filter(|&k| k != p && k != q) {
+        let (at_p, at_q) = ((k.min(p), k.max(p)), (k.min(q), k.max(q)));
+        let (x, y) = (a[at_p.0][at_p.1], a[at_q.0][at_q.1]);
+        a[at_p.0][at_p.1] = cosine * x - sine * y;
+        a[at_q.0][at_q.1] = sine * x + cosine * y;
+    }
+    let (before, after) = (vectors[p], vectors[q]);
+    vectors[p] = [0, 1, 2, 3].map(|k| cosine * before[k] - sine * after[k]);
+    vectors[q] = [0, 1, 2, 3].map(|k| sine * before[k] + cosine * after[k]);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,5 +144,32 @@ mod tests {
             let [a, b, c, d, e, f] = [(); 6].map(|()| next());
             check(DMat3::from_cols_array(&[a, b, c, b, d, e, c, e, f]));
         }
+    }
+
+    #[test]
+    fn the_least_of_four_is_an_eigenvector_and_none_is_less() {
+        let mut random = crate::math::Random::new(3);
+        for round in 0..500 {
+            let mut a = [[0.0; 4]; 4];
+            for (p, q) in (0..4).flat_map(|p| (p..4).map(move |q| (p, q))) {
+                let value = 2.0 * random.unit() - 1.0;
+                // Now and then as good as diagonal, or wholly.
+                let size = if p == q { 1.0 } else { [1.0, 1e-9, 0.0][round % 3] };
+                (a[p][q], a[q][p]) = (size * value, size * value);
+            }
+            let v = least_of_four(a);
+            let times = |x: &[f64; 4]| a.map(|row| (0..4).map(|k| row[k] * x[k]).sum::<f64>());
+            let dot = |x: &[f64; 4], y: &[f64; 4]| (0..4).map(|k| x[k] * y[k]).sum::<f64>();
+            let value = dot(&v, &times(&v));
+            assert!((dot(&v, &v) - 1.0).abs() < 1e-13);
+            for (k, product) in times(&v).into_iter().enumerate() {
+                assert!((product - value * v[k]).abs() < 1e-13, "{a:?} {v:?}");
+            }
+            for _ in 0..20 {
+                let x = [(); 4].map(|()| 2.0 * random.unit() - 1.0);
+                assert!(dot(&x, &times(&x)) >= (value - 1e-12) * dot(&x, &x));
+            }
+        }
+        assert_eq!(least_of_four([[0.0; 4]; 4]), [1.0, 0.0, 0.0, 0.0]);
     }
 }

@@ -7,6 +7,7 @@ pub mod multires;
 mod saved;
 mod spec;
 mod step;
+pub mod tracking;
 
 pub use error::MethodError;
 pub use spec::{ParamDefault, ParamKind, ParamScale, ParamSpec};

@@ -23,7 +23,9 @@
 
 mod contour;
 mod cube_cases;
+mod enrich;
 mod error;
+mod flow;
 mod follow;
 mod grid;
 mod pyramid;
@@ -33,6 +35,7 @@ mod slices;
 mod voxels;
 
 pub use contour::{marching_cubes, marching_cubes_world};
+pub use enrich::Enrichment;
 pub use error::VolumeError;
 pub use follow::{Follower, Lattice};
 pub use grid::{Grid, VectorGrid};

@@ -61,6 +61,39 @@ impl Voxels {
         each!(self, values => finite_range(values))
     }
 
+    /// The numbers as voxels of the same type, rounded where it holds whole numbers, and held within what it holds.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`].
+    pub(crate) fn like(&self, values: &[f64]) -> Result<Voxels, VolumeError> {
+        // `as` holds numbers within what a type holds.
+        macro_rules! whole {
+            ($kind:ident, $number:ty) => {{
+                let mut out = reserve(values.len())?;
+                out.extend(values.iter().map(|v| v.round() as $number));
+                Voxels::$kind(out)
+            }};
+        }
+        Ok(match self {
+            Voxels::U8(_) => whole!(U8, u8),
+            Voxels::I8(_) => whole!(I8, i8),
+            Voxels::U16(_) => whole!(U16, u16),
+            Voxels::I16(_) => whole!(I16, i16),
+            Voxels::U32(_) => whole!(U32, u32),
+            Voxels::I32(_) => whole!(I32, i32),
+            Voxels::F32(_) => {
+                let mut out = reserve(values.len())?;
+                out.extend(values.iter().map(|&v| v as f32));
+                Voxels::F32(out)
+            }
+            Voxels::F64(_) => {
+                let mut out = reserve(values.len())?;
+                out.extend_from_slice(values);
+                Voxels::F64(out)
+            }
+        })
+    }
+
     /// Appends voxels of the same type; `false`, with nothing changed, when the types differ.
     fn append(&mut self, other: &Voxels) -> bool {
         match (self, other) {

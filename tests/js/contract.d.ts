@@ -75,6 +75,8 @@ export class Volume {
   intensities(frame?: number): Float32Array;
   /** One volume per level, [0] = this one; smoothed before it is thinned. */
   pyramid(levels: number, options?: { factor?: number }): Volume[];
+  /** In-between slices by symmetric optical flow, so that spacing becomes close to isotropic. */
+  enrichSlices(options?: { factor?: number; method?: 'flow' | 'linear' }): Volume;
   free(): void;
   [Symbol.dispose](): void;
 }

@@ -71,6 +71,29 @@ test('frames', () => {
   expect(four.intensities(1)[0]).toBe(12);
 });
 
+test('slices between thick ones go along with what moves from one to the next', () => {
+  // A disc of radius 8 that is 6 pixels further in the next slice.
+  const inside = (x: number, y: number, z: number) => Math.hypot(x - 14 - 6 * z, y - 16) < 8;
+  const data = Uint8Array.from({ length: 40 * 32 * 2 }, (_, i) =>
+    inside(i % 40, Math.floor(i / 40) % 32, Math.floor(i / 1280)) ? 200 : 20,
+  );
+  const thick = new Volume({ data, dims: [40, 32, 2], spacing: [1, 1, 2], origin: [5, 0, 0] });
+  const flow = thick.enrichSlices();
+  expect([flow.dims, flow.spacing, [...flow.affine.slice(12, 15)]]).toEqual([
+    [40, 32, 3],
+    [1, 1, 1],
+    [5, 0, 0],
+  ]);
+  expect(flow.slice(2, 0)).toEqual(thick.slice(2, 0));
+  expect(flow.slice(2, 2)).toEqual(thick.slice(2, 1));
+  const wrongOnes = (volume: Volume) =>
+    [...volume.slice(2, 1)].filter(
+      (value, i) => Math.abs(value - (inside(i % 40, Math.floor(i / 40), 0.5) ? 200 : 20)) > 60,
+    ).length;
+  expect(wrongOnes(flow)).toBeLessThan(0.8 * wrongOnes(thick.enrichSlices({ method: 'linear' })));
+  expect(thick.enrichSlices({ factor: 1 }).dims).toEqual(thick.dims);
+});
+
 test('the pyramid starts with the volume itself and shrinks', () => {
   const levels = ball(30, 10).pyramid(3);
   expect(levels.map((level) => level.dims)).toEqual([
@@ -138,6 +161,14 @@ const REFUSED: [string, string, () => unknown][] = [
   ['NaN for a point', 'world', () => grid().sample([1, 2, Number.NaN])],
   ['a growing pyramid', 'factor', () => grid().pyramid(2, { factor: 0.5 })],
   ['too many levels', 'levels', () => grid().pyramid(50)],
+  ['no slices for one', 'factor', () => grid().enrichSlices({ factor: 0 })],
+  ['too many slices for one', 'factor', () => grid().enrichSlices({ factor: 17 })],
+  [
+    'a slice between one',
+    'factor',
+    () => new Volume({ data: counted(), dims: [4, 3, 1, 2] }).enrichSlices({ factor: 2 }),
+  ],
+  ['slices by magic', 'method', () => grid().enrichSlices({ method: wrong('magic') })],
   ['no frames', 'frames', () => Volume.fromFrames([])],
   ['frames of two sizes', 'frames', () => Volume.fromFrames([grid(), ball(4, 1)])],
   ['something else as a frame', 'frames[1]', () => Volume.fromFrames([grid(), wrong({})])],

@@ -1,0 +1,158 @@
+//! Figures of enrichment and tracking, for 4D volumes named.
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program for the terminal")]
+
+#[path = "../tests/common/cine.rs"]
+mod cine;
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use cine::Cine;
+use std::time::Instant;
+use vesicle::io::parse_volume;
+use vesicle::math::{DAffine3, DVec3};
+use vesicle::mesh::{count_crossings, measure};
+use vesicle::methods::tracking::{Component, SurfaceTracker, TrackingOptions, TrackingParams};
+use vesicle::spatial::surface_distance;
+use vesicle::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
+
+/// Every other slice, so that the others are known.
+fn every_other(volume: &Volume) -> Volume {
+    let [nx, ny, nz] = volume.dims();
+    let mut values = Vec::new();
+    for frame in 0..volume.frames() {
+        for z in (0..nz).step_by(2) {
+            values.extend(volume.slice(2, z, frame).unwrap());
+        }
+    }
+    Volume::new(VolumeInit {
+        voxels: Voxels::F32(values),
+        dims: [nx, ny, nz.div_ceil(2), volume.frames()],
+        affine: volume.affine() * DAffine3::from_scale(DVec3::new(1.0, 1.0, 2.0)),
+        slope: 1.0,
+        intercept: 0.0,
+        frame_seconds: 0.0,
+        space: Space::Ras,
+    })
+    .unwrap()
+}
+
+/// Root of the mean squared difference on the slices left out.
+fn left_out_error(given: &Volume, volume: &Volume, method: Enrichment) -> f64 {
+    let made = every_other(given).enrich_slices(Some(2), method).unwrap();
+    let [mut sum, mut count] = [0.0, 0.0];
+    for frame in 0..volume.frames() {
+        for z in (1..made.dims()[2]).step_by(2) {
+            let (a, b) = (made.slice(2, z, frame).unwrap(), volume.slice(2, z, frame).unwrap());
+            sum += a.iter().zip(&b).map(|(a, b)| f64::from(a - b) * f64::from(a - b)).sum::<f64>();
+            count += a.len() as f64;
+        }
+    }
+    (sum / count).sqrt()
+}
+
+fn tell_enrichment(given: &Volume, truth: &Volume) {
+    let began = Instant::now();
+    let flow = left_out_error(given, truth, Enrichment::Flow);
+    let took = began.elapsed().as_secs_f64();
+    let linear = left_out_error(given, truth, Enrichment::Linear);
+    println!("  left out: flow {flow:.3}, linear {linear:.3}, ratio {:.3}; {took:.2} s", flow / linear);
+}
+
+fn folds(mesh: &vesicle::mesh::TriangleMesh) -> f64 {
+    use std::collections::BTreeMap;
+    let mut across: BTreeMap<(u32, u32), Vec<usize>> = BTreeMap::new();
+    for (i, t) in mesh.triangles.iter().enumerate() {
+        for k in 0..3 {
+            let (a, b) = (t[k], t[(k + 1) % 3]);
+            across.entry((a.min(b), a.max(b))).or_default().push(i);
+        }
+    }
+    let normal: Vec<_> = mesh.corners().map(|[a, b, c]| (b - a).cross(c - a)).collect();
+    let mut sums = normal.clone();
+    for pair in across.values() {
+        if let [a, b] = pair[..] {
+            sums[a] += normal[b];
+            sums[b] += normal[a];
+        }
+    }
+    let folded = (0..normal.len()).filter(|&i| (sums[i] - normal[i]).dot(normal[i]) < 0.0).count();
+    folded as f64 / normal.len() as f64
+}
+
+fn track(cine: &Cine) {
+    let began = Instant::now();
+    let mut volume = cine.volume();
+    println!("made in {:.1} s", began.elapsed().as_secs_f64());
+    if std::env::var("PLAIN").is_err() {
+        let began = Instant::now();
+        volume = volume.enrich_slices(None, Enrichment::Flow).unwrap();
+        println!("enriched in {:.1} s", began.elapsed().as_secs_f64());
+    }
+    let began = Instant::now();
+    let number = |name: &str| std::env::var(name).ok().and_then(|v| v.parse().ok());
+    let pixel = volume.spacing()[0];
+    let usual = TrackingParams::default();
+    let params = TrackingParams {
+        threshold: number("TH").unwrap_or(70.0),
+        radius: number("RADIUS").unwrap_or(0.0) * pixel,
+        time_scale: number("SCALE").unwrap_or(0.0) * pixel,
+        window_frames: number("FRAMES").map_or(usual.window_frames, |n| n as u32),
+        cyclic: true,
+        ..usual
+    };
+    let options = TrackingOptions {
+        volume,
+        bounds: Some(cine.cavity_box()),
+        component: Component::Largest,
+        start: None,
+        params,
+    };
+    let mut tracker = SurfaceTracker::new(options).unwrap();
+    println!("noise {:.2}, {:?}", tracker.noise(), tracker.params());
+    while !tracker.is_done() {
+        let began = Instant::now();
+        tracker.step().unwrap();
+        let took = began.elapsed().as_secs_f64();
+        let Some(mesh) = tracker.meshes().last() else { continue };
+        let frame = tracker.meshes().len() - 1;
+        let truth = cine.truth(frame as f64, 0.8);
+        let (a, b) = (measure(mesh), measure(&truth));
+        let off = surface_distance(mesh, &truth).unwrap();
+        println!(
+            "{frame} {:.0} ms () {:?}\n   volume {:.2} of {:.2} ({:+.1} %), area {:+.1} %, mean {:.2}, p95 {:.2}, max {:.1}, folds {:.2} %, chi {}, crossings {}",
+            took * 1e3,
+            tracker.facts()[frame],
+            a.volume / 1000.0,
+            b.volume / 1000.0,
+            100.0 * (a.volume / b.volume - 1.0),
+            100.0 * (a.area / b.area - 1.0),
+            off.mean,
+            off.p95,
+            off.hausdorff,
+            100.0 * folds(mesh),
+            a.euler,
+            count_crossings(mesh)
+        );
+    }
+    println!("tracked in {:.1} s", began.elapsed().as_secs_f64());
+}
+
+fn main() {
+    if let Ok(name) = std::env::var("TRACK") {
+        let cine = match name.as_str() {
+            "small" => Cine::small(),
+            _ => Cine { beats: name.parse().unwrap_or(1.0), ..Cine::full() },
+        };
+        return track(&cine);
+    }
+    let full = Cine { frames: 4, ..Cine::full() };
+    let (noisy, clean) = (full.volume(), Cine { noise: 0.0, ..full }.volume());
+    tell_enrichment(&noisy, &noisy);
+    tell_enrichment(&noisy, &clean);
+    tell_enrichment(&clean, &clean);
+    for file in std::env::args().skip(1) {
+        let volume = parse_volume(&std::fs::read(&file).unwrap(), None).unwrap();
+        println!("{file}: {:?} x {}, {:?}", volume.dims(), volume.frames(), volume.spacing());
+        tell_enrichment(&volume, &volume);
+    }
+}

@@ -1,0 +1,182 @@
+//! From one frame to the next (section 4): prediction, projection, what has no boundary any more, and connectivity.
+
+use super::project::Moment;
+use super::region::Region;
+use crate::math::Vec3;
+use crate::mesh::{Mesh, VertexId};
+use crate::remesh::{Changes, EdgeBounds, Embedding, restructure};
+
+/// How often predictions are smoothed over the mesh: raw, they are worse than none.
+const SMOOTHINGS: usize = 5;
+
+/// Projections in one frame, with a change of connectivity in between.
+const ROUNDS: usize = 2;
+
+/// Iterations in which what has no boundary draws together. A sheet between two walls that have met is gone after some.
+const RETRACTIONS: usize = 10;
+
+/// Between these, connectivity is changed, too.
+const RETRACTIONS_PER_CHANGE: usize = 3;
+
+/// A vertex with less of a step in intensity along its normal than this share of τ is on no boundary.
+const LEAST_STEP: f64 = 0.3;
+
+/// By how much of the way to the middle of their neighbours vertices are spaced along the surface in a frame.
+const SPACING: f32 = 0.5;
+
+/// What happened in a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrameFacts {
+    /// Projections that led nowhere, or too far.
+    pub rejected: usize,
+    /// Moves that were held back, so that nothing crosses.
+    pub held: usize,
+    /// Vertices that had no boundary any more and were drawn together with their neighbours.
+    pub retracted: usize,
+    /// Steps of the projections, in the mean.
+    pub steps: f64,
+    /// How far the last projection moved the vertices, in the mean, world units.
+    pub correction: f64,
+}
+
+/// Takes one mesh, in the world, through the frames.
+#[derive(Clone, Debug)]
+pub(super) struct Follower {
+    guard: Embedding,
+    bounds: EdgeBounds,
+}
+
+impl Follower {
+    pub fn new(bounds: EdgeBounds) -> Self {
+        Self { guard: Embedding::default(), bounds }
+    }
+
+    /// On to where the surface is going to be in the next frame, by how it passes through `moment`.
+    pub fn predict(&mut self, mesh: &mut Mesh, region: &Region, moment: &Moment, facts: &mut FrameFacts) {
+        let mut ways = vec![Vec3::ZERO; mesh.slots()];
+        for v in mesh.vertices() {
+            let at = region.place(mesh.position(v));
+            let way = moment.prediction(at).map_or(Vec3::ZERO, |way| region.direction(way));
+            ways[v.index()] = way;
+        }
+        for _ in 0..SMOOTHINGS {
+            ways = means(mesh, &ways);
+        }
+        facts.held += self.carry(mesh, ways);
+    }
+
+    /// Onto the surface of a frame, with edges in bounds.
+    pub fn settle(
+        &mut self,
+        mesh: &mut Mesh,
+        region: &Region,
+        frame: usize,
+        moment: &Moment,
+        facts: &mut FrameFacts,
+    ) -> Changes {
+        let mut changes = Changes::default();
+        for round in 0..ROUNDS {
+            self.project(mesh, region, moment, facts);
+            if round + 1 < ROUNDS {
+                changes += restructure(mesh, self.bounds, &mut self.guard);
+                self.space(mesh);
+            }
+        }
+        changes += self.retract(mesh, region, frame, facts);
+        changes
+    }
+
+    fn project(&mut self, mesh: &mut Mesh, region: &Region, moment: &Moment, facts: &mut FrameFacts) {
+        let mut ways: Vec<Option<Vec3>> = vec![None; mesh.slots()];
+        let (mut steps, mut sum) = (0, 0.0);
+        for v in mesh.vertices() {
+            if let Some((place, count)) = moment.project(region.place(mesh.position(v))) {
+                let way = region.world(place) - mesh.position(v);
+                ways[v.index()] = Some(way);
+                steps += count;
+                sum += f64::from(way.length());
+            }
+        }
+        let count = mesh.vertex_count().max(1) as f64;
+        let found = mesh.vertices().filter(|v| ways[v.index()].is_some()).count();
+        facts.rejected += mesh.vertex_count() - found;
+        (facts.steps, facts.correction) = (steps as f64 / count, sum / count);
+        let filled = filled(mesh, &ways);
+        facts.held += self.carry(mesh, filled);
+    }
+
+    /// Vertices along the surface towards the middle of their neighbours.
+    fn space(&mut self, mesh: &mut Mesh) {
+        let mut ways = vec![Vec3::ZERO; mesh.slots()];
+        for v in mesh.vertices() {
+            let normal = mesh.area_normal(v).normalize_or_zero();
+            let way = middle(mesh, v) - mesh.position(v);
+            ways[v.index()] = (way - normal * normal.dot(way)) * SPACING;
+        }
+        self.carry(mesh, ways);
+    }
+
+    /// Draws together what lies where inside and outside look alike: a crevice between two walls that have met has no
+    /// boundary left to follow, and would stay as a sheet without volume, from which folds come.
+    fn retract(&mut self, mesh: &mut Mesh, region: &Region, frame: usize, facts: &mut FrameFacts) -> Changes {
+        let mut changes = Changes::default();
+        for iteration in 1..=RETRACTIONS {
+            let mut ways = vec![Vec3::ZERO; mesh.slots()];
+            let mut count = 0;
+            for v in mesh.vertices() {
+                if region.step_along(frame, mesh.position(v), mesh.area_normal(v))
+                    < LEAST_STEP * region.threshold
+                {
+                    ways[v.index()] = middle(mesh, v) - mesh.position(v);
+                    count += 1;
+                }
+            }
+            if iteration == 1 {
+                facts.retracted = count;
+            }
+            if count == 0 {
+                break;
+            }
+            self.carry(mesh, ways);
+            if iteration % RETRACTIONS_PER_CHANGE == 0 {
+                changes += restructure(mesh, self.bounds, &mut self.guard);
+            }
+        }
+        changes
+    }
+
+    /// How many were held back.
+    fn carry(&mut self, mesh: &mut Mesh, mut ways: Vec<Vec3>) -> usize {
+        self.guard.follow_with(mesh, self.bounds.max);
+        self.guard.carry(mesh, &mut ways).len()
+    }
+}
+
+fn middle(mesh: &Mesh, v: VertexId) -> Vec3 {
+    let ring = mesh.ring(v).as_slice();
+    ring.iter().fold(Vec3::ZERO, |sum, &w| sum + mesh.position(w)) * (1.0 / ring.len() as f32)
+}
+
+/// Each the mean of those of the neighbours.
+fn means(mesh: &Mesh, ways: &[Vec3]) -> Vec<Vec3> {
+    let mut out = vec![Vec3::ZERO; ways.len()];
+    for v in mesh.vertices() {
+        let ring = mesh.ring(v).as_slice();
+        out[v.index()] =
+            ring.iter().fold(Vec3::ZERO, |sum, w| sum + ways[w.index()]) * (1.0 / ring.len() as f32);
+    }
+    out
+}
+
+/// With the mean of their neighbours where there are none.
+fn filled(mesh: &Mesh, ways: &[Option<Vec3>]) -> Vec<Vec3> {
+    let mut out = vec![Vec3::ZERO; ways.len()];
+    for v in mesh.vertices() {
+        out[v.index()] = ways[v.index()].unwrap_or_else(|| {
+            let known = mesh.ring(v).as_slice().iter().filter_map(|w| ways[w.index()]);
+            let (sum, count) = known.fold((Vec3::ZERO, 0.0), |(sum, count), way| (sum + way, count + 1.0));
+            if count > 0.0 { sum * (1.0 / count) } else { Vec3::ZERO }
+        });
+    }
+    out
+}

@@ -1,0 +1,190 @@
+//! Parameters of the tracker, and what they may be.
+
+use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, ParamSpec};
+use serde::{Deserialize, Serialize};
+
+/// Parameters of a [`SurfaceTracker`](super::SurfaceTracker). Those that are 0 are taken from the volume.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", default, deny_unknown_fields)]
+pub struct TrackingParams {
+    /// τ: the least difference of the means of two clusters, in intensity.
+    pub threshold: f64,
+    /// k: a window is (2k + 1) voxels wide along each axis.
+    pub window: u32,
+    /// Frames to either side that a window holds: 0 looks at each frame by itself.
+    pub window_frames: u32,
+    /// Where the weight of a point ends, world units: 2h of θ(r) = exp(−r²/h²).
+    pub radius: f64,
+    /// c: the world units that one frame counts as.
+    pub time_scale: f64,
+    /// β: each step of a projection goes by so much less far than the one before.
+    pub damping: f64,
+    /// c_min: shorter edges are drawn together, in the mean edge of the first frame.
+    pub edge_min: f64,
+    /// c_max: longer edges are split, in the same.
+    pub edge_max: f64,
+    /// Whether the last frame is followed by the first.
+    pub cyclic: bool,
+}
+
+impl Default for TrackingParams {
+    fn default() -> Self {
+        Self {
+            threshold: 0.0,
+            window: 2,
+            window_frames: 2,
+            radius: 0.0,
+            time_scale: 0.0,
+            damping: 0.9,
+            edge_min: 0.25,
+            edge_max: 1.5,
+            cyclic: false,
+        }
+    }
+}
+
+/// Where none is given: of noise, whose windows differ by 1.6 deviations, hardly any passes.
+const THRESHOLD_IN_NOISE: f64 = 4.0;
+
+/// At least this share of the range: images without noise have one, too.
+const LEAST_THRESHOLD: f64 = 0.05;
+
+/// Two voxels of a slice and a half: less follows noise, more rounds off what is as thin.
+const RADIUS_IN_PIXELS: f64 = 2.4;
+
+/// A neighbouring frame counts half as much as this one does.
+const TIME_SCALE_IN_RADIUS: f64 = 0.5;
+
+impl TrackingParams {
+    /// Tests all but what is taken from the volume.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] naming the first that is not accepted.
+    pub fn validate(&self) -> Result<(), MethodError> {
+        for (spec, value) in SPECS.iter().zip(self.numbers()) {
+            if spec.default != ParamDefault::FromData || value != 0.0 {
+                spec.check(value)?;
+            }
+        }
+        if self.edge_max > 2.0 * self.edge_min {
+            return Ok(());
+        }
+        let (min, max) = (self.edge_min, self.edge_max);
+        let problem =
+            format!("{max} given, more than twice edgeMin ({min}) accepted: halves would be too short");
+        Err(MethodError::invalid("edgeMax", problem))
+    }
+
+    fn numbers(&self) -> [f64; 8] {
+        let (window, frames) = (f64::from(self.window), f64::from(self.window_frames));
+        let Self { threshold, radius, time_scale, damping, edge_min, edge_max, .. } = *self;
+        [threshold, window, frames, radius, time_scale, damping, edge_min, edge_max]
+    }
+
+    /// With what the volume says where nothing is given: the length of a pixel, the noise and the range of intensities.
+    pub(super) fn with_volume(mut self, pixel: f64, noise: f64, range: f64) -> Self {
+        let or = |value: f64, usual: f64| if value == 0.0 { usual } else { value };
+        self.threshold = or(self.threshold, (THRESHOLD_IN_NOISE * noise).max(LEAST_THRESHOLD * range));
+        self.radius = or(self.radius, RADIUS_IN_PIXELS * pixel);
+        self.time_scale = or(self.time_scale, TIME_SCALE_IN_RADIUS * self.radius);
+        self
+    }
+}
+
+/// The parameters of the tracker, in the order a page should show them.
+pub fn param_specs() -> Vec<ParamSpec> {
+    SPECS.to_vec()
+}
+
+const FROM_DATA: ParamSpec = ParamSpec {
+    default: ParamDefault::FromData,
+    min: Some(1e-9),
+    max: Some(1e9),
+    scale: Some(ParamScale::Log),
+    ..ParamSpec::NUMBER
+};
+
+const COUNT: ParamSpec = ParamSpec {
+    kind: ParamKind::Integer,
+    default: ParamDefault::Number(2.0),
+    max: Some(4.0),
+    step: Some(1.0),
+    ..ParamSpec::NUMBER
+};
+
+const SPECS: [ParamSpec; 8] = [
+    ParamSpec {
+        name: "threshold",
+        label: "Step height",
+        help: "The least difference between bright and dark that counts as a boundary; below 2.5 times the noise, noise does.",
+        symbol: Some("τ"),
+        unit: Some("intensity"),
+        ..FROM_DATA
+    },
+    ParamSpec {
+        name: "window",
+        label: "Window",
+        help: "How far to each side voxels are sorted into bright and dark together: wider, and less noise and detail are left.",
+        symbol: Some("k"),
+        min: Some(1.0),
+        unit: Some("voxels"),
+        ..COUNT
+    },
+    ParamSpec {
+        name: "windowFrames",
+        label: "Window in time",
+        help: "How many frames before and after are sorted along; 0 looks at each frame by itself.",
+        min: Some(0.0),
+        unit: Some("frames"),
+        ..COUNT
+    },
+    ParamSpec {
+        name: "radius",
+        label: "Radius",
+        help: "Up to here the points of the boundary make up a plane: a larger radius gives a smoother surface.",
+        symbol: Some("2h"),
+        unit: Some("world"),
+        ..FROM_DATA
+    },
+    ParamSpec {
+        name: "timeScale",
+        label: "Length of a frame",
+        help: "The distance that one frame counts as: a small one smooths over time, a large one sees each frame alone.",
+        symbol: Some("c"),
+        unit: Some("world"),
+        ..FROM_DATA
+    },
+    ParamSpec {
+        name: "damping",
+        label: "Damping",
+        help: "Each step of a projection goes by so much less far than the one before, so that it comes to rest.",
+        symbol: Some("β"),
+        default: ParamDefault::Number(0.9),
+        min: Some(0.5),
+        max: Some(1.0),
+        step: Some(0.01),
+        ..ParamSpec::NUMBER
+    },
+    ParamSpec {
+        name: "edgeMin",
+        label: "Shortest edge",
+        help: "Shorter edges are drawn together; in the mean edge of the first frame.",
+        symbol: Some("c_min"),
+        default: ParamDefault::Number(0.25),
+        min: Some(0.05),
+        max: Some(1.0),
+        step: Some(0.05),
+        ..ParamSpec::NUMBER
+    },
+    ParamSpec {
+        name: "edgeMax",
+        label: "Longest edge",
+        help: "Longer edges are split; more than twice the shortest, in the mean edge of the first frame.",
+        symbol: Some("c_max"),
+        default: ParamDefault::Number(1.5),
+        min: Some(0.5),
+        max: Some(10.0),
+        step: Some(0.1),
+        ..ParamSpec::NUMBER
+    },
+];

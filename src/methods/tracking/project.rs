@@ -1,0 +1,187 @@
+//! Restricted projection onto the space-time surface in one frame (section 3.3), and prediction (section 4.2).
+
+use super::extremal::{Fit, hyperplane};
+use super::samples::{Falloff, FrameField, Layout, Sums};
+use crate::math::DVec3;
+
+/// Damping of the i-th step is β^i, and no less than this.
+const LEAST_DAMPING: f64 = 0.2;
+
+/// Steps of one projection at most.
+const STEPS: usize = 30;
+
+/// The frame's plane is the surface itself where the normal has less than this (squared) along space: nothing can be
+/// projected onto it then.
+const LEAST_SLOPE: f64 = 0.05;
+
+/// What is around one frame in time.
+pub(super) struct Moment<'a> {
+    pub layout: &'a Layout,
+    pub falloff: Falloff,
+    pub damping: f64,
+    /// A step as short as this is the last.
+    pub still: f64,
+    /// Projections that lead further are rejected.
+    pub longest: f64,
+    /// The fields near in time, and how far each is, in world units.
+    pub fields: &'a [(f64, FrameField)],
+}
+
+impl Moment<'_> {
+    pub fn fit(&self, at: DVec3) -> Option<Fit> {
+        let mut sums = Sums::default();
+        let near = self.layout.near(at, &self.falloff);
+        for (time, field) in self.fields {
+            near.add(field, *time, &mut sums);
+        }
+        hyperplane(&sums).filter(|fit| fit.normal.length_squared() >= LEAST_SLOPE)
+    }
+
+    /// Where a point comes to lie on the surface; nothing where it does not.
+    pub fn project(&self, p: DVec3) -> Option<(DVec3, usize)> {
+        let mut x = p;
+        let mut damping: f64 = 1.0;
+        for step in 0..STEPS {
+            let fit = self.fit(x)?;
+            let n = fit.normal;
+            // The plane through x's surroundings, cut with this frame: where p falls onto it.
+            let above = n.dot(p - x) - fit.distance;
+            let y = p - n * (above / n.length_squared());
+            let next = x + (y - x) * damping;
+            let way = next.distance(x);
+            x = next;
+            if x.distance(p) > self.longest {
+                return None;
+            }
+            if way < self.still {
+                return Some((x, step + 1));
+            }
+            damping = (damping * self.damping).max(LEAST_DAMPING);
+        }
+        Some((x, STEPS))
+    }
+
+    /// How far the surface goes at a point until the next frame.
+    pub fn prediction(&self, at: DVec3) -> Option<DVec3> {
+        let fit = self.fit(at)?;
+        let square = fit.normal.length_squared();
+        Some(fit.normal * (-self.falloff.time_scale * fit.along_time / square))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::region::Region;
+    use super::super::vote::{Face, Faces, TIME, X, Y, Z};
+    use super::*;
+    use crate::math::DAffine3;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    const SPACING: DVec3 = DVec3::new(1.0, 1.25, 1.5);
+    const C: f64 = 2.0;
+
+    fn region() -> Region {
+        Region {
+            dims: [20, 18, 16],
+            spacing: SPACING,
+            to_world: DAffine3::IDENTITY,
+            from_world: DAffine3::IDENTITY,
+            frames: vec![Vec::new(); 5],
+            step: 1.0,
+            threshold: 1.0,
+        }
+    }
+
+    /// Faces near the plane n·x = distance + speed·t, weighted by how near they are.
+    fn plane_faces(region: &Region, normal: DVec3, distance: f64, speed: f64, frame: f64) -> Faces {
+        let mut faces = Faces::default();
+        let [nx, ny, nz] = region.dims;
+        for direction in [X, Y, Z, TIME] {
+            for voxel in 0..(nx * ny * nz) as u32 {
+                let (at, later) = region.face(direction, voxel);
+                let off = normal.dot(at) - distance - speed * (frame + f64::from(later));
+                if off.abs() < 1.0 {
+                    faces[direction].push(Face { voxel, weight: (1.0 - off.abs()) as f32 });
+                }
+            }
+        }
+        faces
+    }
+
+    /// What a place sees of a plane that moves along its normal.
+    fn with_moment(normal: DVec3, distance: f64, speed: f64, test: impl Fn(&Moment<'_>)) {
+        let region = region();
+        let falloff = Falloff { radius: 4.0, time_scale: C };
+        let layout = Layout::new(&region, falloff.radius);
+        let fields: Vec<(f64, FrameField)> = (-2..=1)
+            .map(|t| {
+                (f64::from(t) * C, layout.field(&plane_faces(&region, normal, distance, speed, f64::from(t))))
+            })
+            .collect();
+        test(&Moment { layout: &layout, falloff, damping: 0.9, still: 1e-4, longest: 4.0, fields: &fields });
+    }
+
+    #[test]
+    fn sums_are_those_of_the_faces_within_the_radius() {
+        let region = region();
+        let falloff = Falloff { radius: 4.0, time_scale: C };
+        let layout = Layout::new(&region, falloff.radius);
+        let faces = plane_faces(&region, DVec3::new(0.6, 0.0, 0.8), 12.0, 0.3, 0.0);
+        let field = layout.field(&faces);
+        for (at, time) in [(DVec3::new(9.3, 10.1, 8.7), 0.7), (DVec3::new(0.2, 21.0, 15.0), -1.0)] {
+            let mut sums = Sums::default();
+            layout.near(at, &falloff).add(&field, time, &mut sums);
+            let (mut weight, mut first) = (0.0, [0.0; 4]);
+            for (direction, list) in faces.iter().enumerate() {
+                for face in list {
+                    let (place, later) = region.face(direction, face.voxel);
+                    let way = place - at;
+                    let later = time + f64::from(later) * C;
+                    // Along x the cut is at the radius whatever the rest is.
+                    let across = way.y * way.y + way.z * way.z + later * later;
+                    if across < 16.0 && way.x.abs() <= 4.0 {
+                        let w = f64::from(face.weight) * libm::exp(-(across + way.x * way.x) / 4.0);
+                        weight += w;
+                        for (sum, x) in first.iter_mut().zip([way.x, way.y, way.z, later]) {
+                            *sum += w * x;
+                        }
+                    }
+                }
+            }
+            assert!((sums.weight - weight).abs() < 1e-5 * weight, "{} {weight}", sums.weight);
+            for (a, b) in sums.first.iter().zip(first) {
+                assert!((a - b).abs() < 1e-4 * weight, "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_plane_is_found_from_both_sides_and_its_motion_predicted() {
+        let normal = DVec3::new(2.0, -1.0, 2.0) / 3.0;
+        for speed in [0.0, 0.5, -0.8] {
+            with_moment(normal, 9.0, speed, |moment| {
+                for start in
+                    [DVec3::new(10.0, 10.0, 10.2), DVec3::new(9.0, 9.5, 8.3), DVec3::new(10.5, 11.0, 8.0)]
+                {
+                    let (x, _) = moment.project(start).unwrap();
+                    // A moving plane's points of other frames lie on it in space-time.
+                    assert!((normal.dot(x) - 9.0).abs() < 0.03, "{speed} {start} {}", normal.dot(x));
+                    assert!((x - start).cross(normal).length() < 0.05, "{}", x - start);
+                    let way = moment.prediction(x).unwrap();
+                    assert!((way - normal * speed).length() < 0.04, "{speed} {way}");
+                }
+            });
+        }
+    }
+
+    #[test]
+    fn where_there_are_no_points_or_they_are_too_far_nothing_is_found() {
+        with_moment(DVec3::X, 10.0, 0.0, |moment| {
+            assert!(moment.project(DVec3::new(1.0, 10.0, 10.0)).is_none());
+            assert!(moment.project(DVec3::new(-500.0, 1e6, 3.0)).is_none());
+            let near = Moment { longest: 0.5, fields: moment.fields, ..*moment };
+            assert!(near.project(DVec3::new(12.0, 10.0, 10.0)).is_none());
+        });
+    }
+}

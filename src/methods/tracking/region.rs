@@ -1,0 +1,235 @@
+//! The part of a 4D image that is looked at, and its intensities in steps.
+
+use super::vote::TIME;
+use crate::math::{DAffine3, DMat3, DVec3, Vec3};
+use crate::methods::MethodError;
+use crate::volume::Volume;
+
+/// Intensities are told apart in so many steps, 0 to 254: fewer than noise needs, and one byte a voxel.
+const STEPS: f64 = 254.0;
+
+/// Voxels beyond these parts of the region, one in a thousand at either end, read as the ends.
+const OUTLIERS: f64 = 1e-3;
+
+/// Counts that the ends are found by.
+const BINS: usize = 4096;
+
+/// Cosine of the angle by which voxel axes may be off the right one: rounding in headers stays far below.
+const ORTHOGONAL: f64 = 1e-3;
+
+/// Boxes of voxels of a 4D image, one a frame, in steps of intensity.
+///
+/// Places in it are in millimetres (world units) along the voxels' axes, from the centre of its first voxel.
+#[derive(Clone, Debug)]
+pub(super) struct Region {
+    pub dims: [usize; 3],
+    /// World length of one voxel.
+    pub spacing: DVec3,
+    /// Places to the world.
+    pub to_world: DAffine3,
+    /// World to places.
+    pub from_world: DAffine3,
+    /// By frame, x fastest.
+    pub frames: Vec<Vec<u8>>,
+    /// One step in intensity.
+    pub step: f64,
+    /// τ in steps.
+    pub threshold: f64,
+}
+
+impl Region {
+    /// The voxels of `volume` within a box of the world, and `margin` world units around it; all of them without a box.
+    ///
+    /// # Errors
+    /// Voxel axes that are not at right angles; a box outside the volume; no contrast.
+    pub fn new(volume: &Volume, bounds: Option<[DVec3; 2]>, margin: f64) -> Result<Self, MethodError> {
+        let spacing = DVec3::from(volume.spacing());
+        let axes = volume.affine().matrix3;
+        let directions =
+            DMat3::from_cols(axes.x_axis / spacing.x, axes.y_axis / spacing.y, axes.z_axis / spacing.z);
+        let [x, y, z] = [directions.x_axis, directions.y_axis, directions.z_axis];
+        if x.dot(y).abs().max(y.dot(z).abs()).max(z.dot(x).abs()) > ORTHOGONAL {
+            let problem =
+                "its voxel axes are not at right angles; resample it, or set an affine whose axes are";
+            return Err(MethodError::invalid("volume", problem));
+        }
+        let [low, high] = voxel_box(volume, bounds, margin / spacing)?;
+        let dims = [0, 1, 2].map(|k| high[k] - low[k] + 1);
+        let first = volume.affine().transform_point3(DVec3::from(low.map(|i| i as f64)));
+        let to_world = DAffine3::from_mat3_translation(directions, first);
+        let mut region = Self {
+            dims,
+            spacing,
+            to_world,
+            from_world: to_world.inverse(),
+            frames: Vec::new(),
+            step: 0.0,
+            threshold: 0.0,
+        };
+        region.read(volume, low)?;
+        Ok(region)
+    }
+
+    /// Takes the intensities of all frames over, in steps between the ends.
+    fn read(&mut self, volume: &Volume, low: [usize; 3]) -> Result<(), MethodError> {
+        let mut counts = vec![0u64; BINS];
+        for frame in 0..volume.frames() {
+            self.each_row(volume, low, frame, |row| {
+                row.iter().for_each(|&v| counts[bin_of(v)] += 1);
+            })?;
+        }
+        let [from, to] = ends(&counts);
+        if from >= to {
+            let problem = "all voxels in the box have the same intensity; a boundary needs two";
+            return Err(MethodError::invalid("volume", problem));
+        }
+        let scale = STEPS / (to - from);
+        for frame in 0..volume.frames() {
+            let mut levels = Vec::with_capacity(self.dims.iter().product());
+            self.each_row(volume, low, frame, |row| {
+                levels.extend(
+                    row.iter().map(|&v| ((f64::from(v) - from) * scale + 0.5).clamp(0.0, STEPS) as u8),
+                );
+            })?;
+            self.frames.push(levels);
+        }
+        self.step = volume.span() / scale;
+        Ok(())
+    }
+
+    /// Calls `take` with each row of x of the region, in intensities from 0 to 1.
+    fn each_row(
+        &self,
+        volume: &Volume,
+        low: [usize; 3],
+        frame: usize,
+        mut take: impl FnMut(&[f32]),
+    ) -> Result<(), MethodError> {
+        let grid = volume.normalised_grid(frame)?;
+        let [nx, ny, nz] = self.dims;
+        for z in 0..nz {
+            for y in 0..ny {
+                let start = ((low[2] + z) * grid.dims[1] + low[1] + y) * grid.dims[0] + low[0];
+                take(&grid.values[start..start + nx]);
+            }
+        }
+        Ok(())
+    }
+
+    /// Where a voxel is in the grid.
+    pub fn voxel(&self, index: u32) -> [usize; 3] {
+        let ([nx, ny, _], i) = (self.dims, index as usize);
+        [i % nx, i / nx % ny, i / (nx * ny)]
+    }
+
+    /// The middle of the face after a voxel along a direction, and by how much of a frame it is later than the voxel.
+    pub fn face(&self, direction: usize, voxel: u32) -> (DVec3, f32) {
+        let mut at = DVec3::from(self.voxel(voxel).map(|i| i as f64));
+        if direction == TIME {
+            return (at * self.spacing, 0.5);
+        }
+        at[direction] += 0.5;
+        (at * self.spacing, 0.0)
+    }
+
+    /// By how much the image is brighter one voxel inside of a place of the world than one outside, in steps.
+    pub fn step_along(&self, frame: usize, at: Vec3, normal: Vec3) -> f64 {
+        let way = self.from_world.transform_vector3(normal.as_dvec3()).normalize_or_zero()
+            * self.spacing.min_element();
+        let place = self.from_world.transform_point3(at.as_dvec3());
+        self.sample(frame, place - way) - self.sample(frame, place + way)
+    }
+
+    /// Trilinear, the border replicated.
+    fn sample(&self, frame: usize, place: DVec3) -> f64 {
+        let [nx, ny, _] = self.dims;
+        let along = |k: usize| {
+            let last = (self.dims[k] - 1) as f64;
+            let at = (place[k] / self.spacing[k]).clamp(0.0, last);
+            let index = at as usize;
+            ([index, (index + 1).min(self.dims[k] - 1)], at - index as f64)
+        };
+        let [(xs, fx), (ys, fy), (zs, fz)] = [along(0), along(1), along(2)];
+        let value =
+            |i: usize, j: usize, k: usize| f64::from(self.frames[frame][(zs[k] * ny + ys[j]) * nx + xs[i]]);
+        let mix = |a: f64, b: f64, share: f64| a + (b - a) * share;
+        let along_x = |j: usize, k: usize| mix(value(0, j, k), value(1, j, k), fx);
+        let plane = |k: usize| mix(along_x(0, k), along_x(1, k), fy);
+        mix(plane(0), plane(1), fz)
+    }
+
+    /// Standard deviation of the noise, in steps: from differences between neighbours along x, most of which are noise.
+    pub fn noise(&self) -> f64 {
+        let mut counts = [0u64; 256];
+        for frame in &self.frames {
+            for row in frame.chunks_exact(self.dims[0]) {
+                row.windows(2).for_each(|pair| counts[usize::from(pair[0].abs_diff(pair[1]))] += 1);
+            }
+        }
+        let all: u64 = counts.iter().sum();
+        let (mut below, mut median) = (0, 0.0);
+        for (size, &count) in counts.iter().enumerate() {
+            if 2 * (below + count) >= all && count > 0 {
+                // Within the step by the share of it that is needed.
+                median = size as f64 - 0.5 + (all as f64 / 2.0 - below as f64) / count as f64;
+                break;
+            }
+            below += count;
+        }
+        // The median of |a − b| for two of one normal distribution, in its deviation.
+        median.max(0.0) / (0.674_49 * std::f64::consts::SQRT_2)
+    }
+}
+
+fn bin_of(value: f32) -> usize {
+    (value * (BINS - 1) as f32 + 0.5) as usize
+}
+
+/// The intensities, 0 to 1, that outliers lie beyond.
+fn ends(counts: &[u64]) -> [f64; 2] {
+    let few = OUTLIERS * counts.iter().sum::<u64>() as f64;
+    let beyond = |from_top: bool| {
+        let mut sum = 0;
+        let bins = (0..BINS).map(|k| if from_top { BINS - 1 - k } else { k });
+        let found = bins.into_iter().find(|&bin| {
+            sum += counts[bin];
+            sum as f64 > few
+        });
+        found.unwrap_or(0) as f64 / (BINS - 1) as f64
+    };
+    [false, true].map(beyond)
+}
+
+/// First and last voxel of a box, with `margin` voxels around, within the volume.
+fn voxel_box(
+    volume: &Volume,
+    bounds: Option<[DVec3; 2]>,
+    margin: DVec3,
+) -> Result<[[usize; 3]; 2], MethodError> {
+    let dims = volume.dims();
+    let last = dims.map(|n| n - 1);
+    let Some([low, high]) = bounds else { return Ok([[0; 3], last]) };
+    if !low.is_finite() || !high.is_finite() || low.cmpge(high).any() {
+        let problem = format!(
+            "min {low} and max {high} given; finite corners, min below max along every axis, are needed"
+        );
+        return Err(MethodError::invalid("box", problem));
+    }
+    // The corners of the box in voxels: its axes are those of the world.
+    let corner = |k: usize| {
+        let pick = |axis: usize| if k >> axis & 1 == 0 { low[axis] } else { high[axis] };
+        volume.inverse_affine().transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
+    };
+    let from = (0..8).map(corner).fold(DVec3::INFINITY, DVec3::min);
+    let to = (0..8).map(corner).fold(DVec3::NEG_INFINITY, DVec3::max);
+    if (0..3).any(|axis| to[axis] < 0.0 || from[axis] > last[axis] as f64) {
+        let affine = volume.affine();
+        let ends = [[0; 3], last].map(|at| affine.transform_point3(DVec3::from(at.map(|i| i as f64))));
+        let problem = format!("lies outside the volume, which reaches from {} to {}", ends[0], ends[1]);
+        return Err(MethodError::invalid("box", problem));
+    }
+    let inside = |value: f64, axis: usize| value.clamp(0.0, last[axis] as f64) as usize;
+    let first = [0, 1, 2].map(|axis| inside((from[axis] - margin[axis]).floor(), axis));
+    let end = [0, 1, 2].map(|axis| inside((to[axis] + margin[axis]).ceil(), axis));
+    Ok([first, end])
+}

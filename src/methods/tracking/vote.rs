@@ -1,0 +1,554 @@
+//! Where windows of the image fall into two clusters, and votes for the faces between them (section 2).
+
+use super::region::Region;
+
+/// No level: this window has no boundary in it. Levels of intensity end below.
+const NONE: u8 = u8::MAX;
+
+/// Faces that are counted at once: bytes of a vector.
+const LANES: usize = 16;
+
+/// A cluster must hold more than this share of its window.
+const LEAST_SHARE: f64 = 0.1;
+
+/// Lloyd's iterations at most; two to five are usual.
+const ITERATIONS: usize = 50;
+
+/// What a window is, and when its clusters count.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Window {
+    /// Voxels to either side of the middle.
+    pub reach: usize,
+    /// Frames to either side: 0 where each frame is looked at by itself.
+    pub frames: usize,
+    /// The least difference of the means, in steps of intensity.
+    pub threshold: f64,
+    /// The last frame is followed by the first.
+    pub cyclic: bool,
+}
+
+/// The direction in which two voxels share a face.
+pub(super) const X: usize = 0;
+pub(super) const Y: usize = 1;
+pub(super) const Z: usize = 2;
+pub(super) const TIME: usize = 3;
+
+/// A face with votes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Face {
+    /// Index of the voxel before it; the other one comes next along the direction.
+    pub voxel: u32,
+    /// The share of the windows around it that separate its voxels, above 0.
+    pub weight: f32,
+}
+
+/// Faces of one frame by direction; those along time lie between it and the next.
+pub(super) type Faces = [Vec<Face>; 4];
+
+/// Finds levels and votes of a sequence, frame after frame.
+#[derive(Clone, Debug)]
+pub(super) struct Voting {
+    window: Window,
+    /// By frame, the level between the clusters of the window around each voxel, as rows with room at both ends; not
+    /// there yet, or there no longer.
+    levels: Vec<Option<Vec<u8>>>,
+    /// The largest difference of means that was too small.
+    pub largest_refused: f64,
+}
+
+impl Voting {
+    pub fn new(window: Window, frames: usize) -> Self {
+        Self { window, levels: vec![None; frames], largest_refused: 0.0 }
+    }
+
+    /// The faces of a frame. Frames are asked for in order.
+    pub fn faces(&mut self, region: &Region, frame: usize) -> Faces {
+        let around = self.window.around(frame, region.frames.len());
+        for &t in &around {
+            if self.levels[t].is_none() {
+                self.levels[t] = Some(self.levels_of(region, t));
+            }
+        }
+        let mut faces = Faces::default();
+        for direction in [X, Y, Z] {
+            faces[direction] = self.votes(region, frame, frame, direction, &around);
+        }
+        let count = region.frames.len();
+        let next = if frame + 1 < count { Some(frame + 1) } else { self.window.cyclic.then_some(0) };
+        if let (Some(next), true) = (next, self.window.frames > 0) {
+            // Windows that hold both frames.
+            let both: Vec<usize> =
+                self.window.around(next, count).into_iter().filter(|t| around.contains(t)).collect();
+            faces[TIME] = self.votes(region, frame, next, TIME, &both);
+        }
+        self.forget(frame, count);
+        faces
+    }
+
+    /// The level of the window around each voxel of a frame, where there is one.
+    pub fn levels(&mut self, region: &Region, frame: usize) -> Vec<Option<u8>> {
+        let levels = self.levels_of(region, frame);
+        let rows = Rows::new(region.dims, self.window.reach);
+        let [nx, ny, nz] = region.dims;
+        let row = |r: usize| &levels[rows.at(r % ny, r / ny)..][..nx];
+        (0..ny * nz).flat_map(row).map(|&level| (level != NONE).then_some(level)).collect()
+    }
+
+    /// Levels that no later frame asks for take no room.
+    fn forget(&mut self, frame: usize, count: usize) {
+        for t in 0..count {
+            let needed = (frame + 1..count).any(|later| self.window.around(later, count).contains(&t));
+            if !needed {
+                self.levels[t] = None;
+            }
+        }
+    }
+
+    /// The level of each window whose middle is in a frame.
+    fn levels_of(&mut self, region: &Region, frame: usize) -> Vec<u8> {
+        let [nx, ny, nz] = region.dims;
+        let frames: Vec<&[u8]> =
+            self.window.around(frame, region.frames.len()).iter().map(|&t| &region.frames[t][..]).collect();
+        let rows = Rows::new(region.dims, self.window.reach);
+        let mut out = vec![NONE; rows.len()];
+        let mut slabs = Slabs::new(region.dims, self.window.reach, &frames);
+        for z in 0..nz {
+            for y in 0..ny {
+                slabs.go_to(y, z);
+                let row = rows.at(y, z);
+                let mut counts = Counts::default();
+                for x in 0..nx + self.window.reach {
+                    slabs.slide(&mut counts, x);
+                    if x >= self.window.reach {
+                        out[row + x - self.window.reach] = self.level(&counts);
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// The level that separates the clusters of a window: voxels up to it are in the lower one.
+    fn level(&mut self, counts: &Counts) -> u8 {
+        let Some((low, high)) = counts.two_means(self.window.threshold) else { return NONE };
+        let enough = LEAST_SHARE * f64::from(low.count + high.count);
+        if f64::from(low.count) <= enough || f64::from(high.count) <= enough {
+            return NONE;
+        }
+        let difference = high.mean() - low.mean();
+        if difference <= self.window.threshold {
+            self.largest_refused = self.largest_refused.max(difference);
+            return NONE;
+        }
+        ((low.mean() + high.mean()) / 2.0) as u8
+    }
+
+    /// The faces between the voxels of `frame` and the next ones, in `other` frame for those along time, that windows
+    /// with their middles in the frames `around` separate.
+    fn votes(
+        &self,
+        region: &Region,
+        frame: usize,
+        other: usize,
+        direction: usize,
+        around: &[usize],
+    ) -> Vec<Face> {
+        let ballot = Ballot {
+            levels: around.iter().filter_map(|&t| self.levels[t].as_deref()).collect(),
+            rows: Rows::new(region.dims, self.window.reach),
+            dims: region.dims,
+            direction,
+        };
+        let [nx, ny, nz] = region.dims;
+        let next = [1, nx, nx * ny, 0][direction];
+        let end = |axis: usize, n: usize| n - usize::from(direction == axis);
+        let (here, there) = (&region.frames[frame], &region.frames[other]);
+        let mut faces = Vec::new();
+        for (z, y) in (0..end(Z, nz)).flat_map(|z| (0..end(Y, ny)).map(move |y| (z, y))) {
+            let start = (z * ny + y) * nx;
+            for x in (0..end(X, nx)).step_by(LANES) {
+                let lanes = start + x..start + (x + LANES).min(end(X, nx));
+                let pairs = Pairs::new(&here[lanes.clone()], &there[lanes.start + next..lanes.end + next]);
+                let votes = ballot.votes([x, y, z], &pairs);
+                for (i, voxel) in lanes.enumerate().filter(|&(i, _)| votes[i] > 0) {
+                    let weight = f32::from(votes[i]) / ballot.most([x + i, y, z]) as f32;
+                    faces.push(Face { voxel: voxel as u32, weight });
+                }
+            }
+        }
+        faces
+    }
+}
+
+/// Voxels and the next ones: the lower level of each two, and by how much the other is higher.
+struct Pairs {
+    low: [u8; LANES],
+    span: [u8; LANES],
+}
+
+impl Pairs {
+    fn new(here: &[u8], there: &[u8]) -> Self {
+        let mut pairs = Self { low: [0; LANES], span: [0; LANES] };
+        for (i, (a, b)) in here.iter().zip(there).enumerate() {
+            (pairs.low[i], pairs.span[i]) = (*a.min(b), a.abs_diff(*b));
+        }
+        pairs
+    }
+}
+
+/// The windows that vote for faces along one direction in one frame.
+struct Ballot<'a> {
+    /// Of their frames.
+    levels: Vec<&'a [u8]>,
+    rows: Rows,
+    dims: [usize; 3],
+    direction: usize,
+}
+
+impl Ballot<'_> {
+    /// Along an axis, the middles of the windows that hold a voxel and the next one.
+    fn middles(&self, at: usize, axis: usize) -> std::ops::Range<usize> {
+        let first = at + usize::from(self.direction == axis);
+        first.saturating_sub(self.rows.reach)..(at + self.rows.reach + 1).min(self.dims[axis])
+    }
+
+    /// The most votes that a face can get.
+    fn most(&self, at: [usize; 3]) -> usize {
+        [X, Y, Z].map(|axis| self.middles(at[axis], axis).len()).iter().product::<usize>() * self.levels.len()
+    }
+
+    /// The votes for the faces after a voxel and those next to it.
+    fn votes(&self, [x, y, z]: [usize; 3], pairs: &Pairs) -> [u16; LANES] {
+        let mut votes = [0u16; LANES];
+        if pairs.span == [0; LANES] {
+            return votes;
+        }
+        let reach = self.rows.reach;
+        let windows = 2 * reach + usize::from(self.direction != X);
+        for level in &self.levels {
+            for z in self.middles(z, Z) {
+                for y in self.middles(y, Y) {
+                    // A row has room for `reach` windows before its first voxel.
+                    let from = self.rows.at(y, z) + x + usize::from(self.direction == X) - reach;
+                    count(&level[from..from + windows + LANES], windows, pairs, &mut votes);
+                }
+            }
+        }
+        votes
+    }
+}
+
+impl Window {
+    /// The frames whose windows reach a frame, and that its window reaches.
+    fn around(&self, frame: usize, count: usize) -> Vec<usize> {
+        let reach = self.frames.min(if self.cyclic { (count - 1) / 2 } else { count });
+        let at = |offset: usize| {
+            let t = (frame + count + offset).checked_sub(reach)?;
+            if self.cyclic { Some(t % count) } else { t.checked_sub(count).filter(|&t| t < count) }
+        };
+        (0..=2 * reach).filter_map(at).collect()
+    }
+}
+
+/// Adds, for each of the pairs, the windows of a row whose level separates it.
+#[inline]
+fn count(levels: &[u8], windows: usize, pairs: &Pairs, votes: &mut [u16; LANES]) {
+    let mut few = [0u8; LANES];
+    for row in levels.windows(LANES).take(windows) {
+        for (i, vote) in few.iter_mut().enumerate() {
+            *vote += u8::from(row[i].wrapping_sub(pairs.low[i]) < pairs.span[i]);
+        }
+    }
+    votes.iter_mut().zip(few).for_each(|(all, few)| *all += u16::from(few));
+}
+
+/// Where rows of levels begin: with room for windows beyond both ends.
+struct Rows {
+    ny: usize,
+    nz: usize,
+    row: usize,
+    reach: usize,
+}
+
+impl Rows {
+    fn new([nx, ny, nz]: [usize; 3], reach: usize) -> Self {
+        Self { ny, nz, row: nx + 2 * reach + 2 * LANES, reach }
+    }
+
+    fn len(&self) -> usize {
+        self.row * self.ny * self.nz
+    }
+
+    /// The first voxel of a row.
+    fn at(&self, y: usize, z: usize) -> usize {
+        (z * self.ny + y) * self.row + self.reach
+    }
+}
+
+/// How often each level occurs.
+#[derive(Clone)]
+struct Counts([u16; 256]);
+
+impl Default for Counts {
+    fn default() -> Self {
+        Self([0; 256])
+    }
+}
+
+/// Number of voxels and sum of their levels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Cluster {
+    count: u32,
+    sum: u32,
+}
+
+impl Cluster {
+    fn mean(self) -> f64 {
+        f64::from(self.sum) / f64::from(self.count)
+    }
+}
+
+impl Counts {
+    fn add(&mut self, other: &Self) {
+        self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a += b);
+    }
+
+    fn take(&mut self, other: &Self) {
+        self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a -= b);
+    }
+
+    /// Voxels with levels in a range.
+    fn within(&self, levels: std::ops::Range<usize>) -> Cluster {
+        let mut cluster = Cluster::default();
+        for level in levels {
+            let count = u32::from(self.0[level]);
+            cluster.count += count;
+            cluster.sum += count * level as u32;
+        }
+        cluster
+    }
+
+    /// Two clusters of levels by Lloyd's iterations from the least and the greatest one; nothing where those differ by
+    /// no more than `threshold`.
+    fn two_means(&self, threshold: f64) -> Option<(Cluster, Cluster)> {
+        let least = self.0.iter().position(|&count| count > 0)?;
+        let greatest = self.0.iter().rposition(|&count| count > 0)?;
+        if (greatest - least) as f64 <= threshold {
+            return None;
+        }
+        let all = self.within(least..greatest + 1);
+        // Levels up to `end` are nearer to the lower mean.
+        let mut end = (least + greatest) / 2;
+        let mut low = self.within(least..end + 1);
+        for _ in 0..ITERATIONS {
+            let high = Cluster { count: all.count - low.count, sum: all.sum - low.sum };
+            let middle = ((low.mean() + high.mean()) / 2.0) as usize;
+            if middle == end {
+                return Some((low, high));
+            }
+            // What changes sides alone is counted anew.
+            let changing = self.within(end.min(middle) + 1..end.max(middle) + 1);
+            if middle > end {
+                low = Cluster { count: low.count + changing.count, sum: low.sum + changing.sum };
+            } else {
+                low = Cluster { count: low.count - changing.count, sum: low.sum - changing.sum };
+            }
+            end = middle;
+        }
+        Some((low, Cluster { count: all.count - low.count, sum: all.sum - low.sum }))
+    }
+}
+
+/// Counts of the voxels at each x within a window's reach of (y, z) in several frames: a window is some of them in a row.
+struct Slabs<'a> {
+    dims: [usize; 3],
+    reach: usize,
+    frames: &'a [&'a [u8]],
+    at: Option<(usize, usize)>,
+    counts: Vec<Counts>,
+}
+
+impl<'a> Slabs<'a> {
+    fn new(dims: [usize; 3], reach: usize, frames: &'a [&'a [u8]]) -> Self {
+        Self { dims, reach, frames, at: None, counts: vec![Counts::default(); dims[0]] }
+    }
+
+    /// To a row: by what comes in and goes out where it is the next one.
+    fn go_to(&mut self, y: usize, z: usize) {
+        let ny = self.dims[1];
+        if y > 0 && self.at == Some((y - 1, z)) {
+            if y + self.reach < ny {
+                self.change(y + self.reach, z, |count| *count += 1);
+            }
+            if y > self.reach {
+                self.change(y - self.reach - 1, z, |count| *count -= 1);
+            }
+        } else {
+            self.counts.iter_mut().for_each(|counts| *counts = Counts::default());
+            for y in y.saturating_sub(self.reach)..(y + self.reach + 1).min(ny) {
+                self.change(y, z, |count| *count += 1);
+            }
+        }
+        self.at = Some((y, z));
+    }
+
+    /// Changes the counts of all voxels in the row y of the slices around z.
+    fn change(&mut self, y: usize, z: usize, change: impl Fn(&mut u16)) {
+        let [nx, ny, nz] = self.dims;
+        for z in z.saturating_sub(self.reach)..(z + self.reach + 1).min(nz) {
+            let start = (z * ny + y) * nx;
+            for frame in self.frames {
+                for (counts, &level) in self.counts.iter_mut().zip(&frame[start..start + nx]) {
+                    change(&mut counts.0[usize::from(level)]);
+                }
+            }
+        }
+    }
+
+    /// Takes the slab at `x` into a window, and the one that it leaves behind out of it.
+    fn slide(&self, window: &mut Counts, x: usize) {
+        if let Some(counts) = self.counts.get(x) {
+            window.add(counts);
+        }
+        if x > 2 * self.reach {
+            window.take(&self.counts[x - 2 * self.reach - 1]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{DAffine3, DVec3, Random};
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Noise about two levels.
+    fn region(dims: [usize; 3], frames: usize) -> Region {
+        let mut random = Random::new(8);
+        let [nx, ny, nz] = dims;
+        let value = |i: usize, t: usize, noise: u32| {
+            let bright = i % nx + (i / nx % ny) + i / (nx * ny) > 8 + t;
+            (if bright { 120 } else { 40 }) + noise as u8
+        };
+        let frame = |t: usize, random: &mut Random| {
+            (0..nx * ny * nz).map(|i| value(i, t, random.below(60))).collect()
+        };
+        Region {
+            dims,
+            spacing: DVec3::ONE,
+            to_world: DAffine3::IDENTITY,
+            from_world: DAffine3::IDENTITY,
+            frames: (0..frames).map(|t| frame(t, &mut random)).collect(),
+            step: 1.0,
+            threshold: 50.0,
+        }
+    }
+
+    /// The voxels of one window: of those in the image, index and frame.
+    fn window_at(region: &Region, window: &Window, at: [usize; 3], frame: usize) -> Vec<(usize, usize)> {
+        let [nx, ny, nz] = region.dims;
+        let near = |a: usize, b: usize| a.abs_diff(b) <= window.reach;
+        let cells = (0..nx * ny * nz)
+            .filter(|i| near(i % nx, at[0]) && near(i / nx % ny, at[1]) && near(i / (nx * ny), at[2]));
+        cells
+            .flat_map(|i| {
+                window.around(frame, region.frames.len()).into_iter().map(move |t| (i, t)).collect::<Vec<_>>()
+            })
+            .collect()
+    }
+
+    /// As section 2 says, on the levels themselves: the level between the clusters of a window that passes.
+    fn level_of(values: &[u8], threshold: f64) -> Option<f64> {
+        let (mut low, mut high) = (f64::from(*values.iter().min()?), f64::from(*values.iter().max()?));
+        if high - low <= threshold {
+            return None;
+        }
+        loop {
+            let middle = (low + high) / 2.0;
+            let (a, b): (Vec<f64>, Vec<f64>) =
+                values.iter().map(|&v| f64::from(v)).partition(|v| *v <= middle);
+            let mean = |list: &[f64]| list.iter().sum::<f64>() / list.len() as f64;
+            let next = (mean(&a), mean(&b));
+            if next == (low, high) {
+                let few = 0.1 * values.len() as f64;
+                let passes = a.len() as f64 > few && b.len() as f64 > few && high - low > threshold;
+                return passes.then_some(middle);
+            }
+            (low, high) = next;
+        }
+    }
+
+    /// The voxels of a window, and its level.
+    type Checked = (Vec<(usize, usize)>, Option<f64>);
+
+    #[test]
+    fn votes_are_those_of_all_windows_that_hold_both_voxels() {
+        for (frames, reach_in_time, cyclic) in [(1, 0, false), (4, 1, false), (5, 2, true), (2, 2, true)] {
+            let region = region([7, 6, 5], frames);
+            let window = Window { reach: 1, frames: reach_in_time, threshold: 50.0, cyclic };
+            let mut voting = Voting::new(window, frames);
+            let [nx, ny, nz] = region.dims;
+            let count = nx * ny * nz;
+            let at = |i: usize| [i % nx, i / nx % ny, i / (nx * ny)];
+            let windows: Vec<Vec<Checked>> = (0..frames)
+                .map(|t| {
+                    let of = |i: usize| {
+                        let cells = window_at(&region, &window, at(i), t);
+                        let values: Vec<u8> = cells.iter().map(|&(i, t)| region.frames[t][i]).collect();
+                        let level = level_of(&values, 50.0);
+                        (cells, level)
+                    };
+                    (0..count).map(of).collect()
+                })
+                .collect();
+            let mut voted = 0;
+            for t in 0..frames {
+                let faces = voting.faces(&region, t);
+                for direction in [X, Y, Z, TIME] {
+                    let next = [1, nx, nx * ny, 0][direction];
+                    for i in 0..count {
+                        if direction != TIME && at(i)[direction] + 1 == region.dims[direction] {
+                            continue;
+                        }
+                        let later = if direction == TIME { t + 1 } else { t };
+                        if later == frames && (!cyclic || reach_in_time == 0)
+                            || direction == TIME && reach_in_time == 0
+                        {
+                            continue;
+                        }
+                        let ends = [(i, t), (i + next, later % frames)];
+                        let (mut votes, mut all) = (0, 0);
+                        for (cells, level) in windows.iter().flatten() {
+                            if ends.iter().all(|end| cells.contains(end)) {
+                                all += 1;
+                                let [a, b] = ends.map(|(i, t)| f64::from(region.frames[t][i]));
+                                votes += usize::from(level.is_some_and(|level| (a <= level) != (b <= level)));
+                            }
+                        }
+                        let found = faces[direction].iter().find(|face| face.voxel as usize == i);
+                        let weight = found.map_or(0.0, |face| face.weight);
+                        // Two frames in a circle have none in common.
+                        let expected = votes as f32 / all.max(1) as f32;
+                        assert!((weight - expected).abs() < 1e-6, "{direction} {i} {t}: {weight} {expected}");
+                        voted += usize::from(votes > 0);
+                    }
+                }
+            }
+            assert!(voted > 50, "{voted}");
+        }
+    }
+
+    #[test]
+    fn a_threshold_above_all_steps_tells_how_large_they_are() {
+        let region = region([9, 9, 9], 2);
+        let mut voting = Voting::new(Window { reach: 2, frames: 1, threshold: 100.0, cyclic: false }, 2);
+        let faces = voting.faces(&region, 0);
+        assert!(faces.iter().all(Vec::is_empty));
+        assert!(
+            voting.largest_refused > 60.0 && voting.largest_refused <= 100.0,
+            "{}",
+            voting.largest_refused
+        );
+    }
+}

@@ -1,0 +1,323 @@
+//! In-between slices for volumes whose slices are thick (dynamic surfaces from 4D cardiac MRI, section 5.2).
+
+use super::error::{VolumeError, reserve};
+use super::flow::{Flow, Picture, symmetric_flow};
+use super::voxels::Voxels;
+use super::{Volume, VolumeInit};
+use crate::math::{DAffine3, DVec3};
+
+/// How slices in between come about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Enrichment {
+    /// What lies in both neighbours goes along the optical flow between them, and is averaged where it meets.
+    #[default]
+    Flow,
+    /// Means of the neighbours, weighted by nearness.
+    Linear,
+}
+
+/// Most slices for one: beyond, in-between slices tell nothing.
+const MOST: usize = 16;
+
+impl Volume {
+    /// The volume with `factor` − 1 slices more between any two along the axis of the largest spacing.
+    ///
+    /// The slices that were there stay as they are, at their places in the world; numbers keep their type. `factor`, where
+    /// left out, is the whole number that brings the spacing nearest to the mean of the two others; 1 changes nothing. All
+    /// frames are enriched, each by itself.
+    ///
+    /// # Errors
+    /// `factor` not in 1..=16; a single slice along that axis with a factor above 1; [`VolumeError::TooLarge`].
+    pub fn enrich_slices(&self, factor: Option<usize>, method: Enrichment) -> Result<Volume, VolumeError> {
+        let axis = self.thick_axis();
+        let factor = factor.unwrap_or_else(|| self.isotropic_factor(axis));
+        if !(1..=MOST).contains(&factor) {
+            let problem = format!("{factor} given; 1 to {MOST} is accepted");
+            return Err(VolumeError::invalid("factor", problem));
+        }
+        if factor == 1 {
+            return Ok(self.clone());
+        }
+        let count = self.dims[axis];
+        if count < 2 {
+            let problem =
+                "the volume has one slice along its largest spacing; between two or more there is room";
+            return Err(VolumeError::invalid("factor", problem));
+        }
+        let mut dims = self.dims;
+        dims[axis] = (count - 1) * factor + 1;
+        let mut frames = reserve(self.frames())?;
+        for frame in 0..self.frames() {
+            frames.push(self.enriched_frame(frame, axis, factor, method)?);
+        }
+        let parts: Vec<&Voxels> = frames.iter().collect();
+        let voxels = Voxels::concatenate(&parts)?.unwrap_or(Voxels::F32(Vec::new()));
+        let mut ratio = DVec3::ONE;
+        ratio[axis] = 1.0 / factor as f64;
+        let volume = Volume::new(VolumeInit {
+            voxels,
+            dims,
+            affine: self.affine * DAffine3::from_scale(ratio),
+            slope: self.slope,
+            intercept: self.intercept,
+            frame_seconds: self.frame_seconds,
+            space: self.space,
+        })?;
+        Ok(volume.with_unit(self.unit))
+    }
+
+    /// The axis along which voxels are longest; the last of several.
+    fn thick_axis(&self) -> usize {
+        let spacing = self.spacing();
+        (0..3).fold(2, |axis, other| if spacing[other] > spacing[axis] { other } else { axis })
+    }
+
+    fn isotropic_factor(&self, axis: usize) -> usize {
+        let spacing = self.spacing();
+        let others = (spacing[(axis + 1) % 3] + spacing[(axis + 2) % 3]) / 2.0;
+        let factor = (spacing[axis] / others).round();
+        if self.dims[axis] < 2 || factor < 1.0 { 1 } else { factor.min(MOST as f64) as usize }
+    }
+
+    /// One frame, in stored numbers.
+    fn enriched_frame(
+        &self,
+        frame: usize,
+        axis: usize,
+        factor: usize,
+        method: Enrichment,
+    ) -> Result<Voxels, VolumeError> {
+        let dims = self.dims();
+        let slices = Slices::new(dims, axis);
+        let start = self.frame_start(frame)?;
+        let mut longer = dims;
+        longer[axis] = (dims[axis] - 1) * factor + 1;
+        let out = Slices::new(longer, axis);
+        let mut values = reserve(longer[0] * longer[1] * longer[2])?;
+        values.resize(longer[0] * longer[1] * longer[2], 0.0f64);
+        let stored = |index: usize| self.voxels.get(start + index).unwrap_or(f64::NAN);
+        // Flows are of what can be seen; what is not a number has been given one there.
+        let intensities = self.normalised_grid(frame)?.values;
+        let mut before = slices.picture(0, &intensities)?;
+        for slice in 0..dims[axis] {
+            for at in 0..slices.len() {
+                values[out.index(slice * factor, at)] = stored(slices.index(slice, at));
+            }
+            if slice + 1 == dims[axis] {
+                break;
+            }
+            let after = slices.picture(slice + 1, &intensities)?;
+            let flow = match method {
+                Enrichment::Flow => Some(believable(&before, &after, symmetric_flow(&before, &after)?)?),
+                Enrichment::Linear => None,
+            };
+            for step in 1..factor {
+                let picture = in_between(&before, &after, flow.as_ref(), step as f32 / factor as f32)?;
+                for (at, &value) in picture.values.iter().enumerate() {
+                    values[out.index(slice * factor + step, at)] = self.stored(f64::from(value));
+                }
+            }
+            before = after;
+        }
+        self.voxels.like(&values)
+    }
+
+    /// The stored number of an intensity on the scale of [`Self::normalised_grid`].
+    fn stored(&self, normalised: f64) -> f64 {
+        (self.range[0] + normalised * self.span() - self.intercept) / self.slope
+    }
+}
+
+/// Where the voxels of a slice across an axis are.
+struct Slices {
+    /// Voxels along, and steps in memory, of the two other axes and of the axis itself.
+    across: usize,
+    down: usize,
+    steps: [usize; 3],
+}
+
+impl Slices {
+    fn new(dims: [usize; 3], axis: usize) -> Self {
+        let strides = [1, dims[0], dims[0] * dims[1]];
+        let (across, down) = [(1, 2), (0, 2), (0, 1)][axis];
+        Self {
+            across: dims[across],
+            down: dims[down],
+            steps: [strides[across], strides[down], strides[axis]],
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.across * self.down
+    }
+
+    fn index(&self, slice: usize, at: usize) -> usize {
+        let [across, down, along] = self.steps;
+        slice * along + (at / self.across) * down + (at % self.across) * across
+    }
+
+    fn picture(&self, slice: usize, values: &[f32]) -> Result<Picture, VolumeError> {
+        let mut out = reserve(self.len())?;
+        out.extend((0..self.len()).map(|at| values[self.index(slice, at)]));
+        Ok(Picture { width: self.across, height: self.down, values: out })
+    }
+}
+
+/// The flow by so much as it explains of the difference between the pictures: whole where they are alike along it, none
+/// where they are no more alike than as they are.
+fn believable(before: &Picture, after: &Picture, mut flow: Flow) -> Result<Flow, VolumeError> {
+    let (left, right) = (before.warped(&flow, -0.5)?, after.warped(&flow, 0.5)?);
+    let moved = squared_differences(&left, &right)?;
+    let still = squared_differences(before, after)?;
+    for i in 0..moved.values.len() {
+        let left = if still.values[i] > 0.0 { moved.values[i] / still.values[i] } else { 1.0 };
+        let share = if left < 1.0 { 1.0 - left } else { 0.0 };
+        flow.x.values[i] *= share;
+        flow.y.values[i] *= share;
+    }
+    Ok(flow)
+}
+
+/// Summed over the window around each pixel.
+fn squared_differences(one: &Picture, other: &Picture) -> Result<Picture, VolumeError> {
+    let mut values = reserve(one.values.len())?;
+    values.extend(one.values.iter().zip(&other.values).map(|(a, b)| (a - b) * (a - b)));
+    Picture { values, ..*one }.window_sums()
+}
+
+/// The picture at a share of the way from one to the other.
+fn in_between(
+    before: &Picture,
+    after: &Picture,
+    flow: Option<&Flow>,
+    share: f32,
+) -> Result<Picture, VolumeError> {
+    let mix = |left: &Picture, right: &Picture| {
+        let mut values = reserve(left.values.len())?;
+        values.extend(left.values.iter().zip(&right.values).map(|(a, b)| a + (b - a) * share));
+        Ok(Picture { values, ..*left })
+    };
+    match flow {
+        Some(flow) => mix(&before.warped(flow, -share)?, &after.warped(flow, 1.0 - share)?),
+        None => mix(before, after),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::Space;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn volume(dims: [usize; 4], spacing: [f64; 3], voxels: Voxels) -> Volume {
+        Volume::new(VolumeInit {
+            voxels,
+            dims,
+            affine: DAffine3::from_scale_rotation_translation(
+                DVec3::from(spacing),
+                glam::DQuat::from_rotation_x(0.3),
+                DVec3::new(5.0, -2.0, 1.0),
+            ),
+            slope: 0.5,
+            intercept: 10.0,
+            frame_seconds: 0.04,
+            space: Space::Lps,
+        })
+        .unwrap()
+    }
+
+    /// A slanted cone, as numbers from 0 to 200; x, y in pixels, z in slices.
+    fn cone(x: f64, y: f64, z: f64) -> u8 {
+        let radius = 12.0 - 0.7 * z;
+        let away = libm::hypot(x - 20.0 - 2.0 * z, y - 24.0 + 1.2 * z) - radius;
+        (200.0 / (1.0 + libm::exp(away))).round() as u8
+    }
+
+    /// `steps` slices for one of the cone's.
+    fn cone_volume(steps: usize) -> Volume {
+        let (nx, ny, nz) = (56, 48, 6 * steps + 1);
+        let at = |i: usize| {
+            let z = (i / (nx * ny)) as f64 / steps as f64;
+            cone((i % nx) as f64, (i / nx % ny) as f64, z)
+        };
+        let voxels = Voxels::U8((0..nx * ny * nz).map(at).collect());
+        volume([nx, ny, nz, 1], [1.5, 1.5, 6.0 / steps as f64], voxels)
+    }
+
+    fn error(one: &Volume, truth: &Volume) -> f64 {
+        let (a, b) = (one.intensities(0).unwrap(), truth.intensities(0).unwrap());
+        let squares: f64 = a.iter().zip(&b).map(|(a, b)| f64::from(a - b) * f64::from(a - b)).sum();
+        (squares / a.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn slices_that_were_there_stay_and_those_between_are_nearer_the_truth_than_means() {
+        let (given, truth) = (cone_volume(1), cone_volume(3));
+        let [flow, linear] = [Enrichment::Flow, Enrichment::Linear]
+            .map(|method| given.enrich_slices(Some(3), method).unwrap());
+        assert_eq!(flow.dims(), truth.dims());
+        for slice in 0..7 {
+            assert_eq!(flow.slice(2, 3 * slice, 0).unwrap(), given.slice(2, slice, 0).unwrap());
+        }
+        let last = DVec3::new(55.0, 47.0, 6.0);
+        let end = flow.affine().transform_point3(last * DVec3::new(1.0, 1.0, 3.0));
+        assert!(end.distance(given.affine().transform_point3(last)) < 1e-12);
+        assert!(matches!(flow.voxels(), Voxels::U8(_)));
+        assert_eq!((flow.frame_seconds(), flow.space(), flow.slope()), (0.04, Space::Lps, 0.5));
+        let (by_flow, by_means) = (error(&flow, &truth), error(&linear, &truth));
+        assert!(by_flow < 0.4 * by_means, "{by_flow} {by_means}");
+    }
+
+    #[test]
+    fn the_factor_left_out_brings_the_voxels_near_to_cubes() {
+        assert_eq!(cone_volume(1).enrich_slices(None, Enrichment::Flow).unwrap().dims()[2], 25);
+        let cubes = volume([4, 4, 4, 1], [1.0, 1.0, 1.2], Voxels::I16((0..64).collect()));
+        assert_eq!(cubes.enrich_slices(None, Enrichment::Flow).unwrap().voxels(), cubes.voxels());
+    }
+
+    #[test]
+    fn any_axis_any_frame_and_any_type_is_enriched() {
+        let values: Vec<f64> = (0..3 * 4 * 5 * 2).map(|i| f64::from(i % 7) - 3.0).collect();
+        for voxels in [
+            Voxels::I8(values.iter().map(|&v| v as i8).collect()),
+            Voxels::F32(values.iter().map(|&v| v as f32).collect()),
+            Voxels::F64(values.clone()),
+        ] {
+            let given = volume([3, 4, 5, 2], [9.0, 2.0, 3.0], voxels);
+            for method in [Enrichment::Flow, Enrichment::Linear] {
+                let made = given.enrich_slices(Some(2), method).unwrap();
+                assert_eq!((made.dims(), made.frames()), ([5, 4, 5], 2));
+                for frame in 0..2 {
+                    for x in 0..3 {
+                        assert_eq!(made.slice(0, 2 * x, frame).unwrap(), given.slice(0, x, frame).unwrap());
+                    }
+                }
+            }
+        }
+        let ramp = volume([1, 1, 3, 1], [1.0, 1.0, 4.0], Voxels::F32(vec![0.0, 8.0, 4.0]));
+        let made = ramp.enrich_slices(Some(4), Enrichment::Linear).unwrap();
+        assert_eq!(made.voxels(), &Voxels::F32(vec![0.0, 2.0, 4.0, 6.0, 8.0, 7.0, 6.0, 5.0, 4.0]));
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_none_between_either() {
+        let values = vec![1.0, f32::NAN, 3.0, 5.0, f32::INFINITY, 2.0];
+        let made = volume([1, 3, 2, 1], [1.0, 1.0, 2.0], Voxels::F32(values))
+            .enrich_slices(Some(2), Enrichment::Flow)
+            .unwrap();
+        let Voxels::F32(values) = made.voxels() else { panic!() };
+        assert!(values[1].is_nan() && values[7].is_infinite());
+        assert!(values[3..6].iter().all(|v| (1.0..=5.0).contains(v)), "{values:?}");
+    }
+
+    #[test]
+    fn a_wrong_factor_and_a_single_slice_are_refused() {
+        let one = volume([4, 4, 1, 1], [1.0, 1.0, 5.0], Voxels::U8(vec![0; 16]));
+        for (volume, factor) in [(cone_volume(1), 0), (cone_volume(1), 17), (one.clone(), 2)] {
+            let refusal = volume.enrich_slices(Some(factor), Enrichment::Flow).unwrap_err();
+            assert!(matches!(refusal, VolumeError::InvalidArgument { parameter: "factor", .. }));
+        }
+        assert_eq!(one.enrich_slices(None, Enrichment::Flow).unwrap().dims(), [4, 4, 1]);
+    }
+}

@@ -1,0 +1,311 @@
+//! Symmetric optical flow between two pictures: how the one has to go, and the other to come back, to meet halfway.
+//!
+//! Local least squares (Lucas and Kanade), coarse to fine. The flow u lives on the picture in between: for the intensities
+//! there to be those of both, a(x − u/2) = b(x + u/2).
+
+use super::error::{VolumeError, reserve};
+
+/// Half the width of the window in which one flow is to explain all differences, pixels.
+const RADIUS: usize = 5;
+
+/// Steps on each level; more follow the noise.
+const STEPS: usize = 3;
+
+/// No step is longer than this, in pixels of its level: further away the gradients are those of something else.
+const LONGEST: f32 = 1.0;
+
+/// Pictures smaller than this are not made smaller for a coarser level.
+const SMALLEST: usize = 24;
+
+/// Levels from coarse to fine: on the coarsest a step reaches 4 pixels of the finest.
+const LEVELS: usize = 3;
+
+/// Added to the diagonal of the equations, in the mean squared gradient of the picture: where there is nothing to be seen,
+/// nothing moves.
+const STILLNESS: f32 = 0.2;
+
+/// One picture, rows one after the other.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Picture {
+    pub width: usize,
+    pub height: usize,
+    pub values: Vec<f32>,
+}
+
+/// Flow along x and y for each pixel of the picture in between, pixels.
+pub(super) struct Flow {
+    pub x: Picture,
+    pub y: Picture,
+}
+
+impl Picture {
+    /// The same value everywhere.
+    pub fn flat(width: usize, height: usize, value: f32) -> Result<Self, VolumeError> {
+        let mut values = reserve(width * height)?;
+        values.resize(width * height, value);
+        Ok(Self { width, height, values })
+    }
+
+    /// Bilinear, the border replicated.
+    #[inline]
+    fn at(&self, x: f32, y: f32) -> f32 {
+        let (x0, x1, fx) = between(x, self.width);
+        let (y0, y1, fy) = between(y, self.height);
+        let (above, below) = (y0 * self.width, y1 * self.width);
+        let along = |row: usize| {
+            let (left, right) = (self.values[row + x0], self.values[row + x1]);
+            left + (right - left) * fx
+        };
+        let (top, bottom) = (along(above), along(below));
+        top + (bottom - top) * fy
+    }
+
+    /// The picture as seen through a flow: at each pixel, what is `share` of the flow away.
+    pub fn warped(&self, flow: &Flow, share: f32) -> Result<Self, VolumeError> {
+        let mut values = reserve(self.values.len())?;
+        let ways = flow.x.values.iter().zip(&flow.y.values);
+        for (i, (&u, &v)) in ways.enumerate() {
+            let (x, y) = ((i % self.width) as f32, (i / self.width) as f32);
+            values.push(self.at(x + share * u, y + share * v));
+        }
+        Ok(Self { values, ..*self })
+    }
+
+    /// Half as wide and high: means of four pixels.
+    fn halved(&self) -> Result<Self, VolumeError> {
+        let (width, height) = (self.width / 2, self.height / 2);
+        let mut values = reserve(width * height)?;
+        for y in 0..height {
+            let rows = [2 * y, 2 * y + 1].map(|y| &self.values[y * self.width..][..self.width]);
+            let sums = rows[0].chunks_exact(2).zip(rows[1].chunks_exact(2));
+            values.extend(sums.map(|(a, b)| 0.25 * (a[0] + a[1] + b[0] + b[1])));
+        }
+        Ok(Self { width, height, values })
+    }
+
+    /// As wide and high as told, about twice what it is: the flow of a coarser level, whose pixels are twice as long.
+    fn doubled(&self, width: usize, height: usize) -> Result<Self, VolumeError> {
+        let mut values = reserve(width * height)?;
+        for y in 0..height {
+            values.extend((0..width).map(|x| 2.0 * self.at((x as f32 - 0.5) * 0.5, (y as f32 - 0.5) * 0.5)));
+        }
+        Ok(Self { width, height, values })
+    }
+
+    /// Means over the same windows.
+    fn window_means(&self) -> Result<Self, VolumeError> {
+        let mut means = self.window_sums()?;
+        let count = |at: usize, n: usize| (at.min(RADIUS) + (n - 1 - at).min(RADIUS) + 1) as f32;
+        for (i, mean) in means.values.iter_mut().enumerate() {
+            *mean /= count(i % self.width, self.width) * count(i / self.width, self.height);
+        }
+        Ok(means)
+    }
+
+    /// Sums over windows of (2 `RADIUS` + 1)² pixels, cut at the border.
+    pub fn window_sums(&self) -> Result<Self, VolumeError> {
+        let (width, height) = (self.width, self.height);
+        let mut along = Self::flat(width, height, 0.0)?;
+        let rows = self.values.chunks_exact(width).zip(along.values.chunks_exact_mut(width));
+        rows.for_each(|(row, out)| running_sums(row, out));
+        // Down the columns, a whole row at a time.
+        let mut out = Self::flat(width, height, 0.0)?;
+        let mut sums = vec![0.0f32; width];
+        let row = |y: usize| &along.values[y * width..][..width];
+        for y in 0..(RADIUS).min(height) {
+            sums.iter_mut().zip(row(y)).for_each(|(sum, v)| *sum += v);
+        }
+        for y in 0..height {
+            if y + RADIUS < height {
+                sums.iter_mut().zip(row(y + RADIUS)).for_each(|(sum, v)| *sum += v);
+            }
+            if y > RADIUS {
+                sums.iter_mut().zip(row(y - RADIUS - 1)).for_each(|(sum, v)| *sum -= v);
+            }
+            out.values[y * width..][..width].copy_from_slice(&sums);
+        }
+        Ok(out)
+    }
+}
+
+fn running_sums(row: &[f32], out: &mut [f32]) {
+    let mut sum: f32 = row.iter().take(RADIUS).sum();
+    for x in 0..row.len() {
+        sum += row.get(x + RADIUS).copied().unwrap_or(0.0);
+        if x > RADIUS {
+            sum -= row[x - RADIUS - 1];
+        }
+        out[x] = sum;
+    }
+}
+
+/// The two pixels around `x`, held within the picture, and the share of the way between them.
+#[inline]
+fn between(x: f32, n: usize) -> (usize, usize, f32) {
+    let last = (n - 1) as f32;
+    let x = if x > 0.0 { x } else { 0.0 };
+    let x = if x < last { x } else { last };
+    let index = x as usize;
+    (index, if index + 1 < n { index + 1 } else { index }, x - index as f32)
+}
+
+/// The flow between two pictures of one size.
+///
+/// # Errors
+/// [`VolumeError::TooLarge`].
+pub(super) fn symmetric_flow(a: &Picture, b: &Picture) -> Result<Flow, VolumeError> {
+    let mut levels = vec![(a.clone(), b.clone())];
+    while let Some((a, b)) = levels.last()
+        && levels.len() < LEVELS
+        && a.width.min(a.height) >= 2 * SMALLEST
+    {
+        levels.push((a.halved()?, b.halved()?));
+    }
+    let (coarsest, _) = &levels[levels.len() - 1];
+    let still = Picture::flat(coarsest.width, coarsest.height, 0.0)?;
+    let mut flow = Flow { x: still.clone(), y: still };
+    for (a, b) in levels.iter().rev() {
+        if flow.x.width != a.width || flow.x.height != a.height {
+            flow = Flow { x: flow.x.doubled(a.width, a.height)?, y: flow.y.doubled(a.width, a.height)? };
+        }
+        for _ in 0..STEPS {
+            improve(a, b, &mut flow)?;
+        }
+    }
+    Ok(flow)
+}
+
+/// One step of least squares, and of smoothing.
+fn improve(a: &Picture, b: &Picture, flow: &mut Flow) -> Result<(), VolumeError> {
+    let (before, after) = (a.warped(flow, -0.5)?, b.warped(flow, 0.5)?);
+    let normal = Normal::of(&before, &after)?;
+    for i in 0..before.values.len() {
+        let (x, y) = normal.step(i);
+        flow.x.values[i] += x;
+        flow.y.values[i] += y;
+    }
+    // Without smoothing, steps follow the noise: in-between slices of a heart were then no better than means.
+    flow.x = flow.x.window_means()?;
+    flow.y = flow.y.window_means()?;
+    Ok(())
+}
+
+/// Sums over the window of each pixel: of products of gradients, and of gradients with differences.
+struct Normal {
+    xx: Picture,
+    xy: Picture,
+    yy: Picture,
+    xd: Picture,
+    yd: Picture,
+    stillness: f32,
+}
+
+impl Normal {
+    fn of(before: &Picture, after: &Picture) -> Result<Self, VolumeError> {
+        let (width, height) = (before.width, before.height);
+        let empty = || Picture::flat(width, height, 0.0);
+        let [mut xx, mut xy, mut yy, mut xd, mut yd] = [empty()?, empty()?, empty()?, empty()?, empty()?];
+        let both = |i: usize| before.values[i] + after.values[i];
+        for y in 0..height {
+            let [above, below] = [y.saturating_sub(1), (y + 1).min(height - 1)];
+            for x in 0..width {
+                let [left, right] = [x.saturating_sub(1), (x + 1).min(width - 1)];
+                let i = y * width + x;
+                // Of the mean of both pictures, over two pixels.
+                let gx = 0.25 * (both(y * width + right) - both(y * width + left));
+                let gy = 0.25 * (both(below * width + x) - both(above * width + x));
+                let difference = after.values[i] - before.values[i];
+                xx.values[i] = gx * gx;
+                xy.values[i] = gx * gy;
+                yy.values[i] = gy * gy;
+                xd.values[i] = gx * difference;
+                yd.values[i] = gy * difference;
+            }
+        }
+        let squares: f32 = xx.values.iter().zip(&yy.values).map(|(a, b)| a + b).sum();
+        let window = ((2 * RADIUS + 1) * (2 * RADIUS + 1)) as f32;
+        let stillness = STILLNESS * window * squares / (width * height) as f32;
+        let [xx, xy, yy] = [xx.window_sums()?, xy.window_sums()?, yy.window_sums()?];
+        Ok(Self { xx, xy, yy, xd: xd.window_sums()?, yd: yd.window_sums()?, stillness })
+    }
+
+    /// What the flow changes by at a pixel.
+    #[inline]
+    fn step(&self, i: usize) -> (f32, f32) {
+        let (xx, yy) = (self.xx.values[i] + self.stillness, self.yy.values[i] + self.stillness);
+        let xy = self.xy.values[i];
+        let determinant = xx * yy - xy * xy;
+        if determinant <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let (xd, yd) = (self.xd.values[i], self.yd.values[i]);
+        let x = (xy * yd - yy * xd) / determinant;
+        let y = (xy * xd - xx * yd) / determinant;
+        let length = (x * x + y * y).sqrt();
+        let scale = if length > LONGEST { LONGEST / length } else { 1.0 };
+        (x * scale, y * scale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// A soft disc.
+    fn disc(center: [f32; 2], radius: f32) -> Picture {
+        let (width, height) = (64, 48);
+        let value = |i: usize| {
+            let (x, y) = ((i % width) as f32 - center[0], (i / width) as f32 - center[1]);
+            100.0 / (1.0 + libm::expf(libm::hypotf(x, y) - radius))
+        };
+        Picture { width, height, values: (0..width * height).map(value).collect() }
+    }
+
+    #[test]
+    fn what_has_moved_is_followed_halfway_from_both_sides() {
+        let (a, b) = (disc([28.0, 24.0], 9.0), disc([34.0, 21.0], 9.0));
+        let flow = symmetric_flow(&a, &b).unwrap();
+        // On the rim of the disc in between.
+        for (x, y) in [(31 + 9, 22), (31 - 9, 23), (31, 22 + 9), (31, 23 - 9)] {
+            let (u, v) = (flow.x.values[y * 64 + x], flow.y.values[y * 64 + x]);
+            assert!((u - 6.0).abs() < 0.6 && (v + 3.0).abs() < 0.6, "{u} {v}");
+        }
+        let middle = disc([31.0, 22.5], 9.0);
+        let met = a.warped(&flow, -0.5).unwrap();
+        let worst = met.values.iter().zip(&middle.values).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(worst < 12.0, "{worst}");
+    }
+
+    #[test]
+    fn pictures_alike_or_empty_stay_where_they_are() {
+        for picture in [disc([30.0, 20.0], 8.0), Picture::flat(64, 48, 3.0).unwrap()] {
+            let flow = symmetric_flow(&picture, &picture).unwrap();
+            assert!(flow.x.values.iter().chain(&flow.y.values).all(|u| *u == 0.0));
+        }
+    }
+
+    #[test]
+    fn pictures_of_one_pixel_are_pictures() {
+        for (width, height) in [(1, 1), (1, 9), (200, 1)] {
+            let picture = Picture::flat(width, height, 1.0).unwrap();
+            let other = Picture::flat(width, height, 2.0).unwrap();
+            assert_eq!(symmetric_flow(&picture, &other).unwrap().x.values, vec![0.0; width * height]);
+        }
+    }
+
+    #[test]
+    fn sums_over_windows_are_those_of_their_pixels() {
+        let mut random = crate::math::Random::new(5);
+        let values = (0..13 * 17).map(|_| random.unit() as f32).collect();
+        let picture = Picture { width: 13, height: 17, values };
+        let sums = picture.window_sums().unwrap();
+        for (x, y) in [(0, 0), (6, 8), (12, 16), (3, 15)] {
+            let near = |a: usize, b: usize| a.abs_diff(b) <= RADIUS;
+            let cells = (0..13 * 17).filter(|i| near(i % 13, x) && near(i / 13, y));
+            let sum: f32 = cells.map(|i| picture.values[i]).sum();
+            assert!((sums.values[y * 13 + x] - sum).abs() < 1e-3);
+        }
+    }
+}

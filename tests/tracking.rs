@@ -1,0 +1,161 @@
+//! A surface followed through a beating heart with known truth.
+#![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
+
+#[path = "common/cine.rs"]
+mod cine;
+mod common;
+
+use cine::Cine;
+use vesicle::math::{DVec3, Vec3};
+use vesicle::mesh::{TriangleMesh, count_crossings, measure};
+use vesicle::methods::MethodError;
+use vesicle::methods::tracking::{Component, SurfaceTracker, TrackingOptions, TrackingParams};
+use vesicle::spatial::surface_distance;
+use vesicle::volume::Volume;
+#[cfg(target_arch = "wasm32")]
+use wasm_bindgen_test::wasm_bindgen_test as test;
+
+/// Between the step to the muscle and that from muscle to lung.
+const THRESHOLD: f64 = 70.0;
+
+fn options(cine: &Cine, volume: Volume) -> TrackingOptions {
+    TrackingOptions {
+        volume,
+        bounds: Some(cine.cavity_box()),
+        component: Component::Largest,
+        start: None,
+        params: TrackingParams { threshold: THRESHOLD, cyclic: true, ..TrackingParams::default() },
+    }
+}
+
+/// A part of a beat.
+fn open_ended(cine: &Cine) -> TrackingOptions {
+    let mut options = options(cine, cine.volume());
+    options.params.cyclic = false;
+    options
+}
+
+fn tracked(options: TrackingOptions) -> SurfaceTracker {
+    let mut tracker = SurfaceTracker::new(options).unwrap();
+    while !tracker.is_done() {
+        tracker.step().unwrap();
+        assert!(tracker.mesh().check().is_ok());
+    }
+    tracker
+}
+
+/// Error against the truth in every frame.
+fn errors(cine: &Cine, meshes: &[TriangleMesh]) -> Vec<f64> {
+    let one = |(frame, mesh): (usize, &TriangleMesh)| {
+        surface_distance(mesh, &cine.truth(frame as f64, 0.8)).unwrap().mean
+    };
+    meshes.iter().enumerate().map(one).collect()
+}
+
+#[test]
+fn a_beating_ball_is_followed_through_all_frames_closed_and_without_crossings() {
+    let cine = Cine::small();
+    let tracker = tracked(options(&cine, cine.volume()));
+    assert_eq!(tracker.meshes().len(), cine.frames);
+    for (frame, mesh) in tracker.meshes().iter().enumerate() {
+        let found = measure(mesh);
+        assert_eq!((found.euler, found.components, count_crossings(mesh)), (2, 1, 0), "{frame}");
+        let truth = measure(&cine.truth(frame as f64, 0.8));
+        assert!((found.volume / truth.volume - 1.0).abs() < 0.1, "{frame} {} {}", found.volume, truth.volume);
+    }
+    let errors = errors(&cine, tracker.meshes());
+    assert!(errors.iter().all(|error| *error < 0.3 * cine.spacing.x), "{errors:?}");
+    assert_eq!(tracker.volumes().len(), cine.frames);
+}
+
+/// Of the surfaces of all frames, natively and in wasm.
+const BITS: &str = "b55e21a75e07c7b4";
+
+#[test]
+fn the_same_bits_everywhere() {
+    let cine = Cine::small().first(3);
+    let tracker = tracked(open_ended(&cine));
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    for p in tracker.meshes().iter().flat_map(|mesh| &mesh.positions) {
+        for x in p.to_array() {
+            hash = (hash ^ u64::from(x.to_bits())).wrapping_mul(0x100_0000_01b3);
+        }
+    }
+    assert_eq!(format!("{hash:016x}"), BITS);
+}
+
+#[test]
+fn the_points_lie_on_the_boundary_between_frames_and_in_the_world() {
+    let cine = Cine { noise: 0.0, ..Cine::small() };
+    let mut tracker = SurfaceTracker::new(options(&cine, cine.volume())).unwrap();
+    tracker.step().unwrap();
+    let points = tracker.boundary(0);
+    assert!(tracker.boundary(1).is_empty() && points.len() > 1000);
+    let truth = cine.truth(0.0, 0.8);
+    let (heavy, all) = points.iter().filter(|p| p[3] == 0.0).fold((0.0, 0.0), |(heavy, all), p| {
+        let away = truth.positions.iter().map(|q| q.distance(Vec3::new(p[0], p[1], p[2])));
+        let near = away.fold(f32::INFINITY, f32::min) < 2.0;
+        (heavy + if near { p[4] } else { 0.0 }, all + p[4])
+    });
+    assert!(heavy > 0.9 * all, "{heavy} {all}");
+    assert!(points.iter().any(|p| p[3] == 0.5) && points.iter().all(|p| p[4] > 0.0 && p[4] <= 1.0));
+}
+
+#[test]
+fn a_mesh_of_ones_own_is_followed_and_the_component_is_chosen() {
+    let cine = Cine::small().first(3);
+    let start = cine.truth(0.0, 2.0);
+    let given = tracked(TrackingOptions { start: Some(start), ..open_ended(&cine) });
+    assert!(errors(&cine, given.meshes()).iter().all(|error| *error < 0.3 * cine.spacing.x));
+    let [low, high] = cine.cavity_box();
+    let nearest = Component::Nearest((low + high) / 2.0);
+    let chosen = tracked(TrackingOptions { component: nearest, ..open_ended(&cine) });
+    assert!(measure(&chosen.meshes()[2]).volume > 0.5 * measure(&given.meshes()[2]).volume);
+}
+
+#[test]
+fn what_cannot_be_tracked_is_refused_by_name() {
+    let cine = Cine::small().first(2);
+    let volume = cine.volume();
+    let good = || options(&cine, volume.clone());
+    let refused = |options: TrackingOptions| match SurfaceTracker::new(options) {
+        Err(MethodError::InvalidArgument { parameter, problem }) => (parameter, problem),
+        Err(other) => panic!("{other:?}"),
+        Ok(mut tracker) => loop {
+            match tracker.step() {
+                Err(MethodError::InvalidArgument { parameter, problem }) => break (parameter, problem),
+                Err(other) => panic!("{other:?}"),
+                Ok(report) => assert!(!report.done),
+            }
+        },
+    };
+    let one = cine.first(1).volume();
+    assert_eq!(refused(TrackingOptions { volume: one, ..good() }).0, "volume");
+    let away = Some([DVec3::splat(1000.0), DVec3::splat(1001.0)]);
+    let (parameter, problem) = refused(TrackingOptions { bounds: away, ..good() });
+    assert!(parameter == "box" && problem.contains("reaches from"), "{problem}");
+    for bounds in [[DVec3::ONE, DVec3::ZERO], [DVec3::NAN, DVec3::ONE]] {
+        assert_eq!(refused(TrackingOptions { bounds: Some(bounds), ..good() }).0, "box");
+    }
+    let with = |change: fn(&mut TrackingParams)| {
+        let mut options = good();
+        change(&mut options.params);
+        options
+    };
+    let (parameter, problem) = refused(with(|params| params.threshold = 240.0));
+    assert!(parameter == "threshold" && problem.contains("the largest step in the box is"), "{problem}");
+    assert_eq!(refused(with(|params| params.threshold = -1.0)).0, "threshold");
+    assert_eq!(refused(with(|params| params.window = 5)).0, "window");
+    assert_eq!(refused(with(|params| params.radius = 0.5)).0, "radius");
+    assert_eq!(refused(with(|params| params.radius = 1e6)).0, "radius");
+    assert_eq!(refused(with(|params| params.time_scale = f64::NAN)).0, "timeScale");
+    assert_eq!(refused(with(|params| params.damping = 0.0)).0, "damping");
+    assert_eq!(refused(with(|params| params.edge_max = 0.5)).0, "edgeMax");
+    let open = TriangleMesh {
+        triangles: vec![[0, 1, 2]],
+        positions: vec![Vec3::ZERO; 3],
+        ..TriangleMesh::default()
+    };
+    let refusal = SurfaceTracker::new(TrackingOptions { start: Some(open), ..good() });
+    assert!(matches!(refusal, Err(MethodError::Mesh(_))));
+}
