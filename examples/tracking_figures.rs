@@ -1,4 +1,9 @@
-//! Figures of enrichment and tracking, for 4D volumes named.
+//! Figures of enrichment and tracking.
+//!
+//! `<files>`: enrichment of the 4D volumes named, on slices left out, and of a synthetic heart.
+//! `CENTER=x,y,z,mm <files>`: what is nearest to a voxel is followed in a box of so many mm around it.
+//! `TRACK=<beats>`: a synthetic heart of the paper's size against its truth, or `TRACK=small` one of a few voxels.
+//! `TH`, `RADIUS`, `SCALE`, `FRAMES` are parameters of the tracker (the middle two in pixels), `PLAIN=1` does not enrich.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program for the terminal")]
 
 #[path = "../tests/common/cine.rs"]
@@ -137,6 +142,47 @@ fn track(cine: &Cine) {
     println!("tracked in {:.1} s", began.elapsed().as_secs_f64());
 }
 
+/// Follows what is nearest to a voxel, in a box of `reach` world units around it.
+fn follow_file(volume: &Volume, voxel: DVec3, reach: f64) {
+    let center = volume.affine().transform_point3(voxel);
+    let volume = volume.enrich_slices(None, Enrichment::Flow).unwrap();
+    let number = |name: &str| std::env::var(name).ok().and_then(|v| v.parse().ok());
+    let params = TrackingParams {
+        threshold: number("TH").unwrap_or(0.0),
+        radius: number("RADIUS").unwrap_or(0.0),
+        cyclic: true,
+        ..TrackingParams::default()
+    };
+    let component =
+        if std::env::var("LARGEST").is_ok() { Component::Largest } else { Component::Nearest(center) };
+    let bounds = Some([center - reach, center + reach]);
+    let mut tracker =
+        SurfaceTracker::new(TrackingOptions { volume, bounds, component, start: None, params }).unwrap();
+    println!("noise {:.2}, {:?}", tracker.noise(), tracker.params());
+    while !tracker.is_done() {
+        let began = Instant::now();
+        tracker.step().unwrap();
+        let Some(mesh) = tracker.meshes().last() else { continue };
+        let m = measure(mesh);
+        println!(
+            "{} {:.0} ms, {} triangles, volume {:.2}, area {:.1}, chi {}, crossings {}, folds {:.2} %, {:?}",
+            tracker.meshes().len() - 1,
+            began.elapsed().as_secs_f64() * 1e3,
+            m.triangles,
+            m.volume / 1000.0,
+            m.area / 100.0,
+            m.euler,
+            count_crossings(mesh),
+            100.0 * folds(mesh),
+            tracker.facts().last().unwrap()
+        );
+        if let Ok(folder) = std::env::var("OUT") {
+            let bytes = vesicle::io::write_mesh(mesh, vesicle::io::MeshFormat::Ply).unwrap();
+            std::fs::write(format!("{folder}/frame{}.ply", tracker.meshes().len() - 1), bytes).unwrap();
+        }
+    }
+}
+
 fn main() {
     if let Ok(name) = std::env::var("TRACK") {
         let cine = match name.as_str() {
@@ -153,6 +199,11 @@ fn main() {
     for file in std::env::args().skip(1) {
         let volume = parse_volume(&std::fs::read(&file).unwrap(), None).unwrap();
         println!("{file}: {:?} x {}, {:?}", volume.dims(), volume.frames(), volume.spacing());
+        if let Ok(center) = std::env::var("CENTER") {
+            let numbers: Vec<f64> = center.split(',').map(|x| x.parse().unwrap()).collect();
+            follow_file(&volume, DVec3::from_slice(&numbers), numbers[3]);
+            continue;
+        }
         tell_enrichment(&volume, &volume);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::extremal::plane;
 use super::region::Region;
-use super::samples::{Falloff, Layout};
+use super::samples::{Falloff, Field};
 use super::vote::{Faces, X, Y, Z};
 use crate::math::DVec3;
 use crate::mesh::TriangleMesh;
@@ -31,10 +31,9 @@ pub(super) fn bright_surface(
     region: &Region,
     faces: &Faces,
     levels: &[Option<u8>],
-    layout: &Layout,
-    falloff: &Falloff,
+    falloff: Falloff,
 ) -> Result<TriangleMesh, MethodError> {
-    let points = oriented(region, faces, layout, falloff);
+    let points = oriented(region, faces, falloff);
     let band = BAND * falloff.radius;
     let distance = distances(region, &points, band);
     let levels = spread(levels, region.dims);
@@ -50,13 +49,13 @@ pub(super) fn bright_surface(
 }
 
 /// The faces' middles, each with the normal of the plane through what is around it, turned to where intensity falls.
-fn oriented(region: &Region, faces: &Faces, layout: &Layout, falloff: &Falloff) -> Vec<Oriented> {
-    let field = layout.field(faces);
+fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
+    let field = Field::still(region, falloff, faces);
     let mut points = Vec::new();
     for direction in [X, Y, Z] {
         for face in faces[direction].iter().filter(|face| face.weight >= LEAST_WEIGHT) {
             let (at, _) = region.face(direction, face.voxel);
-            let Some(fit) = plane(&layout.near(at, falloff).still(&field)) else { continue };
+            let Some(fit) = plane(&field.sums(at)) else { continue };
             let slope = slope(region, region.voxel(face.voxel));
             let normal = if fit.normal.dot(slope) > 0.0 { -fit.normal } else { fit.normal };
             points.push(Oriented { at, normal, weight: f64::from(face.weight) });

@@ -35,7 +35,7 @@ use first::bright_surface;
 use follow::Follower;
 use project::Moment;
 use region::Region;
-use samples::{Falloff, FrameField, Layout};
+use samples::{Falloff, Field};
 use vote::{Faces, Voting, Window};
 
 /// Which surface of the first frame is followed.
@@ -83,11 +83,12 @@ pub struct SurfaceTracker {
     start: Option<TriangleMesh>,
     params: TrackingParams,
     noise: f64,
-    layout: Layout,
     voting: Voting,
     /// By frame, as far as they are found.
     faces: Vec<Faces>,
     follower: Option<Follower>,
+    /// Around the newest frame.
+    moment: Option<Moment>,
     mesh: Mesh,
     /// By frame, in the world.
     meshes: Vec<TriangleMesh>,
@@ -122,7 +123,6 @@ impl SurfaceTracker {
             Some(start) => Mesh::from_triangles(start)?,
             None => Mesh::default(),
         };
-        let layout = Layout::new(&region, params.radius);
         let frames = region.frames.len();
         let window = Window {
             reach: params.window as usize,
@@ -137,9 +137,9 @@ impl SurfaceTracker {
             start,
             params,
             noise,
-            layout,
             faces: Vec::new(),
             follower: None,
+            moment: None,
             mesh,
             meshes: Vec::new(),
             facts: Vec::new(),
@@ -245,41 +245,39 @@ impl SurfaceTracker {
             }
         };
         if frame > 0 {
-            let fields = self.fields(frame - 1);
-            follower.predict(&mut mesh, &self.region, &self.moment(&fields), &mut facts);
+            let moment = match self.moment.take() {
+                Some(moment) => moment,
+                None => self.moment_of(frame - 1),
+            };
+            follower.predict(&mut mesh, &self.region, &moment, &mut facts);
         }
-        let fields = self.fields(frame);
-        let changes = follower.settle(&mut mesh, &self.region, frame, &self.moment(&fields), &mut facts);
-        (self.mesh, self.follower) = (mesh, Some(follower));
+        let moment = self.moment_of(frame);
+        let changes = follower.settle(&mut mesh, &self.region, frame, &moment, &mut facts);
+        (self.mesh, self.follower, self.moment) = (mesh, Some(follower), Some(moment));
         self.meshes.push(self.mesh.to_triangles());
         self.facts.push(facts);
         Ok(changes)
     }
 
-    /// The fields near a frame, and how far each is in time.
-    fn fields(&self, frame: usize) -> Vec<(f64, FrameField)> {
-        let count = self.frames() as i64;
-        let c = self.params.time_scale;
-        // Faces along time lie half a frame later than their own.
-        let reach = (self.params.radius / c + 0.5) as i64;
-        let near = (-reach - 1..=reach).filter_map(|offset| {
+    /// What is around a frame.
+    fn moment_of(&self, frame: usize) -> Moment {
+        let (count, falloff) = (self.frames() as i64, self.falloff());
+        let mut field = Field::new(&self.region, falloff);
+        // No frame twice.
+        let may_wrap = self.params.cyclic && (falloff.offsets().count() as i64) < count;
+        for offset in falloff.offsets() {
             let at = frame as i64 + offset;
-            let inside = (0..count).contains(&at) || (self.params.cyclic && 2 * reach + 1 < count);
-            inside.then(|| (offset as f64 * c, self.layout.field(&self.faces[at.rem_euclid(count) as usize])))
-        });
-        near.collect()
+            if may_wrap || (0..count).contains(&at) {
+                field.add(&self.faces[at.rem_euclid(count) as usize], offset);
+            }
+        }
+        let pixel = self.region.spacing.min_element();
+        let (damping, time_scale) = (self.params.damping, self.params.time_scale);
+        Moment { field, time_scale, damping, still: STILL * pixel, longest: LONGEST * pixel }
     }
 
-    fn moment<'a>(&'a self, fields: &'a [(f64, FrameField)]) -> Moment<'a> {
-        let pixel = self.region.spacing.min_element();
-        Moment {
-            layout: &self.layout,
-            falloff: Falloff { radius: self.params.radius, time_scale: self.params.time_scale },
-            damping: self.params.damping,
-            still: STILL * pixel,
-            longest: LONGEST * pixel,
-            fields,
-        }
+    fn falloff(&self) -> Falloff {
+        Falloff { radius: self.params.radius, time_scale: self.params.time_scale }
     }
 
     /// The mesh to begin with, in the world.
@@ -296,8 +294,7 @@ impl SurfaceTracker {
             return Err(MethodError::invalid("threshold", problem));
         }
         let levels = self.voting.levels(&self.region, 0);
-        let falloff = Falloff { radius: self.params.radius, time_scale: self.params.time_scale };
-        let surface = bright_surface(&self.region, &self.faces[0], &levels, &self.layout, &falloff)?;
+        let surface = bright_surface(&self.region, &self.faces[0], &levels, self.falloff())?;
         if surface.triangles.is_empty() {
             let problem = "no surface is in the first frame; choose a larger box, or a lower threshold";
             return Err(MethodError::invalid("box", problem));

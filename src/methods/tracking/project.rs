@@ -1,7 +1,7 @@
 //! Restricted projection onto the space-time surface in one frame (section 3.3), and prediction (section 4.2).
 
 use super::extremal::{Fit, hyperplane};
-use super::samples::{Falloff, FrameField, Layout, Sums};
+use super::samples::Field;
 use crate::math::DVec3;
 
 /// Damping of the i-th step is β^i, and no less than this.
@@ -14,27 +14,22 @@ const STEPS: usize = 30;
 /// projected onto it then.
 const LEAST_SLOPE: f64 = 0.05;
 
-/// What is around one frame in time.
-pub(super) struct Moment<'a> {
-    pub layout: &'a Layout,
-    pub falloff: Falloff,
+/// What is around one frame in time, and how places are projected there.
+#[derive(Clone, Debug)]
+pub(super) struct Moment {
+    pub field: Field,
+    /// World units that one frame counts as: c.
+    pub time_scale: f64,
     pub damping: f64,
     /// A step as short as this is the last.
     pub still: f64,
     /// Projections that lead further are rejected.
     pub longest: f64,
-    /// The fields near in time, and how far each is, in world units.
-    pub fields: &'a [(f64, FrameField)],
 }
 
-impl Moment<'_> {
+impl Moment {
     pub fn fit(&self, at: DVec3) -> Option<Fit> {
-        let mut sums = Sums::default();
-        let near = self.layout.near(at, &self.falloff);
-        for (time, field) in self.fields {
-            near.add(field, *time, &mut sums);
-        }
-        hyperplane(&sums).filter(|fit| fit.normal.length_squared() >= LEAST_SLOPE)
+        hyperplane(&self.field.sums(at)).filter(|fit| fit.normal.length_squared() >= LEAST_SLOPE)
     }
 
     /// Where a point comes to lie on the surface; nothing where it does not.
@@ -65,13 +60,14 @@ impl Moment<'_> {
     pub fn prediction(&self, at: DVec3) -> Option<DVec3> {
         let fit = self.fit(at)?;
         let square = fit.normal.length_squared();
-        Some(fit.normal * (-self.falloff.time_scale * fit.along_time / square))
+        Some(fit.normal * (-self.time_scale * fit.along_time / square))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::region::Region;
+    use super::super::samples::Falloff;
     use super::super::vote::{Face, Faces, TIME, X, Y, Z};
     use super::*;
     use crate::math::DAffine3;
@@ -109,49 +105,57 @@ mod tests {
         faces
     }
 
+    const FALLOFF: Falloff = Falloff { radius: 4.0, time_scale: C };
+
     /// What a place sees of a plane that moves along its normal.
-    fn with_moment(normal: DVec3, distance: f64, speed: f64, test: impl Fn(&Moment<'_>)) {
+    fn moment(normal: DVec3, distance: f64, speed: f64) -> Moment {
         let region = region();
-        let falloff = Falloff { radius: 4.0, time_scale: C };
-        let layout = Layout::new(&region, falloff.radius);
-        let fields: Vec<(f64, FrameField)> = (-2..=1)
-            .map(|t| {
-                (f64::from(t) * C, layout.field(&plane_faces(&region, normal, distance, speed, f64::from(t))))
-            })
-            .collect();
-        test(&Moment { layout: &layout, falloff, damping: 0.9, still: 1e-4, longest: 4.0, fields: &fields });
+        let mut field = Field::new(&region, FALLOFF);
+        for offset in FALLOFF.offsets() {
+            field.add(&plane_faces(&region, normal, distance, speed, offset as f64), offset);
+        }
+        Moment { field, time_scale: C, damping: 0.9, still: 1e-4, longest: 4.0 }
     }
 
     #[test]
     fn sums_are_those_of_the_faces_within_the_radius() {
         let region = region();
-        let falloff = Falloff { radius: 4.0, time_scale: C };
-        let layout = Layout::new(&region, falloff.radius);
-        let faces = plane_faces(&region, DVec3::new(0.6, 0.0, 0.8), 12.0, 0.3, 0.0);
-        let field = layout.field(&faces);
-        for (at, time) in [(DVec3::new(9.3, 10.1, 8.7), 0.7), (DVec3::new(0.2, 21.0, 15.0), -1.0)] {
-            let mut sums = Sums::default();
-            layout.near(at, &falloff).add(&field, time, &mut sums);
-            let (mut weight, mut first) = (0.0, [0.0; 4]);
-            for (direction, list) in faces.iter().enumerate() {
-                for face in list {
-                    let (place, later) = region.face(direction, face.voxel);
-                    let way = place - at;
-                    let later = time + f64::from(later) * C;
-                    // Along x the cut is at the radius whatever the rest is.
-                    let across = way.y * way.y + way.z * way.z + later * later;
-                    if across < 16.0 && way.x.abs() <= 4.0 {
-                        let w = f64::from(face.weight) * libm::exp(-(across + way.x * way.x) / 4.0);
-                        weight += w;
-                        for (sum, x) in first.iter_mut().zip([way.x, way.y, way.z, later]) {
-                            *sum += w * x;
+        for (radius, spread) in [(4.0, 1e-5), (9.0, 1e-4)] {
+            let falloff = Falloff { radius, time_scale: C };
+            let normal = DVec3::new(0.6, 0.0, 0.8);
+            let frames: Vec<Faces> =
+                (-5..=5).map(|t| plane_faces(&region, normal, 12.0, 0.3, f64::from(t))).collect();
+            let mut field = Field::new(&region, falloff);
+            for offset in falloff.offsets() {
+                field.add(&frames[(offset + 5) as usize], offset);
+            }
+            for at in [DVec3::new(9.3, 10.1, 8.7), DVec3::new(0.2, 21.0, 15.0)] {
+                let sums = field.sums(at);
+                let (mut weight, mut first, mut second) = (0.0, [0.0; 4], [0.0; 10]);
+                for (t, faces) in (-5..=5).zip(&frames) {
+                    for (direction, face) in (0..4).flat_map(|d| faces[d].iter().map(move |face| (d, face))) {
+                        let (place, later) = region.face(direction, face.voxel);
+                        let way = place - at;
+                        let time = (f64::from(t) + f64::from(later)) * C;
+                        // Along x the cut is at the radius whatever the rest is.
+                        let across = way.y * way.y + way.z * way.z;
+                        let square = radius * radius;
+                        if across >= square || way.x.abs() > radius || time.abs() >= radius {
+                            continue;
                         }
+                        let r = across + way.x * way.x + time * time;
+                        let w = f64::from(face.weight) * libm::exp(-4.0 * r / square);
+                        let x = [way.x, way.y, way.z, time];
+                        weight += w;
+                        (0..4).for_each(|i| first[i] += w * x[i]);
+                        let pairs = (0..4).flat_map(|i| (i..4).map(move |j| (i, j)));
+                        pairs.zip(&mut second).for_each(|((i, j), sum)| *sum += w * x[i] * x[j]);
                     }
                 }
-            }
-            assert!((sums.weight - weight).abs() < 1e-5 * weight, "{} {weight}", sums.weight);
-            for (a, b) in sums.first.iter().zip(first) {
-                assert!((a - b).abs() < 1e-4 * weight, "{a} {b}");
+                assert!((sums.weight - weight).abs() < spread * weight, "{} {weight}", sums.weight);
+                for (a, b) in sums.first.iter().zip(first).chain(sums.second.iter().zip(second)) {
+                    assert!((a - b).abs() < spread * radius * radius * weight, "{a} {b}");
+                }
             }
         }
     }
@@ -160,28 +164,27 @@ mod tests {
     fn a_plane_is_found_from_both_sides_and_its_motion_predicted() {
         let normal = DVec3::new(2.0, -1.0, 2.0) / 3.0;
         for speed in [0.0, 0.5, -0.8] {
-            with_moment(normal, 9.0, speed, |moment| {
-                for start in
-                    [DVec3::new(10.0, 10.0, 10.2), DVec3::new(9.0, 9.5, 8.3), DVec3::new(10.5, 11.0, 8.0)]
-                {
-                    let (x, _) = moment.project(start).unwrap();
-                    // A moving plane's points of other frames lie on it in space-time.
-                    assert!((normal.dot(x) - 9.0).abs() < 0.03, "{speed} {start} {}", normal.dot(x));
-                    assert!((x - start).cross(normal).length() < 0.05, "{}", x - start);
-                    let way = moment.prediction(x).unwrap();
-                    assert!((way - normal * speed).length() < 0.04, "{speed} {way}");
-                }
-            });
+            let moment = moment(normal, 9.0, speed);
+            for start in
+                [DVec3::new(10.0, 10.0, 10.2), DVec3::new(9.0, 9.5, 8.3), DVec3::new(10.5, 11.0, 8.0)]
+            {
+                let (x, _) = moment.project(start).unwrap();
+                // A moving plane's points of other frames lie on it in space-time.
+                assert!((normal.dot(x) - 9.0).abs() < 0.03, "{speed} {start} {}", normal.dot(x));
+                assert!((x - start).cross(normal).length() < 0.05, "{}", x - start);
+                let way = moment.prediction(x).unwrap();
+                assert!((way - normal * speed).length() < 0.04, "{speed} {way}");
+            }
         }
     }
 
     #[test]
     fn where_there_are_no_points_or_they_are_too_far_nothing_is_found() {
-        with_moment(DVec3::X, 10.0, 0.0, |moment| {
-            assert!(moment.project(DVec3::new(1.0, 10.0, 10.0)).is_none());
-            assert!(moment.project(DVec3::new(-500.0, 1e6, 3.0)).is_none());
-            let near = Moment { longest: 0.5, fields: moment.fields, ..*moment };
-            assert!(near.project(DVec3::new(12.0, 10.0, 10.0)).is_none());
-        });
+        let moment = moment(DVec3::X, 10.0, 0.0);
+        assert!(moment.project(DVec3::new(1.0, 10.0, 10.0)).is_none());
+        assert!(moment.project(DVec3::new(-500.0, 1e6, 3.0)).is_none());
+        assert!(moment.project(DVec3::splat(1e300)).is_none());
+        let near = Moment { longest: 0.5, ..moment };
+        assert!(near.project(DVec3::new(12.0, 10.0, 10.0)).is_none());
     }
 }

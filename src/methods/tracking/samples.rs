@@ -1,13 +1,13 @@
 //! The points of the boundary as a field: weights on the faces between voxels, ready for sums over what is near.
+//!
+//! All places of one frame see the others at the same distances in time, and θ is a product over the axes. So the frames are
+//! summed up once, and what is left are sums along rows of voxels.
 
 use super::region::Region;
 use super::vote::{Faces, TIME, X, Y, Z};
 use crate::math::DVec3;
 
-/// Sums run over so many neighbours along x at once.
-pub(super) const LANES: usize = 4;
-
-/// How weights fall with distance: θ(r) = exp(−r²/h²), 0 beyond 2h.
+/// How weights fall with distance: θ(r) = exp(−r²/h²), with r in space-time, and 0 beyond 2h in space or in time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Falloff {
     /// Where it ends: 2h.
@@ -16,111 +16,137 @@ pub(super) struct Falloff {
     pub time_scale: f64,
 }
 
-/// The faces of one frame, each direction in an array over the voxels, rows with room at both ends.
+impl Falloff {
+    fn theta(&self, distance: f64) -> f64 {
+        libm::exp(-4.0 * distance * distance / (self.radius * self.radius))
+    }
+
+    /// Frames whose faces may be near, from a frame on.
+    pub fn offsets(&self) -> std::ops::RangeInclusive<i64> {
+        let reach = (self.radius / self.time_scale) as i64 + 1;
+        -reach..=reach
+    }
+}
+
+/// Most faces within the radius along one axis.
+pub(super) const MOST: usize = 32;
+
+/// Usually there are no more than this.
+const FEW: usize = 8;
+
+/// What is near in time to one frame.
 #[derive(Clone, Debug)]
-pub(super) struct FrameField {
-    weights: [Vec<f32>; 4],
-}
-
-/// Where the rows of such an array begin.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Layout {
+pub(super) struct Field {
     dims: [usize; 3],
-    row: usize,
-    /// Zeroes before the first voxel of a row.
-    room: usize,
     spacing: DVec3,
-}
-
-impl Layout {
-    pub fn new(region: &Region, radius: f64) -> Self {
-        let room = (2.0 * radius / region.spacing.x) as usize + 2 + LANES;
-        Self { dims: region.dims, row: region.dims[0] + 2 * room, room, spacing: region.spacing }
-    }
-
-    pub fn field(&self, faces: &Faces) -> FrameField {
-        let [nx, ny, nz] = self.dims;
-        let weights = [X, Y, Z, TIME].map(|direction| {
-            let list = &faces[direction];
-            let mut weights = if list.is_empty() { Vec::new() } else { vec![0.0; self.row * ny * nz] };
-            for face in list {
-                let voxel = face.voxel as usize;
-                weights[(voxel / nx) * self.row + self.room + voxel % nx] = face.weight;
-            }
-            weights
-        });
-        FrameField { weights }
-    }
-
-    /// What of the field is near a place.
-    pub fn near(&self, at: DVec3, falloff: &Falloff) -> Near<'_> {
-        let axis =
-            |k: usize| [0.0, 0.5].map(|offset| Axis::new(at[k], self.spacing[k], offset, falloff.radius));
-        Near { layout: self, falloff: *falloff, axes: [axis(0), axis(1), axis(2)] }
-    }
-}
-
-/// The faces near one place.
-pub(super) struct Near<'a> {
-    layout: &'a Layout,
     falloff: Falloff,
-    /// Along x, y and z: of faces in planes of voxel centres, and of those half a voxel further.
-    axes: [[Axis; 2]; 3],
+    /// From one row to the next, and zeroes before the first voxel of a row.
+    row: usize,
+    room: usize,
+    /// By direction of the faces; those along time lie in the middle of voxels.
+    sites: [Sites; 4],
 }
 
-impl Near<'_> {
-    /// Sums over the faces of one frame at the same time, without those along time.
-    pub fn still(&self, field: &FrameField) -> Sums {
-        let mut sums = Sums::default();
+/// Weights times θ of the time, on the faces of one direction: as they are, times the time, and times its square.
+#[derive(Clone, Debug, Default)]
+struct Sites {
+    weights: [Vec<f32>; 3],
+    /// By row, from the first to after the last voxel with a weight.
+    extents: Vec<[u32; 2]>,
+}
+
+impl Field {
+    /// Without points.
+    pub fn new(region: &Region, falloff: Falloff) -> Self {
+        let room = (2.0 * falloff.radius / region.spacing.x) as usize + 2 + FEW;
+        let row = region.dims[0] + 2 * room;
+        Self { dims: region.dims, spacing: region.spacing, falloff, row, room, sites: Default::default() }
+    }
+
+    /// The points of a single frame, without those along time.
+    pub fn still(region: &Region, falloff: Falloff, faces: &Faces) -> Self {
+        let mut field = Self::new(region, falloff);
         for direction in [X, Y, Z] {
-            self.gather(&field.weights[direction], direction, 0.0, &mut sums);
+            field.add_direction(direction, faces, 0.0);
+        }
+        field
+    }
+
+    /// Adds the points of the frame that is `offset` frames later.
+    pub fn add(&mut self, faces: &Faces, offset: i64) {
+        for direction in [X, Y, Z, TIME] {
+            // Faces along time lie half a frame later than their own.
+            let frames = offset as f64 + if direction == TIME { 0.5 } else { 0.0 };
+            let time = frames * self.falloff.time_scale;
+            if time.abs() < self.falloff.radius {
+                self.add_direction(direction, faces, time);
+            }
+        }
+    }
+
+    fn add_direction(&mut self, direction: usize, faces: &Faces, time: f64) {
+        let [nx, ny, nz] = self.dims;
+        let theta = self.falloff.theta(time);
+        let factors = [theta, theta * time, theta * time * time].map(|factor| factor as f32);
+        let Sites { weights, extents } = &mut self.sites[direction];
+        if extents.is_empty() {
+            extents.resize(ny * nz, [u32::MAX, 0]);
+            weights.iter_mut().for_each(|list| list.resize(self.row * ny * nz, 0.0));
+        }
+        for face in &faces[direction] {
+            let (line, x) = (face.voxel as usize / nx, face.voxel as usize % nx);
+            for (list, factor) in weights.iter_mut().zip(factors) {
+                list[line * self.row + self.room + x] += factor * face.weight;
+            }
+            let [first, end] = &mut extents[line];
+            (*first, *end) = ((*first).min(x as u32), (*end).max(x as u32 + 1));
+        }
+    }
+
+    /// Sums over all points around a place of the frame.
+    pub fn sums(&self, at: DVec3) -> Sums {
+        let mut sums = Sums::default();
+        let axis =
+            |k: usize| [0.0, 0.5].map(|offset| Axis::new(at[k], self.spacing[k], offset, &self.falloff));
+        let axes = [axis(0), axis(1), axis(2)];
+        for direction in [X, Y, Z, TIME] {
+            let [x, y, z] = [X, Y, Z].map(|k| &axes[k][usize::from(direction == k)]);
+            // Off the grid there are none.
+            let room = self.room as i64;
+            let outside = x.first < -room || x.end() > self.dims[0] as i64 + room;
+            if outside || self.sites[direction].extents.is_empty() {
+            } else if x.count <= FEW {
+                self.gather::<FEW>(&self.sites[direction], [x, y, z], &mut sums);
+            } else {
+                self.gather::<MOST>(&self.sites[direction], [x, y, z], &mut sums);
+            }
         }
         sums
     }
 
-    /// Adds the faces of one frame at a distance `time` from the place; those along time are half a frame later.
-    pub fn add(&self, field: &FrameField, time: f64, sums: &mut Sums) {
-        let half = 0.5 * self.falloff.time_scale;
-        for direction in [X, Y, Z, TIME] {
-            let time = if direction == TIME { time + half } else { time };
-            self.gather(&field.weights[direction], direction, time, sums);
-        }
-    }
-
-    fn gather(&self, weights: &[f32], direction: usize, time: f64, sums: &mut Sums) {
-        let Layout { dims, row, room, .. } = *self.layout;
-        let radius = self.falloff.radius;
-        let [x, y, z] = [X, Y, Z].map(|k| &self.axes[k][usize::from(direction == k)]);
-        // Off the grid there are none.
-        let outside = x.first < -(room as i64) || x.first + x.padded() as i64 > (dims[0] + room) as i64;
-        if weights.is_empty() || outside || time.abs() >= radius {
-            return;
-        }
-        let here = gauss(time, radius);
-        for k in z.range(dims[2]) {
+    /// `LANES`: no less than the faces along x.
+    fn gather<const LANES: usize>(&self, sites: &Sites, [x, y, z]: [&Axis; 3], sums: &mut Sums) {
+        let square = self.falloff.radius * self.falloff.radius;
+        let near = [x.first, x.end()];
+        for k in z.range(self.dims[2]) {
             let dz = z.distance(k);
-            let left = radius * radius - time * time - dz * dz;
-            if left <= 0.0 {
-                continue;
-            }
-            let mut plane = Plane::default();
-            for j in y.range(dims[1]) {
+            let mut plane = Plane::<LANES>::default();
+            for j in y.range(self.dims[1]) {
+                let line = k as usize * self.dims[1] + j as usize;
                 let dy = y.distance(j);
-                if dy * dy >= left {
+                let [first, end] = sites.extents[line].map(i64::from);
+                if dy * dy + dz * dz >= square || first >= near[1] || end <= near[0] {
                     continue;
                 }
-                let start = (k as usize * dims[1] + j as usize) * row + room;
-                let from = (start as i64 + x.first) as usize;
-                plane.add(&weights[from..from + x.padded()], dy as f32, y.weight(j) as f32);
+                let from = ((line * self.row + self.room) as i64 + x.first) as usize;
+                let rows = [0, 1, 2].map(|power| &sites.weights[power][from..from + x.count]);
+                plane.add(rows, dy as f32, y.weight(j));
             }
-            plane.add_to(sums, x, [dz, time], here * z.weight(k));
+            if plane.used {
+                plane.add_to(sums, x, dz, f64::from(z.weight(k)));
+            }
         }
     }
-}
-
-/// θ, with h half the radius.
-fn gauss(distance: f64, radius: f64) -> f64 {
-    libm::exp(-4.0 * distance * distance / (radius * radius))
 }
 
 /// Faces within the radius along one axis, by the number of the voxel before them.
@@ -133,101 +159,86 @@ struct Axis {
     count: usize,
 }
 
-/// Most faces within the radius along one axis.
-pub(super) const MOST: usize = 32;
-
 impl Axis {
-    fn new(at: f64, spacing: f64, offset: f64, radius: f64) -> Self {
-        let first = ((at - radius) / spacing - offset).ceil() as i64;
-        let last = ((at + radius) / spacing - offset).floor() as i64;
-        let count = usize::try_from(last - first + 1).unwrap_or(0).min(MOST);
+    fn new(at: f64, spacing: f64, offset: f64, falloff: &Falloff) -> Self {
+        let first = libm::ceil((at - falloff.radius) / spacing - offset) as i64;
+        let last = libm::floor((at + falloff.radius) / spacing - offset) as i64;
+        let count = usize::try_from(last.saturating_sub(first) + 1).unwrap_or(0).min(MOST);
         let start = (first as f64 + offset) * spacing - at;
         let mut weights = [0.0; MOST];
         for (i, weight) in weights.iter_mut().take(count).enumerate() {
-            *weight = gauss(start + i as f64 * spacing, radius) as f32;
+            *weight = falloff.theta(start + i as f64 * spacing) as f32;
         }
         Self { first, start, spacing, weights, count }
     }
 
+    /// After the last.
+    fn end(&self) -> i64 {
+        // Places may be as far off as numbers go.
+        self.first.saturating_add(self.count as i64)
+    }
+
     /// Those on the grid.
     fn range(&self, n: usize) -> std::ops::Range<i64> {
-        self.first.max(0)..(self.first + self.count as i64).min(n as i64)
+        self.first.max(0)..self.end().min(n as i64)
     }
 
     fn distance(&self, i: i64) -> f64 {
         self.start + (i - self.first) as f64 * self.spacing
     }
 
-    fn weight(&self, i: i64) -> f64 {
-        f64::from(self.weights[(i - self.first) as usize])
-    }
-
-    /// Their number, rounded up to whole lanes.
-    fn padded(&self) -> usize {
-        self.count.next_multiple_of(LANES)
+    fn weight(&self, i: i64) -> f32 {
+        self.weights[(i - self.first) as usize]
     }
 }
 
-/// Sums over y in one plane, still apart by x.
-struct Plane([[f32; MOST]; 3], bool);
+/// Sums over y in one plane, still apart by x: of the weights times 1, y and y², of those with time times 1 and y, and of
+/// those with its square.
+struct Plane<const LANES: usize> {
+    plain: [[f32; LANES]; 3],
+    timed: [[f32; LANES]; 2],
+    squared: [f32; LANES],
+    used: bool,
+}
 
-impl Default for Plane {
+impl<const LANES: usize> Default for Plane<LANES> {
     fn default() -> Self {
-        Self([[0.0; MOST]; 3], false)
+        let none = [0.0; LANES];
+        Self { plain: [none; 3], timed: [none; 2], squared: none, used: false }
     }
 }
 
-impl Plane {
+impl<const LANES: usize> Plane<LANES> {
     #[inline]
-    fn add(&mut self, row: &[f32], dy: f32, weight: f32) {
-        let (first, second) = (weight * dy, weight * dy * dy);
-        let [a, b, c] = &mut self.0;
-        for (i, chunk) in row.chunks_exact(LANES).enumerate() {
-            for lane in 0..LANES {
-                let w = chunk[lane];
-                a[i * LANES + lane] += weight * w;
-                b[i * LANES + lane] += first * w;
-                c[i * LANES + lane] += second * w;
-            }
+    fn add(&mut self, [plain, timed, squared]: [&[f32]; 3], dy: f32, theta: f32) {
+        let (first, second) = (theta * dy, theta * dy * dy);
+        for (i, ((&w, &t), &s)) in plain.iter().zip(timed).zip(squared).enumerate().take(LANES) {
+            self.plain[0][i] += theta * w;
+            self.plain[1][i] += first * w;
+            self.plain[2][i] += second * w;
+            self.timed[0][i] += theta * t;
+            self.timed[1][i] += first * t;
+            self.squared[i] += theta * s;
         }
-        self.1 = true;
+        self.used = true;
     }
 
-    fn add_to(&self, sums: &mut Sums, x: &Axis, [dz, time]: [f64; 2], weight: f64) {
-        if !self.1 {
-            return;
-        }
-        let [mut s, mut sx, mut sxx, mut sy, mut sxy, mut syy] = [0.0f64; 6];
+    fn add_to(&self, sums: &mut Sums, x: &Axis, dz: f64, weight: f64) {
+        let mut s = [0.0f64; 10];
         for i in 0..x.count {
-            let (g, dx) = (f64::from(x.weights[i]), x.start + i as f64 * x.spacing);
-            let [a, b, c] = [0, 1, 2].map(|k| g * f64::from(self.0[k][i]));
-            s += a;
-            sx += a * dx;
-            sxx += a * dx * dx;
-            sy += b;
-            sxy += b * dx;
-            syy += c;
+            let (theta, dx) = (f64::from(x.weights[i]), x.start + i as f64 * x.spacing);
+            let [a, b, c] = self.plain.each_ref().map(|lanes| theta * f64::from(lanes[i]));
+            let [t, ty] = self.timed.each_ref().map(|lanes| theta * f64::from(lanes[i]));
+            let terms =
+                [a, a * dx, a * dx * dx, b, b * dx, c, t, t * dx, ty, theta * f64::from(self.squared[i])];
+            s.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
         }
-        let add = |sum: &mut f64, value: f64| *sum += weight * value;
-        add(&mut sums.weight, s);
-        for (k, value) in [sx, sy, dz * s, time * s].into_iter().enumerate() {
-            add(&mut sums.first[k], value);
-        }
-        let products = [
-            sxx,
-            sxy,
-            dz * sx,
-            time * sx,
-            syy,
-            dz * sy,
-            time * sy,
-            dz * dz * s,
-            time * dz * s,
-            time * time * s,
-        ];
-        for (k, value) in products.into_iter().enumerate() {
-            add(&mut sums.second[k], value);
-        }
+        let [one, x, xx, y, xy, yy, t, xt, yt, tt] = s.map(|sum| weight * sum);
+        sums.weight += one;
+        let first = [x, y, dz * one, t];
+        let second = [xx, xy, dz * x, xt, yy, dz * y, yt, dz * dz * one, dz * t, tt];
+        sums.first.iter_mut().zip(first).for_each(|(sum, term)| *sum += term);
+        sums.second.iter_mut().zip(second).for_each(|(sum, term)| *sum += term);
     }
 }
 
