@@ -208,7 +208,10 @@ describe('attractors', () => {
 
   test('come back with undo', async () => {
     await app.page.locator('.view > canvas').focus();
-    expect(await app.page.getAttribute('[data-transport=undo]', 'title')).toBe('Undo: removal of attractor 2');
+    // The label comes with the saved state.
+    await expect
+      .poll(() => app.page.getAttribute('[data-transport=undo]', 'title'))
+      .toBe('Undo: removal of attractor 2');
     await app.page.keyboard.press('Control+z');
     await expect.poll(() => items().count()).toBe(3);
     await reach(app.page, 'paused', 'done');
@@ -265,7 +268,7 @@ describe('undo', () => {
     const told = await captions();
     await app.page.click('text=Reset');
     await reach(app.page, 'paused');
-    expect(await app.page.getAttribute('[data-transport=undo]', 'title')).toBe('Undo: Reset');
+    await expect.poll(() => app.page.getAttribute('[data-transport=undo]', 'title')).toBe('Undo: Reset');
     await undo();
     await reach(app.page, 'done');
     expect(await measures(app.page)).toEqual(before);

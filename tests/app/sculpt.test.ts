@@ -139,7 +139,7 @@ describe('the hand', () => {
     expect(answerFrames).toBeLessThanOrEqual(2);
     expect({ closed, crossings }).toEqual({ closed: true, crossings: 0 });
     expect(await hash()).toContain('pose=');
-    expect(await app.page.locator('[data-transport=undo]').isEnabled()).toBe(true);
+    await expect.poll(() => app.page.locator('[data-transport=undo]').isEnabled()).toBe(true);
   });
 
   test('the picture of the surface alone follows a move with the next animation frame', async () => {
