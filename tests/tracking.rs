@@ -7,7 +7,7 @@ mod common;
 
 use cine::Cine;
 use vesicle::math::{DVec3, Vec3};
-use vesicle::mesh::{TriangleMesh, count_crossings, measure};
+use vesicle::mesh::{MeshError, TriangleMesh, count_crossings, measure};
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{Component, SurfaceTracker, TrackingOptions, TrackingParams};
 use vesicle::spatial::surface_distance;
@@ -158,4 +158,17 @@ fn what_cannot_be_tracked_is_refused_by_name() {
     };
     let refusal = SurfaceTracker::new(TrackingOptions { start: Some(open), ..good() });
     assert!(matches!(refusal, Err(MethodError::Mesh(_))));
+    assert_eq!(refused(TrackingOptions { start: Some(TriangleMesh::default()), ..good() }).0, "start");
+    let mut turned = common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
+    turned.triangles.iter_mut().for_each(|corners| corners.reverse());
+    let (parameter, problem) = refused(TrackingOptions { start: Some(turned), ..good() });
+    assert!(parameter == "start" && problem.contains("face inwards"), "{problem}");
+    // Two rings, one through the other.
+    let mut crossing = common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
+    let other = common::torus_around(Vec3::X, [24, 12], [3.0, 1.0]);
+    let first = crossing.positions.len() as u32;
+    crossing.triangles.extend(other.triangles.iter().map(|corners| corners.map(|v| v + first)));
+    crossing.positions.extend(other.positions);
+    let refusal = SurfaceTracker::new(TrackingOptions { start: Some(crossing), ..good() });
+    assert!(matches!(refusal, Err(MethodError::Mesh(MeshError::SelfIntersecting { .. }))));
 }

@@ -28,7 +28,7 @@ pub use params::{TrackingParams, param_specs};
 
 use super::{MethodError, StepReport, Times};
 use crate::math::{DVec3, Vec3};
-use crate::mesh::{Mesh, TriangleMesh, VertexId, measure};
+use crate::mesh::{Mesh, MeshError, TriangleMesh, VertexId, count_crossings, measure};
 use crate::remesh::{Changes, EdgeBounds, remesh};
 use crate::volume::Volume;
 use first::bright_surface;
@@ -102,7 +102,8 @@ impl SurfaceTracker {
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`]: parameters, a volume of one frame, or without contrast, or with axes that are not
-    /// at right angles, a box outside of it; [`MethodError::Mesh`] for a start that is not a closed surface.
+    /// at right angles, a box outside of it; an empty start or one inside out; [`MethodError::Mesh`] for a start
+    /// that is not a closed surface, or crosses itself.
     pub fn new(options: TrackingOptions) -> Result<Self, MethodError> {
         let TrackingOptions { volume, bounds, component, start, params } = options;
         params.validate()?;
@@ -120,7 +121,7 @@ impl SurfaceTracker {
         check_radius(&params, spacing)?;
         region.threshold = params.threshold / region.step;
         let mesh = match &start {
-            Some(start) => Mesh::from_triangles(start)?,
+            Some(start) => start_mesh(start)?,
             None => Mesh::default(),
         };
         let frames = region.frames.len();
@@ -356,6 +357,22 @@ impl SurfaceTracker {
             events,
             times,
         }
+    }
+}
+
+/// A mesh of the caller's, as it is.
+fn start_mesh(start: &TriangleMesh) -> Result<Mesh, MethodError> {
+    if start.triangles.is_empty() {
+        return Err(MethodError::invalid("start", "the mesh is empty; a closed surface is needed"));
+    }
+    let mesh = Mesh::from_triangles(start)?;
+    if measure(start).volume <= 0.0 {
+        let problem = "the triangles face inwards; counter-clockwise seen from outside is needed";
+        return Err(MethodError::invalid("start", problem));
+    }
+    match count_crossings(start) {
+        0 => Ok(mesh),
+        pairs => Err(MeshError::SelfIntersecting { pairs }.into()),
     }
 }
 
