@@ -12,7 +12,7 @@ mod common;
 #[path = "common/scenes.rs"]
 mod scenes;
 
-use common::{Random, euler_of_parts};
+use common::{Random, euler_of_parts, fingerprint};
 use std::collections::BTreeMap;
 use vesicle::math::Vec3;
 use vesicle::mesh::{Measures, Mesh, count_crossings, measure};
@@ -284,12 +284,6 @@ fn a_tomography_direct_and_coarse_to_fine() {
 fn milliseconds() -> f64 {
     static BEGAN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
     BEGAN.get_or_init(std::time::Instant::now).elapsed().as_secs_f64() * 1e3
-}
-
-/// FNV-1a over the bits of all positions.
-fn fingerprint(positions: &[Vec3]) -> u64 {
-    let bytes = positions.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes);
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
 }
 
 /// The same bits after 200 steps natively and in wasm; the package is held to the same number.

@@ -32,17 +32,22 @@ fn rotation_clearing(a: &DMat3, p: usize, q: usize) -> DMat3 {
     {
         return DMat3::IDENTITY;
     }
-    let ratio = gap / (2.0 * off);
-    let sign = if ratio < 0.0 { -1.0 } else { 1.0 };
-    let tangent = sign / (ratio.abs() + (ratio * ratio + 1.0).sqrt());
-    let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
-    let sine = tangent * cosine;
+    let [_, cosine, sine] = clearing_angle(off, gap);
     let mut rotation = DMat3::IDENTITY;
     rotation.col_mut(p)[p] = cosine;
     rotation.col_mut(q)[q] = cosine;
     rotation.col_mut(q)[p] = sine;
     rotation.col_mut(p)[q] = -sine;
     rotation
+}
+
+/// Tangent, cosine and sine of the rotation that clears the entry `off` beside diagonal entries that differ by `gap`.
+fn clearing_angle(off: f64, gap: f64) -> [f64; 3] {
+    let ratio = gap / (2.0 * off);
+    let sign = if ratio < 0.0 { -1.0 } else { 1.0 };
+    let tangent = sign / (ratio.abs() + (ratio * ratio + 1.0).sqrt());
+    let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
+    [tangent, cosine, tangent * cosine]
 }
 
 fn sorted(values: DVec3, vectors: DMat3) -> (DVec3, DMat3) {
@@ -80,11 +85,7 @@ fn rotate(a: &mut [[f64; 4]; 4], vectors: &mut [[f64; 4]; 4], p: usize, q: usize
         a[p][q] = 0.0;
         return;
     }
-    let ratio = gap / (2.0 * off);
-    let sign = if ratio < 0.0 { -1.0 } else { 1.0 };
-    let tangent = sign / (ratio.abs() + (ratio * ratio + 1.0).sqrt());
-    let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
-    let sine = tangent * cosine;
+    let [tangent, cosine, sine] = clearing_angle(off, gap);
     a[p][p] -= tangent * off;
     a[q][q] += tangent * off;
     a[p][q] = 0.0;

@@ -4,6 +4,7 @@
 //! there to be those of both, a(x − u/2) = b(x + u/2).
 
 use super::error::{VolumeError, reserve};
+use super::sampling::locate;
 
 /// Half the width of the window in which one flow is to explain all differences, pixels.
 const RADIUS: usize = 5;
@@ -142,11 +143,8 @@ fn running_sums(row: &[f32], out: &mut [f32]) {
 /// The two pixels around `x`, held within the picture, and the share of the way between them.
 #[inline]
 fn between(x: f32, n: usize) -> (usize, usize, f32) {
-    let last = (n - 1) as f32;
-    let x = if x > 0.0 { x } else { 0.0 };
-    let x = if x < last { x } else { last };
-    let index = x as usize;
-    (index, if index + 1 < n { index + 1 } else { index }, x - index as f32)
+    let (index, share) = locate(x, n);
+    (index, if index + 1 < n { index + 1 } else { index }, share)
 }
 
 /// The flow between two pictures of one size.

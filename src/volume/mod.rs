@@ -39,6 +39,7 @@ pub use enrich::Enrichment;
 pub use error::VolumeError;
 pub use follow::{Follower, Lattice};
 pub use grid::{Grid, VectorGrid};
+pub(crate) use sampling::trilinear;
 pub use voxels::Voxels;
 
 use crate::math::{DAffine3, DVec3};
@@ -258,7 +259,7 @@ impl Volume {
             ));
         }
         let p = self.inverse.transform_point3(world);
-        Ok(sampling::trilinear(self.dims(), p, |index| self.intensity_at(start + index)))
+        Ok(trilinear(self.dims(), p, |index| self.intensity_at(start + index)))
     }
 
     /// Voxels in one frame.

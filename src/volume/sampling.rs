@@ -53,7 +53,7 @@ fn mix<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>>(a: T,
 /// Voxel at or below `x`, and the fraction of the way to the next, with `x` held in [0, n-1].
 /// Written with comparisons: `f32::clamp` by variables becomes two function calls in wasm.
 #[inline]
-fn locate(x: f32, n: usize) -> (usize, f32) {
+pub(super) fn locate(x: f32, n: usize) -> (usize, f32) {
     let last = (n - 1) as f32;
     let x = if x > 0.0 { x } else { 0.0 };
     let x = if x < last { x } else { last };
@@ -62,7 +62,7 @@ fn locate(x: f32, n: usize) -> (usize, f32) {
 }
 
 /// Trilinear interpolation in `f64` of what `value` gives for a voxel's index.
-pub(super) fn trilinear(dims: [usize; 3], p: DVec3, value: impl Fn(usize) -> f64) -> f64 {
+pub(crate) fn trilinear(dims: [usize; 3], p: DVec3, value: impl Fn(usize) -> f64) -> f64 {
     let axes = [0, 1, 2].map(|axis| locate_f64(p[axis], dims[axis]));
     let at = |corner: [usize; 3]| {
         let [x, y, z] = [0, 1, 2].map(|axis| axes[axis].0[corner[axis]]);

@@ -115,3 +115,9 @@ fn solid_angle(surface: &TriangleMesh, p: Vec3) -> f64 {
     };
     surface.triangles.iter().map(seen).sum()
 }
+
+/// FNV-1a over the bits of all positions.
+pub fn fingerprint(positions: &[Vec3]) -> u64 {
+    let bytes = positions.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes);
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
+}

@@ -80,7 +80,6 @@ const LONGEST: f64 = 4.8;
 pub struct SurfaceTracker {
     region: Region,
     component: Component,
-    start: Option<TriangleMesh>,
     params: TrackingParams,
     noise: f64,
     voting: Voting,
@@ -135,7 +134,6 @@ impl SurfaceTracker {
             voting: Voting::new(window, frames),
             region,
             component,
-            start,
             params,
             noise,
             faces: Vec::new(),
@@ -234,27 +232,23 @@ impl SurfaceTracker {
     fn next_frame(&mut self) -> Result<Changes, MethodError> {
         let frame = self.meshes.len();
         let mut facts = FrameFacts::default();
-        let mut mesh = self.mesh.clone();
-        let mut follower = match &self.follower {
-            Some(follower) => follower.clone(),
+        let mut follower = match self.follower.take() {
+            Some(follower) => follower,
             None => {
-                mesh = self.first_mesh()?;
-                let mean = measure(&mesh.to_triangles()).edge_mean;
+                self.find_first_mesh()?;
+                let mean = measure(&self.mesh.to_triangles()).edge_mean;
                 let [min, max] =
                     [self.params.edge_min, self.params.edge_max].map(|share| (share * mean) as f32);
                 Follower::new(EdgeBounds { min, max })
             }
         };
-        if frame > 0 {
-            let moment = match self.moment.take() {
-                Some(moment) => moment,
-                None => self.moment_of(frame - 1),
-            };
-            follower.predict(&mut mesh, &self.region, &moment, &mut facts);
+        // There is one around every frame that was done.
+        if let Some(moment) = self.moment.take() {
+            follower.predict(&mut self.mesh, &self.region, &moment, &mut facts);
         }
         let moment = self.moment_of(frame);
-        let changes = follower.settle(&mut mesh, &self.region, frame, &moment, &mut facts);
-        (self.mesh, self.follower, self.moment) = (mesh, Some(follower), Some(moment));
+        let changes = follower.settle(&mut self.mesh, &self.region, frame, &moment, &mut facts);
+        (self.follower, self.moment) = (Some(follower), Some(moment));
         self.meshes.push(self.mesh.to_triangles());
         self.facts.push(facts);
         Ok(changes)
@@ -281,10 +275,10 @@ impl SurfaceTracker {
         Falloff { radius: self.params.radius, time_scale: self.params.time_scale }
     }
 
-    /// The mesh to begin with, in the world.
-    fn first_mesh(&mut self) -> Result<Mesh, MethodError> {
-        if self.start.is_some() {
-            return Ok(self.mesh.clone());
+    /// The mesh to begin with, in the world, where none was given.
+    fn find_first_mesh(&mut self) -> Result<(), MethodError> {
+        if self.mesh.vertex_count() > 0 {
+            return Ok(());
         }
         if self.faces.iter().flatten().all(Vec::is_empty) {
             let largest = self.voting.largest_refused * self.region.step;
@@ -304,7 +298,8 @@ impl SurfaceTracker {
         self.keep_component(&mut mesh);
         let edge = (EDGE * self.region.spacing.min_element()) as f32;
         remesh(&mut mesh, EdgeBounds { min: edge / EDGE_SPREAD, max: edge * EDGE_SPREAD })?;
-        Ok(mesh)
+        self.mesh = mesh;
+        Ok(())
     }
 
     /// Removes all components but the one that is followed.

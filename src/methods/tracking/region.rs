@@ -3,7 +3,7 @@
 use super::vote::TIME;
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::methods::MethodError;
-use crate::volume::Volume;
+use crate::volume::{Volume, trilinear};
 
 /// Intensities are told apart in so many steps, 0 to 254: fewer than noise needs, and one byte a voxel.
 const STEPS: f64 = 254.0;
@@ -142,20 +142,7 @@ impl Region {
 
     /// Trilinear, the border replicated.
     fn sample(&self, frame: usize, place: DVec3) -> f64 {
-        let [nx, ny, _] = self.dims;
-        let along = |k: usize| {
-            let last = (self.dims[k] - 1) as f64;
-            let at = (place[k] / self.spacing[k]).clamp(0.0, last);
-            let index = at as usize;
-            ([index, (index + 1).min(self.dims[k] - 1)], at - index as f64)
-        };
-        let [(xs, fx), (ys, fy), (zs, fz)] = [along(0), along(1), along(2)];
-        let value =
-            |i: usize, j: usize, k: usize| f64::from(self.frames[frame][(zs[k] * ny + ys[j]) * nx + xs[i]]);
-        let mix = |a: f64, b: f64, share: f64| a + (b - a) * share;
-        let along_x = |j: usize, k: usize| mix(value(0, j, k), value(1, j, k), fx);
-        let plane = |k: usize| mix(along_x(0, k), along_x(1, k), fy);
-        mix(plane(0), plane(1), fz)
+        trilinear(self.dims, place / self.spacing, |i| f64::from(self.frames[frame][i]))
     }
 
     /// Standard deviation of the noise, in steps: from differences between neighbours along x, most of which are noise.

@@ -115,7 +115,9 @@ impl Field {
             let room = self.room as i64;
             let outside = x.first < -room || x.end() > self.dims[0] as i64 + room;
             if outside || self.sites[direction].extents.is_empty() {
-            } else if x.count <= FEW {
+                continue;
+            }
+            if x.count <= FEW {
                 self.gather::<FEW>(&self.sites[direction], [x, y, z], &mut sums);
             } else {
                 self.gather::<MOST>(&self.sites[direction], [x, y, z], &mut sums);
