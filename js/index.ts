@@ -49,6 +49,12 @@ export {
 export { type ParamSpec, paramSpecs } from './params.js';
 export { type InitInput, init as default, initSync } from './runtime.js';
 export type { RunOptions, Stepper, StepReport } from './stepper.js';
+export {
+  type FrameFacts,
+  SurfaceTracker,
+  type TrackingOptions,
+  type TrackingParams,
+} from './tracking.js';
 export { type Space, type Vec3, Volume, type VolumeInit, type VoxelArray } from './volume.js';
 
 /** The version of the library, as in its package. */

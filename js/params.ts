@@ -1,6 +1,6 @@
 import { choice } from './check.js';
 import { call } from './runtime.js';
-import { deformableParamSpecs, implicitParamSpecs, multiresParamSpecs } from './vesicle.js';
+import { deformableParamSpecs, implicitParamSpecs, multiresParamSpecs, trackingParamSpecs } from './vesicle.js';
 
 /** One parameter of a method, described so that a page can build a control for it. */
 export interface ParamSpec {
@@ -35,4 +35,9 @@ export function paramSpecs(method: keyof typeof SPECS): ParamSpec[] {
   return call(() => SPECS[method]() as ParamSpec[]);
 }
 
-const SPECS = { deformable: deformableParamSpecs, implicit: implicitParamSpecs, multires: multiresParamSpecs };
+const SPECS = {
+  deformable: deformableParamSpecs,
+  implicit: implicitParamSpecs,
+  tracking: trackingParamSpecs,
+  multires: multiresParamSpecs,
+};

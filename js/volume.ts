@@ -204,6 +204,18 @@ export class Volume {
   }
 
   /**
+   * Means of blocks of voxels, in all frames: fewer and larger voxels of the same type. What is left over at the far ends is
+   * left out. For images that were interpolated to smaller pixels than were measured.
+   *
+   * @param factors - Voxels along x, y and z that become one, 1 to 16 each.
+   * @throws {@link VesicleError} `invalid-argument`: a factor out of range, or beyond the volume; `too-large`.
+   */
+  binned(factors: Vec3): Volume {
+    const counts = Uint32Array.from(numbers('factors', factors, 3), (factor) => whole('factors', factor, { min: 1 }));
+    return wrap(() => this.#handle.use((raw) => raw.binned(counts)));
+  }
+
+  /**
    * In-between slices along the axis of the largest spacing, by symmetric optical flow between neighbours, for all frames.
    * The slices that were there stay as they are, at their places; voxels keep their type.
    *

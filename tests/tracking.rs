@@ -109,6 +109,87 @@ fn a_mesh_of_ones_own_is_followed_and_the_component_is_chosen() {
 }
 
 #[test]
+fn a_cycle_closes_and_volumes_come_with_the_frames() {
+    let cine = Cine::small();
+    let mut tracker = SurfaceTracker::new(options(&cine, cine.volume())).unwrap();
+    let mut progress = 0.0;
+    while !tracker.is_done() {
+        assert!(tracker.closing().is_none());
+        let report = tracker.step().unwrap();
+        assert!(report.progress > progress, "{} {progress}", report.progress);
+        progress = report.progress;
+    }
+    assert!((progress - 1.0).abs() < 1e-12);
+    let closing = tracker.closing().unwrap();
+    assert!(closing > 0.0 && closing < 0.3 * cine.spacing.x, "{closing}");
+    for (facts, mesh) in tracker.facts().iter().zip(tracker.meshes()) {
+        let found = measure(mesh);
+        assert_eq!((facts.volume, facts.area, facts.triangles), (found.volume, found.area, found.triangles));
+    }
+    assert_eq!(tracker.frame(), cine.frames - 1);
+}
+
+#[test]
+fn a_saved_run_goes_on_with_the_same_bits() {
+    let cine = Cine::small().first(4);
+    let volume = cine.volume();
+    let new = || {
+        let mut options = open_ended(&cine);
+        options.volume = volume.clone();
+        SurfaceTracker::new(options).unwrap()
+    };
+    let mut whole = new();
+    let mut steps = 0;
+    while !whole.is_done() {
+        whole.step().unwrap();
+        steps += 1;
+    }
+    for before in [0, 2, 4, 5, 7, steps] {
+        let mut first = new();
+        (0..before).for_each(|_| drop(first.step().unwrap()));
+        let saved = first.save();
+        let mut second = new();
+        second.step().unwrap();
+        second.restore(&saved).unwrap();
+        assert!(second.save() == saved, "{before}");
+        while !second.is_done() {
+            second.step().unwrap();
+        }
+        assert_eq!(second.facts(), whole.facts(), "{before}");
+        assert!(second.meshes() == whole.meshes(), "{before}");
+    }
+    let saved = whole.save();
+    let mut tracker = new();
+    let other = Cine { noise: 1.0, ..cine };
+    let mut stranger = SurfaceTracker::new(open_ended(&other)).unwrap();
+    assert!(matches!(stranger.restore(&saved), Err(MethodError::BadState { .. })));
+    for cut in [0, 7, 30, saved.len() / 2, saved.len() - 1] {
+        assert!(matches!(tracker.restore(&saved[..cut]), Err(MethodError::BadState { .. })));
+    }
+    assert!(tracker.meshes().is_empty() && tracker.step().is_ok());
+}
+
+#[test]
+fn parameters_of_the_boundary_begin_again_and_the_others_go_on() {
+    let cine = Cine::small().first(3);
+    let mut tracker = SurfaceTracker::new(open_ended(&cine)).unwrap();
+    (0..4).for_each(|_| drop(tracker.step().unwrap()));
+    let params = TrackingParams { damping: 0.8, prediction: false, ..tracker.params().clone() };
+    tracker.set_params(params).unwrap();
+    assert_eq!(tracker.meshes().len(), 1);
+    tracker.step().unwrap();
+    assert_eq!(tracker.meshes().len(), 2);
+    let refused = tracker.set_params(TrackingParams { threshold: -1.0, ..tracker.params().clone() });
+    assert!(refused.is_err() && tracker.meshes().len() == 2);
+    tracker.set_params(TrackingParams { threshold: 60.0, ..tracker.params().clone() }).unwrap();
+    assert!(tracker.meshes().is_empty() && tracker.mesh().vertex_count() == 0 && tracker.bounded() == 0);
+    while !tracker.is_done() {
+        tracker.step().unwrap();
+    }
+    assert!(errors(&cine, tracker.meshes()).iter().all(|error| *error < 0.3 * cine.spacing.x));
+}
+
+#[test]
 fn what_cannot_be_tracked_is_refused_by_name() {
     let cine = Cine::small().first(2);
     let volume = cine.volume();

@@ -533,3 +533,16 @@ fn direction_of(values: &[f64]) -> Result<Vec3, Failure> {
     // Scaled first: squares of very long and very short ones leave the range of numbers.
     Ok((given / largest).normalize_or_zero().as_vec3())
 }
+
+/// The triangles of a mesh, copied out of it for a model to keep.
+#[wasm_bindgen]
+pub struct TrianglesOf(pub(super) TriangleMesh);
+
+#[wasm_bindgen]
+impl TrianglesOf {
+    /// Those of `mesh` as it is now.
+    #[wasm_bindgen(constructor)]
+    pub fn new(mesh: &RawMesh) -> TrianglesOf {
+        TrianglesOf((*mesh.triangles()).clone())
+    }
+}

@@ -10,6 +10,7 @@ mod error;
 mod implicit;
 mod mesh;
 mod multires;
+mod tracking;
 mod volume;
 
 use wasm_bindgen::prelude::wasm_bindgen;

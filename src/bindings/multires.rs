@@ -9,7 +9,7 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::{bytes, doubles, merged, now, to_js};
 use super::error::Failure;
-use super::mesh::{Body, Live, RawMesh};
+use super::mesh::{Body, Live, RawMesh, TrianglesOf};
 use crate::mesh::TriangleMesh;
 use crate::methods::multires::{
     ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, param_specs,
@@ -171,19 +171,6 @@ struct Facts {
     folded: usize,
     missed: usize,
     held: usize,
-}
-
-/// The triangles of a mesh, copied out of it for a model to keep.
-#[wasm_bindgen]
-pub struct TrianglesOf(TriangleMesh);
-
-#[wasm_bindgen]
-impl TrianglesOf {
-    /// Those of `mesh` as it is now.
-    #[wasm_bindgen(constructor)]
-    pub fn new(mesh: &RawMesh) -> TrianglesOf {
-        TrianglesOf((*mesh.triangles()).clone())
-    }
 }
 
 /// Ellipsoids packed in twelves: the middle, and the three semi-axes.

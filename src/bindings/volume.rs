@@ -121,6 +121,18 @@ impl RawVolume {
         Ok(levels.into_iter().map(RawVolume).collect())
     }
 
+    /// Seconds from one frame to the next; 0 where there is no such time.
+    #[wasm_bindgen(js_name = frameSeconds)]
+    pub fn frame_seconds(&self) -> f64 {
+        self.0.frame_seconds()
+    }
+
+    /// Means of blocks of voxels.
+    pub fn binned(&self, factors: &[u32]) -> Result<RawVolume, JsValue> {
+        let factors = [0, 1, 2].map(|axis| factors.get(axis).map_or(1, |&n| n as usize));
+        Ok(RawVolume(self.0.binned(factors).map_err(Failure::from)?))
+    }
+
     /// In-between slices, by optical flow or as means.
     #[wasm_bindgen(js_name = enrichSlices)]
     pub fn enrich_slices(&self, factor: Option<usize>, flow: bool) -> Result<RawVolume, JsValue> {

@@ -85,6 +85,8 @@ pub enum ParamKind {
     Integer,
     /// One of the choices.
     Choice,
+    /// On or off.
+    Boolean,
 }
 
 /// The default of a parameter.
@@ -95,6 +97,8 @@ pub enum ParamDefault {
     Number(f64),
     /// One of the choices.
     Choice(&'static str),
+    /// On or off.
+    Boolean(bool),
     /// Taken from the data; `null` for the reader.
     FromData,
 }

@@ -21,6 +21,7 @@
 //! # Ok::<(), vesicle::volume::VolumeError>(())
 //! ```
 
+mod binning;
 mod contour;
 mod cube_cases;
 mod enrich;

@@ -1,10 +1,13 @@
 //! From one frame to the next (section 4): prediction, projection, what has no boundary any more, and connectivity.
 
+use super::TrackingParams;
 use super::project::Moment;
 use super::region::Region;
 use crate::math::Vec3;
-use crate::mesh::{Mesh, VertexId};
+use crate::mesh::{Mesh, TriangleMesh, VertexId, measure};
 use crate::remesh::{Changes, EdgeBounds, Embedding, restructure};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// How often predictions are smoothed over the mesh: raw, they are worse than none.
 const SMOOTHINGS: usize = 5;
@@ -24,9 +27,17 @@ const LEAST_STEP: f64 = 0.3;
 /// By how much of the way to the middle of their neighbours vertices are spaced along the surface in a frame.
 const SPACING: f32 = 0.5;
 
-/// What happened in a frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// What happened in a frame, and what came out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FrameFacts {
+    /// What the surface encloses, cubed world units.
+    pub volume: f64,
+    /// Its area, squared world units.
+    pub area: f64,
+    /// Its triangles.
+    pub triangles: usize,
+    /// Those that face away from their three neighbours.
+    pub folded: usize,
     /// Projections that led nowhere, or too far.
     pub rejected: usize,
     /// Moves that were held back, so that nothing crosses.
@@ -39,20 +50,47 @@ pub struct FrameFacts {
     pub correction: f64,
 }
 
+/// Into which frame it goes, and by what.
+pub(super) struct Going<'a> {
+    pub region: &'a Region,
+    pub params: &'a TrackingParams,
+    pub frame: usize,
+    /// What is around that frame.
+    pub into: &'a Moment,
+}
+
 /// Takes one mesh, in the world, through the frames.
 #[derive(Clone, Debug)]
 pub(super) struct Follower {
     guard: Embedding,
+    /// The mean edge of the first frame's mesh.
+    pub edge: f64,
     bounds: EdgeBounds,
 }
 
 impl Follower {
-    pub fn new(bounds: EdgeBounds) -> Self {
-        Self { guard: Embedding::default(), bounds }
+    pub fn new(edge: f64) -> Self {
+        Self { guard: Embedding::default(), edge, bounds: EdgeBounds { min: 0.0, max: 0.0 } }
+    }
+
+    /// Into the next frame, from what is around the one before where there is one.
+    pub fn go(&mut self, mesh: &mut Mesh, from: Option<&Moment>, going: &Going) -> (Changes, FrameFacts) {
+        let mut facts = FrameFacts::default();
+        let bound = |share: f64| (share * self.edge) as f32;
+        self.bounds = EdgeBounds { min: bound(going.params.edge_min), max: bound(going.params.edge_max) };
+        if let (Some(from), true) = (from, going.params.prediction) {
+            self.predict(mesh, going.region, from, &mut facts);
+        }
+        let changes = self.settle(mesh, going, &mut facts);
+        let triangles = mesh.to_triangles();
+        let measured = measure(&triangles);
+        (facts.volume, facts.area, facts.triangles) = (measured.volume, measured.area, measured.triangles);
+        facts.folded = folded(&triangles);
+        (changes, facts)
     }
 
     /// On to where the surface is going to be in the next frame, by how it passes through `moment`.
-    pub fn predict(&mut self, mesh: &mut Mesh, region: &Region, moment: &Moment, facts: &mut FrameFacts) {
+    fn predict(&mut self, mesh: &mut Mesh, region: &Region, moment: &Moment, facts: &mut FrameFacts) {
         let mut ways = vec![Vec3::ZERO; mesh.slots()];
         for v in mesh.vertices() {
             let at = region.place(mesh.position(v));
@@ -66,23 +104,16 @@ impl Follower {
     }
 
     /// Onto the surface of a frame, with edges in bounds.
-    pub fn settle(
-        &mut self,
-        mesh: &mut Mesh,
-        region: &Region,
-        frame: usize,
-        moment: &Moment,
-        facts: &mut FrameFacts,
-    ) -> Changes {
+    fn settle(&mut self, mesh: &mut Mesh, going: &Going, facts: &mut FrameFacts) -> Changes {
         let mut changes = Changes::default();
         for round in 0..ROUNDS {
-            self.project(mesh, region, moment, facts);
+            self.project(mesh, going.region, going.into, facts);
             if round + 1 < ROUNDS {
                 changes += restructure(mesh, self.bounds, &mut self.guard);
                 self.space(mesh);
             }
         }
-        changes += self.retract(mesh, region, frame, facts);
+        changes += self.retract(mesh, going.region, going.frame, facts);
         changes
     }
 
@@ -179,4 +210,19 @@ fn filled(mesh: &Mesh, ways: &[Option<Vec3>]) -> Vec<Vec3> {
         });
     }
     out
+}
+
+/// Triangles that face away from the sum of their three neighbours.
+fn folded(mesh: &TriangleMesh) -> usize {
+    let normals: Vec<Vec3> = mesh.corners().map(|[a, b, c]| (b - a).cross(c - a)).collect();
+    // The triangle to the left of each edge, from end to end.
+    let left: BTreeMap<[u32; 2], usize> = (mesh.triangles.iter().enumerate())
+        .flat_map(|(t, &[a, b, c])| [([a, b], t), ([b, c], t), ([c, a], t)])
+        .collect();
+    let faces_away = |t: usize| {
+        let [a, b, c] = mesh.triangles[t];
+        let across = [[b, a], [c, b], [a, c]].map(|edge| left.get(&edge).map_or(Vec3::ZERO, |&t| normals[t]));
+        across.into_iter().fold(Vec3::ZERO, |sum, normal| sum + normal).dot(normals[t]) < 0.0
+    };
+    (0..normals.len()).filter(|&t| faces_away(t)).count()
 }

@@ -21,6 +21,8 @@ mod params;
 mod project;
 mod region;
 mod samples;
+mod start;
+mod state;
 mod vote;
 
 pub use follow::FrameFacts;
@@ -28,11 +30,11 @@ pub use params::{TrackingParams, param_specs};
 
 use super::{MethodError, StepReport, Times};
 use crate::math::{DVec3, Vec3};
-use crate::mesh::{Mesh, MeshError, TriangleMesh, VertexId, count_crossings, measure};
-use crate::remesh::{Changes, EdgeBounds, remesh};
+use crate::mesh::{Mesh, TriangleMesh, measure};
+use crate::remesh::Changes;
+use crate::spatial::surface_distance;
 use crate::volume::Volume;
-use first::bright_surface;
-use follow::Follower;
+use follow::{Follower, Going};
 use project::Moment;
 use region::Region;
 use samples::{Falloff, Field};
@@ -63,12 +65,6 @@ pub struct TrackingOptions {
     pub params: TrackingParams,
 }
 
-/// Edges of the first frame's mesh, in the shortest side of a voxel.
-const EDGE: f64 = 1.2;
-
-/// Their bounds, in that length.
-const EDGE_SPREAD: f32 = 1.5;
-
 /// A step of a projection as short as this is the last, in the shortest side of a voxel.
 const STILL: f64 = 0.012;
 
@@ -80,8 +76,11 @@ const LONGEST: f64 = 4.8;
 pub struct SurfaceTracker {
     region: Region,
     component: Component,
+    /// The caller's mesh; empty without.
+    start: Mesh,
     params: TrackingParams,
-    noise: f64,
+    /// Of the volume: the shortest side of a voxel, the noise and the range of intensities.
+    image: ImageFacts,
     voting: Voting,
     /// By frame, as far as they are found.
     faces: Vec<Faces>,
@@ -92,8 +91,20 @@ pub struct SurfaceTracker {
     /// By frame, in the world.
     meshes: Vec<TriangleMesh>,
     facts: Vec<FrameFacts>,
+    closing: Option<f64>,
     steps: u32,
     clock: fn() -> f64,
+}
+
+/// What parameters are taken from where none are given.
+#[derive(Clone, Copy, Debug)]
+struct ImageFacts {
+    /// The shortest side of a voxel.
+    pixel: f64,
+    /// The standard deviation of the noise, in intensity.
+    noise: f64,
+    /// The range of intensities.
+    range: f64,
 }
 
 impl SurfaceTracker {
@@ -110,48 +121,85 @@ impl SurfaceTracker {
             let problem = "it has one frame; a 4D volume of two frames or more is needed";
             return Err(MethodError::invalid("volume", problem));
         }
-        let spacing = volume.spacing();
-        let pixel = spacing.into_iter().fold(f64::INFINITY, f64::min);
+        let pixel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         // Room for windows and planes beyond the box.
         let margin = if params.radius > 0.0 { params.radius } else { LONGEST * pixel };
-        let mut region = Region::new(&volume, bounds, margin)?;
-        let noise = region.noise() * region.step;
-        let params = params.with_volume(pixel, noise, volume.span());
-        check_radius(&params, spacing)?;
-        region.threshold = params.threshold / region.step;
-        let mesh = match &start {
-            Some(start) => start_mesh(start)?,
-            None => Mesh::default(),
-        };
-        let frames = region.frames.len();
-        let window = Window {
-            reach: params.window as usize,
-            frames: params.window_frames as usize,
-            threshold: region.threshold,
-            cyclic: params.cyclic,
-        };
-        Ok(Self {
-            voting: Voting::new(window, frames),
+        let region = Region::new(&volume, bounds, margin)?;
+        let image = ImageFacts { pixel, noise: region.noise() * region.step, range: volume.span() };
+        let start = start.as_ref().map_or(Ok(Mesh::default()), start::checked)?;
+        let mut tracker = Self {
+            voting: Voting::new(Window::default(), 0),
+            mesh: start.clone(),
             region,
             component,
-            params,
-            noise,
+            start,
+            params: TrackingParams::default(),
+            image,
             faces: Vec::new(),
             follower: None,
             moment: None,
-            mesh,
             meshes: Vec::new(),
             facts: Vec::new(),
+            closing: None,
             steps: 0,
             clock: || 0.0,
-        })
+        };
+        tracker.params = tracker.completed(params)?;
+        tracker.begin();
+        Ok(tracker)
+    }
+
+    /// Parameters, checked, with what is taken from the volume.
+    fn completed(&self, params: TrackingParams) -> Result<TrackingParams, MethodError> {
+        params.validate()?;
+        let ImageFacts { pixel, noise, range } = self.image;
+        let params = params.with_volume(pixel, noise, range);
+        let most = samples::MOST / 2 - 1;
+        let longest = pixel * most as f64;
+        if params.radius < pixel || params.radius > longest {
+            let problem =
+                format!("{} given, {pixel} to {longest} (1 to {most} voxels) accepted", params.radius);
+            return Err(MethodError::invalid("radius", problem));
+        }
+        Ok(params)
+    }
+
+    /// Back before the first step, with the parameters as they are.
+    fn begin(&mut self) {
+        self.region.threshold = self.params.threshold / self.region.step;
+        let window = Window {
+            reach: self.params.window as usize,
+            frames: self.params.window_frames as usize,
+            threshold: self.region.threshold,
+            cyclic: self.params.cyclic,
+        };
+        self.voting = Voting::new(window, self.frames());
+        self.faces.clear();
+        (self.follower, self.moment, self.closing) = (None, None, None);
+        self.meshes.clear();
+        self.facts.clear();
+        let replaced = std::mem::replace(&mut self.mesh, self.start.clone());
+        self.mesh.count_on_from(&replaced);
+    }
+
+    /// Live parameters. Those of the boundary (`threshold`, `window`, `windowFrames`, `cyclic`) begin everything again; the
+    /// others hold from the next frame on.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`], and nothing has changed.
+    pub fn set_params(&mut self, params: TrackingParams) -> Result<(), MethodError> {
+        let params = self.completed(params)?;
+        let stands = params.same_boundary(&self.params);
+        self.params = params;
+        if !stands {
+            self.begin();
+        }
+        Ok(())
     }
 
     /// Times are told by this clock, in milliseconds.
-    #[must_use]
-    pub fn with_clock(mut self, clock: fn() -> f64) -> Self {
+    pub fn set_clock(&mut self, clock: fn() -> f64) {
         self.clock = clock;
-        self
     }
 
     /// Parameters, with what was taken from the volume.
@@ -161,7 +209,7 @@ impl SurfaceTracker {
 
     /// The standard deviation of the noise, in intensity.
     pub fn noise(&self) -> f64 {
-        self.noise
+        self.image.noise
     }
 
     /// The surface in the newest frame, in the world.
@@ -169,7 +217,7 @@ impl SurfaceTracker {
         &self.mesh
     }
 
-    /// The surfaces of the frames so far, in the world.
+    /// The surfaces of the frames so far, in the world: positions and triangles.
     pub fn meshes(&self) -> &[TriangleMesh] {
         &self.meshes
     }
@@ -179,9 +227,25 @@ impl SurfaceTracker {
         &self.facts
     }
 
+    /// The frame that the mesh is of: 0 before the first, too.
+    pub fn frame(&self) -> usize {
+        self.meshes.len().saturating_sub(1)
+    }
+
     /// The volumes that the surfaces of the frames so far enclose, in cubed world units.
     pub fn volumes(&self) -> Vec<f64> {
-        self.meshes.iter().map(|mesh| measure(mesh).volume).collect()
+        self.facts.iter().map(|facts| facts.volume).collect()
+    }
+
+    /// Of a cyclic sequence: how far the surface of the last frame, taken on to the first, is from the first frame's in the
+    /// mean, world units; once it is known.
+    pub fn closing(&self) -> Option<f64> {
+        self.closing
+    }
+
+    /// So many frames, from the first on, have their boundary.
+    pub fn bounded(&self) -> usize {
+        self.faces.len()
     }
 
     /// The boundary's points in a frame, as far as they are found: x, y, z in the world, t in frames, and the weight.
@@ -198,12 +262,13 @@ impl SurfaceTracker {
         points
     }
 
-    /// Whether all frames are done.
+    /// Whether all frames are done, and a cycle is closed.
     pub fn is_done(&self) -> bool {
-        self.meshes.len() == self.frames()
+        self.meshes.len() == self.frames() && (self.closing.is_some() || !self.params.cyclic)
     }
 
-    /// Finds the boundary in one more frame; then follows the surface into one more frame.
+    /// Finds the boundary in one more frame; then follows the surface into one more frame; at last, in a cyclic sequence,
+    /// from the last to the first.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] where there is no boundary at all, or no surface; [`MethodError::TooManyVertices`].
@@ -216,42 +281,52 @@ impl SurfaceTracker {
             let faces = self.voting.faces(&self.region, frame);
             self.faces.push(faces);
             times.add("boundary", (self.clock)() - began);
-        } else if !self.is_done() {
+        } else if self.meshes.len() < self.frames() {
             changes = self.next_frame()?;
             times.add("surface", (self.clock)() - began);
+        } else if !self.is_done() {
+            self.close();
+            times.add("closing", (self.clock)() - began);
         }
         self.steps += 1;
         Ok(self.report(changes, times))
     }
 
-    fn frames(&self) -> usize {
+    /// Frames of the volume.
+    pub fn frames(&self) -> usize {
         self.region.frames.len()
     }
 
     /// The surface in the next frame; where it fails, nothing has changed.
     fn next_frame(&mut self) -> Result<Changes, MethodError> {
         let frame = self.meshes.len();
-        let mut facts = FrameFacts::default();
         let mut follower = match self.follower.take() {
             Some(follower) => follower,
             None => {
                 self.find_first_mesh()?;
-                let mean = measure(&self.mesh.to_triangles()).edge_mean;
-                let [min, max] =
-                    [self.params.edge_min, self.params.edge_max].map(|share| (share * mean) as f32);
-                Follower::new(EdgeBounds { min, max })
+                Follower::new(measure(&self.mesh.to_triangles()).edge_mean)
             }
         };
         // There is one around every frame that was done.
-        if let Some(moment) = self.moment.take() {
-            follower.predict(&mut self.mesh, &self.region, &moment, &mut facts);
-        }
-        let moment = self.moment_of(frame);
-        let changes = follower.settle(&mut self.mesh, &self.region, frame, &moment, &mut facts);
-        (self.follower, self.moment) = (Some(follower), Some(moment));
-        self.meshes.push(self.mesh.to_triangles());
+        let from = self.moment.take();
+        let into = self.moment_of(frame);
+        let going = Going { region: &self.region, params: &self.params, frame, into: &into };
+        let (changes, facts) = follower.go(&mut self.mesh, from.as_ref(), &going);
+        (self.follower, self.moment) = (Some(follower), Some(into));
+        self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
         self.facts.push(facts);
         Ok(changes)
+    }
+
+    /// From the last frame on to the first: a cycle's surface should come back to where it began.
+    fn close(&mut self) {
+        let (Some(mut follower), Some(first)) = (self.follower.clone(), self.meshes.first()) else { return };
+        let mut mesh = self.mesh.clone();
+        let into = self.moment_of(0);
+        let going = Going { region: &self.region, params: &self.params, frame: 0, into: &into };
+        follower.go(&mut mesh, self.moment.as_ref(), &going);
+        let apart = surface_distance(&mesh.to_triangles(), first);
+        self.closing = Some(apart.map_or(f64::INFINITY, |distance| distance.mean));
     }
 
     /// What is around a frame.
@@ -275,74 +350,24 @@ impl SurfaceTracker {
         Falloff { radius: self.params.radius, time_scale: self.params.time_scale }
     }
 
-    /// The mesh to begin with, in the world, where none was given.
-    fn find_first_mesh(&mut self) -> Result<(), MethodError> {
-        if self.mesh.vertex_count() > 0 {
-            return Ok(());
-        }
-        if self.faces.iter().flatten().all(Vec::is_empty) {
-            let largest = self.voting.largest_refused * self.region.step;
-            let problem = format!(
-                "{} given, no boundary found: the largest step in the box is {largest:.4}; less than that is needed",
-                self.params.threshold
-            );
-            return Err(MethodError::invalid("threshold", problem));
-        }
-        let levels = self.voting.levels(&self.region, 0);
-        let surface = bright_surface(&self.region, &self.faces[0], &levels, self.falloff())?;
-        if surface.triangles.is_empty() {
-            let problem = "no surface is in the first frame; choose a larger box, or a lower threshold";
-            return Err(MethodError::invalid("box", problem));
-        }
-        let mut mesh = Mesh::from_triangles(&surface)?;
-        self.keep_component(&mut mesh);
-        let edge = (EDGE * self.region.spacing.min_element()) as f32;
-        remesh(&mut mesh, EdgeBounds { min: edge / EDGE_SPREAD, max: edge * EDGE_SPREAD })?;
-        self.mesh = mesh;
-        Ok(())
-    }
-
-    /// Removes all components but the one that is followed.
-    fn keep_component(&self, mesh: &mut Mesh) {
-        let mut left: Vec<VertexId> = mesh.vertices().collect();
-        let mut parts: Vec<(VertexId, f64)> = Vec::new();
-        while let Some(&first) = left.first() {
-            let members = mesh.component_of(first, usize::MAX);
-            let score = match self.component {
-                Component::Largest => -(members.len() as f64),
-                Component::Nearest(p) => {
-                    let away = |v: &VertexId| mesh.position(*v).as_dvec3().distance(p);
-                    members.iter().map(away).fold(f64::INFINITY, f64::min)
-                }
-            };
-            parts.push((first, score));
-            let mut is_member = vec![false; mesh.slots()];
-            members.iter().for_each(|v| is_member[v.index()] = true);
-            left.retain(|v| !is_member[v.index()]);
-        }
-        let best = parts.iter().map(|part| part.1).fold(f64::INFINITY, f64::min);
-        let kept = parts.iter().position(|part| part.1 == best);
-        for (k, (v, _)) in parts.iter().enumerate() {
-            if Some(k) != kept {
-                mesh.remove_component(*v);
-            }
-        }
-    }
-
     fn report(&self, events: Changes, times: Times) -> StepReport {
         let frames = self.frames();
         let (found, done) = (self.faces.len(), self.meshes.len());
-        let phase = if found < frames {
-            format!("boundary, frame {} of {frames}", found)
-        } else {
+        let phase = if self.closing.is_some() {
+            "surface, back in the first frame".into()
+        } else if done > 0 {
             format!("surface, frame {done} of {frames}")
+        } else {
+            format!("boundary, frame {found} of {frames}")
         };
+        let closing = usize::from(self.params.cyclic);
+        let steps_done = found + done + usize::from(self.closing.is_some());
         let measured = measure(&self.mesh.to_triangles());
         StepReport {
             iteration: self.steps,
             done: self.is_done(),
             phase,
-            progress: (found + done) as f64 / (2 * frames) as f64,
+            progress: steps_done as f64 / (2 * frames + closing) as f64,
             residual: self.facts.last().map_or(f64::NAN, |facts| facts.correction),
             tolerance: STILL * self.region.spacing.min_element(),
             vertices: self.mesh.vertex_count() as u32,
@@ -353,37 +378,6 @@ impl SurfaceTracker {
             times,
         }
     }
-}
-
-/// A mesh of the caller's, as it is.
-fn start_mesh(start: &TriangleMesh) -> Result<Mesh, MethodError> {
-    if start.triangles.is_empty() {
-        return Err(MethodError::invalid("start", "the mesh is empty; a closed surface is needed"));
-    }
-    let mesh = Mesh::from_triangles(start)?;
-    if measure(start).volume <= 0.0 {
-        let problem = "the triangles face inwards; counter-clockwise seen from outside is needed";
-        return Err(MethodError::invalid("start", problem));
-    }
-    match count_crossings(start) {
-        0 => Ok(mesh),
-        pairs => Err(MeshError::SelfIntersecting { pairs }.into()),
-    }
-}
-
-/// Sums run over so many voxels along an axis at the most.
-fn check_radius(params: &TrackingParams, spacing: [f64; 3]) -> Result<(), MethodError> {
-    let least = spacing.into_iter().fold(f64::INFINITY, f64::min);
-    let most = least * (samples::MOST / 2 - 1) as f64;
-    if params.radius >= least && params.radius <= most {
-        return Ok(());
-    }
-    let problem = format!(
-        "{} given, {least} to {most} (1 to {} voxels) accepted",
-        params.radius,
-        samples::MOST / 2 - 1
-    );
-    Err(MethodError::invalid("radius", problem))
 }
 
 impl Region {

@@ -23,6 +23,8 @@ pub struct TrackingParams {
     pub edge_min: f64,
     /// c_max: longer edges are split, in the same.
     pub edge_max: f64,
+    /// Whether a frame begins where the surface is going from the one before; else where it was.
+    pub prediction: bool,
     /// Whether the last frame is followed by the first.
     pub cyclic: bool,
 }
@@ -38,6 +40,7 @@ impl Default for TrackingParams {
             damping: 0.9,
             edge_min: 0.25,
             edge_max: 1.5,
+            prediction: true,
             cyclic: false,
         }
     }
@@ -81,6 +84,12 @@ impl TrackingParams {
         [threshold, window, frames, radius, time_scale, damping, edge_min, edge_max]
     }
 
+    /// Whether the boundary that was found under others still stands.
+    pub(super) fn same_boundary(&self, others: &Self) -> bool {
+        let key = |p: &Self| (p.threshold.to_bits(), p.window, p.window_frames, p.cyclic);
+        key(self) == key(others)
+    }
+
     /// With what the volume says where nothing is given: the length of a pixel, the noise and the range of intensities.
     pub(super) fn with_volume(mut self, pixel: f64, noise: f64, range: f64) -> Self {
         let or = |value: f64, usual: f64| if value == 0.0 { usual } else { value };
@@ -112,7 +121,9 @@ const COUNT: ParamSpec = ParamSpec {
     ..ParamSpec::NUMBER
 };
 
-const SPECS: [ParamSpec; 8] = [
+const SWITCH: ParamSpec = ParamSpec { kind: ParamKind::Boolean, ..ParamSpec::NUMBER };
+
+const SPECS: [ParamSpec; 10] = [
     ParamSpec {
         name: "threshold",
         label: "Step height",
@@ -186,5 +197,19 @@ const SPECS: [ParamSpec; 8] = [
         max: Some(10.0),
         step: Some(0.1),
         ..ParamSpec::NUMBER
+    },
+    ParamSpec {
+        name: "prediction",
+        label: "Prediction",
+        help: "A frame begins where the surface is going by how it passes through time; else where it was.",
+        default: ParamDefault::Boolean(true),
+        ..SWITCH
+    },
+    ParamSpec {
+        name: "cyclic",
+        label: "Cyclic",
+        help: "The last frame is followed by the first, as in a heartbeat; at the end the surface is taken back there.",
+        default: ParamDefault::Boolean(false),
+        ..SWITCH
     },
 ];

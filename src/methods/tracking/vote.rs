@@ -1,6 +1,7 @@
 //! Where windows of the image fall into two clusters, and votes for the faces between them (section 2).
 
 use super::region::Region;
+use serde::{Deserialize, Serialize};
 
 /// No level: this window has no boundary in it. Levels of intensity end below.
 const NONE: u8 = u8::MAX;
@@ -15,7 +16,7 @@ const LEAST_SHARE: f64 = 0.1;
 const ITERATIONS: usize = 50;
 
 /// What a window is, and when its clusters count.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Window {
     /// Voxels to either side of the middle.
     pub reach: usize,
@@ -34,7 +35,7 @@ pub(super) const Z: usize = 2;
 pub(super) const TIME: usize = 3;
 
 /// A face with votes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Face {
     /// Index of the voxel before it; the other one comes next along the direction.
     pub voxel: u32,

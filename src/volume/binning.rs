@@ -1,0 +1,147 @@
+//! Fewer, larger voxels: means of blocks.
+
+use super::error::{VolumeError, reserve};
+use super::{Volume, VolumeInit};
+use crate::math::{DAffine3, DMat3, DVec3};
+
+/// Most voxels of one along an axis.
+const MOST: usize = 16;
+
+impl Volume {
+    /// The volume with means of `factors` voxels along x, y and z as its voxels, in all frames; numbers keep their type. What
+    /// is left over at the far ends is left out.
+    ///
+    /// Images that were interpolated to smaller pixels than were measured, as magnetic resonance often is, say as much with fewer
+    /// voxels, and windows of as many voxels reach further.
+    ///
+    /// # Errors
+    /// A factor not in 1..=16, or larger than the volume along its axis; [`VolumeError::TooLarge`].
+    pub fn binned(&self, factors: [usize; 3]) -> Result<Volume, VolumeError> {
+        let dims = self.dims();
+        if (0..3).any(|axis| !(1..=MOST).contains(&factors[axis]) || factors[axis] > dims[axis]) {
+            let problem = format!(
+                "{factors:?} given; 1 to {MOST}, and no more than there are voxels ({dims:?}), is accepted"
+            );
+            return Err(VolumeError::invalid("factors", problem));
+        }
+        let [nx, ny, nz] = [0, 1, 2].map(|axis| dims[axis] / factors[axis]);
+        let mut values = reserve(nx * ny * nz * self.frames())?;
+        for frame in 0..self.frames() {
+            let start = self.frame_start(frame)?;
+            for block in 0..nx * ny * nz {
+                let first =
+                    [block % nx * factors[0], block / nx % ny * factors[1], block / (nx * ny) * factors[2]];
+                values.push(self.block_mean(start, first, factors));
+            }
+        }
+        let ratio = DVec3::from(factors.map(|factor| factor as f64));
+        let index_map =
+            DAffine3 { matrix3: DMat3::from_diagonal(ratio), translation: (ratio - DVec3::ONE) * 0.5 };
+        let volume = Volume::new(VolumeInit {
+            voxels: self.voxels.like(&values)?,
+            dims: [nx, ny, nz, self.frames()],
+            affine: self.affine * index_map,
+            slope: self.slope,
+            intercept: self.intercept,
+            frame_seconds: self.frame_seconds,
+            space: self.space,
+        })?;
+        Ok(volume.with_unit(self.unit))
+    }
+
+    /// The mean of the numbers in a block that are numbers, as they are stored; not a number where there are none.
+    fn block_mean(&self, start: usize, first: [usize; 3], size: [usize; 3]) -> f64 {
+        let [nx, ny, _] = self.dims();
+        let (mut sum, mut count) = (0.0, 0.0);
+        for z in first[2]..first[2] + size[2] {
+            for y in first[1]..first[1] + size[1] {
+                for x in first[0]..first[0] + size[0] {
+                    let value = self.voxels.get(start + (z * ny + y) * nx + x).unwrap_or(f64::NAN);
+                    if value.is_finite() {
+                        sum += value;
+                        count += 1.0;
+                    }
+                }
+            }
+        }
+        sum / count
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::{Space, Voxels};
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// A ramp in the world's x + 10 y + 100 z, doubled in the second frame.
+    fn ramp() -> Volume {
+        let affine = DAffine3 {
+            matrix3: DMat3::from_diagonal(DVec3::new(1.0, 2.0, 5.0)),
+            translation: DVec3::new(3.0, -4.0, 7.0),
+        };
+        let mut values = Vec::new();
+        for frame in 1..=2 {
+            for i in 0..7 * 6 * 4 {
+                let at =
+                    affine.transform_point3(DVec3::new((i % 7) as f64, (i / 7 % 6) as f64, (i / 42) as f64));
+                values.push(((at.x + 10.0 * at.y + 100.0 * at.z) * f64::from(frame)) as f32);
+            }
+        }
+        Volume::new(VolumeInit {
+            voxels: Voxels::F32(values),
+            dims: [7, 6, 4, 2],
+            affine,
+            slope: 1.0,
+            intercept: 0.0,
+            frame_seconds: 0.5,
+            space: Space::Lps,
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn means_lie_in_the_middle_of_their_blocks() {
+        let volume = ramp();
+        let binned = volume.binned([2, 3, 1]).unwrap();
+        assert_eq!((binned.dims(), binned.frames()), ([3, 2, 4], 2));
+        assert_eq!(binned.spacing(), [2.0, 6.0, 5.0]);
+        assert_eq!((binned.frame_seconds(), binned.space()), (0.5, Space::Lps));
+        for frame in 0..2 {
+            for index in [[0, 0, 0], [2, 1, 3], [1, 0, 2]] {
+                let at = binned.affine().transform_point3(DVec3::from(index.map(f64::from)));
+                let there = (at.x + 10.0 * at.y + 100.0 * at.z) * (frame + 1) as f64;
+                assert!((binned.sample(at, frame).unwrap() - there).abs() < 1e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn types_stay_and_what_is_no_number_is_left_out() {
+        let init = |voxels, dims| VolumeInit {
+            voxels,
+            dims,
+            affine: DAffine3::IDENTITY,
+            slope: 2.0,
+            intercept: 1.0,
+            frame_seconds: 0.0,
+            space: Space::Ras,
+        };
+        let whole = Volume::new(init(Voxels::U8(vec![1, 2, 4, 9]), [4, 1, 1, 1])).unwrap();
+        let binned = whole.binned([2, 1, 1]).unwrap();
+        assert!(matches!(binned.voxels(), Voxels::U8(_)));
+        assert_eq!(binned.intensities(0).unwrap(), [5.0, 15.0]);
+        let holes = Volume::new(init(Voxels::F32(vec![f32::NAN, 2.0, 4.0, 6.0]), [4, 1, 1, 1])).unwrap();
+        assert_eq!(holes.binned([2, 1, 1]).unwrap().intensities(0).unwrap(), [5.0, 11.0]);
+    }
+
+    #[test]
+    fn factors_out_of_range_are_refused() {
+        let volume = ramp();
+        for factors in [[0, 1, 1], [8, 1, 1], [1, 1, 17]] {
+            let refused = volume.binned(factors).unwrap_err();
+            assert!(refused.to_string().contains("1 to 16"), "{refused}");
+        }
+    }
+}
