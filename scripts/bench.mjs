@@ -1,4 +1,5 @@
-// Times points to a surface, remeshing, sculpting and the head CT, in Node and in Chromium; prints tables and writes bench.json.
+// Times points to a surface, remeshing, sculpting, tracking and the head CT, in Node and in Chromium; prints tables and
+// writes bench.json.
 // `npm run bench -- points` does one of them, and writes nothing.
 import { readFile, writeFile } from 'node:fs/promises';
 import { cpus } from 'node:os';
@@ -26,6 +27,10 @@ const BENCHES = {
     file: BUST,
     inNode: async () => (await import('../bench/skin.mjs')).measure(new Uint8Array(await readFile(at(BUST))), REPEATS),
     rows: skinRows,
+  },
+  track: {
+    inNode: async () => (await import('../bench/track.mjs')).measure(REPEATS),
+    rows: trackRows,
   },
   head: {
     file: SCAN,
@@ -106,6 +111,24 @@ function skinRows({ host, rows }) {
     ];
   };
   return [[host, '', `the middle of ${20 * REPEATS} frames`], ...rows.map(row)];
+}
+
+function trackRows({ host, dims, frames, cubes, run, ratio, trueEjection, bytes }) {
+  const percent = (share) => `${(100 * share).toFixed(1)} %`;
+  const found = `ejected ${percent(run.ejection)} of ${percent(trueEjection)}, folded ${percent(run.folded)} at most`;
+  return [
+    [host, '', `${dims.join(' x ')} voxels, ${frames} frames; best of ${REPEATS}`],
+    ['  marching cubes', seconds(cubes), 'all frames, as they were measured'],
+    ['  enrichment', seconds(run.enrich), 'all frames'],
+    ['  votes', seconds(run.votes), `all frames; ${seconds(run.begin)} before them`],
+    ['  first frame', seconds(run.first), `up to ${run.triangles} triangles`],
+    ['  a tracked frame', seconds(run.frame), `in the middle, ${seconds(run.worst)} the longest`],
+    ['  all surfaces', seconds(run.tracked), `and ${seconds(run.closingTime)} back to the first`],
+    ['  the whole', seconds(run.milliseconds), found],
+    ['  whole / marching cubes', ratio.toFixed(0), `closing ${run.closing.toFixed(2)} mm`],
+    ['  crossing pairs', String(run.selfIntersections), run.closed ? 'closed' : 'NOT CLOSED'],
+    ['  memory', `${(bytes / 1e6).toFixed(0)} MB`, 'of the module, at the end'],
+  ];
 }
 
 function print(rows) {
