@@ -75,6 +75,8 @@ export class Volume {
   intensities(frame?: number): Float32Array;
   /** One volume per level, [0] = this one; smoothed before it is thinned. */
   pyramid(levels: number, options?: { factor?: number }): Volume[];
+  /** Means of blocks of so many voxels along x, y and z, in all frames. */
+  binned(factors: Vec3): Volume;
   /** In-between slices by symmetric optical flow, so that spacing becomes close to isotropic. */
   enrichSlices(options?: { factor?: number; method?: 'flow' | 'linear' }): Volume;
   free(): void;
@@ -216,7 +218,7 @@ export interface ParamSpec {
   unit?: string;
   choices?: string[];
 }
-export function paramSpecs(method: 'deformable' | 'implicit' | 'multires'): ParamSpec[];
+export function paramSpecs(method: 'deformable' | 'implicit' | 'tracking' | 'multires'): ParamSpec[];
 
 // ── 1. deformable model with automatic topology changes ──────────────────
 export interface DeformableParams {
@@ -322,6 +324,62 @@ export class ImplicitSurface implements Stepper {
   /** f sampled on a grid around the object, so that the deformable model can take over. */
   toVolume(dims: Vec3): Volume;
   colorize(cameras: Camera[]): void;
+  save(): Uint8Array;
+  restore(state: Uint8Array): void;
+  free(): void;
+  [Symbol.dispose](): void;
+}
+
+// ── 3. dynamic surface through a 4D image ────────────────────────────────
+export interface TrackingParams {
+  threshold?: number; // τ, smallest step between the two cluster means, intensity units
+  window?: number; // k: a window is 2k+1 voxels wide
+  windowFrames?: number; // and so many frames to either side
+  radius?: number; // support of the weight θ, world units
+  timeScale?: number; // c, world units per frame
+  damping?: number; // β
+  edgeMin?: number; // c_min, of the first frame's mean edge
+  edgeMax?: number; // c_max
+  prediction?: boolean;
+  cyclic?: boolean;
+}
+export interface TrackingOptions {
+  volume: Volume; // 4D
+  box?: { min: Vec3; max: Vec3 };
+  component?: 'largest' | Vec3; // the surface of interest: largest, or the one nearest a point
+  start?: Mesh; // instead of meshing the first frame
+  params?: TrackingParams;
+}
+export interface FrameFacts {
+  volume: number;
+  area: number;
+  triangles: number;
+  folded: number;
+  rejected: number;
+  held: number;
+  retracted: number;
+  steps: number;
+  correction: number;
+}
+export class SurfaceTracker implements Stepper {
+  constructor(options: TrackingOptions);
+  step(iterations?: number): StepReport; // one frame at a time: of the boundary, then of the surface
+  run(options?: RunOptions): Promise<StepReport>;
+  readonly mesh: Mesh; // of the current frame
+  readonly frame: number;
+  readonly frames: number;
+  readonly noise: number; // standard deviation, intensity units
+  readonly closing: number | undefined; // of a cycle: how far it is from its beginning, world units
+  readonly facts: FrameFacts[];
+  readonly params: Required<TrackingParams>;
+  setParams(params: TrackingParams): void;
+  /** Boundary votes as weighted space-time points: x, y, z, t, w. */
+  boundary(frame?: number): Float32Array;
+  meshAt(frame: number): Mesh;
+  /** Enclosed volume per frame, world units cubed. */
+  volumes(): Float64Array;
+  /** Animated: one node per frame, shown in turn. */
+  toGlb(): Uint8Array;
   save(): Uint8Array;
   restore(state: Uint8Array): void;
   free(): void;

@@ -24,6 +24,8 @@ same<Same<built.DeformableParams, contract.DeformableParams>>(true);
 same<Same<built.Attractor, contract.Attractor>>(true);
 same<Same<built.Camera, contract.Camera>>(true);
 same<Same<built.ImplicitParams, contract.ImplicitParams>>(true);
+same<Same<built.TrackingParams, contract.TrackingParams>>(true);
+same<Same<built.FrameFacts, contract.FrameFacts>>(true);
 same<Same<built.ControlEllipsoid, contract.ControlEllipsoid>>(true);
 same<Same<built.MultiresParams, contract.MultiresParams>>(true);
 
@@ -58,6 +60,9 @@ export const newModel = (options: Own<ModelOptions>) => new built.DeformableMode
 
 type SurfaceOptions = ConstructorParameters<typeof contract.ImplicitSurface>[0];
 export const newSurface = (options: SurfaceOptions) => new built.ImplicitSurface(options);
+
+export const tracker = (tracker: built.SurfaceTracker): contract.SurfaceTracker & built.Stepper => tracker;
+export const newTracker = (options: Own<contract.TrackingOptions>) => new built.SurfaceTracker(options);
 
 export const multires = (model: built.MultiresolutionModel): contract.MultiresolutionModel & built.Stepper => model;
 

@@ -94,6 +94,33 @@ test('slices between thick ones go along with what moves from one to the next', 
   expect(thick.enrichSlices({ factor: 1 }).dims).toEqual(thick.dims);
 });
 
+test('binned voxels are means of blocks, in their place, of all frames', () => {
+  const placed = { spacing: [1, 2, 3], origin: [10, 20, 30], slope: 2, intercept: -1, frameSeconds: 0.5, space: 'LPS' };
+  const volume = grid({ dims: [3, 2, 2, 2], ...placed });
+  const binned = volume.binned([2, 1, 2]);
+  // The third voxel along x is left over.
+  expect([binned.dims, binned.frames, binned.space]).toEqual([[1, 2, 1], 2, 'LPS']);
+  expect(binned.spacing).toEqual([2, 2, 6]);
+  expect([...binned.affine.slice(12, 15)]).toEqual([10.5, 20, 31.5]);
+  // Means of 0, 1, 6, 7 and so on, which are stored as whole numbers.
+  const stored = [...binned.intensities(0), ...binned.intensities(1)].map((value) => (value + 1) / 2);
+  for (const [i, mean] of [3.5, 6.5, 15.5, 18.5].entries())
+    expect(Math.abs((stored[i] as number) - mean)).toBeLessThan(0.51);
+  const exact = new Volume({ data: Float32Array.from(counted()), dims: [3, 2, 2, 2] }).binned([2, 1, 2]);
+  expect([...exact.intensities(0), ...exact.intensities(1)]).toEqual([3.5, 6.5, 15.5, 18.5]);
+});
+
+test('binned by 1 it is the same, by all it is one voxel, and the volume stays', () => {
+  const volume = grid();
+  const same = volume.binned([1, 1, 1]);
+  expect([...same.intensities()]).toEqual([...counted()]);
+  expect([...same.affine]).toEqual([...volume.affine]);
+  expect(volume.binned(new Uint8Array([2, 3, 4]) as unknown as Vec3).dims).toEqual([1, 1, 1]);
+  volume.free();
+  expect(same.range).toEqual([0, 23]);
+  expect(failure(() => volume.binned([1, 1, 1])).code).toBe('freed');
+});
+
 test('the pyramid starts with the volume itself and shrinks', () => {
   const levels = ball(30, 10).pyramid(3);
   expect(levels.map((level) => level.dims)).toEqual([
@@ -161,6 +188,13 @@ const REFUSED: [string, string, () => unknown][] = [
   ['NaN for a point', 'world', () => grid().sample([1, 2, Number.NaN])],
   ['a growing pyramid', 'factor', () => grid().pyramid(2, { factor: 0.5 })],
   ['too many levels', 'levels', () => grid().pyramid(50)],
+  ['blocks of nothing', 'factors', () => grid().binned([1, 0, 1])],
+  ['blocks larger than the volume', 'factors', () => grid().binned([3, 1, 1])],
+  ['blocks of too many', 'factors', () => grid({ dims: [24, 1, 1] }).binned([17, 1, 1])],
+  ['blocks of parts', 'factors', () => grid().binned([1.5, 1, 1])],
+  ['blocks of NaN', 'factors', () => grid().binned([Number.NaN, 1, 1])],
+  ['one number for blocks', 'factors', () => grid().binned(wrong(2))],
+  ['two numbers for blocks', 'factors', () => grid().binned(wrong([2, 2]))],
   ['no slices for one', 'factor', () => grid().enrichSlices({ factor: 0 })],
   ['too many slices for one', 'factor', () => grid().enrichSlices({ factor: 17 })],
   [
