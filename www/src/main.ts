@@ -3,6 +3,7 @@ import { ExtractLab } from './labs/extract';
 import type { Lab, LabKind, PassedOn } from './labs/labs';
 import { ReconstructLab } from './labs/reconstruct';
 import { SculptLab } from './labs/sculpt';
+import { TrackLab } from './labs/track';
 import { h } from './ui/dom';
 
 /** The first is what an empty or unknown address opens. */
@@ -18,6 +19,12 @@ const LABS: [LabKind, ...LabKind[]] = [
     name: 'Reconstruct',
     tagline: 'A smooth closed surface through sparse and noisy points. Nothing leaves this machine.',
     open: (root, help, passOn) => new ReconstructLab(root, help, passOn),
+  },
+  {
+    id: 'track',
+    name: 'Track',
+    tagline: 'A closed surface that follows what moves in a 4D image. Nothing leaves this machine.',
+    open: (root, help) => new TrackLab(root, help),
   },
   {
     id: 'sculpt',

@@ -69,7 +69,7 @@ export interface VolumeView {
   histogram: Uint32Array;
   /** The intensities shown as black and as white. */
   window: [number, number];
-  /** x fastest, 0 = black, 255 = white. */
+  /** x fastest, 0 = black, 255 = white; where all frames are wanted, one after the other. */
   voxels: Uint8Array;
 }
 

@@ -69,6 +69,23 @@ export const SCULPT_EXERCISES: Exercise[] = [
   },
 ];
 
+/** Of the Track lab. */
+export const TRACK_EXERCISES: Exercise[] = [
+  {
+    title: 'How sure is an ejection fraction?',
+    example: 'thick-slices',
+    steps: [
+      'Open the computed ventricle and let it end. Note largest and smallest volume, ejection fraction, the true ones, mean error and the folded triangles of the worst frame.',
+      'Set τ to 15, 30, 50 and 70; note the same. At which τ does the warning about noise appear, and what do you see in the slices there?',
+      'Under “With and without”, compare with no in-between slices and with linear ones. Where on the surface is the difference: in the wall, at the muscles, or at the apex?',
+      'Do the same with the heart, where nobody knows the truth.',
+    ],
+    look: 'Which of the numbers is right although the surface is wrong? Why does the ejection fraction hardly change where both volumes are too small? Which frame is worst, and what do the muscles do then?',
+    handIn:
+      'A table of τ and in-between slices against volumes, ejection fraction and error; the CSV of two runs; three sentences on how many digits of the heart’s ejection fraction you would report.',
+  },
+];
+
 /** Exercises for a lab course, each with a button that opens what it begins with. */
 export function exercises(list: Exercise[], onOpen: (example: string) => void): HTMLElement {
   return h('div', { class: 'exercises' }, ...list.map((exercise) => exerciseOf(exercise, onOpen)));

@@ -18,7 +18,7 @@ const SWITCHES = [
   { name: 'surface', label: 'Surface' },
   { name: 'edges', label: 'Wireframe' },
 ] as const;
-const PLACEMENTS: { value: SlicePlacement; label: string }[] = [
+export const PLACEMENTS: { value: SlicePlacement; label: string }[] = [
   { value: 'walls', label: 'on the walls' },
   { value: 'in place', label: 'in place' },
   { value: 'hidden', label: 'hidden' },

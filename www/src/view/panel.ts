@@ -11,7 +11,21 @@ export interface PanelEvents {
   onIndex: (index: number) => void;
   /** The picture was clicked or dragged on, at a voxel index. `pressed`: this is where it began. */
   onPoint: (index: Vec3, pressed: boolean) => void;
+  /** Asked first, with the place and how many voxels a finger is wide: what follows the pointer instead until it is let go. */
+  grab?: (index: Vec3, slack: Vec3) => Grip | undefined;
 }
+
+/** Something on a slice that is being dragged; places in voxels, also between and beyond them. */
+export interface Grip {
+  move: (index: Vec3) => void;
+  drop: () => void;
+}
+
+/** Draws over the picture, in its pixels times the scales. */
+export type Overlay = (context: CanvasRenderingContext2D, scaleX: number, scaleY: number) => void;
+
+/** Pixels of the screen from which an edge can still be grabbed. */
+const SLACK = 7;
 
 /** One slice as a picture with the surface's outline over it, its crosshair, and a slider. */
 export class SlicePanel {
@@ -19,6 +33,8 @@ export class SlicePanel {
   /** The bare slice in voxels, also the texture of the plane in the 3D view. */
   readonly picture = document.createElement('canvas');
   readonly frame: SliceFrame;
+  /** What else is to be seen on the slice. */
+  overlay: Overlay = () => undefined;
   readonly #volume: VolumeView;
   readonly #inverse: Float64Array;
   readonly #canvas: HTMLCanvasElement;
@@ -49,7 +65,7 @@ export class SlicePanel {
     // The slider speaks the number already.
     this.#output = h('output', { for: id, 'aria-live': 'off' });
     this.element = this.#build(id);
-    this.#followPointer(events.onPoint);
+    this.#followPointer(events);
     this.#observer.observe(this.#canvas);
   }
 
@@ -99,6 +115,7 @@ export class SlicePanel {
     this.#drawCrosshair(context, scaleX, scaleY);
     this.#drawOutline(context, scaleX, scaleY);
     this.#drawAttractors(context, scaleX, scaleY);
+    this.overlay(context, scaleX, scaleY);
   }
 
   dispose(): void {
@@ -191,30 +208,51 @@ export class SlicePanel {
     }
   }
 
-  #followPointer(onPoint: PanelEvents['onPoint']): void {
+  #followPointer({ onPoint, grab }: PanelEvents): void {
+    let grip: Grip | undefined;
     const report = (event: PointerEvent) =>
-      onPoint(this.#indexAt(event.offsetX, event.offsetY), event.type === 'pointerdown');
+      onPoint(this.#voxelAt(event.offsetX, event.offsetY), event.type === 'pointerdown');
     this.#canvas.addEventListener('pointerdown', (event) => {
       this.#canvas.setPointerCapture(event.pointerId);
-      report(event);
+      grip = grab?.(this.#placeAt(event.offsetX, event.offsetY), this.#slack());
+      if (!grip) report(event);
     });
     this.#canvas.addEventListener('pointermove', (event) => {
-      if (event.buttons & 1) report(event);
+      if (grip) grip.move(this.#placeAt(event.offsetX, event.offsetY));
+      else if (event.buttons & 1) report(event);
     });
+    for (const end of ['pointerup', 'pointercancel'] as const)
+      this.#canvas.addEventListener(end, () => {
+        grip?.drop();
+        grip = undefined;
+      });
   }
 
-  #indexAt(canvasX: number, canvasY: number): Vec3 {
+  /** In voxels along the two sides of the picture; 0 across it. */
+  #slack(): Vec3 {
+    const { scaleX, scaleY } = this.#placement();
+    const slack: Vec3 = [0, 0, 0];
+    slack[this.frame.horizontal.axis] = SLACK / scaleX;
+    slack[this.frame.vertical.axis] = SLACK / scaleY;
+    return slack;
+  }
+
+  /** Of a place on the canvas, also beyond the picture; the centre of the first voxel is at 0. */
+  #placeAt(canvasX: number, canvasY: number): Vec3 {
     const { x, y, scaleX, scaleY } = this.#placement();
-    const index: Vec3 = [...this.#crosshair];
+    const place: Vec3 = [...this.#crosshair];
     for (const [{ axis, flip }, position] of [
       [this.frame.horizontal, (canvasX - x) / scaleX],
       [this.frame.vertical, (canvasY - y) / scaleY],
-    ] as const) {
-      const last = this.#volume.dims[axis] - 1;
-      const raw = Math.min(last, Math.max(0, Math.floor(position)));
-      index[axis] = flip ? last - raw : raw;
-    }
-    return index;
+    ] as const)
+      place[axis] = (flip ? this.#volume.dims[axis] - position : position) - 0.5;
+    return place;
+  }
+
+  /** The voxel of the picture that is nearest to a place on the canvas. */
+  #voxelAt(canvasX: number, canvasY: number): Vec3 {
+    const place = this.#placeAt(canvasX, canvasY);
+    return place.map((at, axis) => Math.min((this.#volume.dims[axis] ?? 1) - 1, Math.max(0, Math.round(at)))) as Vec3;
   }
 }
 

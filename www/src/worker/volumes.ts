@@ -23,7 +23,7 @@ function parseFile(file: NamedBytes): Volume {
 }
 
 /** A volume from one file, or from a header and its data in either order. */
-function parseFiles(files: NamedBytes[]): Volume {
+export function parseFiles(files: NamedBytes[]): Volume {
   const [first, second] = files;
   if (!first) throw new Refusal('bad-file', 'no file was given');
   if (!second) return parseFile(first);
@@ -35,15 +35,26 @@ export function volumeFrom(source: VolumeSource): Volume {
   return 'files' in source ? parseFiles(source.files) : new Volume(shapeVoxels(source.shape));
 }
 
-/** The volume reduced to what the page shows. */
-export function viewOf(volume: Volume, name: string): VolumeView {
+/** The volume reduced to what the page shows: its first frame, or so many of them after each other. */
+export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
   const { range } = volume;
   const histogram = volume.histogram(HISTOGRAM_BINS);
   // A few extreme voxels (metal, noise) must not make everything else grey.
   const [low = range[0], high = range[1]] = quantiles(histogram, range, [0.001, 0.999]);
   const window: [number, number] = high > low ? [low, high] : range;
   const { dims, frames, spacing, affine, space } = volume;
-  return { name, dims, frames, spacing, affine, space, range, histogram, window, voxels: greys(volume, window) };
+  return {
+    name,
+    dims,
+    frames,
+    spacing,
+    affine,
+    space,
+    range,
+    histogram,
+    window,
+    voxels: greys(volume, window, pictures),
+  };
 }
 
 /** The coarser copies that a model with so many levels works on, shown with the greys of the volume itself. */
@@ -59,9 +70,10 @@ export function levelsOf(volume: Volume, levels: number, window: [number, number
 }
 
 /** Slice by slice, so that no second full copy in floats is made. */
-function greys(volume: Volume, window: [number, number]): Uint8Array {
+function greys(volume: Volume, window: [number, number], frames = 1): Uint8Array {
   const [nx, ny, nz] = volume.dims;
-  const voxels = new Uint8Array(nx * ny * nz);
-  for (let z = 0; z < nz; z++) quantize(volume.slice(2, z), window, voxels, z * nx * ny);
+  const voxels = new Uint8Array(nx * ny * nz * frames);
+  for (let frame = 0; frame < frames; frame++)
+    for (let z = 0; z < nz; z++) quantize(volume.slice(2, z, frame), window, voxels, (frame * nz + z) * nx * ny);
   return voxels;
 }

@@ -1,0 +1,42 @@
+import type { TrackClient } from '../track/client';
+import type { Enrichment, Setup, SurfaceError } from '../track/protocol';
+import { type ComparedRun, comparedRun, type Other } from '../ui/track-compare';
+import type { TrackResults } from './track-results';
+import type { TrackSettings } from './track-settings';
+
+const NAMES: Record<Enrichment, string> = {
+  none: 'no in-between slices',
+  linear: 'linear slices',
+  flow: 'slices by flow',
+};
+
+/** The present run beside the same with one thing else; nothing when it was cancelled. */
+export async function compareWith(
+  client: TrackClient,
+  { setup, params }: TrackSettings,
+  { results, took }: { results: TrackResults; took: number | undefined },
+  other: Other,
+): Promise<[ComparedRun, ComparedRun] | undefined> {
+  const predicted = params.prediction === true;
+  const [here, there] =
+    other === 'prediction'
+      ? [predicted ? 'with prediction' : 'without prediction', predicted ? 'without prediction' : 'with prediction']
+      : [NAMES[setup.preparation.enrichment], NAMES[other]];
+  const changed = otherwise(setup, other, predicted);
+  const facts = results.frames.map((frame) => frame.facts);
+  const errors = results.frames.flatMap(({ error }) => error ?? []);
+  const present: ComparedRun = { name: here, facts, closing: results.closing, error: meanOf(errors), took };
+  const run = await client.request('compare', { setup: changed });
+  return run && [present, comparedRun(there, run)];
+}
+
+function otherwise(setup: Setup, other: Other, predicted: boolean): Setup {
+  if (other === 'prediction') return { ...setup, params: { ...setup.params, prediction: !predicted } };
+  return { ...setup, preparation: { ...setup.preparation, enrichment: other } };
+}
+
+function meanOf(errors: SurfaceError[]): SurfaceError | undefined {
+  if (errors.length === 0) return undefined;
+  const mean = (of: keyof SurfaceError) => errors.reduce((sum, error) => sum + error[of], 0) / errors.length;
+  return { mean: mean('mean'), most: mean('most') };
+}

@@ -1,0 +1,116 @@
+/** The Track lab's settings as the part of an address after `#track?`, and back. */
+import type { ParamValues, Vec3 } from '../protocol';
+import { FILMS, OWN_PREPARATION, type TrackExample } from '../track/examples';
+import { viewOf } from '../track/presets';
+import type { Box, Enrichment, Preparation, Setup } from '../track/protocol';
+import type { TrackViewOptions } from '../view/beating';
+import { differing, readValue } from './link';
+
+export const ADDRESS = '#track';
+
+export interface LinkedTrack {
+  example?: string;
+  /** The name of a file of one's own: it is not in the link. */
+  file?: string;
+  params: ParamValues;
+  preparation: Partial<Preparation>;
+  box?: Box | 'whole';
+  at?: Vec3 | 'largest';
+  view: Partial<TrackViewOptions>;
+}
+
+export interface TrackSettings {
+  example: TrackExample | undefined;
+  file: string;
+  setup: Setup;
+  view: TrackViewOptions;
+}
+
+const SWITCHES = ['surface', 'edges', 'votes', 'region'] as const;
+const ENRICHMENTS: readonly string[] = ['none', 'linear', 'flow'] satisfies Enrichment[];
+
+/** What the example, or else an image of one's own, is opened with, changed as a link says. */
+export function setupOf(example: TrackExample | undefined, linked?: LinkedTrack): Setup {
+  const { box, at } = linked ?? {};
+  return {
+    preparation: { ...(example?.preparation ?? OWN_PREPARATION), ...linked?.preparation },
+    box: box === 'whole' ? undefined : (box ?? example?.box),
+    at: at === 'largest' ? undefined : (at ?? example?.at),
+    params: { ...example?.params, ...linked?.params },
+  };
+}
+
+/** Only what differs from what the example, or else the method, brings along. */
+export function linkOf({ example, file, setup, view }: TrackSettings): LinkedTrack {
+  const usual = setupOf(example);
+  const same = (one: unknown, other: unknown) => JSON.stringify(one) === JSON.stringify(other);
+  return {
+    ...(!example && { file }),
+    ...(example && example !== FILMS[0] && { example: example.id }),
+    params: differing(setup.params, usual.params),
+    preparation: differing({ ...setup.preparation }, { ...usual.preparation }),
+    ...(!same(setup.box, usual.box) && { box: setup.box ?? 'whole' }),
+    ...(!same(setup.at, usual.at) && { at: setup.at ?? 'largest' }),
+    view: differing({ ...view }, { ...viewOf(example) }),
+  };
+}
+
+const asText = (values: number[]) => values.map((value) => Number(value.toFixed(3))).join(',');
+
+export function toHash({ example, file, params, preparation, box, at, view }: LinkedTrack): string {
+  const query = new URLSearchParams();
+  for (const [name, value] of Object.entries({ example, file, ...preparation, ...view }))
+    if (value !== undefined) query.set(name, String(value));
+  if (box) query.set('box', box === 'whole' ? box : asText([...box.min, ...box.max]));
+  if (at) query.set('at', at === 'largest' ? at : asText(at));
+  for (const [name, value] of Object.entries(params)) query.set(`p.${name}`, String(value));
+  const text = query.toString().replaceAll('%2C', ',');
+  return text ? `${ADDRESS}?${text}` : ADDRESS;
+}
+
+/** Undefined where the address is not one of this lab with something to say. What makes no sense is left out. */
+export function fromHash(hash: string): LinkedTrack | undefined {
+  const [address = '', text] = hash.split(/\?(.*)/s);
+  if (address !== ADDRESS || !text) return undefined;
+  const query = new URLSearchParams(text);
+  const linked: LinkedTrack = { params: {}, preparation: preparationOf(query), view: viewIn(query) };
+  for (const name of ['example', 'file'] as const) {
+    const value = query.get(name);
+    if (value) linked[name] = value;
+  }
+  const [box, at] = [numbersOf(query.get('box'), 6), numbersOf(query.get('at'), 3)];
+  if (box) linked.box = { min: box.slice(0, 3) as Vec3, max: box.slice(3) as Vec3 };
+  else if (query.get('box') === 'whole') linked.box = 'whole';
+  if (at) linked.at = at as Vec3;
+  else if (query.get('at') === 'largest') linked.at = 'largest';
+  for (const [name, value] of query) if (name.startsWith('p.')) linked.params[name.slice(2)] = paramOf(value);
+  return linked;
+}
+
+function paramOf(text: string): unknown {
+  return text === 'true' ? true : text === 'false' ? false : readValue(text);
+}
+
+function preparationOf(query: URLSearchParams): Partial<Preparation> {
+  const [binning, factor] = [Number(query.get('binning')), Number(query.get('factor') ?? Number.NaN)];
+  const enrichment = query.get('enrichment') ?? '';
+  return {
+    ...((binning === 1 || binning === 2) && { binning }),
+    ...(ENRICHMENTS.includes(enrichment) && { enrichment: enrichment as Enrichment }),
+    ...(Number.isInteger(factor) && factor >= 0 && { factor }),
+  };
+}
+
+function viewIn(query: URLSearchParams): Partial<TrackViewOptions> {
+  const view: Partial<TrackViewOptions> = {};
+  for (const name of SWITCHES) if (query.has(name)) view[name] = query.get(name) === 'true';
+  const [slices, below] = [query.get('slices'), query.get('below')];
+  if (slices) view.slices = slices as TrackViewOptions['slices'];
+  if (below) view.below = below as TrackViewOptions['below'];
+  return view;
+}
+
+function numbersOf(text: string | null, length: number): number[] | undefined {
+  const list = (text ?? '').split(',').map(Number);
+  return text && list.length === length && list.every(Number.isFinite) ? list : undefined;
+}

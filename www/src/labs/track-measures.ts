@@ -1,0 +1,79 @@
+import { beatOf } from '../track/curve';
+import type { TrackedFrame } from '../track/protocol';
+import { count, figure } from '../ui/format';
+import type { MoreMeasure } from '../ui/measures';
+
+const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
+const round = (value: number) => figure(Number(value.toPrecision(3)));
+
+/** What is measured beside the surface of the frame that is shown. */
+export const TRACK_ROWS: MoreMeasure[] = [
+  {
+    name: 'ejection',
+    label: 'Ejection fraction',
+    help: 'Share of the largest volume that is driven out',
+    text: percent,
+  },
+  {
+    name: 'folded',
+    label: 'Folded',
+    help: 'Triangles of this frame that face away from their neighbours',
+    text: count,
+  },
+  {
+    name: 'closing',
+    label: 'Closes within',
+    help: 'Of a cyclic sequence: how far the last frame’s surface, taken on to the first, is from the first one’s in the mean',
+    text: round,
+  },
+  {
+    name: 'errorMean',
+    label: 'Error, mean',
+    help: 'Distance of the vertices from the true wall, where it is known',
+    text: round,
+  },
+  { name: 'errorMost', label: 'Error, 95 %', help: 'The same: 95 % of the vertices are nearer', text: round },
+  { name: 'noise', label: 'Noise σ', help: 'Measured in the box, intensity units', text: round },
+];
+
+export interface Tracked {
+  frames: readonly TrackedFrame[];
+  /** Of the image. */
+  count: number;
+  frame: number;
+  closing: number | undefined;
+  noise: number;
+}
+
+/** For the rows, and for other programs. */
+export function moreOf({ frames, count, frame, closing, noise }: Tracked): Record<string, unknown> {
+  const beat = frames.length === count ? beatOf(frames.map(({ facts }) => facts.volume)) : undefined;
+  const shown = frames[frame];
+  return {
+    noise,
+    frame: frame + 1,
+    frames: count,
+    tracked: frames.length,
+    ...(shown && { folded: shown.facts.folded }),
+    ...(shown?.error && { errorMean: shown.error.mean, errorMost: shown.error.most }),
+    ...(beat && { ejection: beat.ejection, largest: beat.largest, smallest: beat.smallest }),
+    ...(closing !== undefined && { closing }),
+  };
+}
+
+const COLUMNS = [
+  ...['volume', 'area', 'triangles', 'folded', 'rejected', 'held', 'retracted', 'steps', 'correction'],
+] as const;
+
+/** One line a frame: all that the table shows, in world units. */
+export function framesCsv(frames: readonly TrackedFrame[], truth: readonly number[] | undefined): string {
+  const known = frames.some(({ error }) => error);
+  const head = ['frame', ...COLUMNS, 'crossings', ...(known ? ['error', 'error (95 %)', 'true volume'] : [])];
+  const lines = frames.map(({ facts, measures, error }, i) => [
+    i + 1,
+    ...COLUMNS.map((name) => facts[name as keyof typeof facts]),
+    measures.report?.selfIntersections ?? '',
+    ...(known ? [error?.mean ?? '', error?.most ?? '', truth?.[i] ?? ''] : []),
+  ]);
+  return `${[head, ...lines].map((line) => line.join(',')).join('\n')}\n`;
+}

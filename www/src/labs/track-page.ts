@@ -1,0 +1,155 @@
+import type { TrackExample } from '../track/examples';
+import type { Opened } from '../track/protocol';
+import { h, section, uniqueId } from '../ui/dom';
+import { figure, milliseconds } from '../ui/format';
+import { folded } from './extract-page';
+
+/** The parts the page is put together from. */
+export interface Parts {
+  data: HTMLElement;
+  figure: HTMLElement;
+  preparation: HTMLElement;
+  region: HTMLElement;
+  threshold: HTMLElement;
+  params: HTMLElement;
+  transport: HTMLElement;
+  frames: HTMLElement;
+  cancel: HTMLElement;
+  options: HTMLElement;
+  banner: HTMLElement;
+  status: HTMLElement;
+  canvas: HTMLElement;
+  slices: HTMLElement;
+  stills: HTMLElement;
+  drop: HTMLElement;
+  measures: HTMLElement;
+  warnings: HTMLElement;
+  curve: HTMLElement;
+  table: HTMLElement;
+  compare: HTMLElement;
+  exports: HTMLElement;
+  saves: HTMLElement;
+  link: HTMLElement;
+  exercises: HTMLElement;
+}
+
+/** Lays the lab out: set-up on one side, view and slices in the middle, what comes of it on the other side. */
+export function layOut(root: HTMLElement, parts: Parts): void {
+  root.className = 'lab track';
+  const scene = h('div', { class: 'scene' }, parts.canvas);
+  const view = h(
+    'div',
+    { class: 'view beside' },
+    parts.options,
+    h('div', { class: 'pictures' }, scene),
+    parts.banner,
+    parts.drop,
+  );
+  root.replaceChildren(
+    h(
+      'div',
+      { class: 'stage' },
+      view,
+      parts.frames,
+      parts.transport,
+      h('div', { class: 'saying' }, parts.status, parts.cancel),
+      parts.slices,
+      parts.stills,
+    ),
+    h(
+      'div',
+      { class: 'column setup' },
+      section('Image', parts.data, parts.figure),
+      section('Boundary', parts.threshold),
+      section('Box and surface', parts.region),
+      folded('Preparation', parts.preparation),
+      folded('Parameters', parts.params),
+    ),
+    h(
+      'div',
+      { class: 'column results' },
+      section('Beat', parts.curve, parts.warnings),
+      section('Surface of this frame', parts.measures),
+      section('Save', parts.exports, parts.saves, parts.link),
+      folded('Frames', parts.table),
+      folded('With and without', parts.compare),
+      folded('Exercise', parts.exercises),
+    ),
+  );
+}
+
+/** What is told of an image, so that its place is there before one is open. */
+const FACTS = ['File', 'Frames', 'Voxels', 'Size of a voxel', 'Tracked in', 'Prepared in'];
+
+/** Which image is open, and how to open others. */
+export class FilmPanel {
+  readonly element: HTMLElement;
+  readonly #examples: HTMLSelectElement;
+  readonly #own = h('option', { value: '', hidden: true }, 'Your file');
+  readonly #facts = h('dl', { class: 'facts' });
+  readonly #credit = h('p', { class: 'help credit' });
+
+  /** `figures` are listed apart from the other examples. */
+  constructor(
+    examples: TrackExample[],
+    figures: TrackExample[],
+    chooser: HTMLElement,
+    onExample: (example: TrackExample) => void,
+  ) {
+    const id = uniqueId('example');
+    const group = (label: string, list: TrackExample[]) =>
+      h('optgroup', { label }, ...list.map((example) => h('option', { value: example.id }, example.name)));
+    this.#examples = h(
+      'select',
+      { id },
+      this.#own,
+      group('Images', examples),
+      ...(figures.length > 0 ? [group('Figures of the paper', figures)] : []),
+    );
+    this.#examples.addEventListener('change', () => {
+      const example = [...examples, ...figures].find((one) => one.id === this.#examples.value);
+      if (example) onExample(example);
+    });
+    this.show(undefined, undefined, '');
+    this.element = h(
+      'div',
+      { class: 'data' },
+      h('div', { class: 'row stacked' }, h('label', { for: id }, 'Example'), this.#examples),
+      h('div', { class: 'row' }, chooser),
+      h(
+        'p',
+        { class: 'help' },
+        'Or drop a 4D NIfTI or NRRD anywhere on the page, or several 3D files: frames in the order of their names. It stays on this machine.',
+      ),
+      this.#facts,
+      this.#credit,
+    );
+  }
+
+  /** Shows in the list which example is open, or that a file is. */
+  choose(example: TrackExample | undefined): void {
+    this.#own.hidden = example !== undefined;
+    this.#examples.value = example?.id ?? '';
+  }
+
+  show(
+    opened: Pick<Opened, 'dims' | 'spacing' | 'volume' | 'prepared'> | undefined,
+    example: TrackExample | undefined,
+    name: string,
+  ): void {
+    this.choose(example);
+    const sizes = (values: readonly number[]) => values.map((x) => figure(Number(x.toPrecision(3)))).join(' × ');
+    const unit = example?.unit ?? 'mm';
+    const known = opened && [
+      name,
+      String(opened.volume.frames),
+      sizes(opened.dims),
+      `${sizes(opened.spacing)} ${unit}`.trim(),
+      `${sizes(opened.volume.dims)}`,
+      milliseconds(opened.prepared),
+    ];
+    const rows = FACTS.map((fact, i) => h('div', {}, h('dt', {}, fact), h('dd', {}, known?.[i] ?? '–')));
+    this.#facts.replaceChildren(...rows);
+    this.#credit.textContent = example?.credit ?? '';
+  }
+}

@@ -1,0 +1,274 @@
+import type { LabState } from '../state';
+import type { TrackClient } from '../track/client';
+import { beatOf } from '../track/curve';
+import type { Between, StepEvent, TrackedFrame, VolumeView, Votes } from '../track/protocol';
+import type { History, HistoryMark } from '../ui/history';
+import type { LabStates } from './lab-states';
+import { moreOf } from './track-measures';
+import type { TrackParts } from './track-parts';
+
+/** What has come of a run so far; nothing of it changes any more. */
+export interface TrackRecord {
+  frames: readonly TrackedFrame[];
+  closing: number | undefined;
+  mark: (iteration: number) => HistoryMark;
+}
+
+/** What of an image the results need. */
+interface Film {
+  volume: VolumeView;
+  /** Slices of the image as it was opened. */
+  slices: number;
+  truth: number[] | undefined;
+}
+
+/** What comes of the steps, on the screen: one frame of it at a time, and what all together say. */
+export class TrackResults {
+  readonly #client: TrackClient;
+  readonly #ui: TrackParts;
+  readonly #states: LabStates;
+  readonly #history: History;
+  #film: Film | undefined;
+  #frames: readonly TrackedFrame[] = [];
+  #closing: number | undefined;
+  #frame = 0;
+  /** Somebody looks at a frame of their choice while others are being found. */
+  #held = false;
+  #votes: Votes | undefined;
+  #between: { key: string; between: Between } | undefined;
+  /** What was asked of the worker and has not come yet. */
+  #asked = new Set<string>();
+  /** Counts runs: what is on its way from the one before is not shown. */
+  #run = 0;
+  #other: { volumes: number[]; name: string } | undefined;
+  /** Of the parameters in force. */
+  window = 2;
+  threshold = 1;
+  noise = 0;
+
+  constructor(client: TrackClient, ui: TrackParts, states: LabStates, history: History) {
+    this.#client = client;
+    this.#ui = ui;
+    this.#states = states;
+    this.#history = history;
+  }
+
+  get frames(): readonly TrackedFrame[] {
+    return this.#frames;
+  }
+
+  /** No step was done yet. */
+  get isNew(): boolean {
+    return this.#history.reports.length === 0;
+  }
+
+  get closing(): number | undefined {
+    return this.#closing;
+  }
+
+  get frame(): number {
+    return this.#frame;
+  }
+
+  get truth(): number[] | undefined {
+    return this.#film?.truth;
+  }
+
+  /** Another image, or the same prepared in another way. */
+  setFilm(volume: VolumeView, slices: number, truth: number[] | undefined, keep: boolean): void {
+    this.#film = { volume, slices, truth };
+    this.#between = undefined;
+    this.#ui.view.setVolume(volume, keep);
+  }
+
+  /** A new run of the image: nothing is known of it. */
+  startOver(): void {
+    this.#history.clear();
+    this.#begin([], undefined);
+  }
+
+  /** Back to where so many steps were done: the surfaces of all frames are found anew. */
+  rewind(iteration: number): void {
+    this.#history.rewind(this.#history.marker()(iteration));
+    this.#begin([], undefined);
+  }
+
+  record(): TrackRecord {
+    return { frames: this.#frames, closing: this.#closing, mark: this.#history.marker() };
+  }
+
+  /** As it was after so many steps. */
+  restore({ frames, closing, mark }: TrackRecord, iteration: number, done: boolean): void {
+    this.#history.rewind(mark(iteration));
+    const count = this.#film?.volume.frames ?? 0;
+    this.#begin(frames.slice(0, Math.max(0, iteration - count)), done ? closing : undefined);
+  }
+
+  #begin(frames: readonly TrackedFrame[], closing: number | undefined): void {
+    this.#run += 1;
+    this.#frames = frames;
+    this.#closing = closing;
+    this.#votes = undefined;
+    this.#asked.clear();
+    this.#held = false;
+    this.#other = undefined;
+    this.#ui.compare.clear();
+    this.#ui.frames.stop();
+    this.show(frames.length > 0 ? Math.min(this.#frame, frames.length - 1) : 0);
+  }
+
+  /** The run goes on: the newest frame is the one to look at. */
+  follow(): void {
+    this.#held = false;
+  }
+
+  take({ report, index, frame, closing }: StepEvent): void {
+    this.#history.add([report]);
+    this.#closing = closing;
+    if (frame && index !== undefined) this.#frames = [...this.#frames.slice(0, index), frame];
+    const count = this.#film?.volume.frames ?? 1;
+    const newest = index ?? Math.min(report.iteration, count) - 1;
+    if (this.#held || (index === undefined && this.#frames.length > 0)) this.show(this.#frame);
+    else this.show(newest);
+  }
+
+  /** By hand: it stays, whatever comes meanwhile. */
+  choose(frame: number): void {
+    this.#held = true;
+    this.show(frame);
+  }
+
+  show(frame: number): void {
+    const { view, frames: bar, measures } = this.#ui;
+    const count = this.#film?.volume.frames ?? 1;
+    this.#frame = Math.min(frame, count - 1);
+    const tracked = this.#frames[this.#frame];
+    view.showFrame(this.#frame, tracked?.surface);
+    bar.show(this.#frame, count, this.#frames.length);
+    if (tracked) measures.showMeasures(tracked.measures);
+    else measures.clear();
+    const { noise } = this;
+    measures.showMore(moreOf({ frames: this.#frames, count, frame: this.#frame, closing: this.#closing, noise }));
+    this.showCurve();
+    this.showStills();
+    this.#ui.transport.showReport(this.#history.reports.at(-1));
+    this.#ui.showState(this.#states.beneath, this.#states.ready, this.#frames.length, tracked !== undefined);
+    this.#root.dataset.frame = String(this.#frame + 1);
+  }
+
+  showCurve(): void {
+    const { curve, table } = this.#ui;
+    const frames = this.#film?.volume.frames ?? 1;
+    const facts = this.#frames.map((one) => one.facts);
+    const volumes = facts.map(({ volume }) => volume);
+    curve.show({ volumes, truth: this.truth, other: this.#other, frame: this.#frame, frames, unit: this.#unit });
+    const errors = this.#frames.map(({ error }) => error);
+    table.show(facts, errors, this.#frame);
+  }
+
+  /** Of lengths. */
+  #unit = 'mm';
+  set unit(unit: string) {
+    this.#unit = unit;
+  }
+
+  /** Another run's volumes beside these. */
+  set other(other: { volumes: number[]; name: string } | undefined) {
+    this.#other = other;
+    this.showCurve();
+  }
+
+  /** The pictures below the view, and the points of the boundary; what they need is asked for. */
+  showStills(): void {
+    const film = this.#film;
+    if (!film) return;
+    const { below, votes } = this.#ui.options.value;
+    if (votes || below === 'boundary') this.#askVotes();
+    if (below === 'between') this.#askBetween(film);
+    const present = this.#votes?.frame === this.#frame ? this.#votes : undefined;
+    this.#ui.view.showVotes(votes ? present : undefined);
+    if (below === 'slices') return;
+    const { voxel } = this.#ui.view.crosshair;
+    this.#ui.stills.show({
+      subject: { volume: film.volume, frame: this.#frame, voxel },
+      window: this.window,
+      threshold: this.threshold,
+      votes: present,
+      between: this.#between?.key === this.#betweenKey(film) ? this.#between.between : undefined,
+      pair: [this.#pair(film), film.slices],
+      outlines: () => this.#frames.map(({ surface }) => this.#ui.view.outlineIn(surface, 2)),
+    });
+  }
+
+  /** In words, for the status line. */
+  describe(state: LabState): string {
+    const count = this.#film?.volume.frames ?? 0;
+    const steps = this.#history.reports.length;
+    if (state === 'running') return this.#frames.length > 0 ? 'Following the surface.' : 'Finding the boundary.';
+    if (steps === 0) return 'Ready.';
+    if (state !== 'done') return `Paused: ${this.#frames.length} of ${count} frames have their surface.`;
+    const beat = beatOf(this.#frames.map(({ facts }) => facts.volume));
+    const ejection = beat ? ` Ejection fraction ${(100 * beat.ejection).toFixed(1)} %.` : '';
+    return `Done: all ${count} frames have their surface.${ejection}`;
+  }
+
+  get #root(): HTMLElement {
+    return this.#ui.frames.element;
+  }
+
+  /** The slice of the image as it was opened that is at the crosshair or just before it. */
+  #pair({ volume, slices }: Film): number {
+    const { voxel } = this.#ui.view.crosshair;
+    const factor = slices > 1 ? (volume.dims[2] - 1) / (slices - 1) : 1;
+    return Math.max(0, Math.min(slices - 2, Math.floor(voxel[2] / factor)));
+  }
+
+  #betweenKey(film: Film): string {
+    return `${this.#frame} ${this.#pair(film)}`;
+  }
+
+  #askVotes(): void {
+    const { length } = this.#history.reports;
+    if (this.#votes?.frame === this.#frame || length <= this.#frame) return;
+    this.#ask(
+      'votes',
+      () => this.#client.request('votes', { frame: this.#frame }),
+      (votes) => {
+        this.#votes = votes;
+      },
+    );
+  }
+
+  #askBetween(film: Film): void {
+    const key = this.#betweenKey(film);
+    if (this.#between?.key === key || film.slices < 2) return;
+    const body = { frame: this.#frame, slice: this.#pair(film), window: film.volume.window };
+    this.#ask(
+      'between',
+      () => this.#client.request('between', body),
+      (between) => {
+        this.#between = { key, between };
+      },
+    );
+  }
+
+  /** One of a kind at a time; when it has come, what is needed then is asked for. */
+  #ask<Reply>(kind: string, request: () => Promise<Reply>, take: (reply: Reply) => void): void {
+    if (this.#asked.has(kind)) return;
+    this.#asked.add(kind);
+    const run = this.#run;
+    request().then(
+      (reply) => {
+        if (run !== this.#run) return;
+        this.#asked.delete(kind);
+        take(reply);
+        this.showStills();
+      },
+      (error) => {
+        if (run !== this.#run) return;
+        this.#asked.delete(kind);
+        this.#states.fail('That could not be shown.', error);
+      },
+    );
+  }
+}

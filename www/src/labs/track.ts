@@ -1,0 +1,345 @@
+import { RequestError, toFailure } from '../channel';
+import type { LabState } from '../state';
+import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
+import { TrackClient } from '../track/client';
+import { FILMS } from '../track/examples';
+import { isTrackPreset, type TrackPreset, type TrackVariant, variantInForce, viewOf } from '../track/presets';
+import type { Opened, Setup, VolumeView, WorkerEvent } from '../track/protocol';
+import { History } from '../ui/history';
+import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
+import type { Other } from '../ui/track-compare';
+import { invert, sliceFrames } from '../view/anatomy';
+import { LabStates } from './lab-states';
+import type { Lab, PassedOn } from './labs';
+import { compareWith } from './track-comparing';
+import { linkOf, toHash } from './track-link';
+import { Opening, type Source } from './track-opening';
+import { type PartEvents, TrackParts } from './track-parts';
+import { TrackResults } from './track-results';
+import { saveAnimation, saveFrames, saveTable } from './track-saving';
+import { TrackSettings } from './track-settings';
+
+/**
+ * The Track lab: a surface that is followed through the frames of a 4D image. Here its parts are put together; what is
+ * opened, set, shown, compared and saved is each in a file of its own.
+ */
+export class TrackLab implements Lab {
+  readonly #root: HTMLElement;
+  readonly #closing = new AbortController();
+  readonly #client = new TrackClient((event) => this.#onEvent(event));
+  readonly #ui: TrackParts;
+  readonly #states: LabStates;
+  readonly #results: TrackResults;
+  readonly #settings: TrackSettings;
+  readonly #opening: Opening;
+  #volume: VolumeView | undefined;
+  /** Slices of the image as it was opened. */
+  #slices = 1;
+  #truth: number[] | undefined;
+  /** The milliseconds of the run, for comparisons; unknown where it was interrupted. */
+  #began: number | undefined;
+  #took: number | undefined;
+
+  constructor(root: HTMLElement, help: HTMLElement) {
+    this.#root = root;
+    const { signal } = this.#closing;
+    const ui = new TrackParts(root, this.#client, signal, this.#events());
+    const states = new LabStates(ui.banner, ui.status, signal);
+    this.#ui = ui;
+    this.#states = states;
+    this.#results = new TrackResults(this.#client, ui, states, new History());
+    this.#settings = new TrackSettings(
+      this.#client,
+      ui,
+      states,
+      this.#results,
+      () => this.#showSettings(),
+      (volume) => this.#takeVolume(volume, true),
+    );
+    this.#opening = new Opening(this.#client, ui, states, (opened, setup, source) =>
+      this.#adopt(opened, setup, source),
+    );
+    states.follow((state) => this.#showState(state));
+    offerShortcuts(this.#shortcuts(), help, signal);
+  }
+
+  /** Opens what the address says, or else the built-in example, and runs it. */
+  async start(_passedOn?: PassedOn): Promise<void> {
+    try {
+      const { specs } = await this.#client.request('hello', undefined);
+      this.#ui.makeParams(specs);
+    } catch (error) {
+      this.#states.fail('Vesicle could not start.', error);
+      return;
+    }
+    const { signal } = this.#closing;
+    if (signal.aborted) return;
+    window.addEventListener('hashchange', () => void this.#followLink(), { signal });
+    await this.#opening.link(FILMS[0]);
+  }
+
+  close(): void {
+    this.#closing.abort();
+    this.#opening.close();
+    this.#client.close();
+    this.#ui.dispose();
+    this.#root.replaceChildren();
+  }
+
+  /** Also where a link could not be followed the address is that of what is open. */
+  async #followLink(): Promise<void> {
+    await this.#opening.link();
+    this.#updateAddress();
+  }
+
+  /** What is asked for on the page, and who does it. */
+  #events(): PartEvents {
+    return {
+      onFiles: (files) => void this.#opening.files(files),
+      onExample: (example) => void this.#opening.example(example),
+      onExampleId: (id) => this.#opening.byId(id),
+      onVariant: (preset, variant) => this.#openVariant(preset, variant),
+      onPreparation: (preparation, what) => void this.#settings.change({ preparation }, what),
+      onRegion: (region) => this.#setRegion(region),
+      onComponent: (which) => this.#setComponent(which),
+      onParam: (name, value) => void this.#settings.setParams({ [name]: value }, this.#ui.labelOf(name)),
+      onOptions: () => this.#optionsChanged(),
+      onFrame: (frame) => this.#results.choose(frame),
+      onMoved: () => this.#results?.showStills(),
+      onCompare: (other) => void this.#compare(other),
+      onCancelCompare: () => this.#ask(this.#client.request('cancelCompare', undefined)),
+      onSave: (what) => void this.#save(what),
+      onCancel: () => void this.#opening.cancel(),
+      onToggle: () => this.#toggle(),
+      onStep: (steps) => this.#step(steps),
+      onReset: () => void this.#reset(),
+      onUndo: () => void this.#settings.travel('undo'),
+      onRedo: () => void this.#settings.travel('redo'),
+      onDismiss: () => this.#dismiss(),
+      onCopyLink: () => void this.#copyLink(),
+      onError: (title, error) => this.#states.fail(title, error),
+    };
+  }
+
+  #shortcuts(): Shortcut[] {
+    const redo = () => void this.#settings.travel('redo');
+    const { frames } = this.#ui;
+    return [
+      { key: ' ', shown: 'Space', text: 'play or pause the tracking', act: () => this.#toggle() },
+      { key: 's', shown: 's', text: 'one step', act: () => this.#step(1) },
+      { key: 'd', shown: 'd', text: 'ten steps', act: () => this.#step(10) },
+      { key: 'r', shown: 'r', text: 'reset', act: () => void this.#reset() },
+      { key: 'b', shown: 'b', text: 'beat, or hold', act: () => frames.toggle() },
+      { key: ',', shown: ',', text: 'previous frame', act: () => frames.go(-1) },
+      { key: '.', shown: '.', text: 'next frame', act: () => frames.go(1) },
+      { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#settings.travel('undo') },
+      { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: redo },
+      { key: 'y', ctrl: true, shown: 'Ctrl Y', text: 'redo', act: redo },
+      { key: 'Escape', shown: 'Esc', text: 'away with the message', act: () => this.#dismiss() },
+    ];
+  }
+
+  /** Shows an image that has been opened, as its example or link wants it, and tracks. */
+  async #adopt(opened: Opened, setup: Setup, { name, example, linked }: Source): Promise<void> {
+    this.#states.ready = true;
+    this.#slices = opened.dims[2];
+    this.#truth = opened.truth;
+    this.#results.unit = example?.unit ?? 'mm';
+    this.#ui.adopt(opened, example, name);
+    this.#takeVolume(opened.volume, false);
+    this.#settings.adopt(setup, { ...opened, volume: undefined });
+    this.#results.startOver();
+    this.#ui.options.set({ ...viewOf(example), ...linked?.view });
+    if (setup.at) this.#ui.view.goTo(setup.at);
+    await this.#client.request('play', undefined);
+  }
+
+  #takeVolume(volume: VolumeView, keep: boolean): void {
+    this.#volume = volume;
+    this.#results.setFilm(volume, this.#slices, this.#truth, keep);
+    const { box } = this.#settings.setup;
+    if (box && !keep) this.#ui.view.look(box);
+  }
+
+  /** The voxels that are looked at. */
+  get #region(): VoxelBox | undefined {
+    if (!this.#volume) return undefined;
+    const { dims, affine } = this.#volume;
+    const { box } = this.#settings.setup;
+    if (!box) return { low: [0, 0, 0], high: [dims[0] - 1, dims[1] - 1, dims[2] - 1] };
+    return voxelsOf(box, invert(affine), dims);
+  }
+
+  #setRegion(region: VoxelBox | undefined): void {
+    const volume = this.#volume;
+    const present = this.#region;
+    if (!volume || JSON.stringify(region) === JSON.stringify(present)) return;
+    const box = region && boxOf(region, volume.affine, invert(volume.affine));
+    void this.#settings.change({ box }, 'box');
+  }
+
+  #setComponent(which: 'here' | 'largest'): void {
+    const at = which === 'here' ? this.#ui.view.crosshair.point : undefined;
+    void this.#settings.change({ at }, 'surface');
+  }
+
+  #openVariant(preset: TrackPreset, { name, params, view }: TrackVariant): void {
+    this.#ui.options.set({ ...viewOf(preset), ...view });
+    const differs = Object.entries(params).some(([key, value]) => !Object.is(this.#settings.params[key], value));
+    if (differs) void this.#settings.setParams(params, `figure: ${name}`);
+  }
+
+  #showSettings(): void {
+    const { params, setup, noise, suggested } = this.#settings;
+    const [low, high] = this.#volume?.range ?? [0, 1];
+    this.#ui.showParams(params, noise, suggested, high - low);
+    this.#ui.preparation.show(setup.preparation);
+    this.#ui.compare.show(params.prediction === true, setup.preparation);
+    const region = this.#region;
+    if (region && this.#volume) {
+      const names = sliceFrames(this.#volume).map((frame) => frame.name);
+      this.#ui.region.show(region, this.#volume.dims, names, setup.at, setup.box === undefined);
+      this.#ui.view.showRegion(region);
+    }
+    const example = this.#opening.source?.example;
+    const preset = isTrackPreset(example) ? example : undefined;
+    const given = { ...preset?.params };
+    const variant = preset && variantInForce(preset, params, given);
+    this.#ui.showFigure(preset, variant);
+    this.#updateAddress();
+  }
+
+  #optionsChanged(): void {
+    if (!this.#states?.ready) return;
+    this.#results.showStills();
+    this.#updateAddress();
+  }
+
+  #toggle(): void {
+    const { value, canChange, canRun } = this.#states;
+    if (!canChange) return;
+    this.#ui.banner.hide();
+    if (value === 'running') this.#ask(this.#client.request('pause', undefined));
+    else if (canRun) {
+      this.#results.follow();
+      this.#ask(this.#client.request('play', undefined));
+    }
+  }
+
+  #step(steps: number): void {
+    if (!this.#states.canRun || this.#states.value === 'running') return;
+    this.#ui.banner.hide();
+    this.#results.follow();
+    this.#settings.remember(steps === 1 ? '1 step' : `${steps} steps`);
+    this.#client
+      .request('step', { count: steps })
+      .catch((error) => this.#states.fail('The step could not be done.', error));
+  }
+
+  /** Starts over, with the settings as they are. */
+  async #reset(): Promise<void> {
+    const { ready, value, engineBroken } = this.#states;
+    if (!ready || value === 'loading') return;
+    if (engineBroken) return this.#opening.again();
+    this.#states.load('Starting over.');
+    try {
+      await this.#settings.rebuild();
+      this.#states.stand('Ready to start.');
+    } catch (error) {
+      this.#states.fail('The tracker could not be built.', error);
+    }
+  }
+
+  async #compare(other: Other): Promise<void> {
+    const { compare } = this.#ui;
+    compare.begin();
+    try {
+      const present = { results: this.#results, took: this.#took };
+      const runs = await compareWith(this.#client, this.#settings, present, other);
+      if (!runs) return compare.refuse('Cancelled.');
+      compare.finish(runs);
+      const [, there] = runs;
+      this.#results.other = { volumes: there.facts.map(({ volume }) => volume), name: there.name };
+    } catch (error) {
+      const { code, message } = toFailure(error);
+      compare.refuse(message);
+      if (code === 'internal') this.#states.fail('The comparison stopped.', error);
+    }
+  }
+
+  async #save(what: 'frames' | 'animation' | 'table'): Promise<void> {
+    const { saving } = this.#ui;
+    try {
+      if (what === 'frames') await saveFrames(this.#client, saving, this.#results);
+      else if (what === 'animation') await saveAnimation(this.#client, saving);
+      else saveTable(saving, this.#results);
+    } catch (error) {
+      this.#states.fail('That could not be saved.', error);
+    }
+  }
+
+  /** Waits for nothing; tells when it fails. */
+  #ask(request: Promise<unknown>): void {
+    request.catch((error) => this.#states.fail('That did not work.', error));
+  }
+
+  /** The page's address says what is open and how it is set. */
+  #updateAddress(): void {
+    const { source } = this.#opening;
+    if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
+    const { example, name: file } = source;
+    const { setup } = this.#settings;
+    const hash = toHash(linkOf({ example, file, setup, view: this.#ui.options.value }));
+    if (hash !== location.hash) window.history.replaceState(null, '', hash);
+  }
+
+  async #copyLink(): Promise<void> {
+    this.#updateAddress();
+    const lacks = this.#opening.source?.example ? '' : ' Your file is not in it: whoever opens it needs the file too.';
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.#ui.status.say(`Link copied.${lacks}`);
+    } catch {
+      this.#ui.status.say(`The link is in the address bar.${lacks}`);
+    }
+  }
+
+  #onEvent(event: WorkerEvent): void {
+    if (event.event === 'preparing') this.#ui.status.say(event.what);
+    else if (event.event === 'comparing') this.#ui.compare.tell(event.part, event.phase);
+    else if (event.event === 'failure') this.#states.fail('The run has stopped.', new RequestError(event.failure));
+    else if (event.event === 'step') {
+      const first = this.#results.frames.length === 0 && event.frame !== undefined;
+      this.#results.take(event);
+      if (first && this.#states.value === 'running') this.#ui.status.say(this.#results.describe('running'));
+    } else if (this.#states.enter(event.state)) this.#settled(event.state);
+  }
+
+  #settled(state: 'running' | 'paused' | 'done'): void {
+    this.#time(state);
+    this.#ui.status.say(this.#results.describe(state));
+    const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
+    if (state === 'done' && !calm) this.#ui.frames.start();
+    else this.#ui.frames.stop();
+  }
+
+  /** A run from its first step to its end without a pause has a time that can be compared. */
+  #time(state: 'running' | 'paused' | 'done'): void {
+    if (state === 'running') this.#began = this.#results.isNew ? performance.now() : undefined;
+    else if (state === 'done' && this.#began !== undefined) this.#took = performance.now() - this.#began;
+    if (state !== 'running') this.#began = undefined;
+    if (state === 'paused') this.#took = undefined;
+  }
+
+  #showState(state: LabState): void {
+    const { beneath, ready } = this.#states;
+    const { frames, frame } = this.#results;
+    this.#root.dataset.state = state;
+    this.#ui.showState(beneath, ready, frames.length, frames[frame] !== undefined);
+    if (state === 'done' || state === 'paused') this.#updateAddress();
+  }
+
+  #dismiss(): void {
+    if (this.#states.dismiss()) this.#ui.status.say(this.#results.describe(this.#states.value));
+  }
+}

@@ -1,0 +1,111 @@
+/** Canny's edge detector (1986), as the paper compares its boundary with: smoothing, slope, ridges, two thresholds. */
+
+export interface CannySettings {
+  /** Standard deviation of the smoothing, pixels. */
+  deviation: number;
+  /** Ridges of a slope above `high` are edges, and those above `low` that hang together with them; intensity per pixel. */
+  low: number;
+  high: number;
+}
+
+export interface Picture {
+  width: number;
+  height: number;
+  values: ArrayLike<number>;
+}
+
+/** 1 where there is an edge. */
+export function canny(picture: Picture, { deviation, low, high }: CannySettings): Uint8Array {
+  const { width, height } = picture;
+  const smooth = smoothed(picture, deviation);
+  const at = (x: number, y: number) => smooth[clamp(y, height) * width + clamp(x, width)] ?? 0;
+  const slopes = new Float32Array(width * height);
+  const ridge = new Uint8Array(width * height);
+  const slope = (x: number, y: number) =>
+    [(at(x + 1, y) - at(x - 1, y)) / 2, (at(x, y + 1) - at(x, y - 1)) / 2] as const;
+  for (let y = 0; y < height; y++) for (let x = 0; x < width; x++) slopes[y * width + x] = Math.hypot(...slope(x, y));
+  for (let y = 0; y < height; y++)
+    for (let x = 0; x < width; x++) {
+      const [dx, dy] = slope(x, y);
+      const here = slopes[y * width + x] ?? 0;
+      const [ahead, behind] = [1, -1].map((way) => along(slopes, width, height, x, y, dx, dy, way));
+      // The one behind may be as steep: of two alike one is taken.
+      if (here > (ahead ?? 0) && here >= (behind ?? 0)) ridge[y * width + x] = 1;
+    }
+  return connected(width, height, ridge, slopes, low, high);
+}
+
+/** The slope one pixel on along the direction of the slope, between the two pixels there. */
+function along(
+  slopes: Float32Array,
+  width: number,
+  height: number,
+  x: number,
+  y: number,
+  dx: number,
+  dy: number,
+  way: number,
+): number {
+  const size = Math.max(Math.abs(dx), Math.abs(dy)) || 1;
+  const [toX, toY] = [x + (way * dx) / size, y + (way * dy) / size];
+  const [x0, y0] = [Math.floor(toX), Math.floor(toY)];
+  const [u, v] = [toX - x0, toY - y0];
+  const at = (i: number, j: number) => slopes[clamp(j, height) * width + clamp(i, width)] ?? 0;
+  return (
+    (1 - v) * ((1 - u) * at(x0, y0) + u * at(x0 + 1, y0)) + v * ((1 - u) * at(x0, y0 + 1) + u * at(x0 + 1, y0 + 1))
+  );
+}
+
+/** Ridges above `high`, and what hangs together with them above `low`. */
+function connected(
+  width: number,
+  height: number,
+  ridge: Uint8Array,
+  slopes: Float32Array,
+  low: number,
+  high: number,
+): Uint8Array {
+  const edges = new Uint8Array(width * height);
+  const open: number[] = [];
+  const take = (i: number, least: number) => {
+    if (!ridge[i] || edges[i] || (slopes[i] ?? 0) < least) return;
+    edges[i] = 1;
+    open.push(i);
+  };
+  for (let i = 0; i < edges.length; i++) {
+    take(i, high);
+    for (let from = open.pop(); from !== undefined; from = open.pop()) {
+      const [x, y] = [from % width, Math.floor(from / width)];
+      for (let j = Math.max(0, y - 1); j <= Math.min(height - 1, y + 1); j++)
+        for (let k = Math.max(0, x - 1); k <= Math.min(width - 1, x + 1); k++) take(j * width + k, low);
+    }
+  }
+  return edges;
+}
+
+/** By a Gaussian, first along rows, then along columns; beyond the border its values go on. */
+function smoothed({ width, height, values }: Picture, deviation: number): Float32Array {
+  const reach = Math.ceil(3 * deviation);
+  const kernel = Array.from({ length: 2 * reach + 1 }, (_, i) =>
+    Math.exp(-((i - reach) ** 2) / (2 * deviation ** 2 || 1)),
+  );
+  const sum = kernel.reduce((a, b) => a + b, 0);
+  const pass = (from: ArrayLike<number>, stepX: number, stepY: number) => {
+    const out = new Float32Array(width * height);
+    for (let y = 0; y < height; y++)
+      for (let x = 0; x < width; x++) {
+        let total = 0;
+        for (const [i, weight] of kernel.entries()) {
+          const [atX, atY] = [clamp(x + (i - reach) * stepX, width), clamp(y + (i - reach) * stepY, height)];
+          total += weight * (from[atY * width + atX] ?? 0);
+        }
+        out[y * width + x] = total / sum;
+      }
+    return out;
+  };
+  return pass(pass(values, 1, 0), 0, 1);
+}
+
+function clamp(i: number, length: number): number {
+  return Math.min(length - 1, Math.max(0, i));
+}

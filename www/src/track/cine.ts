@@ -1,0 +1,141 @@
+/** A beating ventricle as cine MR would show it, computed: what is true is known. */
+import type { Vec3 } from '../protocol';
+
+export interface CineSpec {
+  dims: Vec3;
+  spacing: Vec3;
+  frames: number;
+  /** Standard deviation of the noise; the blood is 110 brighter than the muscle. */
+  noise: number;
+  /** Half the length of the long axis, mm; all else goes with it. */
+  size: number;
+  /** With two muscles in the cavity whose gaps to the wall close in systole. */
+  papillary: boolean;
+}
+
+/** Intensities before noise. */
+const BLOOD = 200;
+const MUSCLE = 90;
+const LUNG = 45;
+/** The long half axis that the other lengths are told for. */
+const UNIT = 42;
+/** Samples through the thickness of a slice. */
+const SAMPLES = 3;
+/** Edge of the cells that the true volume is counted in, mm of a heart of the unit's size. */
+const CELL = 1.5;
+
+/** 0 in diastole, 1 in systole. */
+export function contraction({ frames }: CineSpec, frame: number): number {
+  const phase = (frame / frames) % 1;
+  const rise = (x: number) => 0.5 - 0.5 * Math.cos(Math.PI * Math.min(1, Math.max(0, x)));
+  return rise(phase / 0.35) - 0.92 * rise((phase - 0.35) / 0.3) - 0.08 * rise((phase - 0.65) / 0.35);
+}
+
+export function middleOf({ dims, spacing }: CineSpec): Vec3 {
+  return dims.map((n, k) => ((n - 1) / 2) * (spacing[k] ?? 1)) as Vec3;
+}
+
+/** Signed distances, about, of the cavity and of the heart: negative inside. */
+function distances(spec: CineSpec, at: Vec3, contracted: number): [number, number] {
+  const unit = spec.size / UNIT;
+  const middle = middleOf(spec);
+  const p = at.map((x, k) => (x - (middle[k] ?? 0)) / unit) as Vec3;
+  const [wide, long] = [25 * (1 - 0.34 * contracted), UNIT * (1 - 0.1 * contracted)];
+  const base = 20 - 6 * contracted;
+  let cavity = smoothMax(ellipsoid(p, [wide, wide, long]), p[2] - base, 3);
+  const thick = 9 + 4 * contracted;
+  const outside: Vec3 = [wide + thick, wide + thick, long + thick - 3 * contracted];
+  const heart = smoothMax(ellipsoid(p, outside), p[2] - base - 4, 3);
+  for (const angle of spec.papillary ? [0.7, 3] : []) {
+    // Away from the wall but for its foot; the gap closes in systole.
+    const away = wide - 9 + 4.5 * contracted;
+    const from: Vec3 = [p[0] - away * Math.cos(angle), p[1] - away * Math.sin(angle), p[2] + 12];
+    cavity = smoothMax(cavity, -ellipsoid(from, [5, 5, 18]), 2);
+  }
+  return [cavity * unit, heart * unit];
+}
+
+function ellipsoid(p: Vec3, axes: Vec3): number {
+  const size = Math.hypot(p[0] / axes[0], p[1] / axes[1], p[2] / axes[2]);
+  const slope = Math.hypot(p[0] / axes[0] ** 2, p[1] / axes[1] ** 2, p[2] / axes[2] ** 2);
+  return slope > 0 ? (size * (size - 1)) / slope : -Math.min(...axes);
+}
+
+/** The larger of two, rounded where they meet. */
+function smoothMax(a: number, b: number, width: number): number {
+  const near = Math.max(0, width - Math.abs(a - b)) / width;
+  return Math.max(a, b) + near * near * width * 0.25;
+}
+
+/** All frames, x fastest; the noise is that of magnitudes, and always the same. */
+export function cineVoxels(spec: CineSpec): Uint8Array {
+  const [nx, ny, nz] = spec.dims;
+  const voxels = new Uint8Array(nx * ny * nz * spec.frames);
+  const normal = normals(17);
+  let target = 0;
+  for (let frame = 0; frame < spec.frames; frame++) {
+    const contracted = contraction(spec, frame);
+    for (let z = 0; z < nz; z++)
+      for (let y = 0; y < ny; y++)
+        for (let x = 0; x < nx; x++) {
+          const clean = intensity(spec, [x, y, z], contracted);
+          const noisy = Math.hypot(clean + spec.noise * normal(), spec.noise * normal());
+          voxels[target++] = Math.min(255, Math.round(noisy));
+        }
+  }
+  return voxels;
+}
+
+/** Of a voxel before noise: thick slices show what is above and below, too. */
+function intensity(spec: CineSpec, index: Vec3, contracted: number): number {
+  const { spacing } = spec;
+  let sum = 0;
+  for (let k = 0; k < SAMPLES; k++) {
+    const z = (index[2] + (k + 0.5) / SAMPLES - 0.5) * spacing[2];
+    const [cavity, heart] = distances(spec, [index[0] * spacing[0], index[1] * spacing[1], z], contracted);
+    const share = (d: number) => Math.min(1, Math.max(0, 0.5 - d / spacing[0]));
+    const around = LUNG + (MUSCLE - LUNG) * share(heart);
+    sum += around + (BLOOD - around) * share(cavity);
+  }
+  return sum / SAMPLES;
+}
+
+/** What the cavity holds in a frame, mm³. */
+export function trueVolume(spec: CineSpec, frame: number): number {
+  const contracted = contraction(spec, frame);
+  const step = (CELL * spec.size) / UNIT;
+  const middle = middleOf(spec);
+  const reach = (mm: number) => Math.ceil((mm * spec.size) / UNIT / step);
+  const [wide, low, high] = [reach(28), reach(45), reach(24)];
+  let cells = 0;
+  for (let k = -low; k <= high; k++)
+    for (let j = -wide; j <= wide; j++)
+      for (let i = -wide; i <= wide; i++) {
+        const at: Vec3 = [middle[0] + i * step, middle[1] + j * step, middle[2] + k * step];
+        cells += Math.min(1, Math.max(0, 0.5 - distances(spec, at, contracted)[0] / step));
+      }
+  return cells * step ** 3;
+}
+
+/** Distances of points from the true wall of the cavity, packed xyz in; sorted. */
+export function wallDistances(spec: CineSpec, frame: number, points: Float32Array): Float64Array {
+  const contracted = contraction(spec, frame);
+  const found = Float64Array.from({ length: points.length / 3 }, (_, i) => {
+    const at: Vec3 = [points[3 * i] ?? 0, points[3 * i + 1] ?? 0, points[3 * i + 2] ?? 0];
+    return Math.abs(distances(spec, at, contracted)[0]);
+  });
+  return found.sort();
+}
+
+/** Gaussian numbers of deviation 1, the same for the same seed. */
+function normals(seed: number): () => number {
+  let state = seed;
+  const uniform = () => {
+    // mulberry32
+    state = (state + 0x6d2b79f5) | 0;
+    let t = Math.imul(state ^ (state >>> 15), 1 | state);
+    t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
+    return ((t ^ (t >>> 14)) >>> 0) / 4294967296;
+  };
+  return () => Math.sqrt(-2 * Math.log(1 - uniform())) * Math.cos(2 * Math.PI * uniform());
+}

@@ -1,0 +1,56 @@
+/** The whole run once more with something else. */
+import type { Volume } from 'vesicle';
+import type { CineSpec } from './cine';
+import { errorOf } from './frames';
+import type { ComparedTrack, Setup, SurfaceError } from './protocol';
+import { buildTracker, prepared } from './source';
+
+type Tell = (part: number, phase: string) => void;
+
+/** Undefined when the signal aborts it. */
+export async function compared(
+  original: Volume,
+  spec: CineSpec | undefined,
+  setup: Setup,
+  signal: AbortSignal,
+  tell: Tell,
+): Promise<ComparedTrack | undefined> {
+  const began = performance.now();
+  const volume = prepared(original, setup.preparation, (what) => tell(0, what));
+  try {
+    return await followed(volume, spec, setup, signal, tell, began);
+  } catch (error) {
+    if (signal.aborted) return undefined;
+    throw error;
+  } finally {
+    if (volume !== original) volume.free();
+  }
+}
+
+async function followed(
+  volume: Volume,
+  spec: CineSpec | undefined,
+  setup: Setup,
+  signal: AbortSignal,
+  tell: Tell,
+  began: number,
+): Promise<ComparedTrack> {
+  const { tracker } = buildTracker(volume, setup);
+  try {
+    await tracker.run({ signal, onStep: ({ progress, phase }) => tell(progress, phase) });
+    const took = performance.now() - began;
+    const errors: SurfaceError[] = [];
+    let crossings = 0;
+    for (let frame = 0; frame < tracker.frames; frame++) {
+      const mesh = tracker.meshAt(frame);
+      crossings += mesh.check().selfIntersections;
+      if (spec) errors.push(errorOf(spec, frame, mesh.arrays().positions));
+      mesh.free();
+    }
+    const mean = (of: 'mean' | 'most') => errors.reduce((sum, error) => sum + error[of], 0) / errors.length;
+    const error = errors.length > 0 ? { mean: mean('mean'), most: mean('most') } : undefined;
+    return { facts: tracker.facts, closing: tracker.closing, error, took, crossings };
+  } finally {
+    tracker.free();
+  }
+}

@@ -1,0 +1,81 @@
+import type { Unit } from '../examples';
+import type { ParamValues, Vec3 } from '../protocol';
+import { type CineSpec, middleOf } from './cine';
+import type { Box, Preparation } from './protocol';
+
+/** A 4D image that comes with the page, and what suits it. */
+export interface TrackExample {
+  id: string;
+  name: string;
+  source: { file: string } | { cine: CineSpec };
+  unit: Unit;
+  preparation: Preparation;
+  box?: Box;
+  at?: Vec3;
+  params: ParamValues;
+  credit: string;
+}
+
+const PLAIN: Preparation = { binning: 1, enrichment: 'none', factor: 0 };
+
+/** What is done to an image of the user's: in-between slices are made where slices are thick. */
+export const OWN_PREPARATION: Preparation = { binning: 1, enrichment: 'flow', factor: 0 };
+
+/** The middle of the left ventricle's blood. */
+const LEFT_VENTRICLE: Vec3 = [0.85, 24.08, 1.77];
+const REACH = 42;
+const around = (middle: Vec3, reach: number): Box => ({
+  min: middle.map((x) => x - reach) as Vec3,
+  max: middle.map((x) => x + reach) as Vec3,
+});
+
+export const HEART_CREDIT =
+  'Cine MR of a pig’s heart, short axis, 20 slices in 20 phases of one beat: WrightGroupSRI, ep-dataset, CC0. Pixels binned 2 × 2.';
+
+export const HEART = {
+  source: { file: 'heart.nii.gz' },
+  unit: 'mm',
+  preparation: { binning: 1, enrichment: 'flow', factor: 0 },
+  box: around(LEFT_VENTRICLE, REACH),
+  at: LEFT_VENTRICLE,
+  params: { threshold: 25, cyclic: true },
+  credit: HEART_CREDIT,
+} satisfies Partial<TrackExample>;
+
+const VENTRICLE: CineSpec = {
+  dims: [36, 36, 36],
+  spacing: [2, 2, 2],
+  frames: 12,
+  noise: 8,
+  size: 24,
+  papillary: false,
+};
+const THICK: CineSpec = { dims: [48, 48, 12], spacing: [1.6, 1.6, 5], frames: 12, noise: 8, size: 26, papillary: true };
+
+/** The first is shown when the lab opens. */
+export const FILMS: [TrackExample, ...TrackExample[]] = [
+  { id: 'heart', name: 'Beating heart, MR: left ventricle', ...HEART },
+  {
+    id: 'ventricle',
+    name: 'Computed ventricle, with its truth',
+    source: { cine: VENTRICLE },
+    unit: 'mm',
+    preparation: PLAIN,
+    box: around(middleOf(VENTRICLE), 29),
+    at: middleOf(VENTRICLE),
+    params: { threshold: 60, cyclic: true },
+    credit: 'Computed: a cavity whose volume is known in every frame, with the noise of MR.',
+  },
+  {
+    id: 'thick-slices',
+    name: 'Computed ventricle in thick slices, with muscles',
+    source: { cine: THICK },
+    unit: 'mm',
+    preparation: { binning: 1, enrichment: 'flow', factor: 0 },
+    box: around(middleOf(THICK), 32),
+    at: middleOf(THICK),
+    params: { threshold: 60, cyclic: true },
+    credit:
+      'Computed: the same with two muscles in the cavity, in slices of 5 mm. Without in-between slices the muscles come out in steps.',
+  },
+];

@@ -1,0 +1,96 @@
+/** 4D images as the worker opens and prepares them. */
+import { SurfaceTracker, Volume } from 'vesicle';
+import { Refusal } from '../worker/refusal';
+import { parseFiles } from '../worker/volumes';
+import { cineVoxels } from './cine';
+import type { FilmSource, NamedBytes, Preparation, Setup } from './protocol';
+
+/** Seconds from one computed frame to the next. */
+const CINE_SECONDS = 0.04;
+
+export function filmFrom(source: FilmSource): Volume {
+  if ('cine' in source) {
+    const { dims, spacing, frames } = source.cine;
+    return new Volume({
+      data: cineVoxels(source.cine),
+      dims: [...dims, frames],
+      spacing,
+      frameSeconds: CINE_SECONDS,
+    });
+  }
+  return fromParts(framesOf(source.files));
+}
+
+/** The files of each frame, in the order of their names: a header together with its data. */
+export function framesOf(files: NamedBytes[]): NamedBytes[][] {
+  const byName = [...files].sort((a, b) => a.name.localeCompare(b.name, 'en', { numeric: true }));
+  const isData = ({ name }: NamedBytes) => /\.(z?raw|img)(\.gz)?$/i.test(name);
+  const stem = ({ name }: NamedBytes) => name.replace(/\..*$/, '');
+  const heads = byName.filter((file) => !isData(file));
+  // One header takes any data; of several, each that of its name.
+  const belongs = (head: NamedBytes) => (file: NamedBytes) =>
+    isData(file) && (heads.length === 1 || stem(file) === stem(head));
+  return heads.map((head) => [head, ...byName.filter(belongs(head))]);
+}
+
+function fromParts(parts: NamedBytes[][]): Volume {
+  const [first] = parts;
+  if (!first) throw new Refusal('bad-file', 'there is no image among the files, only data without a header');
+  if (parts.length === 1) return parseFiles(first);
+  const frames: Volume[] = [];
+  try {
+    for (const files of parts) frames.push(parseFiles(files));
+    return Volume.fromFrames(frames);
+  } finally {
+    for (const frame of frames) frame.free();
+  }
+}
+
+/** Another volume, or the same where nothing is to be done. `tell` hears what is being done. */
+export function prepared(film: Volume, preparation: Preparation, tell: (what: string) => void): Volume {
+  const { binning, enrichment, factor } = preparation;
+  let present = film;
+  const take = (next: Volume) => {
+    if (present !== film) present.free();
+    present = next;
+  };
+  try {
+    if (binning > 1) {
+      tell('Binning pixels.');
+      take(present.binned(factorsOf(present, binning)));
+    }
+    if (enrichment !== 'none' && factor !== 1) {
+      const how = enrichment === 'flow' ? 'by optical flow' : 'by linear interpolation';
+      tell(`Making in-between slices of ${present.frames} frames ${how}.`);
+      take(present.enrichSlices({ method: enrichment, ...(factor > 0 && { factor }) }));
+    }
+    return present;
+  } catch (error) {
+    if (present !== film) present.free();
+    throw error;
+  }
+}
+
+/** Slices lie along the axis of the largest spacing; the other two are binned. */
+function factorsOf({ spacing }: Volume, binning: number): [number, number, number] {
+  const across = spacing.indexOf(Math.max(...spacing));
+  return [0, 1, 2].map((axis) => (axis === across ? 1 : binning)) as [number, number, number];
+}
+
+/** A tracker as asked for, and the threshold that it would choose by itself. */
+export function buildTracker(
+  volume: Volume,
+  { box, at, params }: Setup,
+): { tracker: SurfaceTracker; suggested: number } {
+  const { threshold, ...others } = params;
+  const options = { volume, component: at ?? ('largest' as const), params: others, ...(box && { box }) };
+  const tracker = new SurfaceTracker(options);
+  try {
+    const suggested = tracker.params.threshold;
+    if (threshold !== undefined) tracker.setParams({ threshold: threshold as number });
+    return { tracker, suggested };
+  } catch (error) {
+    tracker.free();
+    throw error;
+  }
+}

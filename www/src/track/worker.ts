@@ -1,0 +1,309 @@
+/** The worker of the Track lab: it holds one 4D image and one tracker, and does what the page asks. */
+import init, { paramSpecs, type StepReport, type SurfaceTracker, type Volume, version } from 'vesicle';
+import { Refusal, toFailure } from '../worker/refusal';
+import { answer, buffersOf, stop, type Work } from '../worker/serving';
+import { viewOf } from '../worker/volumes';
+import { betweenSlices } from './between';
+import { type CineSpec, trueVolume } from './cine';
+import { compared } from './comparing';
+import { trackedFrame } from './frames';
+import type {
+  ComparedTrack,
+  Opened,
+  ParamValues,
+  Preparation,
+  Ready,
+  RequestKind,
+  Requests,
+  SavedTrack,
+  Setup,
+  ToWorker,
+  VolumeView,
+  Votes,
+  WorkerEvent,
+} from './protocol';
+import { buildTracker, filmFrom, prepared } from './source';
+
+type Handlers = {
+  [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
+};
+
+/** Parameters that the boundary depends on; with the others it stays, and only the surfaces are found anew. */
+const OF_THE_BOUNDARY = ['threshold', 'window', 'windowFrames', 'cyclic'];
+
+function send(event: WorkerEvent, transfer: Transferable[] = []): void {
+  self.postMessage(event, { transfer });
+}
+
+/** An image as it was opened, and as it was prepared. */
+interface Film {
+  name: string;
+  original: Volume;
+  spec: CineSpec | undefined;
+  prepared: Volume;
+  preparation: Preparation;
+}
+
+class Session {
+  #film: Film | undefined;
+  #tracker: SurfaceTracker | undefined;
+  #setup: Setup | undefined;
+  #suggested = 0;
+  #iteration = 0;
+  #done = false;
+  /** Frames whose surface the page has. */
+  #sent = 0;
+  /** The tracker when the boundary of all frames was found, and no surface yet. */
+  #bounded: { state: Uint8Array; iteration: number } | undefined;
+  #run: Work | undefined;
+  #comparison: Work | undefined;
+
+  readonly handlers: Handlers = {
+    hello: async () => {
+      await init();
+      return { version: version(), specs: paramSpecs('tracking') };
+    },
+    open: (body) => this.#open(body),
+    rebuild: (setup) => this.#rebuild(setup),
+    play: () => this.#play(),
+    pause: () => this.#pause(),
+    step: ({ count }) => this.#step(count),
+    setParams: (params) => this.#setParams(params),
+    votes: ({ frame }) => this.#votes(frame),
+    between: ({ frame, slice, window }) => betweenSlices(this.#image().original, frame, slice, window),
+    save: () => this.#save(),
+    restore: (saved) => this.#restore(saved),
+    export: ({ frame, format }) => this.#export(frame, format),
+    animation: () => this.#current().toGlb(),
+    compare: ({ setup }) => this.#compare(setup),
+    cancelCompare: () => stop(this.#comparison),
+  };
+
+  async #open({ name, source, setup }: Requests['open']['body']): Promise<Opened> {
+    await this.#pause();
+    const tell = (what: string) => send({ event: 'preparing', what });
+    const began = performance.now();
+    const original = filmFrom(source);
+    const spec = 'cine' in source ? source.cine : undefined;
+    let made: Volume = original;
+    try {
+      made = prepared(original, setup.preparation, tell);
+      const took = performance.now() - began;
+      const ready = this.#adopt(made, setup);
+      const { dims, spacing } = original;
+      this.#forgetFilm();
+      this.#film = { name, original, spec, prepared: made, preparation: setup.preparation };
+      const truth = spec && Array.from({ length: spec.frames }, (_, frame) => trueVolume(spec, frame));
+      return { ...ready, volume: this.#view(), dims, spacing, truth, prepared: took };
+    } catch (error) {
+      if (made !== original) made.free();
+      original.free();
+      throw error;
+    }
+  }
+
+  async #rebuild(setup: Setup): Promise<Ready> {
+    await this.#pause();
+    return this.#build(setup);
+  }
+
+  /** A tracker of the present image, prepared anew where that is to be done in another way. */
+  #build(setup: Setup): Ready {
+    const film = this.#image();
+    if (same(film.preparation, setup.preparation)) return { ...this.#adopt(film.prepared, setup), volume: undefined };
+    const made = prepared(film.original, setup.preparation, (what) => send({ event: 'preparing', what }));
+    try {
+      const ready = this.#adopt(made, setup);
+      if (film.prepared !== film.original) film.prepared.free();
+      this.#film = { ...film, prepared: made, preparation: setup.preparation };
+      return { ...ready, volume: this.#view() };
+    } catch (error) {
+      if (made !== film.original) made.free();
+      throw error;
+    }
+  }
+
+  #adopt(volume: Volume, setup: Setup): Omit<Ready, 'volume'> {
+    const { tracker, suggested } = buildTracker(volume, setup);
+    this.#tracker?.free();
+    this.#tracker = tracker;
+    this.#setup = setup;
+    this.#suggested = suggested;
+    this.#bounded = undefined;
+    this.#standAt(0, false);
+    return this.#ready();
+  }
+
+  #ready(): Omit<Ready, 'volume'> {
+    const { params, noise } = this.#current();
+    return { params: { ...params }, suggested: this.#suggested, noise };
+  }
+
+  #standAt(iteration: number, done: boolean): void {
+    this.#iteration = iteration;
+    this.#done = done;
+    this.#sent = this.#current().facts.length;
+  }
+
+  #view(): VolumeView {
+    const { name, prepared } = this.#image();
+    return viewOf(prepared, name, prepared.frames);
+  }
+
+  #image(): Film {
+    if (!this.#film) throw new Refusal('invalid-argument', 'no image is open: open one first');
+    return this.#film;
+  }
+
+  #current(): SurfaceTracker {
+    if (!this.#tracker) throw new Refusal('invalid-argument', 'no image is open: open one first');
+    return this.#tracker;
+  }
+
+  #forgetFilm(): void {
+    const film = this.#film;
+    if (!film) return;
+    if (film.prepared !== film.original) film.prepared.free();
+    film.original.free();
+  }
+
+  async #play(): Promise<undefined> {
+    await stop(this.#comparison);
+    const tracker = this.#current();
+    if (this.#run || this.#done) return;
+    const abort = new AbortController();
+    this.#run = { abort, ended: this.#runToEnd(tracker, abort.signal) };
+    send({ event: 'state', state: 'running' });
+  }
+
+  async #runToEnd(tracker: SurfaceTracker, signal: AbortSignal): Promise<void> {
+    try {
+      await tracker.run({ signal, onStep: (report) => this.#stepped(report) });
+    } catch (error) {
+      if (!signal.aborted) send({ event: 'failure', failure: toFailure(error) });
+    }
+    this.#run = undefined;
+    this.#standStill();
+  }
+
+  #stepped(report: StepReport): void {
+    const tracker = this.#current();
+    this.#iteration = report.iteration;
+    this.#done = report.done;
+    const { length } = tracker.facts;
+    if (length === 0 && report.iteration === tracker.frames)
+      this.#bounded = { state: tracker.save(), iteration: report.iteration };
+    const index = length > this.#sent ? length - 1 : undefined;
+    this.#sent = length;
+    const frame = index === undefined ? undefined : trackedFrame(tracker, index, this.#image().spec);
+    const transfer = frame ? buffersOf([frame.surface.positions, frame.surface.normals, frame.surface.indices]) : [];
+    send({ event: 'step', report, index, frame, closing: tracker.closing }, transfer);
+  }
+
+  async #pause(): Promise<undefined> {
+    await stop(this.#comparison);
+    await stop(this.#run);
+  }
+
+  async #step(count: number): Promise<undefined> {
+    await this.#pause();
+    const tracker = this.#current();
+    try {
+      for (let i = 0; i < count && !this.#done; i++) this.#stepped(tracker.step(1));
+    } finally {
+      this.#standStill();
+    }
+  }
+
+  #standStill(): void {
+    send({ event: 'state', state: this.#done ? 'done' : 'paused' });
+  }
+
+  /** All frames with the same parameters: what depends on the change is found anew, from the first frame. */
+  async #setParams(values: ParamValues): Promise<Requests['setParams']['reply']> {
+    await this.#pause();
+    const tracker = this.#current();
+    const before: ParamValues = { ...tracker.params };
+    tracker.setParams(values);
+    const params: ParamValues = { ...tracker.params };
+    const changed = Object.keys(params).filter((name) => !Object.is(params[name], before[name]));
+    const setup = { ...(this.#setup as Setup) };
+    this.#setup = { ...setup, params: { ...setup.params, ...values } };
+    if (changed.some((name) => OF_THE_BOUNDARY.includes(name))) {
+      this.#bounded = undefined;
+      this.#standAt(0, false);
+    } else if (changed.length > 0 && this.#sent > 0) this.#backToBoundary(params);
+    return { params, iteration: this.#iteration };
+  }
+
+  #backToBoundary(params: ParamValues): void {
+    if (!this.#bounded) {
+      this.#adopt(this.#image().prepared, this.#setup as Setup);
+      return;
+    }
+    const tracker = this.#current();
+    tracker.restore(this.#bounded.state);
+    tracker.setParams(Object.fromEntries(Object.entries(params).filter(([name]) => !OF_THE_BOUNDARY.includes(name))));
+    this.#standAt(this.#bounded.iteration, false);
+  }
+
+  #votes(frame: number): Votes {
+    const all = this.#current().boundary(frame);
+    const count = all.length / 5;
+    const [points, weights] = [new Float32Array(3 * count), new Float32Array(count)];
+    for (let i = 0; i < count; i++) {
+      points.set(all.subarray(5 * i, 5 * i + 3), 3 * i);
+      weights[i] = all[5 * i + 4] ?? 0;
+    }
+    return { frame, points, weights };
+  }
+
+  #save(): SavedTrack {
+    const setup = this.#setup as Setup;
+    return { state: this.#current().save(), setup, iteration: this.#iteration, done: this.#done };
+  }
+
+  async #restore({ state, setup, iteration, done }: SavedTrack): Promise<Ready> {
+    await this.#pause();
+    const places = ({ preparation, box, at }: Setup) => ({ preparation, box, at });
+    const fits = this.#setup && same(places(this.#setup), places(setup));
+    const volume = fits ? undefined : this.#build(setup).volume;
+    this.#current().restore(state);
+    this.#setup = setup;
+    this.#bounded = undefined;
+    this.#standAt(iteration, done);
+    this.#standStill();
+    return { ...this.#ready(), volume };
+  }
+
+  #export(frame: number, format: Requests['export']['body']['format']): Uint8Array {
+    const mesh = this.#current().meshAt(frame);
+    try {
+      return mesh.toBytes(format);
+    } finally {
+      mesh.free();
+    }
+  }
+
+  async #compare(setup: Setup): Promise<ComparedTrack | undefined> {
+    await this.#pause();
+    const { original, spec } = this.#image();
+    const abort = new AbortController();
+    const tell = (part: number, phase: string) => send({ event: 'comparing', part, phase });
+    const result = compared(original, spec, setup, abort.signal, tell);
+    this.#comparison = { abort, ended: result };
+    try {
+      return await result;
+    } finally {
+      this.#comparison = undefined;
+    }
+  }
+}
+
+function same(one: unknown, other: unknown): boolean {
+  return JSON.stringify(one) === JSON.stringify(other);
+}
+
+const session = new Session();
+
+self.onmessage = ({ data }: MessageEvent<ToWorker>) => void answer(session.handlers, data);

@@ -1,0 +1,86 @@
+import { warningsOf } from '../track/curve';
+import type { FrameFacts, SurfaceError } from '../track/protocol';
+import { h } from './dom';
+import { count, figure, plural } from './format';
+
+/** One column of the table of frames. */
+interface Column {
+  head: string;
+  help: string;
+  text: (facts: FrameFacts) => string;
+}
+
+const COLUMNS: Column[] = [
+  { head: 'volume', help: 'Enclosed', text: ({ volume }) => figure(volume) },
+  { head: 'area', help: 'Of the surface', text: ({ area }) => figure(area) },
+  { head: 'folded', help: 'Triangles that face away from their three neighbours', text: ({ folded }) => count(folded) },
+  {
+    head: 'moved',
+    help: 'By the projection, in the mean, after the prediction',
+    text: ({ correction }) => figure(round(correction)),
+  },
+  { head: 'steps', help: 'Of the projections, in the mean', text: ({ steps }) => figure(round(steps)) },
+  { head: 'held', help: 'Moves held back, so that nothing crosses', text: ({ held }) => count(held) },
+  { head: 'rejected', help: 'Projections that led nowhere or too far', text: ({ rejected }) => count(rejected) },
+  { head: 'retracted', help: 'Vertices without a boundary, drawn together', text: ({ retracted }) => count(retracted) },
+];
+
+const round = (value: number) => Number(value.toPrecision(3));
+
+/** What happened in each frame, and what looks wrong about it. */
+export class BeatTable {
+  readonly warnings = h('p', { class: 'warning', role: 'status', 'data-warnings': '0' });
+  readonly element: HTMLElement;
+  readonly #table = h('table', { class: 'times' });
+
+  constructor() {
+    const label = 'What happened in each frame';
+    this.element = h(
+      'div',
+      {},
+      h('div', { class: 'scroll tall', tabindex: 0, role: 'region', 'aria-label': label }, this.#table),
+      h(
+        'p',
+        { class: 'help' },
+        'Volume and area in world units. Moved: how far the projection took the vertices after the prediction. Held, rejected and retracted: moves that were not made, and why.',
+      ),
+    );
+  }
+
+  show(facts: readonly FrameFacts[], errors: readonly (SurfaceError | undefined)[], frame: number): void {
+    this.#warn(facts);
+    const known = errors.some((error) => error);
+    const heads = ['frame', ...COLUMNS.map(({ head }) => head), ...(known ? ['error'] : [])];
+    const head = heads.map((title, i) => h('th', { scope: 'col', title: COLUMNS[i - 1]?.help }, title));
+    const rows = facts.map((one, i) => {
+      const cells = COLUMNS.map(({ text }) => h('td', {}, text(one)));
+      const error = errors[i];
+      if (known) cells.push(h('td', {}, error ? figure(round(error.mean)) : ''));
+      const now = i === frame && 'true';
+      return h('tr', { 'aria-current': now }, h('th', { scope: 'row' }, String(i + 1)), ...cells);
+    });
+    this.#table.replaceChildren(h('thead', {}, h('tr', {}, ...head)), h('tbody', {}, ...rows));
+  }
+
+  #warn(facts: readonly FrameFacts[]): void {
+    const found = warningsOf(facts);
+    const frames = (kind: 'folded' | 'area') => found.filter((one) => one.kind === kind);
+    const [folded, jumped] = [frames('folded'), frames('area')];
+    const percent = (shares: number[]) => `${(100 * Math.max(...shares.map(Math.abs))).toFixed(1)} %`;
+    const texts = [
+      ...(folded.length > 0
+        ? [
+            `In ${plural(folded.length, 'frame')} more than 1 % of the triangles are folded over, at most ${percent(folded.map(({ share }) => share))}: there the surface is crumpled, however well its volume looks.`,
+          ]
+        : []),
+      ...(jumped.length > 0
+        ? [
+            `In ${plural(jumped.length, 'frame')} the area jumps by more than 15 % from the one before, at most by ${percent(jumped.map(({ share }) => share))}: parts may have been lost or joined.`,
+          ]
+        : []),
+    ];
+    this.warnings.dataset.warnings = String(found.length);
+    const text = texts.join(' ');
+    if (this.warnings.textContent !== text) this.warnings.textContent = text;
+  }
+}

@@ -1,0 +1,124 @@
+import { h, icon, uniqueId } from './dom';
+import { count } from './format';
+
+const PLAY = 'M7 4.5v15l12-7.5z';
+const PAUSE = 'M6 5h4.5v14H6zM13.5 5H18v14h-4.5z';
+const BACK = 'M6 5h2.5v14H6zM18 5v14l-9-7z';
+const ON = 'M6 5v14l9-7zM16 5h2.5v14H16z';
+/** Milliseconds a frame is seen: slower than a heart, so that the eye can follow. */
+const FRAME_MS = 110;
+
+/** The frames that are done, one after the other: by hand, or beating in a loop. */
+export class FrameBar {
+  readonly element: HTMLElement;
+  readonly #onFrame: (frame: number) => void;
+  readonly #beat: HTMLButtonElement;
+  readonly #icon = h('span', { class: 'icon-holder' });
+  readonly #text = h('span');
+  readonly #buttons: HTMLButtonElement[];
+  readonly #slider: HTMLInputElement;
+  /** The slider speaks the number already. */
+  readonly #at = h('output', { 'aria-live': 'off', 'data-frames': '' });
+  #frame = 0;
+  #count = 1;
+  #done = 0;
+  #pending = 0;
+  #since = 0;
+
+  /** `onFrame`: another frame is to be shown. */
+  constructor(onFrame: (frame: number) => void) {
+    this.#onFrame = onFrame;
+    const id = uniqueId('frame');
+    this.#slider = h('input', { type: 'range', id, min: 0, max: 1, step: 1, value: 0 });
+    this.#slider.addEventListener('input', () => this.#byHand(this.#slider.valueAsNumber));
+    this.#beat = h(
+      'button',
+      { type: 'button', 'data-frame': 'beat', onclick: () => this.toggle() },
+      this.#icon,
+      this.#text,
+    );
+    const previous = labelled('previous', BACK, 'Previous frame', () => this.go(-1));
+    const next = labelled('next', ON, 'Next frame', () => this.go(1));
+    this.#buttons = [previous, next];
+    this.element = h(
+      'div',
+      { class: 'frames', role: 'group', 'aria-label': 'Frames' },
+      h('div', { class: 'buttons' }, previous, this.#beat, next),
+      h('label', { for: id }, 'Frame'),
+      this.#slider,
+      this.#at,
+    );
+    this.show(0, 1, 0);
+  }
+
+  get frame(): number {
+    return this.#frame;
+  }
+
+  get beating(): boolean {
+    return this.#pending !== 0;
+  }
+
+  /** `done`: so many frames have their surface. */
+  show(frame: number, frames: number, done: number): void {
+    this.#frame = Math.min(frame, frames - 1);
+    this.#count = frames;
+    this.#done = done;
+    if (done < 2) this.stop();
+    this.#slider.max = String(Math.max(1, frames - 1));
+    this.#slider.valueAsNumber = this.#frame;
+    this.#slider.disabled = frames < 2;
+    this.#slider.setAttribute('aria-valuetext', `frame ${this.#frame + 1} of ${frames}`);
+    this.#at.value = `${count(this.#frame + 1)} of ${count(frames)}`;
+    this.#beat.disabled = done < 2;
+    for (const button of this.#buttons) button.disabled = frames < 2;
+    this.#label();
+  }
+
+  /** So many frames further, beyond the last the first again. */
+  go(by: number): void {
+    this.#byHand((this.#frame + by + this.#count) % this.#count);
+  }
+
+  toggle(): void {
+    if (this.beating) this.stop();
+    else this.start();
+  }
+
+  start(): void {
+    if (this.#done < 2 || this.beating) return;
+    this.#since = performance.now();
+    this.#pending = requestAnimationFrame((now) => this.#turn(now));
+    this.#label();
+  }
+
+  stop(): void {
+    cancelAnimationFrame(this.#pending);
+    this.#pending = 0;
+    this.#label();
+  }
+
+  #turn(now: number): void {
+    this.#pending = requestAnimationFrame((next) => this.#turn(next));
+    if (now - this.#since < FRAME_MS) return;
+    this.#since = now;
+    this.#onFrame((this.#frame + 1) % Math.max(1, this.#done));
+  }
+
+  #byHand(frame: number): void {
+    this.stop();
+    this.#onFrame(frame);
+  }
+
+  #label(): void {
+    this.#icon.replaceChildren(icon(this.beating ? PAUSE : PLAY));
+    this.#text.textContent = this.beating ? 'Hold' : 'Beat';
+    const title = this.beating ? 'Hold this frame' : 'Show the frames that are done in a loop';
+    this.#beat.title = title;
+    this.#beat.setAttribute('aria-label', title);
+  }
+}
+
+function labelled(name: string, path: string, text: string, onclick: () => void): HTMLButtonElement {
+  return h('button', { type: 'button', 'data-frame': name, 'aria-label': text, title: text, onclick }, icon(path));
+}

@@ -1,0 +1,92 @@
+import type { Enrichment, Preparation } from '../track/protocol';
+import { h, uniqueId } from './dom';
+
+const KINDS: { value: Enrichment; label: string }[] = [
+  { value: 'none', label: 'none' },
+  { value: 'linear', label: 'linear' },
+  { value: 'flow', label: 'by optical flow' },
+];
+/** More slices for one than this the library does not make. */
+const MOST = 16;
+
+/** What is done to the image before tracking. */
+export class PreparationControls {
+  readonly element: HTMLElement;
+  readonly #binning: HTMLSelectElement;
+  readonly #kind: HTMLSelectElement;
+  readonly #factor: HTMLInputElement;
+  readonly #error = h('p', { class: 'field-error', role: 'alert' });
+  #value: Preparation = { binning: 1, enrichment: 'none', factor: 0 };
+
+  constructor(onChange: (preparation: Preparation, what: string) => void) {
+    const [binning, kind, factor] = ['binning', 'enrichment', 'factor'].map(uniqueId) as [string, string, string];
+    this.#binning = h(
+      'select',
+      { id: binning, 'data-prepare': 'binning' },
+      h('option', { value: '1' }, '×1'),
+      h('option', { value: '2' }, '×2'),
+    );
+    this.#binning.addEventListener('change', () =>
+      onChange({ ...this.#value, binning: this.#binning.value === '2' ? 2 : 1 }, 'binning'),
+    );
+    const options = KINDS.map(({ value, label }) => h('option', { value }, label));
+    this.#kind = h('select', { id: kind, 'data-prepare': 'enrichment' }, ...options);
+    this.#kind.addEventListener('change', () =>
+      onChange({ ...this.#value, enrichment: this.#kind.value as Enrichment }, 'in-between slices'),
+    );
+    this.#factor = h('input', {
+      type: 'number',
+      id: factor,
+      min: 0,
+      max: MOST,
+      step: 1,
+      placeholder: 'auto',
+      inputmode: 'numeric',
+      'data-prepare': 'factor',
+    });
+    this.#factor.addEventListener('change', () => {
+      const given = this.#factor.value === '' && !this.#factor.validity.badInput ? 0 : this.#factor.valueAsNumber;
+      const valid = Number.isInteger(given) && given >= 0 && given <= MOST;
+      this.#error.textContent = valid ? '' : `A whole number from 1 to ${MOST}, or none for as many as make cubes.`;
+      if (valid) onChange({ ...this.#value, factor: given }, 'number of slices');
+    });
+    this.element = h(
+      'div',
+      { class: 'preparation' },
+      row(
+        'Pixels of a slice',
+        binning,
+        this.#binning,
+        '×2 makes one of two by two: for images that were interpolated to finer pixels than were measured.',
+      ),
+      row(
+        'In-between slices',
+        kind,
+        this.#kind,
+        'Where slices are thick. By flow, walls that go aside from slice to slice stay sharp.',
+      ),
+      row('Slices for one', factor, this.#factor, 'Empty: as many as bring the voxels nearest to cubes.'),
+      this.#error,
+    );
+  }
+
+  show(preparation: Preparation): void {
+    this.#value = preparation;
+    this.#binning.value = String(preparation.binning);
+    this.#kind.value = preparation.enrichment;
+    this.#factor.value = preparation.factor > 0 ? String(preparation.factor) : '';
+    this.#factor.disabled = preparation.enrichment === 'none';
+    this.#error.textContent = '';
+  }
+}
+
+function row(label: string, id: string, control: HTMLElement, help: string): HTMLElement {
+  control.setAttribute('aria-describedby', `${id}-help`);
+  return h(
+    'div',
+    { class: 'param' },
+    h('label', { for: id }, label),
+    h('span', { class: 'value' }, control),
+    h('p', { class: 'help', id: `${id}-help` }, help),
+  );
+}

@@ -1,0 +1,112 @@
+import type { Vec3 } from '../protocol';
+import type { VoxelBox } from '../track/box';
+import { h } from './dom';
+
+export interface RegionEvents {
+  onRegion: (region: VoxelBox | undefined) => void;
+  /** The surface nearest to the crosshair is followed, or the largest. */
+  onComponent: (which: 'here' | 'largest') => void;
+}
+
+/** The box that is looked at, in slices, and the surface in it that is followed. */
+export class RegionControls {
+  readonly element: HTMLElement;
+  readonly #inputs: HTMLInputElement[] = [];
+  readonly #names: HTMLElement[] = [];
+  readonly #whole: HTMLButtonElement;
+  readonly #largest: HTMLButtonElement;
+  readonly #here: HTMLButtonElement;
+  readonly #error = h('p', { class: 'field-error', role: 'alert' });
+  readonly #followed = h('p', { class: 'help', 'data-component': '' });
+  #dims: Vec3 = [1, 1, 1];
+  #region: VoxelBox = { low: [0, 0, 0], high: [0, 0, 0] };
+  readonly #onRegion: RegionEvents['onRegion'];
+
+  constructor({ onRegion, onComponent }: RegionEvents) {
+    this.#onRegion = onRegion;
+    const rows = [0, 1, 2].map((axis) => this.#row(axis));
+    this.#whole = button('box', 'whole', 'Whole image', () => onRegion(undefined));
+    this.#largest = button('component', 'largest', 'Largest', () => onComponent('largest'));
+    this.#here = button('component', 'here', 'Nearest to the crosshair', () => onComponent('here'));
+    this.element = h(
+      'div',
+      { class: 'region' },
+      h('p', { class: 'help' }, 'Drag the sides of the dashed box on the slices, or type its first and last slice.'),
+      ...rows,
+      this.#error,
+      h('div', { class: 'buttons' }, this.#whole),
+      h('p', {}, 'Surface that is followed'),
+      h('div', { class: 'buttons' }, this.#largest, this.#here),
+      this.#followed,
+    );
+  }
+
+  /** `names` of the slices across each axis. */
+  show(region: VoxelBox, dims: Vec3, names: string[], nearest: Vec3 | undefined, whole: boolean): void {
+    this.#dims = dims;
+    this.#region = region;
+    for (const axis of [0, 1, 2]) {
+      const name = names[axis] ?? '';
+      this.#names[axis]?.replaceChildren(name);
+      for (const [side, input] of this.#inputs.slice(2 * axis, 2 * axis + 2).entries()) {
+        input.max = String((dims[axis] ?? 1) - 1);
+        input.value = String((side === 0 ? region.low : region.high)[axis] ?? 0);
+        input.setAttribute('aria-label', `${name}, ${side === 0 ? 'first' : 'last'} slice of the box`);
+      }
+    }
+    this.#whole.disabled = whole;
+    this.#largest.setAttribute('aria-pressed', String(nearest === undefined));
+    this.#here.setAttribute('aria-pressed', String(nearest !== undefined));
+    this.#followed.textContent = nearest
+      ? `The one nearest to (${nearest.map((x) => x.toFixed(1)).join(', ')}).`
+      : 'The largest of the first frame.';
+    this.#error.textContent = '';
+  }
+
+  complain(message: string): void {
+    this.#error.textContent = message;
+  }
+
+  #row(axis: number): HTMLElement {
+    const inputs = ['first', 'last'].map((side) => {
+      const input = h('input', {
+        type: 'number',
+        min: 0,
+        step: 1,
+        inputmode: 'numeric',
+        'data-box': `${axis}-${side}`,
+      });
+      input.addEventListener('change', () => this.#typed());
+      this.#inputs.push(input);
+      return input;
+    });
+    const name = h('span');
+    this.#names.push(name);
+    const swatch = h('span', { class: `swatch axis-${axis}`, 'aria-hidden': 'true' });
+    return h(
+      'div',
+      { class: 'row' },
+      h('span', { class: 'value' }, swatch, name),
+      h('span', { class: 'value' }, ...inputs),
+    );
+  }
+
+  #typed(): void {
+    const values = this.#inputs.map((input) => input.valueAsNumber);
+    const ends = (side: number) => [0, 1, 2].map((axis) => values[2 * axis + side] ?? Number.NaN) as Vec3;
+    const [low, high] = [ends(0), ends(1)];
+    const wrong = [0, 1, 2].some((axis) => {
+      const [from = Number.NaN, to = Number.NaN] = [low[axis], high[axis]];
+      return (
+        !Number.isInteger(from) || !Number.isInteger(to) || from < 0 || to >= (this.#dims[axis] ?? 1) || from >= to
+      );
+    });
+    if (wrong) this.#error.textContent = 'Whole numbers within the image are needed, the first below the last.';
+    else if (low.some((x, k) => x !== this.#region.low[k]) || high.some((x, k) => x !== this.#region.high[k]))
+      this.#onRegion({ low, high });
+  }
+}
+
+function button(group: string, name: string, text: string, onclick: () => void): HTMLButtonElement {
+  return h('button', { type: 'button', [`data-${group}`]: name, onclick }, text);
+}

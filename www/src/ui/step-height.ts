@@ -1,0 +1,77 @@
+import type { ParamSpec } from '../protocol';
+import { h, symbol, uniqueId } from './dom';
+import { figure } from './format';
+
+/** Below so many times the noise, noise makes boundaries. */
+const SAFE = 2.5;
+
+/** The step height τ, with the noise it has to stand out from. */
+export class StepHeight {
+  readonly element: HTMLElement;
+  readonly #number: HTMLInputElement;
+  readonly #slider: HTMLInputElement;
+  readonly #suggest: HTMLButtonElement;
+  readonly #noise = h('p', { class: 'help' });
+  readonly #warning = h('p', { class: 'warning', role: 'status' });
+  readonly #error = h('p', { class: 'field-error', role: 'alert' });
+  #suggested = 0;
+
+  constructor({ label, symbol: letter, help }: ParamSpec, onChange: (threshold: number) => void) {
+    const id = uniqueId('threshold');
+    this.#number = h('input', {
+      type: 'number',
+      id,
+      step: 'any',
+      min: 0,
+      inputmode: 'decimal',
+      'aria-describedby': `${id}-help`,
+    });
+    this.#slider = h('input', { type: 'range', min: 0, max: 1, step: 'any', 'aria-label': `${label}, slider` });
+    this.#number.addEventListener('change', () => onChange(this.#number.valueAsNumber));
+    // Everything begins again with it: only where the slider is let go.
+    this.#slider.addEventListener('input', () => {
+      this.#number.value = String(rounded(this.#slider.valueAsNumber));
+    });
+    this.#slider.addEventListener('change', () => onChange(rounded(this.#slider.valueAsNumber)));
+    this.#suggest = h('button', {
+      type: 'button',
+      'data-threshold': 'suggest',
+      onclick: () => onChange(this.#suggested),
+    });
+    this.element = h(
+      'div',
+      { class: 'param', 'data-param': 'threshold' },
+      h('label', { for: id }, label, ' ', ...(letter ? [symbol(letter)] : [])),
+      h('span', { class: 'value' }, this.#number),
+      this.#slider,
+      h('p', { class: 'help', id: `${id}-help` }, help),
+      this.#noise,
+      h('div', { class: 'buttons' }, this.#suggest),
+      this.#warning,
+      this.#error,
+    );
+  }
+
+  /** `most`: the largest difference that there can be. */
+  show(threshold: number, noise: number, suggested: number, most: number): void {
+    this.#suggested = suggested;
+    const top = rounded(Math.max(most / 2, threshold));
+    Object.assign(this.#slider, { max: String(top), step: String(top / 500) });
+    this.#slider.valueAsNumber = threshold;
+    this.#slider.setAttribute('aria-valuetext', figure(threshold));
+    this.#number.value = String(Number(threshold.toPrecision(6)));
+    this.#noise.textContent = `Noise measured in the box: σ = ${figure(rounded(noise))}. Suggested: ${figure(rounded(suggested))}.`;
+    this.#suggest.textContent = `Take ${figure(rounded(suggested))}`;
+    this.#suggest.disabled = Object.is(threshold, suggested);
+    const low = threshold < SAFE * noise;
+    const text = low ? `Below 2.5 σ = ${figure(rounded(SAFE * noise))}: noise alone will make boundaries.` : '';
+    if (this.#warning.textContent !== text) this.#warning.textContent = text;
+    this.#error.textContent = '';
+  }
+
+  complain(message: string): void {
+    this.#error.textContent = message;
+  }
+}
+
+const rounded = (value: number) => Number(value.toPrecision(3));

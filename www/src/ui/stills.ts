@@ -1,0 +1,154 @@
+import type { Vec3 } from '../protocol';
+import type { CannySettings } from '../track/canny';
+import type { Between, Votes } from '../track/protocol';
+import type { Below } from '../view/beating';
+import {
+  Picture,
+  paintBetween,
+  paintBoundary,
+  paintCanny,
+  paintTime,
+  paintWindow,
+  type Subject,
+  voxelIn,
+} from '../view/pictures';
+import { h, uniqueId } from './dom';
+
+/** The paper's, for greys of 0 to 255. */
+const CANNY: CannySettings = { deviation: 1.5, low: 10, high: 20 };
+const CANNY_FIELDS = [
+  { name: 'deviation', label: 'σ', min: 0.1 },
+  { name: 'low', label: 'low', min: 0 },
+  { name: 'high', label: 'high', min: 0 },
+] as const;
+
+/** What the pictures show, as far as it is known. */
+export interface StillsOf {
+  subject: Subject;
+  /** k, and τ. */
+  window: number;
+  threshold: number;
+  votes: Votes | undefined;
+  between: Between | undefined;
+  /** Of the slices that `between` lies between, and of how many. */
+  pair: [number, number];
+  /** Outline in the slice by frame; asked for only where it is shown. */
+  outlines: () => readonly (Float32Array | undefined)[];
+}
+
+/** One of the paper's rows of pictures in place of the slices. */
+export class Stills {
+  readonly element: HTMLElement;
+  readonly #rows: Record<Exclude<Below, 'slices'>, HTMLElement>;
+  readonly #sorted = new Picture('The slice with the window at the crosshair sorted into bright and dark');
+  readonly #boundary = new Picture('The boundary in the slice: the brighter the more windows voted for it');
+  readonly #canny = new Picture('Canny’s edges in the slice');
+  readonly #time = new Picture('One line of the slice in all frames, time to the right, with the surface on it');
+  readonly #between = ['Slice', 'Between, by flow', 'Between, linear', 'Next slice'].map(
+    (label) => new Picture(label),
+  ) as [Picture, Picture, Picture, Picture];
+  readonly #settings = { ...CANNY };
+  #below: Below = 'slices';
+  #of: StillsOf | undefined;
+
+  /** `onVoxel`, `onFrame`: what was clicked on. */
+  constructor(onVoxel: (voxel: Vec3) => void, onFrame: (frame: number) => void) {
+    this.#rows = {
+      boundary: h(
+        'div',
+        { class: 'stills' },
+        this.#sorted.element,
+        this.#boundary.element,
+        this.#canny.element,
+        this.#cannyFields(),
+      ),
+      time: h('div', { class: 'stills' }, this.#time.element),
+      between: h('div', { class: 'stills four' }, ...this.#between.map(({ element }) => element)),
+    };
+    this.element = h('div', { hidden: true, 'data-stills': '' }, ...Object.values(this.#rows));
+    this.#sorted.canvas.addEventListener('click', ({ offsetX, offsetY }) => {
+      const { clientWidth, clientHeight } = this.#sorted.canvas;
+      const { volume, voxel } = this.#of?.subject ?? {};
+      if (volume && voxel) onVoxel(voxelIn(volume, voxel, offsetX / clientWidth, offsetY / clientHeight));
+    });
+    this.#time.canvas.addEventListener('click', ({ offsetX }) => {
+      const frames = this.#of?.subject.volume.frames ?? 1;
+      onFrame(Math.min(frames - 1, Math.floor((offsetX / this.#time.canvas.clientWidth) * frames)));
+    });
+  }
+
+  set below(below: Below) {
+    this.#below = below;
+    this.element.hidden = below === 'slices';
+    for (const [name, row] of Object.entries(this.#rows)) row.hidden = name !== below;
+    this.draw();
+  }
+
+  show(of: StillsOf): void {
+    this.#of = of;
+    this.draw();
+  }
+
+  draw(): void {
+    if (!this.#of) return;
+    if (this.#below === 'boundary') this.#drawBoundary(this.#of);
+    else if (this.#below === 'time') this.#drawTime(this.#of);
+    else if (this.#below === 'between') this.#drawBetween(this.#of);
+  }
+
+  #drawBoundary({ subject, window, threshold, votes }: StillsOf): void {
+    const split = paintWindow(this.#sorted, subject, window, threshold);
+    this.#sorted.caption = split
+      ? 'The window at the crosshair, sorted by 2-means: it votes for what lies between green and red.'
+      : 'The window at the crosshair, sorted by 2-means: the two are too near each other, it does not vote.';
+    if (votes) paintBoundary(this.#boundary, subject, votes);
+    this.#boundary.caption = votes
+      ? `Votes of all windows, which reach into the slices and frames beside; τ = ${Number(threshold.toPrecision(3))}.`
+      : 'The boundary of this frame is not found yet.';
+    this.element.dataset.votes = String(votes?.weights.length ?? 0);
+    this.#drawCanny();
+  }
+
+  #drawCanny(): void {
+    if (!this.#of) return;
+    paintCanny(this.#canny, this.#of.subject, this.#settings);
+    this.#canny.caption = 'Canny’s edges: three numbers to find by trying.';
+  }
+
+  #drawTime({ subject, outlines }: StillsOf): void {
+    const points = paintTime(this.#time, subject, outlines());
+    this.element.dataset.crossings = String(points);
+    this.#time.caption = `The line through the crosshair, from left to right of the slice downwards, in all ${subject.volume.frames} frames to the right; dots: where the surface crosses it. A click shows the frame.`;
+  }
+
+  #drawBetween({ subject, between, pair: [slice, slices] }: StillsOf): void {
+    if (between) paintBetween(this.#between, subject.volume, between);
+    const captions = [
+      `Slice ${slice + 1} of ${slices}`,
+      'Half way, by optical flow',
+      'Half way, linear',
+      `Slice ${slice + 2}`,
+    ];
+    for (const [i, picture] of this.#between.entries()) picture.caption = captions[i] ?? '';
+    this.element.dataset.between = between ? String(slice) : '';
+  }
+
+  #cannyFields(): HTMLElement {
+    const fields = CANNY_FIELDS.map(({ name, label, min }) => {
+      const id = uniqueId('canny');
+      const input = h('input', { type: 'number', id, min, step: 'any', value: CANNY[name], 'data-canny': name });
+      input.addEventListener('change', () => {
+        if (!input.checkValidity() || input.value === '') input.valueAsNumber = this.#settings[name];
+        this.#settings[name] = input.valueAsNumber;
+        this.#drawCanny();
+      });
+      return h('span', { class: 'value' }, h('label', { for: id }, label), input);
+    });
+    return h(
+      'div',
+      { class: 'canny', role: 'group', 'aria-label': 'Canny’s numbers' },
+      h('span', {}, 'Canny’s'),
+      ...fields,
+    );
+  }
+}

@@ -1,0 +1,67 @@
+import type { Below, TrackViewOptions } from '../view/beating';
+import { h } from './dom';
+import { choice, PLACEMENTS } from './view-options';
+
+const SWITCHES = [
+  { name: 'surface', label: 'Surface' },
+  { name: 'edges', label: 'Wireframe' },
+  { name: 'votes', label: 'Boundary' },
+  { name: 'region', label: 'Box' },
+] as const;
+
+const BELOW: { value: Below; label: string }[] = [
+  { value: 'slices', label: 'slices' },
+  { value: 'boundary', label: 'boundary beside Canny’s' },
+  { value: 'time', label: 'a line through time' },
+  { value: 'between', label: 'between two slices' },
+];
+
+/** What the view of the Track lab shows, and what stands below it. */
+export class TrackOptionControls {
+  readonly element: HTMLElement;
+  readonly #boxes = new Map<string, HTMLInputElement>();
+  readonly #slices: HTMLSelectElement;
+  readonly #below: HTMLSelectElement;
+  readonly #value: TrackViewOptions;
+  readonly #onChange: (options: TrackViewOptions) => void;
+
+  constructor(initial: TrackViewOptions, onChange: (options: TrackViewOptions) => void) {
+    this.#value = { ...initial };
+    this.#onChange = onChange;
+    const switches = SWITCHES.map(({ name, label }) => {
+      const box = h('input', { type: 'checkbox', checked: initial[name], 'data-view': name });
+      box.addEventListener('change', () => this.set({ [name]: box.checked }));
+      this.#boxes.set(name, box);
+      return h('label', {}, box, label);
+    });
+    const slices = choice('Slices', 'slices', PLACEMENTS, initial.slices, (value) => this.set({ slices: value }));
+    const below = choice('Below', 'below', BELOW, initial.below, (value) => this.set({ below: value }));
+    this.#slices = slices.select;
+    this.#below = below.select;
+    this.element = h(
+      'div',
+      { class: 'view-options', role: 'group', 'aria-label': 'What the view shows' },
+      ...switches,
+      slices.element,
+      below.element,
+    );
+  }
+
+  get value(): TrackViewOptions {
+    return this.#value;
+  }
+
+  /** Shows what is asked for and tells; what is no choice counts as the first. */
+  set(changed: Partial<TrackViewOptions>): void {
+    Object.assign(this.#value, changed);
+    if (!BELOW.some(({ value }) => value === this.#value.below)) this.#value.below = 'slices';
+    if (!PLACEMENTS.some(({ value }) => value === this.#value.slices)) this.#value.slices = 'walls';
+    for (const { name } of SWITCHES) {
+      const box = this.#boxes.get(name);
+      if (box) box.checked = this.#value[name];
+    }
+    this.#slices.value = this.#value.slices;
+    this.#below.value = this.#value.below;
+    this.#onChange({ ...this.#value });
+  }
+}

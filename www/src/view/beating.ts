@@ -1,0 +1,278 @@
+import { Box3, Vector3 } from 'three';
+import type { LevelView, Surface, Vec3, VolumeView } from '../protocol';
+import type { VoxelBox } from '../track/box';
+import { cutBy } from '../track/cut';
+import type { Votes } from '../track/protocol';
+import { onSchemeChange, token } from '../ui/dom';
+import type { SlicePlacement } from '../ui/view-options';
+import { invert, sliceFrames, slicePlane, toWorld } from './anatomy';
+import { PointCloud } from './cloud';
+import { VolumeFrame } from './frame';
+import { Lines } from './lines';
+import { AXIS_TOKENS, SlicePanel } from './panel';
+import { SlicePlane } from './planes';
+import { RegionGrips, regionEdges } from './region';
+import { projectSegments } from './slicing';
+import { SurfaceObject } from './surface';
+import { Viewport } from './viewport';
+import { drawVotes, voteColors } from './votes';
+
+/** What is shown under the view: the slices, or one of the paper's pictures. */
+export type Below = 'slices' | 'boundary' | 'time' | 'between';
+
+export interface TrackViewOptions {
+  surface: boolean;
+  edges: boolean;
+  votes: boolean;
+  region: boolean;
+  slices: SlicePlacement;
+  below: Below;
+}
+
+interface Scene {
+  volume: VolumeView;
+  inverse: Float64Array;
+  panels: SlicePanel[];
+  planes: SlicePlane[];
+  frame: VolumeFrame;
+}
+
+/** Diameter of a point of the boundary as a part of the shortest side of a voxel. */
+const DISC = 1.6;
+
+/** The 3D view and the slices of one frame after the other, kept in step with each other. */
+export class BeatingView {
+  /** Called when the box was dragged to other voxels. */
+  onRegion: (region: VoxelBox) => void = () => undefined;
+  /** Called whenever the slices have moved. */
+  onMoved: () => void = () => undefined;
+  readonly #viewport: Viewport;
+  readonly #slices: HTMLElement;
+  readonly #surface = new SurfaceObject();
+  readonly #cloud = new PointCloud();
+  readonly #box = new Lines('#fff');
+  readonly #grips = new RegionGrips(
+    () => this.#redraw(),
+    (region) => this.onRegion(region),
+  );
+  #options: TrackViewOptions;
+  #scene: Scene | undefined;
+  #shown: Surface | undefined;
+  #votes: Votes | undefined;
+  #frame = 0;
+  #crosshair: Vec3 = [0, 0, 0];
+
+  constructor(canvas: HTMLCanvasElement, slices: HTMLElement, options: TrackViewOptions) {
+    this.#viewport = new Viewport(canvas);
+    this.#slices = slices;
+    this.#options = options;
+    for (const { object } of [this.#surface, this.#cloud, this.#box]) this.#viewport.add(object);
+    this.#viewport.onDraw = (viewer) => this.#placeSlices(viewer);
+    this.#recolor();
+    onSchemeChange(() => this.#recolor());
+  }
+
+  /** Another image, or the same prepared in another way: `keep` leaves slices and camera where they are in the world. */
+  setVolume(volume: VolumeView, keep: boolean): void {
+    const at = keep && this.#scene ? toWorld(this.#scene.volume.affine, this.#crosshair) : undefined;
+    this.#clear();
+    const inverse = invert(volume.affine);
+    const panels = sliceFrames(volume).map((frame) => {
+      const panel: SlicePanel = new SlicePanel(volume, frame, inverse, {
+        onIndex: (index) => this.#moveSlice(frame.axis, index),
+        onPoint: (index) => this.#moveTo(index),
+        grab: (place, slack) =>
+          this.#options.region ? this.#grips.grab(place, slack, frame.axis, volume.dims) : undefined,
+      });
+      panel.overlay = (context, scaleX, scaleY) => this.#drawOver(panel, context, scaleX, scaleY);
+      return panel;
+    });
+    const planes = panels.map(
+      ({ frame, picture }) =>
+        new SlicePlane(volume, frame, picture, { frame: token(AXIS_TOKENS[frame.axis]), section: token('--outline') }),
+    );
+    const frame = new VolumeFrame(volume, token('--muted'));
+    this.#scene = { volume, inverse, panels, planes, frame };
+    for (const { object } of [...planes, frame]) this.#viewport.add(object);
+    this.#slices.append(
+      ...[...panels].sort((a, b) => a.frame.name.localeCompare(b.frame.name)).map((panel) => panel.element),
+    );
+    this.#cloud.size = DISC * Math.min(...volume.spacing);
+    if (!keep) this.#viewport.frame(volume);
+    this.#moveTo(volume.dims.map((n) => (n - 1) >> 1) as Vec3);
+    this.showFrame(0, undefined);
+    if (at) this.goTo(at);
+  }
+
+  /** Looks from so near that a box fills the view. */
+  look(box: { min: Vec3; max: Vec3 }): void {
+    const { space } = this.#scene?.volume ?? { space: 'RAS' };
+    this.#viewport.frameBox(new Box3(new Vector3(...box.min), new Vector3(...box.max)), space === 'LPS' ? 1 : -1, 0.5);
+  }
+
+  /** The slices of a frame, and its surface where it has one. */
+  showFrame(frame: number, surface: Surface | undefined): void {
+    this.#frame = frame;
+    this.#shown = surface;
+    if (surface) this.#surface.show(surface);
+    const level = this.#level;
+    for (const panel of this.#scene?.panels ?? []) panel.setLevel(level);
+    this.#placePlanes();
+    this.#cut();
+    this.#apply();
+  }
+
+  /** The boundary of a frame, or none. */
+  showVotes(votes: Votes | undefined): void {
+    this.#votes = votes;
+    if (votes) this.#cloud.show(votes.points, voteColors(votes.weights));
+    this.#apply();
+    this.#redraw();
+  }
+
+  /** The voxels that are looked at. */
+  showRegion(region: VoxelBox): void {
+    this.#grips.region = region;
+    this.#redraw();
+  }
+
+  setOptions(options: TrackViewOptions): void {
+    this.#options = { ...options };
+    this.#apply();
+    this.#redraw();
+  }
+
+  goTo(point: Vec3): void {
+    const scene = this.#scene;
+    if (!scene) return;
+    const last = (axis: number) => (scene.volume.dims[axis] ?? 1) - 1;
+    this.#moveTo(toWorld(scene.inverse, point).map((x, k) => Math.min(last(k), Math.max(0, Math.round(x)))) as Vec3);
+  }
+
+  goToVoxel(voxel: Vec3): void {
+    this.#moveTo(voxel);
+  }
+
+  /** Where the slices meet: in the world, and as a voxel. */
+  get crosshair(): { point: Vec3; voxel: Vec3 } {
+    const voxel: Vec3 = [...this.#crosshair];
+    return { point: this.#scene ? toWorld(this.#scene.volume.affine, voxel) : [0, 0, 0], voxel };
+  }
+
+  /** Redraws what is over the slices. */
+  refresh(): void {
+    this.#redraw();
+  }
+
+  /** The cut of a surface with the slice across the last voxel axis, in pixels of the slice's picture. */
+  outlineIn(surface: Surface, axis: 0 | 1 | 2): Float32Array {
+    const scene = this.#scene;
+    const panel = scene?.panels[axis];
+    if (!scene || !panel) return new Float32Array(0);
+    const plane = slicePlane(scene.volume.affine, scene.inverse, axis, this.#crosshair[axis]);
+    return projectSegments(cutBy(surface, plane), scene.inverse, scene.volume, panel.frame);
+  }
+
+  dispose(): void {
+    this.#clear();
+    for (const part of [this.#surface, this.#cloud, this.#box]) part.dispose();
+    this.#viewport.dispose();
+  }
+
+  /** The voxels of the frame that is shown. */
+  get #level(): LevelView | undefined {
+    const volume = this.#scene?.volume;
+    return volume && { dims: volume.dims, voxels: voxelsOfFrame(volume, this.#frame) };
+  }
+
+  #moveSlice(axis: 0 | 1 | 2, index: number): void {
+    const at: Vec3 = [...this.#crosshair];
+    at[axis] = index;
+    this.#moveTo(at);
+  }
+
+  #moveTo(index: Vec3): void {
+    this.#crosshair = index;
+    for (const panel of this.#scene?.panels ?? []) panel.setCrosshair(index);
+    this.#placePlanes();
+    this.#cut();
+    this.onMoved();
+  }
+
+  #placePlanes(): void {
+    for (const [axis, plane] of this.#scene?.planes.entries() ?? []) plane.moveTo(this.#crosshair[axis] ?? 0);
+    this.#viewport.invalidate();
+  }
+
+  /** The surface's outlines on the slices. */
+  #cut(): void {
+    const scene = this.#scene;
+    if (!scene) return;
+    for (const axis of [0, 1, 2] as const) {
+      const plane = slicePlane(scene.volume.affine, scene.inverse, axis, this.#crosshair[axis]);
+      const section = this.#shown ? cutBy(this.#shown, plane) : new Float32Array(0);
+      scene.panels[axis]?.setOutline(section);
+      scene.planes[axis]?.showSection(section);
+    }
+    this.#viewport.invalidate();
+  }
+
+  #apply(): void {
+    const { surface, edges, votes, region } = this.#options;
+    this.#surface.solid = surface && this.#shown !== undefined;
+    this.#surface.edges = edges && this.#shown !== undefined;
+    this.#cloud.object.visible = votes && this.#votes !== undefined;
+    this.#box.object.visible = region;
+    this.#viewport.invalidate();
+  }
+
+  #redraw(): void {
+    const scene = this.#scene;
+    for (const panel of scene?.panels ?? []) panel.draw();
+    if (scene && this.#grips.region) this.#box.show(regionEdges(this.#grips.region, scene.volume.affine));
+    this.#box.object.visible = this.#options.region;
+    this.#viewport.invalidate();
+  }
+
+  #drawOver(panel: SlicePanel, context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
+    const scene = this.#scene;
+    if (!scene) return;
+    const { volume, inverse } = scene;
+    const slice = this.#crosshair[panel.frame.axis];
+    if (this.#options.votes && this.#votes)
+      drawVotes(context, this.#votes, { volume, inverse, frame: panel.frame, slice, scaleX, scaleY });
+    if (this.#options.region) this.#grips.draw(context, panel.frame, volume.dims, scaleX, scaleY);
+  }
+
+  #placeSlices(viewer: Vector3): void {
+    const { slices } = this.#options;
+    for (const plane of this.#scene?.planes ?? []) {
+      plane.object.visible = slices !== 'hidden';
+      if (slices !== 'hidden') plane.stand(slices, viewer);
+    }
+  }
+
+  #recolor(): void {
+    this.#surface.edgeColor = token('--wire');
+    this.#box.object.material.color.set(token('--region'));
+    this.#redraw();
+  }
+
+  #clear(): void {
+    const scene = this.#scene;
+    if (!scene) return;
+    for (const item of [...scene.planes, scene.frame]) {
+      this.#viewport.remove(item.object);
+      item.dispose();
+    }
+    for (const panel of scene.panels) panel.dispose();
+    this.#scene = undefined;
+    this.#votes = undefined;
+  }
+}
+
+/** The greys of one frame. */
+export function voxelsOfFrame({ dims, voxels }: VolumeView, frame: number): Uint8Array {
+  const size = dims[0] * dims[1] * dims[2];
+  return voxels.subarray(frame * size, (frame + 1) * size);
+}

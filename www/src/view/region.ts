@@ -1,0 +1,84 @@
+/** The box of voxels that is looked at: over the slices, where its sides can be dragged, and in the 3D view. */
+import type { Vec3 } from '../protocol';
+import type { VoxelBox } from '../track/box';
+import { token } from '../ui/dom';
+import { type Axis, type SliceFrame, toWorld } from './anatomy';
+import type { Grip } from './panel';
+
+/** Fewer voxels than this along an axis hold no window with a boundary in it. */
+const LEAST = 4;
+
+export class RegionGrips {
+  region: VoxelBox | undefined;
+  readonly #onMove: () => void;
+  readonly #onDrop: (region: VoxelBox) => void;
+
+  constructor(onMove: () => void, onDrop: (region: VoxelBox) => void) {
+    this.#onMove = onMove;
+    this.#onDrop = onDrop;
+  }
+
+  /** Takes hold of the sides that are near the place, on a slice across an axis. */
+  grab(place: Vec3, slack: Vec3, across: Axis, dims: Vec3): Grip | undefined {
+    const start = this.region;
+    if (!start) return undefined;
+    const within = ([0, 1, 2] as const).every(
+      (axis) =>
+        axis === across ||
+        (place[axis] > start.low[axis] - 0.5 - slack[axis] && place[axis] < start.high[axis] + 0.5 + slack[axis]),
+    );
+    const near = ([0, 1, 2] as const).flatMap((axis) => {
+      if (axis === across || !within) return [];
+      const [toLow, toHigh] = [
+        Math.abs(place[axis] - start.low[axis] + 0.5),
+        Math.abs(place[axis] - start.high[axis] - 0.5),
+      ];
+      if (Math.min(toLow, toHigh) > slack[axis]) return [];
+      return [{ axis, side: toLow < toHigh ? ('low' as const) : ('high' as const) }];
+    });
+    if (near.length === 0) return undefined;
+    return {
+      move: (to) => {
+        this.region = near.reduce((box, { axis, side }) => moved(box, axis, side, to[axis], dims), start);
+        this.#onMove();
+      },
+      drop: () => {
+        if (this.region) this.#onDrop(this.region);
+      },
+    };
+  }
+
+  /** The box where it meets a slice, in pixels of the slice times the scales. */
+  draw(context: CanvasRenderingContext2D, frame: SliceFrame, dims: Vec3, scaleX: number, scaleY: number): void {
+    const { region } = this;
+    if (!region) return;
+    const span = ({ axis, flip }: SliceFrame['horizontal']) => {
+      const [from, to] = [region.low[axis], region.high[axis] + 1];
+      return flip ? [dims[axis] - to, dims[axis] - from] : [from, to];
+    };
+    const [[x0 = 0, x1 = 0], [y0 = 0, y1 = 0]] = [span(frame.horizontal), span(frame.vertical)];
+    context.save();
+    context.setLineDash([5, 4]);
+    context.lineWidth = 1.5;
+    context.strokeStyle = token('--region');
+    context.strokeRect(x0 * scaleX, y0 * scaleY, (x1 - x0) * scaleX, (y1 - y0) * scaleY);
+    context.restore();
+  }
+}
+
+function moved(box: VoxelBox, axis: Axis, side: 'low' | 'high', to: number, dims: Vec3): VoxelBox {
+  const ends: VoxelBox = { low: [...box.low], high: [...box.high] };
+  if (side === 'low') ends.low[axis] = Math.max(0, Math.min(Math.round(to + 0.5), box.high[axis] - LEAST + 1));
+  else ends.high[axis] = Math.min(dims[axis] - 1, Math.max(Math.round(to - 0.5), box.low[axis] + LEAST - 1));
+  return ends;
+}
+
+/** The twelve edges around the voxels, pairs of world points. */
+export function regionEdges({ low, high }: VoxelBox, affine: ArrayLike<number>): Float32Array {
+  const corner = (i: number) =>
+    toWorld(affine, low.map((from, k) => ((i >> k) & 1 ? (high[k] ?? 0) + 0.5 : from - 0.5)) as Vec3);
+  const edges: number[] = [];
+  for (let i = 0; i < 8; i++)
+    for (let k = 0; k < 3; k++) if (!((i >> k) & 1)) edges.push(...corner(i), ...corner(i | (1 << k)));
+  return Float32Array.from(edges);
+}

@@ -1,0 +1,59 @@
+/** The points of the boundary: coloured by how many windows voted for them, in space and on slices. */
+import type { Vec3, VolumeView } from '../protocol';
+import type { Votes } from '../track/protocol';
+import { type SliceFrame, toWorld } from './anatomy';
+
+/** From few votes to all, sRGB 0..1. */
+const FEW: Vec3 = [0.99, 0.82, 0.38];
+const MANY: Vec3 = [0.78, 0.1, 0.24];
+/** Shades on slices. */
+const SHADES = 6;
+
+export function voteColors(weights: Float32Array): Float32Array {
+  const out = new Float32Array(3 * weights.length);
+  for (let i = 0; i < weights.length; i++) {
+    const part = Math.min(1, weights[i] ?? 0);
+    for (let k = 0; k < 3; k++) out[3 * i + k] = (FEW[k] ?? 0) + part * ((MANY[k] ?? 0) - (FEW[k] ?? 0));
+  }
+  return out;
+}
+
+interface OnSlice {
+  volume: VolumeView;
+  inverse: ArrayLike<number>;
+  frame: SliceFrame;
+  slice: number;
+  scaleX: number;
+  scaleY: number;
+}
+
+/** The points that lie in a slice: in its plane, in pixels of its picture. */
+export function votesIn(
+  { points, weights }: Votes,
+  { volume, inverse, frame, slice }: Omit<OnSlice, 'scaleX' | 'scaleY'>,
+): { x: number; y: number; weight: number }[] {
+  const out = [];
+  const place = ({ axis, flip }: SliceFrame['horizontal'], index: Vec3) =>
+    (flip ? volume.dims[axis] - 1 - index[axis] : index[axis]) + 0.5;
+  for (let i = 0; i < weights.length; i++) {
+    const point: Vec3 = [points[3 * i] ?? 0, points[3 * i + 1] ?? 0, points[3 * i + 2] ?? 0];
+    const index = toWorld(inverse, point);
+    // Faces to the slices before and after lie half a voxel off.
+    if (Math.abs(index[frame.axis] - slice) > 0.25) continue;
+    out.push({ x: place(frame.horizontal, index), y: place(frame.vertical, index), weight: weights[i] ?? 0 });
+  }
+  return out;
+}
+
+export function drawVotes(context: CanvasRenderingContext2D, votes: Votes, on: OnSlice): void {
+  const found = votesIn(votes, on);
+  const colors = voteColors(Float32Array.from({ length: SHADES }, (_, i) => i / (SHADES - 1)));
+  const size = Math.max(1.5, 0.5 * Math.min(on.scaleX, on.scaleY));
+  for (let shade = 0; shade < SHADES; shade++) {
+    const [r = 0, g = 0, b = 0] = colors.subarray(3 * shade, 3 * shade + 3);
+    context.fillStyle = `rgb(${255 * r} ${255 * g} ${255 * b})`;
+    for (const { x, y, weight } of found)
+      if (Math.round(Math.min(1, weight) * (SHADES - 1)) === shade)
+        context.fillRect(x * on.scaleX - size / 2, y * on.scaleY - size / 2, size, size);
+  }
+}
