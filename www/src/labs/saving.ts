@@ -17,8 +17,8 @@ export class Saving {
   }
 
   /** The surface as it is now. */
-  async mesh(format: MeshFormat, type: string): Promise<void> {
-    this.bytes(format, await this.#fetch(format), type);
+  async mesh(format: MeshFormat, type: string, suffix = ''): Promise<void> {
+    this.bytes(format, await this.#fetch(format), type, suffix);
   }
 
   /** What the plots show. */
@@ -26,11 +26,12 @@ export class Saving {
     this.bytes('csv', new TextEncoder().encode(toCsv(history, residual)), 'text/csv');
   }
 
-  bytes(extension: string, bytes: Uint8Array, type: string): void {
+  /** `suffix` tells files of the same kind apart. */
+  bytes(extension: string, bytes: Uint8Array, type: string, suffix = ''): void {
     const stem = this.name
       .replace(/\.(nii|nrrd|nhdr|mha|mhd|gz|ply|obj|xyz|pts|csv|txt)\b.*$/i, '')
       .replaceAll(' ', '-');
-    download(`${stem}.${extension}`, bytes, type);
-    this.#say(`Saved ${stem}.${extension}.`);
+    download(`${stem}${suffix}.${extension}`, bytes, type);
+    this.#say(`Saved ${stem}${suffix}.${extension}.`);
   }
 }

@@ -26,7 +26,7 @@ export interface TrackSettings {
   view: TrackViewOptions;
 }
 
-const SWITCHES = ['surface', 'edges', 'votes', 'region'] as const;
+const SWITCHES = ['surface', 'edges', 'region'] as const;
 const ENRICHMENTS: readonly string[] = ['none', 'linear', 'flow'] satisfies Enrichment[];
 
 /** What the example, or else an image of one's own, is opened with, changed as a link says. */
@@ -104,7 +104,8 @@ function preparationOf(query: URLSearchParams): Partial<Preparation> {
 function viewIn(query: URLSearchParams): Partial<TrackViewOptions> {
   const view: Partial<TrackViewOptions> = {};
   for (const name of SWITCHES) if (query.has(name)) view[name] = query.get(name) === 'true';
-  const [slices, below] = [query.get('slices'), query.get('below')];
+  const [votes, slices, below] = ['votes', 'slices', 'below'].map((name) => query.get(name));
+  if (votes) view.votes = votes as TrackViewOptions['votes'];
   if (slices) view.slices = slices as TrackViewOptions['slices'];
   if (below) view.below = below as TrackViewOptions['below'];
   return view;

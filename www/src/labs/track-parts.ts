@@ -31,7 +31,7 @@ import { FilmPanel, layOut } from './track-page';
 export const INITIAL_VIEW: TrackViewOptions = {
   surface: true,
   edges: false,
-  votes: false,
+  votes: 'none',
   region: true,
   slices: 'walls',
   below: 'slices',
@@ -222,14 +222,9 @@ export class TrackParts {
   }
 
   #saveMesh(format: MeshFormat, type: string): void {
-    const { name } = this.saving;
-    this.saving.name = `${name}-${this.frames.frame + 1}`;
     this.saving
-      .mesh(format, type)
-      .catch((error) => this.#events.onError('The surface could not be saved.', error))
-      .finally(() => {
-        this.saving.name = name;
-      });
+      .mesh(format, type, `-${this.frames.frame + 1}`)
+      .catch((error) => this.#events.onError('The surface could not be saved.', error));
   }
 }
 

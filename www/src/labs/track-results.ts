@@ -183,10 +183,10 @@ export class TrackResults {
     const film = this.#film;
     if (!film) return;
     const { below, votes } = this.#ui.options.value;
-    if (votes || below === 'boundary') this.#askVotes();
+    if (votes !== 'none' || below === 'boundary') this.#askVotes();
     if (below === 'between') this.#askBetween(film);
     const present = this.#votes?.frame === this.#frame ? this.#votes : undefined;
-    this.#ui.view.showVotes(votes ? present : undefined);
+    this.#ui.view.showVotes(votes === 'none' ? undefined : present);
     if (below === 'slices') return;
     const { voxel } = this.#ui.view.crosshair;
     this.#ui.stills.show({
@@ -216,11 +216,11 @@ export class TrackResults {
     return this.#ui.frames.element;
   }
 
-  /** The slice of the image as it was opened that is at the crosshair or just before it. */
+  /** The slice of the image as it was opened that is nearest to the crosshair and has two neighbours. */
   #pair({ volume, slices }: Film): number {
     const { voxel } = this.#ui.view.crosshair;
     const factor = slices > 1 ? (volume.dims[2] - 1) / (slices - 1) : 1;
-    return Math.max(0, Math.min(slices - 2, Math.floor(voxel[2] / factor)));
+    return Math.max(1, Math.min(slices - 2, Math.round(voxel[2] / factor)));
   }
 
   #betweenKey(film: Film): string {
@@ -241,7 +241,7 @@ export class TrackResults {
 
   #askBetween(film: Film): void {
     const key = this.#betweenKey(film);
-    if (this.#between?.key === key || film.slices < 2) return;
+    if (this.#between?.key === key || film.slices < 3) return;
     const body = { frame: this.#frame, slice: this.#pair(film), window: film.volume.window };
     this.#ask(
       'between',

@@ -116,6 +116,7 @@ export class TrackSettings {
         this.#inForce();
         this.#ui.banner.hide();
         this.#results.rewind(iteration);
+        this.#states.stand('Beginning again.');
         this.#onChange();
         await this.#client.request('play', undefined);
       } catch (error) {
@@ -153,9 +154,12 @@ export class TrackSettings {
   async #goTo(saved: SavedTrack, { record }: PageState): Promise<void> {
     // The worker went back to the state already; this tells what was in it.
     const ready = await this.#client.request('restore', saved);
-    this.#take(saved.setup, ready);
+    const asBefore = JSON.stringify(saved.setup.preparation) === JSON.stringify(this.#setup.preparation);
+    const volume = asBefore ? undefined : await this.#client.request('view', undefined);
+    this.#take(saved.setup, { ...ready, volume });
     this.#results.restore(record, saved.iteration, saved.done);
     this.#onChange();
+    await this.#client.request('tell', undefined);
   }
 
   #take(setup: Setup, { volume, ...ready }: Ready): void {

@@ -1,39 +1,53 @@
-/** What lies between two slices, by linear interpolation and along the optical flow (figure 5). */
+/** What interpolation makes of a slice's two neighbours in its place, linear and along the optical flow (figure 5). */
 import { Volume } from 'vesicle';
 import { quantize } from '../quantize';
 import { Refusal } from '../worker/refusal';
 import type { Between } from './protocol';
 
-/** The slice half way between `slice` and the next one along the last voxel axis. */
+/** As if slice number `slice` across the last voxel axis had not been measured. */
 export function betweenSlices(volume: Volume, frame: number, slice: number, window: [number, number]): Between {
   const [width, height, slices] = volume.dims;
-  if (slice < 0 || slice + 1 >= slices)
-    throw new Refusal('invalid-argument', `slice ${slice} has no next one: there are ${slices}`);
-  const pair = new Float32Array(2 * width * height);
-  pair.set(volume.slice(2, slice, frame));
-  pair.set(volume.slice(2, slice + 1, frame), width * height);
+  if (slice < 1 || slice + 1 >= slices)
+    throw new Refusal('invalid-argument', `slice ${slice} has no two neighbours: there are ${slices} slices`);
+  const [before, measured, after] = [-1, 0, 1].map((off) => volume.slice(2, slice + off, frame)) as Three;
+  const middle = (method: 'flow' | 'linear') => between(before, after, width, height, method);
+  const [linear, flow] = [middle('linear'), middle('flow')];
   const greys = (values: Float32Array) => {
     const out = new Uint8Array(width * height);
     quantize(values, window, out, 0);
     return out;
   };
-  const middle = (method: 'flow' | 'linear') => {
-    // Far from each other, so that it is between these two that a slice is put.
-    const two = new Volume({ data: pair, dims: [width, height, 2], spacing: [1, 1, 4] });
-    const three = two.enrichSlices({ factor: 2, method });
-    try {
-      return greys(three.slice(2, 1));
-    } finally {
-      two.free();
-      three.free();
-    }
-  };
+  const off = { linear: rms(linear, measured), flow: rms(flow, measured) };
   return {
-    width,
-    height,
-    first: greys(pair.subarray(0, width * height)),
-    second: greys(pair.subarray(width * height)),
-    linear: middle('linear'),
-    flow: middle('flow'),
+    ...{ width, height, off, before: greys(before), flow: greys(flow), measured: greys(measured) },
+    ...{ linear: greys(linear), after: greys(after) },
   };
+}
+
+type Three = [Float32Array, Float32Array, Float32Array];
+
+function between(
+  one: Float32Array,
+  other: Float32Array,
+  width: number,
+  height: number,
+  method: 'flow' | 'linear',
+): Float32Array {
+  const data = new Float32Array(2 * width * height);
+  data.set(one);
+  data.set(other, width * height);
+  // Far from each other, so that it is between these two that a slice is put.
+  const two = new Volume({ data, dims: [width, height, 2], spacing: [1, 1, 4] });
+  const three = two.enrichSlices({ factor: 2, method });
+  try {
+    return three.slice(2, 1);
+  } finally {
+    two.free();
+    three.free();
+  }
+}
+
+function rms(one: Float32Array, other: Float32Array): number {
+  const squares = one.reduce((sum, value, i) => sum + (value - (other[i] ?? 0)) ** 2, 0);
+  return Math.sqrt(squares / one.length);
 }

@@ -89,14 +89,17 @@ export function cineVoxels(spec: CineSpec): Uint8Array {
 /** Of a voxel before noise: thick slices show what is above and below, too. */
 function intensity(spec: CineSpec, index: Vec3, contracted: number): number {
   const { spacing } = spec;
-  let sum = 0;
-  for (let k = 0; k < SAMPLES; k++) {
-    const z = (index[2] + (k + 0.5) / SAMPLES - 0.5) * spacing[2];
-    const [cavity, heart] = distances(spec, [index[0] * spacing[0], index[1] * spacing[1], z], contracted);
+  const at = (off: number): Vec3 => [index[0] * spacing[0], index[1] * spacing[1], (index[2] + off) * spacing[2]];
+  const shade = ([cavity, heart]: [number, number]) => {
     const share = (d: number) => Math.min(1, Math.max(0, 0.5 - d / spacing[0]));
     const around = LUNG + (MUSCLE - LUNG) * share(heart);
-    sum += around + (BLOOD - around) * share(cavity);
-  }
+    return around + (BLOOD - around) * share(cavity);
+  };
+  const middle = distances(spec, at(0), contracted);
+  // Far from any wall all of the voxel is alike.
+  if (Math.min(Math.abs(middle[0]), Math.abs(middle[1])) > Math.max(...spacing)) return shade(middle);
+  let sum = 0;
+  for (let k = 0; k < SAMPLES; k++) sum += shade(distances(spec, at((k + 0.5) / SAMPLES - 0.5), contracted));
   return sum / SAMPLES;
 }
 

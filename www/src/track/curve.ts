@@ -1,4 +1,5 @@
 /** What the volumes of a heartbeat say. */
+import type { FrameFacts } from './protocol';
 
 export interface Beat {
   /** Frame of the largest and of the smallest volume. */
@@ -21,7 +22,7 @@ export function beatOf(volumes: readonly number[]): Beat | undefined {
 
 /** Of the triangles, more than this share facing the other way is worth a warning. */
 export const FOLDED = 0.01;
-/** From one frame to the next, by more than this share the area does not change in a heart. */
+/** From one frame to the next the area of a body that only grows or shrinks goes with its volume to the power of 2/3; more than this share off is worth a warning. */
 export const AREA_JUMP = 0.15;
 
 export interface Warned {
@@ -30,11 +31,14 @@ export interface Warned {
   share: number;
 }
 
+type Suspect = Pick<FrameFacts, 'folded' | 'triangles' | 'area' | 'volume'>;
+
 /** The frames that are suspect even where volume and error look well. */
-export function warningsOf(facts: readonly { folded: number; triangles: number; area: number }[]): Warned[] {
-  return facts.flatMap(({ folded, triangles, area }, frame) => {
-    const before = facts[frame - 1]?.area;
-    const [share, jump] = [folded / (triangles || 1), before ? area / before - 1 : 0];
+export function warningsOf(facts: readonly Suspect[]): Warned[] {
+  return facts.flatMap(({ folded, triangles, area, volume }, frame) => {
+    const before = facts[frame - 1];
+    const expected = before && before.area * (volume / before.volume) ** (2 / 3);
+    const [share, jump] = [folded / (triangles || 1), expected ? area / expected - 1 : 0];
     return [
       ...(share > FOLDED ? [{ frame, kind: 'folded' as const, share }] : []),
       ...(Math.abs(jump) > AREA_JUMP ? [{ frame, kind: 'area' as const, share: jump }] : []),

@@ -111,14 +111,17 @@ export interface Votes {
   weights: Float32Array;
 }
 
-/** A slice and its neighbour, and what lies between them by either method; greys as in the volume's view. */
+/** A slice with its neighbours, and what would be made of these two in its place; greys as in the volume's view. */
 export interface Between {
   width: number;
   height: number;
-  first: Uint8Array;
-  second: Uint8Array;
-  linear: Uint8Array;
+  before: Uint8Array;
   flow: Uint8Array;
+  measured: Uint8Array;
+  linear: Uint8Array;
+  after: Uint8Array;
+  /** How far each is off the measured slice, root of the mean square, intensity units. */
+  off: { linear: number; flow: number };
 }
 
 /** What a comparison leaves out or takes in. */
@@ -149,8 +152,12 @@ export interface Requests {
   votes: { body: { frame: number }; reply: Votes };
   between: { body: { frame: number; slice: number; window: [number, number] }; reply: Between };
   save: { body: undefined; reply: SavedTrack };
-  /** Back to a saved run of the same image. */
+  /** Back to a saved run of the same image; its state is told when it is asked for. */
   restore: { body: SavedTrack; reply: Ready };
+  /** The image as it is prepared now. */
+  view: { body: undefined; reply: VolumeView };
+  /** Tells the state by an event. */
+  tell: { body: undefined; reply: undefined };
   export: { body: { frame: number; format: MeshFormat }; reply: Uint8Array };
   /** All frames as one animated GLB. */
   animation: { body: undefined; reply: Uint8Array };

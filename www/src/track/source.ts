@@ -71,9 +71,9 @@ export function prepared(film: Volume, preparation: Preparation, tell: (what: st
   }
 }
 
-/** Slices lie along the axis of the largest spacing; the other two are binned. */
+/** Slices lie across the axis of the largest spacing, or the last where voxels are cubes; the other two are binned. */
 function factorsOf({ spacing }: Volume, binning: number): [number, number, number] {
-  const across = spacing.indexOf(Math.max(...spacing));
+  const across = spacing.lastIndexOf(Math.max(...spacing));
   return [0, 1, 2].map((axis) => (axis === across ? 1 : binning)) as [number, number, number];
 }
 

@@ -73,6 +73,8 @@ class Session {
     between: ({ frame, slice, window }) => betweenSlices(this.#image().original, frame, slice, window),
     save: () => this.#save(),
     restore: (saved) => this.#restore(saved),
+    view: () => this.#view(),
+    tell: () => this.#standStill(),
     export: ({ frame, format }) => this.#export(frame, format),
     animation: () => this.#current().toGlb(),
     compare: ({ setup }) => this.#compare(setup),
@@ -215,7 +217,7 @@ class Session {
     }
   }
 
-  #standStill(): void {
+  #standStill(): undefined {
     send({ event: 'state', state: this.#done ? 'done' : 'paused' });
   }
 
@@ -267,13 +269,12 @@ class Session {
     await this.#pause();
     const places = ({ preparation, box, at }: Setup) => ({ preparation, box, at });
     const fits = this.#setup && same(places(this.#setup), places(setup));
-    const volume = fits ? undefined : this.#build(setup).volume;
+    if (!fits) this.#build(setup);
     this.#current().restore(state);
     this.#setup = setup;
     this.#bounded = undefined;
     this.#standAt(iteration, done);
-    this.#standStill();
-    return { ...this.#ready(), volume };
+    return { ...this.#ready(), volume: undefined };
   }
 
   #export(frame: number, format: Requests['export']['body']['format']): Uint8Array {

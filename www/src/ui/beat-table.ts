@@ -15,8 +15,8 @@ const COLUMNS: Column[] = [
   { head: 'area', help: 'Of the surface', text: ({ area }) => figure(area) },
   { head: 'folded', help: 'Triangles that face away from their three neighbours', text: ({ folded }) => count(folded) },
   {
-    head: 'moved',
-    help: 'By the projection, in the mean, after the prediction',
+    head: 'rest',
+    help: 'How far the last projection still moved the vertices, in the mean',
     text: ({ correction }) => figure(round(correction)),
   },
   { head: 'steps', help: 'Of the projections, in the mean', text: ({ steps }) => figure(round(steps)) },
@@ -42,7 +42,7 @@ export class BeatTable {
       h(
         'p',
         { class: 'help' },
-        'Volume and area in world units. Moved: how far the projection took the vertices after the prediction. Held, rejected and retracted: moves that were not made, and why.',
+        'Volume and area in world units. Steps: of the projections. Rest: how far the last of them still moved the vertices. Held, rejected and retracted: moves that were not made, and why.',
       ),
     );
   }
@@ -75,7 +75,7 @@ export class BeatTable {
         : []),
       ...(jumped.length > 0
         ? [
-            `In ${plural(jumped.length, 'frame')} the area jumps by more than 15 % from the one before, at most by ${percent(jumped.map(({ share }) => share))}: parts may have been lost or joined.`,
+            `In ${plural(jumped.length, 'frame')} the area is more than 15 % off what it was before and the change of volume explains, at most ${percent(jumped.map(({ share }) => share))}: parts may have been lost or joined.`,
           ]
         : []),
     ];

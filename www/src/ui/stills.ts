@@ -14,8 +14,8 @@ import {
 } from '../view/pictures';
 import { h, uniqueId } from './dom';
 
-/** The paper's, for greys of 0 to 255. */
-const CANNY: CannySettings = { deviation: 1.5, low: 10, high: 20 };
+/** For greys of 0 to 255; the paper found 1.5, 10 and 20 for its image. */
+const CANNY: CannySettings = { deviation: 1, low: 6, high: 14 };
 const CANNY_FIELDS = [
   { name: 'deviation', label: 'σ', min: 0.1 },
   { name: 'low', label: 'low', min: 0 },
@@ -30,7 +30,7 @@ export interface StillsOf {
   threshold: number;
   votes: Votes | undefined;
   between: Between | undefined;
-  /** Of the slices that `between` lies between, and of how many. */
+  /** The slice that `between` is in the place of, and how many there are. */
   pair: [number, number];
   /** Outline in the slice by frame; asked for only where it is shown. */
   outlines: () => readonly (Float32Array | undefined)[];
@@ -44,9 +44,13 @@ export class Stills {
   readonly #boundary = new Picture('The boundary in the slice: the brighter the more windows voted for it');
   readonly #canny = new Picture('Canny’s edges in the slice');
   readonly #time = new Picture('One line of the slice in all frames, time to the right, with the surface on it');
-  readonly #between = ['Slice', 'Between, by flow', 'Between, linear', 'Next slice'].map(
-    (label) => new Picture(label),
-  ) as [Picture, Picture, Picture, Picture];
+  readonly #between = [
+    'The slice before',
+    'Made of the two by optical flow',
+    'The slice between them as it was measured',
+    'Made of the two by linear interpolation',
+    'The slice after',
+  ].map((label) => new Picture(label));
   readonly #settings = { ...CANNY };
   #below: Below = 'slices';
   #of: StillsOf | undefined;
@@ -63,17 +67,16 @@ export class Stills {
         this.#cannyFields(),
       ),
       time: h('div', { class: 'stills' }, this.#time.element),
-      between: h('div', { class: 'stills four' }, ...this.#between.map(({ element }) => element)),
+      between: h('div', { class: 'stills five' }, ...this.#between.map(({ element }) => element)),
     };
     this.element = h('div', { hidden: true, 'data-stills': '' }, ...Object.values(this.#rows));
-    this.#sorted.canvas.addEventListener('click', ({ offsetX, offsetY }) => {
-      const { clientWidth, clientHeight } = this.#sorted.canvas;
+    this.#sorted.canvas.addEventListener('click', (event) => {
       const { volume, voxel } = this.#of?.subject ?? {};
-      if (volume && voxel) onVoxel(voxelIn(volume, voxel, offsetX / clientWidth, offsetY / clientHeight));
+      if (volume && voxel) onVoxel(voxelIn(volume, voxel, ...this.#sorted.partsAt(event)));
     });
-    this.#time.canvas.addEventListener('click', ({ offsetX }) => {
+    this.#time.canvas.addEventListener('click', (event) => {
       const frames = this.#of?.subject.volume.frames ?? 1;
-      onFrame(Math.min(frames - 1, Math.floor((offsetX / this.#time.canvas.clientWidth) * frames)));
+      onFrame(Math.min(frames - 1, Math.floor(this.#time.partsAt(event)[0] * frames)));
     });
   }
 
@@ -112,7 +115,7 @@ export class Stills {
   #drawCanny(): void {
     if (!this.#of) return;
     paintCanny(this.#canny, this.#of.subject, this.#settings);
-    this.#canny.caption = 'Canny’s edges: three numbers to find by trying.';
+    this.#canny.caption = 'Canny’s edges: three numbers to find by trying (the paper’s: 1.5, 10, 20).';
   }
 
   #drawTime({ subject, outlines }: StillsOf): void {
@@ -123,10 +126,12 @@ export class Stills {
 
   #drawBetween({ subject, between, pair: [slice, slices] }: StillsOf): void {
     if (between) paintBetween(this.#between, subject.volume, between);
+    const off = (method: 'linear' | 'flow') => (between ? `: off by ${between.off[method].toFixed(1)}` : '');
     const captions = [
-      `Slice ${slice + 1} of ${slices}`,
-      'Half way, by optical flow',
-      'Half way, linear',
+      `Slice ${slice} of ${slices}`,
+      `Of these two, by flow${off('flow')}`,
+      `Slice ${slice + 1}, as measured`,
+      `Of these two, linear${off('linear')}`,
       `Slice ${slice + 2}`,
     ];
     for (const [i, picture] of this.#between.entries()) picture.caption = captions[i] ?? '';

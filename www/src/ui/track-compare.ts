@@ -124,7 +124,7 @@ export class TrackComparePanel {
 function summary({ name, facts, closing, error, took }: ComparedRun) {
   const mean = (of: (one: FrameFacts) => number) => facts.reduce((sum, one) => sum + of(one), 0) / (facts.length || 1);
   const later = facts.slice(1);
-  const moved = later.reduce((sum, { correction }) => sum + correction, 0) / (later.length || 1);
+  const rest = later.reduce((sum, { correction }) => sum + correction, 0) / (later.length || 1);
   const steps = later.reduce((sum, one) => sum + one.steps, 0) / (later.length || 1);
   const beat = beatOf(facts.map(({ volume }) => volume));
   return {
@@ -132,7 +132,7 @@ function summary({ name, facts, closing, error, took }: ComparedRun) {
     ejection: beat?.ejection,
     diastole: beat?.largest,
     systole: beat?.smallest,
-    moved,
+    rest,
     steps,
     folded: mean(({ folded, triangles }) => folded / (triangles || 1)),
     area: mean(({ area }) => area),
@@ -148,7 +148,7 @@ export type Summary = ReturnType<typeof summary>;
 function said(runs: [ComparedRun, ComparedRun]): string {
   const [here, there] = runs.map(summary) as [Summary, Summary];
   const percent = (share: number | undefined) => (share === undefined ? '–' : `${(100 * share).toFixed(1)} %`);
-  return `Ejection fraction ${percent(here.ejection)} ${here.name}, ${percent(there.ejection)} ${there.name}; the projection moved vertices by ${figure(round(here.moved))} and ${figure(round(there.moved))} in the mean.`;
+  return `Ejection fraction ${percent(here.ejection)} ${here.name}, ${percent(there.ejection)} ${there.name}; projections took ${figure(round(here.steps))} and ${figure(round(there.steps))} steps in the mean.`;
 }
 
 const round = (value: number) => Number(value.toPrecision(3));
@@ -162,8 +162,8 @@ function tableOf(runs: [ComparedRun, ComparedRun]): HTMLElement {
     row('Largest volume', ({ diastole }) => size(diastole)),
     row('Smallest volume', ({ systole }) => size(systole)),
     row('Ejection fraction', ({ ejection }) => (ejection === undefined ? '–' : `${(100 * ejection).toFixed(1)} %`)),
-    row('Moved by projection', ({ moved }) => size(moved)),
-    row('Steps of it', ({ steps }) => size(steps)),
+    row('Steps of projections', ({ steps }) => size(steps)),
+    row('Rest of the last', ({ rest }) => size(rest)),
     row('Folded', ({ folded }) => `${(100 * folded).toFixed(2)} %`),
     row('Area', ({ area }) => size(area)),
     ...(both.some(({ closing }) => closing !== undefined)

@@ -1,25 +1,31 @@
-import type { Below, TrackViewOptions } from '../view/beating';
+import type { Below, ShownVotes, TrackViewOptions } from '../view/beating';
 import { h } from './dom';
 import { choice, PLACEMENTS } from './view-options';
 
 const SWITCHES = [
   { name: 'surface', label: 'Surface' },
   { name: 'edges', label: 'Wireframe' },
-  { name: 'votes', label: 'Boundary' },
   { name: 'region', label: 'Box' },
 ] as const;
+
+const VOTES: { value: ShownVotes; label: string }[] = [
+  { value: 'none', label: 'hidden' },
+  { value: 'near', label: 'near the surface' },
+  { value: 'all', label: 'all' },
+];
 
 const BELOW: { value: Below; label: string }[] = [
   { value: 'slices', label: 'slices' },
   { value: 'boundary', label: 'boundary beside Canny’s' },
   { value: 'time', label: 'a line through time' },
-  { value: 'between', label: 'between two slices' },
+  { value: 'between', label: 'in-between slices' },
 ];
 
 /** What the view of the Track lab shows, and what stands below it. */
 export class TrackOptionControls {
   readonly element: HTMLElement;
   readonly #boxes = new Map<string, HTMLInputElement>();
+  readonly #votes: HTMLSelectElement;
   readonly #slices: HTMLSelectElement;
   readonly #below: HTMLSelectElement;
   readonly #value: TrackViewOptions;
@@ -34,14 +40,17 @@ export class TrackOptionControls {
       this.#boxes.set(name, box);
       return h('label', {}, box, label);
     });
+    const votes = choice('Boundary', 'votes', VOTES, initial.votes, (value) => this.set({ votes: value }));
     const slices = choice('Slices', 'slices', PLACEMENTS, initial.slices, (value) => this.set({ slices: value }));
     const below = choice('Below', 'below', BELOW, initial.below, (value) => this.set({ below: value }));
+    this.#votes = votes.select;
     this.#slices = slices.select;
     this.#below = below.select;
     this.element = h(
       'div',
       { class: 'view-options', role: 'group', 'aria-label': 'What the view shows' },
       ...switches,
+      votes.element,
       slices.element,
       below.element,
     );
@@ -56,10 +65,12 @@ export class TrackOptionControls {
     Object.assign(this.#value, changed);
     if (!BELOW.some(({ value }) => value === this.#value.below)) this.#value.below = 'slices';
     if (!PLACEMENTS.some(({ value }) => value === this.#value.slices)) this.#value.slices = 'walls';
+    if (!VOTES.some(({ value }) => value === this.#value.votes)) this.#value.votes = 'none';
     for (const { name } of SWITCHES) {
       const box = this.#boxes.get(name);
       if (box) box.checked = this.#value[name];
     }
+    this.#votes.value = this.#value.votes;
     this.#slices.value = this.#value.slices;
     this.#below.value = this.#value.below;
     this.#onChange({ ...this.#value });

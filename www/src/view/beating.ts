@@ -15,15 +15,18 @@ import { RegionGrips, regionEdges } from './region';
 import { projectSegments } from './slicing';
 import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
-import { drawVotes, voteColors } from './votes';
+import { drawVotes, voteColors, votesNear } from './votes';
 
 /** What is shown under the view: the slices, or one of the paper's pictures. */
 export type Below = 'slices' | 'boundary' | 'time' | 'between';
 
+/** Which points of the boundary are shown: those about the surface, or all in the box. */
+export type ShownVotes = 'none' | 'near' | 'all';
+
 export interface TrackViewOptions {
   surface: boolean;
   edges: boolean;
-  votes: boolean;
+  votes: ShownVotes;
   region: boolean;
   slices: SlicePlacement;
   below: Below;
@@ -39,6 +42,10 @@ interface Scene {
 
 /** Diameter of a point of the boundary as a part of the shortest side of a voxel. */
 const DISC = 1.6;
+/** Points that are so many of the shortest sides from a vertex are near the surface. */
+const NEAR = 2;
+/** The box that is looked at has room around what is in it. */
+const CLOSER = 0.36;
 
 /** The 3D view and the slices of one frame after the other, kept in step with each other. */
 export class BeatingView {
@@ -107,7 +114,9 @@ export class BeatingView {
   /** Looks from so near that a box fills the view. */
   look(box: { min: Vec3; max: Vec3 }): void {
     const { space } = this.#scene?.volume ?? { space: 'RAS' };
-    this.#viewport.frameBox(new Box3(new Vector3(...box.min), new Vector3(...box.max)), space === 'LPS' ? 1 : -1, 0.5);
+    const all = new Box3(new Vector3(...box.min), new Vector3(...box.max));
+    const [middle, size] = [all.getCenter(new Vector3()), all.getSize(new Vector3()).multiplyScalar(2 * CLOSER)];
+    this.#viewport.frameBox(new Box3().setFromCenterAndSize(middle, size), space === 'LPS' ? 1 : -1, 0.5);
   }
 
   /** The slices of a frame, and its surface where it has one. */
@@ -125,9 +134,17 @@ export class BeatingView {
   /** The boundary of a frame, or none. */
   showVotes(votes: Votes | undefined): void {
     this.#votes = votes;
-    if (votes) this.#cloud.show(votes.points, voteColors(votes.weights));
+    this.#showCloud();
     this.#apply();
     this.#redraw();
+  }
+
+  #showCloud(): void {
+    const { votes } = this.#options;
+    if (!this.#votes || votes === 'none') return;
+    const reach = NEAR * Math.min(...(this.#scene?.volume.spacing ?? [1]));
+    const near = votes === 'near' && this.#shown ? votesNear(this.#votes, this.#shown, reach) : this.#votes;
+    this.#cloud.show(near.points, voteColors(near.weights));
   }
 
   /** The voxels that are looked at. */
@@ -138,6 +155,7 @@ export class BeatingView {
 
   setOptions(options: TrackViewOptions): void {
     this.#options = { ...options };
+    this.#showCloud();
     this.#apply();
     this.#redraw();
   }
@@ -221,7 +239,7 @@ export class BeatingView {
     const { surface, edges, votes, region } = this.#options;
     this.#surface.solid = surface && this.#shown !== undefined;
     this.#surface.edges = edges && this.#shown !== undefined;
-    this.#cloud.object.visible = votes && this.#votes !== undefined;
+    this.#cloud.object.visible = votes !== 'none' && this.#votes !== undefined;
     this.#box.object.visible = region;
     this.#viewport.invalidate();
   }
@@ -239,7 +257,7 @@ export class BeatingView {
     if (!scene) return;
     const { volume, inverse } = scene;
     const slice = this.#crosshair[panel.frame.axis];
-    if (this.#options.votes && this.#votes)
+    if (this.#options.votes !== 'none' && this.#votes)
       drawVotes(context, this.#votes, { volume, inverse, frame: panel.frame, slice, scaleX, scaleY });
     if (this.#options.region) this.#grips.draw(context, panel.frame, volume.dims, scaleX, scaleY);
   }

@@ -28,6 +28,15 @@ export class Picture {
     if (this.#caption.textContent !== text) this.#caption.textContent = text;
   }
 
+  /** How far across and down the picture, 0 to 1, something happened: it may not fill its canvas. */
+  partsAt({ offsetX, offsetY }: MouseEvent): [number, number] {
+    const { width, height, clientWidth, clientHeight } = this.canvas;
+    const fit = Math.min(clientWidth / width, clientHeight / height);
+    const part = (at: number, room: number, size: number) =>
+      Math.min(1 - 1e-6, Math.max(0, (at - (room - fit * size) / 2) / (fit * size)));
+    return [part(offsetX, clientWidth, width), part(offsetY, clientHeight, height)];
+  }
+
   /** Draws a small picture pixel by pixel, each so wide and high; `over` draws in its pixels. */
   paint(
     small: HTMLCanvasElement,
@@ -54,8 +63,10 @@ export interface Subject {
 
 /** The voxel axis that slices lie across, as scanners number them. */
 const ACROSS = 2;
+/** Pixels across and down of the part of a slice that shows a window. */
+const CUT = 28;
 
-/** The slice that the crosshair is in, the window there sorted into bright and dark: green and red, as in figure 4 a. */
+/** The part of the slice about the crosshair, the window there sorted into bright and dark: green and red, as in figure 4 a. */
 export function paintWindow(
   picture: Picture,
   { volume, frame, voxel }: Subject,
@@ -72,13 +83,19 @@ export function paintWindow(
   const found = twoMeans(window.map((i) => values[i] ?? 0));
   const [low, high] = volume.window;
   const split = isSplit(found, (threshold * 255) / (high - low || 1));
-  picture.paint(small, pixelOfSide(volume, side), (context, scaleX, scaleY) => {
-    context.lineWidth = 2;
+  const [left, top] = cornerOf(volume, side, voxel);
+  const cut = document.createElement('canvas');
+  [cut.width, cut.height] = [Math.min(CUT, width), Math.min(CUT, height)];
+  cut.getContext('2d')?.drawImage(small, -left, -top);
+  picture.paint(cut, pixelOfSide(volume, side), (context, scaleX, scaleY) => {
+    context.lineWidth = 3;
     for (const bright of [0, 1]) {
       context.strokeStyle = bright ? '#2ecc5a' : '#ff5a4d';
-      for (const [k, i] of window.entries())
+      for (const [k, i] of window.entries()) {
+        const [column, row] = [(i % width) - left, Math.floor(i / width) - top];
         if (found.bright[k] === bright)
-          context.strokeRect((i % width) * scaleX + 1, Math.floor(i / width) * scaleY + 1, scaleX - 2, scaleY - 2);
+          context.strokeRect(column * scaleX + 2, row * scaleY + 2, scaleX - 4, scaleY - 4);
+      }
     }
   });
   return split;
@@ -129,7 +146,7 @@ export function paintTime(
   });
   const small = inGrey(frames, length, (i) => lines[i % frames]?.[Math.floor(i / frames)] ?? 0);
   let count = 0;
-  picture.paint(small, [(2.6 * length) / frames, 1], (context, scaleX, scaleY) => {
+  picture.paint(small, [(3.6 * length) / frames, 1], (context, scaleX, scaleY) => {
     context.fillStyle = token('--outline');
     for (const [t, outline] of outlines.entries())
       for (const x of outline ? crossings(outline, row + 0.5) : []) {
@@ -145,31 +162,39 @@ export function paintTime(
   return count;
 }
 
-/** Figure 5: of two slices and what is between them. */
+/** Figure 5: a slice, its neighbours, and what is made of them in its place. */
 export function paintBetween(
-  pictures: readonly [Picture, Picture, Picture, Picture],
+  pictures: readonly Picture[],
   volume: VolumeView,
-  { width, height, first, second, linear, flow }: Between,
+  { width, height, before, flow, measured, linear, after }: Between,
 ): void {
   const side = sliceSide(volume);
   const pixel = pixelOfSide(volume, side);
-  for (const [i, voxels] of [first, flow, linear, second].entries())
+  for (const [i, voxels] of [before, flow, measured, linear, after].entries())
     pictures[i]?.paint(slicePicture({ dims: [width, height, 1], voxels }, side, 0), pixel);
 }
 
-/** What a click on a slice's picture means, 0 to 1 across and down: the voxel there. */
+/** What a click on the part of the slice means, 0 to 1 across and down: the voxel there. */
 export function voxelIn(volume: VolumeView, voxel: Vec3, across: number, down: number): Vec3 {
   const side = sliceSide(volume);
   const out: Vec3 = [...voxel];
-  for (const [{ axis, flip }, part] of [
-    [side.horizontal, across],
-    [side.vertical, down],
+  const [left, top] = cornerOf(volume, side, voxel);
+  for (const [{ axis, flip }, from, part] of [
+    [side.horizontal, left, across],
+    [side.vertical, top, down],
   ] as const) {
     const last = volume.dims[axis] - 1;
-    const at = Math.min(last, Math.floor(part * (last + 1)));
+    const at = Math.max(0, Math.min(last, from + Math.floor(part * Math.min(CUT, last + 1))));
     out[axis] = flip ? last - at : at;
   }
   return out;
+}
+
+/** Where the part of the slice begins that the crosshair is in the middle of. */
+function cornerOf({ dims }: VolumeView, { horizontal, vertical }: Side, voxel: Vec3): [number, number] {
+  const from = (side: Side['horizontal']) =>
+    Math.max(0, Math.min(dims[side.axis] - CUT, placeIn(side, voxel, dims) - (CUT >> 1)));
+  return [from(horizontal), from(vertical)];
 }
 
 function sliceSide(volume: VolumeView) {

@@ -1,5 +1,5 @@
 /** The points of the boundary: coloured by how many windows voted for them, in space and on slices. */
-import type { Vec3, VolumeView } from '../protocol';
+import type { Surface, Vec3, VolumeView } from '../protocol';
 import type { Votes } from '../track/protocol';
 import { type SliceFrame, toWorld } from './anatomy';
 
@@ -16,6 +16,24 @@ export function voteColors(weights: Float32Array): Float32Array {
     for (let k = 0; k < 3; k++) out[3 * i + k] = (FEW[k] ?? 0) + part * ((MANY[k] ?? 0) - (FEW[k] ?? 0));
   }
   return out;
+}
+
+/** Those within reach of a vertex of the surface, about. */
+export function votesNear({ frame, points, weights }: Votes, { positions, vertices }: Surface, reach: number): Votes {
+  const cell = (p: Float32Array, i: number, k: number, off = 0) => Math.floor((p[3 * i + k] ?? 0) / reach) + off;
+  const key = (x: number, y: number, z: number) => `${x} ${y} ${z}`;
+  const taken = new Set<string>();
+  for (let i = 0; i < vertices; i++)
+    for (let off = 0; off < 27; off++) {
+      const [dx, dy, dz] = [(off % 3) - 1, (Math.floor(off / 3) % 3) - 1, Math.floor(off / 9) - 1];
+      taken.add(key(cell(positions, i, 0, dx), cell(positions, i, 1, dy), cell(positions, i, 2, dz)));
+    }
+  const near = [...weights.keys()].filter((i) =>
+    taken.has(key(cell(points, i, 0), cell(points, i, 1), cell(points, i, 2))),
+  );
+  const kept = new Float32Array(3 * near.length);
+  for (const [to, i] of near.entries()) kept.set(points.subarray(3 * i, 3 * i + 3), 3 * to);
+  return { frame, points: kept, weights: Float32Array.from(near, (i) => weights[i] ?? 0) };
 }
 
 interface OnSlice {

@@ -1,0 +1,301 @@
+/** Parts of the Track lab that need no browser. */
+import { readFile } from 'node:fs/promises';
+import { beforeAll, describe, expect, test } from 'vitest';
+import init, { type FrameFacts, Mesh, Volume } from '../../pkg/index.js';
+import { at } from '../../scripts/shell.mjs';
+import { fromHash, linkOf, setupOf, toHash } from '../../www/src/labs/track-link';
+import { framesCsv } from '../../www/src/labs/track-measures';
+import type { Surface } from '../../www/src/protocol';
+import { betweenSlices } from '../../www/src/track/between';
+import { boxOf, voxelsOf } from '../../www/src/track/box';
+import { canny } from '../../www/src/track/canny';
+import { cineVoxels, contraction, trueVolume, wallDistances } from '../../www/src/track/cine';
+import { boundaryPicture, isSplit, twoMeans, windowAt } from '../../www/src/track/clusters';
+import { beatOf, warningsOf } from '../../www/src/track/curve';
+import { crossings, cutBy } from '../../www/src/track/cut';
+import { FILMS } from '../../www/src/track/examples';
+import { TRACK_PRESETS, viewOf } from '../../www/src/track/presets';
+import { filmFrom, framesOf, prepared } from '../../www/src/track/source';
+import { invert } from '../../www/src/view/anatomy';
+import { votesNear } from '../../www/src/view/votes';
+
+beforeAll(() => init());
+
+const SPEC = { dims: [36, 36, 36], spacing: [2, 2, 2], frames: 8, noise: 0, size: 24, papillary: false } as const;
+const spec = () => structuredClone(SPEC) as unknown as Parameters<typeof cineVoxels>[0];
+
+function surfaceOf(mesh: Mesh): Surface {
+  const { positions, normals, indices } = mesh.arrays();
+  return { positions, normals, indices, vertices: positions.length / 3, triangles: indices.length / 3 };
+}
+
+describe('the computed ventricle', () => {
+  test('contracts and fills once in a beat', () => {
+    const part = Array.from({ length: 8 }, (_, frame) => contraction(spec(), frame));
+    expect(part[0]).toBe(0);
+    expect(Math.max(...part)).toBeGreaterThan(0.95);
+    expect(part.at(-1)).toBeLessThan(0.1);
+  });
+
+  test('holds as much as its bright voxels say', () => {
+    const voxels = cineVoxels(spec());
+    const size = 36 ** 3;
+    for (const frame of [0, 3]) {
+      const blood = voxels.subarray(frame * size, (frame + 1) * size).reduce((sum, v) => sum + (v > 145 ? 8 : 0), 0);
+      expect(trueVolume(spec(), frame) / blood).toBeGreaterThan(0.96);
+      expect(trueVolume(spec(), frame) / blood).toBeLessThan(1.04);
+    }
+  });
+
+  test('knows how far a point is from its wall, and is the same every time', () => {
+    // The short half axis is 25 · 24/42 mm, and the middle of the volume 35 mm from its first voxel.
+    const half = (25 * 24) / 42;
+    const found = wallDistances(spec(), 0, Float32Array.of(35 + half, 35, 35, 35 + half + 1, 35, 35));
+    expect(found[0]).toBeCloseTo(0, 4);
+    expect(found[1]).toBeCloseTo(1, 1);
+    const noisy = { ...spec(), noise: 8 };
+    expect(cineVoxels(noisy)).toEqual(cineVoxels(noisy));
+  });
+});
+
+describe('a heartbeat', () => {
+  test('has an end of diastole and of systole, and an ejection fraction', () => {
+    expect(beatOf([90, 100, 60, 40, 70])).toEqual({
+      diastole: 1,
+      systole: 3,
+      largest: 100,
+      smallest: 40,
+      ejection: 0.6,
+    });
+    expect(beatOf([5])).toBeUndefined();
+  });
+
+  test('is suspect where triangles fold over or the area jumps', () => {
+    const facts = [
+      { folded: 0, triangles: 1000, area: 100, volume: 80 },
+      { folded: 11, triangles: 1000, area: 110, volume: 80 },
+      { folded: 10, triangles: 1000, area: 90, volume: 80 },
+      // As much smaller as the volume makes it.
+      { folded: 0, triangles: 1000, area: 90 / 4, volume: 10 },
+    ];
+    expect(warningsOf(facts).map(({ frame, kind }) => [frame, kind])).toEqual([
+      [1, 'folded'],
+      [2, 'area'],
+    ]);
+  });
+
+  test('is a table with a line a frame', () => {
+    const facts: FrameFacts = {
+      ...{ volume: 2, area: 3, triangles: 4, folded: 5, rejected: 6, held: 7, retracted: 8, steps: 9, correction: 10 },
+    };
+    const frame = { facts, surface: {}, measures: {}, error: { mean: 0.5, most: 1 } };
+    const lines = framesCsv([frame] as unknown as Parameters<typeof framesCsv>[0], [2.5]).split('\n');
+    expect(lines[0]).toMatch(/^frame,volume,area,triangles,folded,.*,error,error \(95 %\),true volume$/);
+    expect(lines[1]).toBe('1,2,3,4,5,6,7,8,9,10,,0.5,1,2.5');
+  });
+});
+
+describe('Canny', () => {
+  const disc = (width: number, height: number) => ({
+    width,
+    height,
+    values: Float32Array.from({ length: width * height }, (_, i) =>
+      Math.hypot((i % width) - 20, Math.floor(i / width) - 20) < 10 ? 200 : 50,
+    ),
+  });
+
+  test('finds a thin closed line around a disc, and nothing else', () => {
+    const edges = canny(disc(41, 41), { deviation: 1, low: 6, high: 14 });
+    const found = [...edges.keys()].filter((i) => edges[i]);
+    expect(found.length).toBeGreaterThan(45);
+    expect(found.length).toBeLessThan(95);
+    for (const i of found)
+      expect(Math.abs(Math.hypot((i % 41) - 20, Math.floor(i / 41) - 20) - 9.75)).toBeLessThan(1.5);
+  });
+
+  test('keeps faint edges only where they hang together with strong ones', () => {
+    // A step across the whole picture that fades from left to right, and a faint one apart from it.
+    const [width, height] = [60, 30];
+    const values = Float32Array.from({ length: width * height }, (_, i) => {
+      const [x, y] = [i % width, Math.floor(i / width)];
+      return (y > 8 ? 60 - x : 0) + (y > 20 ? 12 : 0);
+    });
+    const rowsOf = (high: number) => {
+      const edges = canny({ width, height, values }, { deviation: 1, low: 3, high });
+      return new Set([...edges.keys()].filter((i) => edges[i]).map((i) => Math.floor(i / width)));
+    };
+    expect([...rowsOf(15)].every((row) => row < 12)).toBe(true);
+    expect([...rowsOf(3.2)].some((row) => row > 18)).toBe(true);
+  });
+
+  test('finds nothing where all is alike', () => {
+    const plain = { width: 9, height: 7, values: new Float32Array(63).fill(80) };
+    expect(Math.max(...canny(plain, { deviation: 1.5, low: 0.1, high: 0.2 }))).toBe(0);
+  });
+});
+
+describe('windows', () => {
+  test('are sorted by 2-means, and vote only for a step between two that are both there', () => {
+    const found = twoMeans([10, 12, 11, 100, 104]);
+    expect(found.means[0]).toBeCloseTo(11);
+    expect(found.means[1]).toBeCloseTo(102);
+    expect([...found.bright]).toEqual([0, 0, 0, 1, 1]);
+    expect(isSplit(found, 50)).toBe(true);
+    expect(isSplit(found, 95)).toBe(false);
+    expect(isSplit(twoMeans([...new Array(24).fill(10), 100]), 50)).toBe(false);
+    expect(twoMeans([7, 7, 7]).means).toEqual([7, 7]);
+  });
+
+  test('end with the picture', () => {
+    const picture = { width: 10, height: 8, values: [] };
+    expect(windowAt(picture, 5, 4, 2)).toHaveLength(25);
+    expect(windowAt(picture, 0, 0, 2)).toEqual([0, 1, 2, 10, 11, 12, 20, 21, 22]);
+  });
+
+  test('are brought together on pixels by the square roots of their votes', () => {
+    const faces = [
+      { x: 0.75, y: 0.25, weight: 0.25 },
+      { x: 0.25, y: 0.75, weight: 1 },
+      { x: 9, y: 9, weight: 1 },
+    ];
+    expect([...boundaryPicture({ width: 2, height: 1 }, faces)]).toEqual([1.5, 0]);
+  });
+});
+
+describe('cuts', () => {
+  test('of a ball with a plane are a circle, and with a line two points', () => {
+    const ball = Mesh.icosphere([0, 0, 0], 10, 1);
+    const cut = cutBy(surfaceOf(ball), { origin: [0, 0, 3], normal: [0, 0, 1] });
+    expect(cut.length).toBeGreaterThan(6 * 20);
+    for (let i = 0; i < cut.length; i += 3) {
+      expect(cut[i + 2]).toBeCloseTo(3, 4);
+      expect(Math.hypot(cut[i] ?? 0, cut[i + 1] ?? 0)).toBeCloseTo(Math.sqrt(91), 0);
+    }
+    const flat = Float32Array.from({ length: (cut.length / 3) * 2 }, (_, i) => cut[3 * (i >> 1) + (i % 2)] ?? 0);
+    const [left, right, ...more] = crossings(flat, 0.1);
+    expect(more).toEqual([]);
+    expect(left).toBeCloseTo(-Math.sqrt(91), 0);
+    expect(right).toBeCloseTo(Math.sqrt(91), 0);
+    ball.free();
+  });
+
+  test('leave the points of the boundary that are near', () => {
+    const ball = Mesh.icosphere([0, 0, 0], 10, 1);
+    const votes = { frame: 0, points: Float32Array.of(10, 0, 0, 0, 0, 0), weights: Float32Array.of(0.5, 1) };
+    expect([...votesNear(votes, surfaceOf(ball), 2).weights]).toEqual([0.5]);
+    ball.free();
+  });
+});
+
+describe('boxes', () => {
+  test('of voxels are exact where the image lies along the world', () => {
+    const affine = [2, 0, 0, 0, 0, -2, 0, 0, 0, 0, 5, 0, 7, 8, 9, 1];
+    const region = { low: [3, 0, 4], high: [20, 11, 9] } as Parameters<typeof boxOf>[0];
+    expect(voxelsOf(boxOf(region, affine, invert(affine)), invert(affine), [30, 30, 12])).toEqual(region);
+  });
+
+  test('hold their middle and about their size where it stands askew', () => {
+    const c = Math.SQRT1_2;
+    const affine = [c, c, 0, 0, -c, c, 0, 0, 0, 0, 3, 0, 1, 2, 3, 1];
+    const region = { low: [10, 20, 5], high: [29, 39, 9] } as Parameters<typeof boxOf>[0];
+    const found = voxelsOf(boxOf(region, affine, invert(affine)), invert(affine), [60, 60, 20]);
+    expect(found).toEqual(region);
+  });
+});
+
+describe('links', () => {
+  const view = viewOf(FILMS[0]);
+
+  test('say nothing of what is usual', () => {
+    const setup = setupOf(FILMS[0]);
+    expect(toHash(linkOf({ example: FILMS[0], file: '', setup, view }))).toBe('#track');
+    expect(fromHash('#track')).toBeUndefined();
+    expect(fromHash('#sculpt?example=globe')).toBeUndefined();
+  });
+
+  test('bring everything back', () => {
+    const example = FILMS[1];
+    const setup = {
+      ...setupOf(example),
+      preparation: { binning: 2 as const, enrichment: 'linear' as const, factor: 3 },
+      box: { min: [1, 2, 3] as [number, number, number], max: [4, 5, 6.5] as [number, number, number] },
+      at: undefined,
+      params: { threshold: 42, prediction: false },
+    };
+    const linked = fromHash(
+      toHash(linkOf({ example, file: '', setup, view: { ...view, below: 'time', edges: true, votes: 'all' } })),
+    );
+    expect(linked?.example).toBe(example?.id);
+    expect(setupOf(example, linked)).toEqual({ ...setup, params: { ...example?.params, ...setup.params } });
+    expect(linked?.view).toEqual({ below: 'time', edges: true, votes: 'all' });
+  });
+
+  test('leave out what makes no sense', () => {
+    const linked = fromHash('#track?box=1,2&at=x&binning=7&enrichment=magic&factor=-2&p.threshold=abc');
+    expect(linked).toEqual({ params: { threshold: 'abc' }, preparation: {}, view: {} });
+    expect(fromHash('#track?box=whole&at=largest')).toMatchObject({ box: 'whole', at: 'largest' });
+  });
+});
+
+describe('images', () => {
+  const named = (...names: string[]) => names.map((name) => ({ name, bytes: new Uint8Array() }));
+
+  test('of several files are frames in the order of their names, headers with their data', () => {
+    const names = (files: string[]) => framesOf(named(...files)).map((parts) => parts.map(({ name }) => name));
+    expect(names(['f10.nii', 'f2.nii', 'f1.nii'])).toEqual([['f1.nii'], ['f2.nii'], ['f10.nii']]);
+    expect(names(['b.raw', 'a.mhd', 'a.raw', 'b.mhd'])).toEqual([
+      ['a.mhd', 'a.raw'],
+      ['b.mhd', 'b.raw'],
+    ]);
+    expect(names(['voxels.raw', 'image.nhdr'])).toEqual([['image.nhdr', 'voxels.raw']]);
+  });
+
+  test('are put together from their frames', () => {
+    const frame = (value: number) => {
+      const volume = new Volume({ data: new Uint8Array(64).fill(value), dims: [4, 4, 4] });
+      const bytes = volume.toNifti();
+      volume.free();
+      return bytes;
+    };
+    const files = [9, 7, 8].map((value) => ({ name: `frame-${value}.nii`, bytes: frame(value) }));
+    const film = filmFrom({ files });
+    expect(film.frames).toBe(3);
+    expect([0, 1, 2].map((index) => film.sample([1, 1, 1], index))).toEqual([7, 8, 9]);
+    film.free();
+  });
+
+  test('are binned and get slices as asked for', async () => {
+    const film = Volume.parse(new Uint8Array(await readFile(at('www/public/data/heart.nii.gz'))));
+    expect([...film.dims, film.frames]).toEqual([64, 64, 20, 20]);
+    const told: string[] = [];
+    const volume = prepared(film, { binning: 2, enrichment: 'linear', factor: 2 }, (what) => told.push(what));
+    expect(volume.dims).toEqual([32, 32, 39]);
+    expect(told).toHaveLength(2);
+    expect(prepared(film, { binning: 1, enrichment: 'none', factor: 0 }, () => undefined)).toBe(film);
+    volume.free();
+    film.free();
+  });
+
+  test('have a picture between two slices that is sharper by flow', () => {
+    // A bright disc that goes aside from one slice to the next.
+    const disc = (x: number, y: number, z: number) => (Math.hypot(x - 13 - 3 * z, y - 16) < 7 ? 200 : 40);
+    const data = Float32Array.from({ length: 32 * 32 * 3 }, (_, i) => disc(i % 32, Math.floor(i / 32) % 32, i >> 10));
+    const volume = new Volume({ data, dims: [32, 32, 3] });
+    const { linear, flow, before, off } = betweenSlices(volume, 0, 1, [0, 255]);
+    const half = (values: Uint8Array) => values.reduce((sum, v) => sum + (v > 80 && v < 160 ? 1 : 0), 0);
+    expect(before[16 * 32 + 13]).toBe(200);
+    expect(half(flow)).toBeLessThan(0.7 * half(linear));
+    expect(off.flow).toBeLessThan(0.9 * off.linear);
+    expect(() => betweenSlices(volume, 0, 2, [0, 255])).toThrow(/neighbours/);
+    volume.free();
+  });
+});
+
+test('every figure has an id of its own, says what the paper saw and what comes out', () => {
+  expect(new Set([...FILMS, ...TRACK_PRESETS].map(({ id }) => id)).size).toBe(FILMS.length + TRACK_PRESETS.length);
+  for (const { saw, variants } of TRACK_PRESETS)
+    for (const { came } of variants) {
+      for (const text of [saw, came]) expect(text).toMatch(/^\S.{40,}\.$/);
+      expect(came).toMatch(/^Here/);
+    }
+});

@@ -1,0 +1,333 @@
+/** The Track lab: a surface that is followed through the frames of a 4D image. */
+import { readFile } from 'node:fs/promises';
+import { strFromU8, unzipSync } from 'three/addons/libs/fflate.module.js';
+import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
+import init, { Mesh, Volume } from '../../pkg/index.js';
+import { cineVoxels } from '../../www/src/track/cine';
+import { type App, drop, openApp, overflow, reach, unnamedControls } from './browser';
+
+let app: App;
+
+/** Small enough that a test can track it many times. */
+const SMALL = { dims: [24, 24, 24], spacing: [2, 2, 2], frames: 4, noise: 4, size: 18, papillary: false } as const;
+const spec = () => structuredClone(SMALL) as unknown as Parameters<typeof cineVoxels>[0];
+
+beforeAll(async () => {
+  await init();
+  app = await openApp();
+  // What beats in a loop would only take time from what is tested; where it is tested it is asked for.
+  await app.page.emulateMedia({ reducedMotion: 'reduce' });
+});
+afterAll(() => app.close());
+afterEach(() => {
+  expect(app.complaints.splice(0)).toEqual([]);
+});
+
+async function openAt(hash: string, ...states: string[]): Promise<void> {
+  await app.page.goto('about:blank');
+  await app.page.goto(app.address + hash);
+  await reach(app.page, ...states);
+}
+
+async function measured(): Promise<Record<string, number | boolean>> {
+  return JSON.parse((await app.page.getAttribute('[data-measures]', 'data-measures')) ?? '{}');
+}
+
+/** All frames have their surface, and that has been shown. */
+async function tracked(frames: number): Promise<void> {
+  await expect.poll(async () => [await state(), (await measured()).tracked]).toEqual(['done', frames]);
+}
+
+const text = async (selector: string) => (await app.page.locator(selector).first().textContent()) ?? '';
+const hash = () => app.page.evaluate(() => location.hash);
+const state = () => app.page.getAttribute('#lab', 'data-state');
+const enabled = (selector: string) => app.page.locator(selector).isEnabled();
+const shown = async () => (await measured()).frame;
+const beat = async () => JSON.parse((await app.page.getAttribute('[data-beat]', 'data-beat')) ?? '{}');
+
+/** A 4D image as a file, and its frames as files of their own. */
+function small(): { film: Uint8Array; frames: Uint8Array[] } {
+  const { dims, spacing, frames } = spec();
+  const voxels = cineVoxels(spec());
+  const size = voxels.length / frames;
+  const bytes = (data: Uint8Array, count: number) => {
+    const volume = new Volume({ data, dims: [...dims, count], spacing });
+    const file = volume.toNifti();
+    volume.free();
+    return file;
+  };
+  const frame = (t: number) => bytes(voxels.slice(t * size, (t + 1) * size), 1);
+  return { film: bytes(voxels, frames), frames: Array.from({ length: frames }, (_, t) => frame(t)) };
+}
+
+/** Opens the small image, and waits until it is tracked. */
+async function dropSmall(): Promise<void> {
+  await drop(app.page, [{ name: 'small.nii', bytes: small().film }]);
+  await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('small.nii'));
+  await reach(app.page, 'done');
+}
+
+/** What a click saves. */
+async function saved(selector: string): Promise<{ name: string; bytes: Uint8Array }> {
+  const [download] = await Promise.all([app.page.waitForEvent('download'), app.page.click(selector)]);
+  return { name: download.suggestedFilename(), bytes: new Uint8Array(await readFile(await download.path())) };
+}
+
+describe('the computed ventricle', () => {
+  test('is tracked through all frames by itself, near its known volumes', async () => {
+    await openAt('#track?example=ventricle', 'done');
+    const found = await measured();
+    expect(found).toMatchObject({ tracked: 12, closed: true, oriented: true, crossings: 0, components: 1 });
+    expect(found.errorMean).toBeLessThan(1);
+    expect(found.closing).toBeLessThan(1);
+    expect(await app.page.title()).toBe('Vesicle: Track');
+    expect(await hash()).toBe('#track?example=ventricle');
+    const { ejection, diastole, systole } = await beat();
+    expect(ejection).toBeGreaterThan(0.58);
+    expect(ejection).toBeLessThan(0.7);
+    // Volume hardly changes from the end of the beat to its beginning.
+    expect([10, 11, 0]).toContain(diastole);
+    expect(systole).toBe(4);
+  });
+
+  test('tells in words what the curve shows, beside the truth', async () => {
+    expect(await text('[data-beat]')).toMatch(/^End-diastole \(ED\) in frame \d+: [\d.]+ ml; end-systole .* In truth /);
+    expect(await text('.status')).toMatch(/^Done: all 12 frames have their surface\. Ejection fraction [\d.]+ %\.$/);
+    expect(await app.page.locator('.results table').first().locator('tbody tr').count()).toBe(12);
+  });
+
+  test('shows each frame, by slider, button and key, and beats in a loop', async () => {
+    const volumes = new Set<unknown>();
+    for (const frame of [0, 4]) {
+      await app.page.locator('.frames input[type=range]').fill(String(frame));
+      await expect.poll(shown).toBe(frame + 1);
+      volumes.add((await measured()).volume);
+    }
+    expect(volumes.size).toBe(2);
+    await app.page.click('[data-frame=next]');
+    await expect.poll(shown).toBe(6);
+    await app.page.locator('body').press(',');
+    await expect.poll(shown).toBe(5);
+    await app.page.click('[data-frame=beat]');
+    await expect.poll(shown).not.toBe(5);
+    await app.page.click('[data-frame=beat]');
+    await expect.poll(() => text('[data-frame=beat]')).toBe('Beat');
+  });
+
+  test('has votes on its surface and pictures below', async () => {
+    await app.page.selectOption('[data-view=below]', 'boundary');
+    const stills = app.page.locator('[data-stills]');
+    await expect.poll(async () => Number(await stills.getAttribute('data-votes'))).toBeGreaterThan(1000);
+    await app.page.selectOption('[data-view=below]', 'time');
+    await expect.poll(async () => Number(await stills.getAttribute('data-crossings'))).toBeGreaterThanOrEqual(24);
+    await app.page.selectOption('[data-view=below]', 'between');
+    await expect.poll(async () => stills.getAttribute('data-between')).toMatch(/\d/);
+    expect(await hash()).toContain('below=between');
+    await app.page.selectOption('[data-view=below]', 'slices');
+    await expect.poll(() => app.page.locator('.slices').isVisible()).toBe(true);
+  });
+
+  test('is compared with the run without prediction', async () => {
+    await app.page.click('summary:has-text("With and without")');
+    await app.page.selectOption('[data-compare=with]', 'prediction');
+    await app.page.click('[data-compare=start]');
+    const runs = async () =>
+      JSON.parse((await app.page.getAttribute('[data-comparison]', 'data-comparison')) ?? '{}') as {
+        name: string;
+        steps: number;
+        error: number;
+      }[];
+    await expect.poll(async () => (await runs()).length).toBe(2);
+    const [present, other] = await runs();
+    expect([present?.name, other?.name]).toEqual(['with prediction', 'without prediction']);
+    expect(other?.steps).toBeGreaterThanOrEqual(present?.steps ?? 0);
+    expect(other?.error).toBeLessThan(1);
+    await expect.poll(() => text('[data-beat]')).toContain('without prediction:');
+    expect(await state()).toBe('done');
+  });
+
+  test('all controls have names, and a phone is wide enough', async () => {
+    expect(await unnamedControls(app.page)).toEqual([]);
+    expect(await overflow(app.page, 390, 844)).toBeLessThanOrEqual(0);
+    await app.page.setViewportSize({ width: 1280, height: 800 });
+  });
+});
+
+describe('an image of one’s own', () => {
+  beforeAll(() => dropSmall());
+
+  test('is prepared with in-between slices where they help, and tracked', async () => {
+    expect(await measured()).toMatchObject({ frames: 4, tracked: 4, closed: true, crossings: 0 });
+    expect(await hash()).toContain('file=small.nii');
+  });
+
+  test('may come as its frames', async () => {
+    const { frames } = small();
+    const files = frames.map((bytes, i) => ({ name: `t${i + 1}.nii`, bytes }));
+    const before = (await measured()).volume;
+    await drop(app.page, files.reverse());
+    await expect.poll(() => text('.facts')).toContain(' + 3');
+    await tracked(4);
+    expect((await measured()).volume).toBe(before);
+  });
+
+  test('is refused with the library’s words where it has one frame, and the former stays', async () => {
+    const [first] = small().frames;
+    await drop(app.page, [{ name: 'still.nii', bytes: first as Uint8Array }]);
+    await expect.poll(state).toBe('error');
+    expect(await text('.banner')).toMatch(/still\.nii could not be opened\..*frame/);
+    await app.page.click('.banner button');
+    await expect.poll(state).toBe('done');
+    expect((await measured()).tracked).toBe(4);
+  });
+});
+
+describe('changes', () => {
+  beforeAll(() => dropSmall());
+
+  test('of the step height begin again, are undone and done again', async () => {
+    const { volume } = await measured();
+    const threshold = app.page.locator('[data-param=threshold] input[type=number]');
+    await threshold.fill('80');
+    await threshold.press('Enter');
+    await expect.poll(hash).toContain('p.threshold=80');
+    await tracked(4);
+    const changed = (await measured()).volume;
+    expect(changed).not.toBe(volume);
+    await expect.poll(() => enabled('[data-transport=undo]')).toBe(true);
+    await app.page.click('[data-transport=undo]');
+    await expect.poll(async () => (await measured()).volume).toBe(volume);
+    await expect.poll(hash).not.toContain('p.threshold');
+    await expect.poll(() => enabled('[data-transport=redo]')).toBe(true);
+    await app.page.click('[data-transport=redo]');
+    await expect.poll(async () => (await measured()).volume).toBe(changed);
+    await expect.poll(() => enabled('[data-transport=undo]')).toBe(true);
+    await app.page.click('[data-transport=undo]');
+    await expect.poll(async () => (await measured()).volume).toBe(volume);
+  });
+
+  test('that cannot be are refused beside their control', async () => {
+    const threshold = app.page.locator('[data-param=threshold] input[type=number]');
+    const before = await threshold.inputValue();
+    await threshold.fill('-3');
+    await threshold.press('Enter');
+    await expect.poll(() => text('[data-param=threshold] .field-error')).toMatch(/\S/);
+    expect(await threshold.inputValue()).toBe(before);
+  });
+
+  test('of a step height beyond any step stop the run and say the largest', async () => {
+    const threshold = app.page.locator('[data-param=threshold] input[type=number]');
+    await threshold.fill('250');
+    await threshold.press('Enter');
+    await expect.poll(() => text('.banner')).toMatch(/The run has stopped\..*largest step/);
+    await app.page.click('.banner button');
+    await expect.poll(() => enabled('[data-transport=undo]')).toBe(true);
+    await app.page.click('[data-transport=undo]');
+    await tracked(4);
+  });
+
+  test('warn where noise alone makes boundaries', async () => {
+    const warning = () => text('[data-param=threshold] .warning');
+    expect(await warning()).toBe('');
+    const threshold = app.page.locator('[data-param=threshold] input[type=number]');
+    await threshold.fill('5');
+    await threshold.press('Enter');
+    await expect.poll(warning).toMatch(/^Below 2\.5 σ/);
+    await app.page.click('[data-threshold=suggest]');
+    await expect.poll(warning).toBe('');
+    await tracked(4);
+  });
+
+  test('of the box make a new tracker of those voxels', async () => {
+    const last = app.page.locator('[data-box="2-last"]');
+    await last.fill('14');
+    await last.press('Enter');
+    await expect.poll(hash).toContain('box=');
+    await tracked(4);
+    expect(await last.inputValue()).toBe('14');
+    await app.page.click('[data-box=whole]');
+    await expect.poll(hash).not.toContain('box=');
+    await tracked(4);
+  });
+
+  test('of the preparation show the image as it is then', async () => {
+    await app.page.click('summary:has-text("Preparation")');
+    await app.page.selectOption('[data-prepare=binning]', '2');
+    await expect.poll(hash).toContain('binning=2');
+    await tracked(4);
+    expect(await app.page.locator('[data-box="0-last"]').inputValue()).toBe('11');
+    await expect.poll(() => enabled('[data-transport=undo]')).toBe(true);
+    await app.page.click('[data-transport=undo]');
+    await expect.poll(() => app.page.locator('[data-box="0-last"]').inputValue()).toBe('23');
+    await expect.poll(async () => (await measured()).tracked).toBe(4);
+  });
+
+  test('reset stands before the first step; steps and play go on from there', async () => {
+    await app.page.click('text=Reset');
+    await expect.poll(async () => [await state(), (await measured()).tracked]).toEqual(['paused', 0]);
+    await app.page.click('text="Step"');
+    await expect.poll(() => text('.iteration')).toBe('Iteration 1');
+    await app.page.click('text="Step ×10"');
+    await expect.poll(async () => (await measured()).tracked).toBe(4);
+    expect(await text('.iteration')).toBe('Iteration 8');
+  });
+});
+
+describe('what is saved', () => {
+  beforeAll(() => dropSmall());
+
+  test('is the frame that is shown', async () => {
+    await app.page.locator('.frames input[type=range]').fill('2');
+    await expect.poll(shown).toBe(3);
+    const { name, bytes } = await saved('[data-export=ply]');
+    expect(name).toBe('small-3.ply');
+    const mesh = Mesh.parse(bytes);
+    expect(mesh.info().volume).toBeCloseTo(Number((await measured()).volume), -1);
+    mesh.free();
+  });
+
+  test('are all frames, each a file', async () => {
+    const { name, bytes } = await saved('[data-action=save-frames]');
+    expect(name).toBe('small.zip');
+    const files = unzipSync(bytes);
+    expect(Object.keys(files)).toEqual(['frame-1.ply', 'frame-2.ply', 'frame-3.ply', 'frame-4.ply']);
+    expect(strFromU8(files['frame-1.ply']?.subarray(0, 3) ?? new Uint8Array())).toBe('ply');
+  });
+
+  test('is the beat as an animation, and the table of frames', async () => {
+    const glb = await saved('[data-action=save-animation]');
+    expect(new TextDecoder().decode(glb.bytes.subarray(0, 4))).toBe('glTF');
+    const csv = await saved('[data-action=save-table]');
+    expect(new TextDecoder().decode(csv.bytes).trim().split('\n')).toHaveLength(5);
+  });
+});
+
+describe('links', () => {
+  test('restore parameters, preparation, box and what is shown', async () => {
+    const there =
+      '#track?example=ventricle&binning=2&below=time&box=10,10,10,60,60,60&at=largest&p.threshold=70&p.prediction=false';
+    await openAt(there, 'done');
+    expect(new Set((await hash()).split(/[?&]/))).toEqual(new Set(there.split(/[?&]/)));
+    expect(await app.page.locator('[data-param=prediction] input').isChecked()).toBe(false);
+    expect(await app.page.locator('[data-param=threshold] input[type=number]').inputValue()).toBe('70');
+  });
+
+  test('whose settings cannot be are followed without them', async () => {
+    await openAt('#track?example=ventricle&p.threshold=-1', 'running', 'done');
+    await expect.poll(() => text('.banner')).toContain('The link’s settings are left out.');
+  });
+});
+
+test('pauses at any time, and a new image ends what runs', async () => {
+  await app.page.selectOption('.data select', 'heart');
+  await expect
+    .poll(async () => [await state(), await text('.facts')])
+    .toEqual(['running', expect.stringContaining('heart')]);
+  await app.page.click('text="Pause"');
+  await expect.poll(state).toBe('paused');
+  expect((await measured()).tracked).toBeLessThan(20);
+  await app.page.click('text="Play"');
+  await expect.poll(state).toBe('running');
+  await dropSmall();
+  await tracked(4);
+});
