@@ -4,7 +4,7 @@ import { strFromU8, unzipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { cineVoxels } from '../../www/src/track/cine';
-import { type App, drop, openApp, overflow, reach, unnamedControls } from './browser';
+import { type App, drop, openApp, overflow, reach, recordNews, unnamedControls } from './browser';
 
 let app: App;
 
@@ -139,10 +139,10 @@ describe('the computed ventricle', () => {
       }[];
     await expect.poll(async () => (await runs()).length).toBe(2);
     const [present, other] = await runs();
-    expect([present?.name, other?.name]).toEqual(['with prediction', 'without prediction']);
+    expect([present?.name, other?.name]).toEqual(['predicted', 'not predicted']);
     expect(other?.steps).toBeGreaterThanOrEqual(present?.steps ?? 0);
     expect(other?.error).toBeLessThan(1);
-    await expect.poll(() => text('[data-beat]')).toContain('without prediction:');
+    await expect.poll(() => text('[data-beat]')).toContain('not predicted:');
     expect(await state()).toBe('done');
   });
 
@@ -315,7 +315,30 @@ describe('links', () => {
   test('whose settings cannot be are followed without them', async () => {
     await openAt('#track?example=ventricle&p.threshold=-1', 'running', 'done');
     await expect.poll(() => text('.banner')).toContain('The link’s settings are left out.');
+    await tracked(12);
   });
+});
+
+test('is cancelled while an image is being opened: what was open is there again', async () => {
+  const news = await recordNews(app.page);
+  await app.page.evaluate(() => {
+    const cancel = document.querySelector<HTMLButtonElement>('[data-action=cancel]');
+    const press = () => {
+      if (!cancel || cancel.hidden) return;
+      watch.disconnect();
+      cancel.click();
+    };
+    const watch = new MutationObserver(press);
+    if (cancel) watch.observe(cancel, { attributeFilter: ['hidden'] });
+  });
+  const before = await text('.facts');
+  await app.page.selectOption('.data select', 'thick-slices');
+  await expect.poll(news).toContainEqual('Cancelled.');
+  await expect.poll(state).toMatch(/running|done/);
+  expect(await text('.facts')).toBe(
+    before.replace(/Prepared in.*$/, (await text('.facts')).match(/Prepared in.*$/)?.[0] ?? ''),
+  );
+  expect(await app.page.locator('.banner').isVisible()).toBe(false);
 });
 
 test('pauses at any time, and a new image ends what runs', async () => {

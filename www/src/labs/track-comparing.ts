@@ -5,9 +5,9 @@ import type { TrackResults } from './track-results';
 import type { TrackSettings } from './track-settings';
 
 const NAMES: Record<Enrichment, string> = {
-  none: 'no in-between slices',
-  linear: 'linear slices',
-  flow: 'slices by flow',
+  none: 'as measured',
+  linear: 'linear',
+  flow: 'by flow',
 };
 
 /** The present run beside the same with one thing else; nothing when it was cancelled. */
@@ -20,7 +20,7 @@ export async function compareWith(
   const predicted = params.prediction === true;
   const [here, there] =
     other === 'prediction'
-      ? [predicted ? 'with prediction' : 'without prediction', predicted ? 'without prediction' : 'with prediction']
+      ? [predicted ? 'predicted' : 'not predicted', predicted ? 'not predicted' : 'predicted']
       : [NAMES[setup.preparation.enrichment], NAMES[other]];
   const changed = otherwise(setup, other, predicted);
   const facts = results.frames.map((frame) => frame.facts);

@@ -24,15 +24,23 @@ export const TRACK_ROWS: MoreMeasure[] = [
     name: 'closing',
     label: 'Closes within',
     help: 'Of a cyclic sequence: how far the last frame’s surface, taken on to the first, is from the first one’s in the mean',
+    optional: true,
     text: round,
   },
   {
     name: 'errorMean',
     label: 'Error, mean',
     help: 'Distance of the vertices from the true wall, where it is known',
+    optional: true,
     text: round,
   },
-  { name: 'errorMost', label: 'Error, 95 %', help: 'The same: 95 % of the vertices are nearer', text: round },
+  {
+    name: 'errorMost',
+    label: 'Error, 95 %',
+    help: 'The same: 95 % of the vertices are nearer',
+    optional: true,
+    text: round,
+  },
   { name: 'noise', label: 'Noise σ', help: 'Measured in the box, intensity units', text: round },
 ];
 

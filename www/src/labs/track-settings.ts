@@ -98,6 +98,8 @@ export class TrackSettings {
         await this.#client.request('play', undefined);
       } catch (error) {
         forget();
+        // Cancelled: the engine is being started again.
+        if (this.#states.engineBroken) return;
         this.#onChange();
         this.#states.fail(`That ${what} cannot be.`, error);
       }

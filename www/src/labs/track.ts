@@ -4,7 +4,7 @@ import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
 import { TrackClient } from '../track/client';
 import { FILMS } from '../track/examples';
 import { isTrackPreset, type TrackPreset, type TrackVariant, variantInForce, viewOf } from '../track/presets';
-import type { Opened, Setup, VolumeView, WorkerEvent } from '../track/protocol';
+import type { Opened, Setup, StepEvent, VolumeView, WorkerEvent } from '../track/protocol';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { Other } from '../ui/track-compare';
@@ -18,6 +18,9 @@ import { type PartEvents, TrackParts } from './track-parts';
 import { TrackResults } from './track-results';
 import { saveAnimation, saveFrames, saveTable } from './track-saving';
 import { TrackSettings } from './track-settings';
+
+/** Frames between two reports in words. */
+const REPORT_EVERY = 5;
 
 /**
  * The Track lab: a surface that is followed through the frames of a 4D image. Here its parts are put together; what is
@@ -150,7 +153,8 @@ export class TrackLab implements Lab {
     this.#settings.adopt(setup, { ...opened, volume: undefined });
     this.#results.startOver();
     this.#ui.options.set({ ...viewOf(example), ...linked?.view });
-    if (setup.at) this.#ui.view.goTo(setup.at);
+    const crosshair = (setup.at === example?.at && example?.crosshair) || setup.at;
+    if (crosshair) this.#ui.view.goTo(crosshair);
     await this.#client.request('play', undefined);
   }
 
@@ -309,10 +313,18 @@ export class TrackLab implements Lab {
     else if (event.event === 'comparing') this.#ui.compare.tell(event.part, event.phase);
     else if (event.event === 'failure') this.#states.fail('The run has stopped.', new RequestError(event.failure));
     else if (event.event === 'step') {
-      const first = this.#results.frames.length === 0 && event.frame !== undefined;
       this.#results.take(event);
-      if (first && this.#states.value === 'running') this.#ui.status.say(this.#results.describe('running'));
+      this.#report(event);
     } else if (this.#states.enter(event.state)) this.#settled(event.state);
+  }
+
+  /** Now and then, for those who listen: each frame would be too much. */
+  #report({ index }: StepEvent): void {
+    if (index === undefined || this.#states.value !== 'running') return;
+    const { frames } = this.#results;
+    if (index === 0) this.#ui.status.say(this.#results.describe('running'));
+    else if ((index + 1) % REPORT_EVERY === 0)
+      this.#ui.status.say(`${frames.length} of ${this.#volume?.frames} frames have their surface.`);
   }
 
   #settled(state: 'running' | 'paused' | 'done'): void {

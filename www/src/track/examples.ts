@@ -12,6 +12,8 @@ export interface TrackExample {
   preparation: Preparation;
   box?: Box;
   at?: Vec3;
+  /** Where the slices meet at first; where the surface is nearest to, if nothing is said. */
+  crosshair?: Vec3;
   params: ParamValues;
   credit: string;
 }
@@ -38,6 +40,7 @@ export const HEART = {
   preparation: { binning: 1, enrichment: 'flow', factor: 0 },
   box: around(LEFT_VENTRICLE, REACH),
   at: LEFT_VENTRICLE,
+  crosshair: [1.4, 36.1, 3.52],
   params: { threshold: 25, cyclic: true },
   credit: HEART_CREDIT,
 } satisfies Partial<TrackExample>;

@@ -72,6 +72,8 @@ export const TRACK_PRESETS: TrackPreset[] = [
     id: 'figure-4',
     name: 'Figure 4: boundary beside Canny’s',
     ...HEART,
+    // On the wall between the ventricles.
+    crosshair: [17.51, 34.41, 6.18],
     saw: 'Windows are sorted into bright and dark by 2-means; what separates the two in many windows is the boundary. It is as good as Canny’s, whose four numbers had to be tried out, and has one: the step height τ.',
     variants: [
       {

@@ -174,8 +174,9 @@ class Session {
     const tracker = this.#current();
     if (this.#run || this.#done) return;
     const abort = new AbortController();
-    this.#run = { abort, ended: this.#runToEnd(tracker, abort.signal) };
+    // Before the first step, which may be done at once.
     send({ event: 'state', state: 'running' });
+    this.#run = { abort, ended: this.#runToEnd(tracker, abort.signal) };
   }
 
   async #runToEnd(tracker: SurfaceTracker, signal: AbortSignal): Promise<void> {

@@ -24,9 +24,9 @@ export function section(title: string, ...children: (Node | string)[]): HTMLElem
   return h('section', { class: 'panel' }, h('h2', {}, title), ...children);
 }
 
-/** A letter of a formula; a Latin letter after a Greek one is its index. */
+/** A letter of a formula; a Latin letter after a Greek one is its index, and so is what stands after a low line. */
 export function symbol(text: string): HTMLElement {
-  const [, base = text, index = ''] = /^([α-ω])([A-Za-z])$/.exec(text) ?? [];
+  const [, base = text, index = ''] = /^([α-ω])([A-Za-z])$/.exec(text) ?? /^(\w)_(\w+)$/.exec(text) ?? [];
   return h('span', { class: 'symbol' }, base, ...(index ? [h('sub', {}, index)] : []));
 }
 

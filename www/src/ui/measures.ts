@@ -49,6 +49,8 @@ export interface MoreMeasure {
   label: string;
   help: string;
   text: (value: number) => string;
+  /** Left out where nothing is known. */
+  optional?: boolean;
 }
 
 /** The measures of the surface. */
@@ -79,6 +81,7 @@ export class MeasurePanel {
     for (const { measure, cell } of this.#more) {
       const value = values[measure.name];
       cell.textContent = typeof value === 'number' ? measure.text(value) : '–';
+      if (measure.optional && cell.parentElement) cell.parentElement.hidden = typeof value !== 'number';
     }
     this.#tell();
   }

@@ -10,14 +10,14 @@ const SWITCHES = [
 
 const VOTES: { value: ShownVotes; label: string }[] = [
   { value: 'none', label: 'hidden' },
-  { value: 'near', label: 'near the surface' },
+  { value: 'near', label: 'near it' },
   { value: 'all', label: 'all' },
 ];
 
 const BELOW: { value: Below; label: string }[] = [
   { value: 'slices', label: 'slices' },
-  { value: 'boundary', label: 'boundary beside Canny’s' },
-  { value: 'time', label: 'a line through time' },
+  { value: 'boundary', label: 'boundary, Canny' },
+  { value: 'time', label: 'line in time' },
   { value: 'between', label: 'in-between slices' },
 ];
 

@@ -45,7 +45,7 @@ const DISC = 1.6;
 /** Points that are so many of the shortest sides from a vertex are near the surface. */
 const NEAR = 2;
 /** The box that is looked at has room around what is in it. */
-const CLOSER = 0.36;
+const CLOSER = 0.3;
 
 /** The 3D view and the slices of one frame after the other, kept in step with each other. */
 export class BeatingView {
