@@ -250,6 +250,29 @@ describe('changes', () => {
     await tracked(4);
   });
 
+  test('of the box are made by dragging its sides on a slice', async () => {
+    const slice = app.page.locator('.slice canvas').first();
+    await slice.scrollIntoViewIfNeeded();
+    const box = await slice.boundingBox();
+    if (!box) throw new Error('there is no slice');
+    const before = await app.page.locator('[data-box="0-first"]').inputValue();
+    // The picture is as wide as high in the middle of its canvas; patients' right is on the left.
+    const [middle, half] = [box.x + box.width / 2, Math.min(box.width, box.height) / 2];
+    await app.page.mouse.move(middle - half + 2, box.y + box.height / 2);
+    await app.page.mouse.down();
+    await app.page.mouse.move(middle - half / 2, box.y + box.height / 2, { steps: 4 });
+    await app.page.mouse.up();
+    await expect.poll(hash).toContain('box=');
+    await tracked(4);
+    const ends = ['0-first', '0-last'].map((end) => app.page.locator(`[data-box="${end}"]`).inputValue());
+    const [first, last] = (await Promise.all(ends)).map(Number);
+    expect(before).toBe('0');
+    expect((last ?? 0) - (first ?? 0)).toBe(17);
+    await app.page.click('[data-box=whole]');
+    await expect.poll(hash).not.toContain('box=');
+    await tracked(4);
+  });
+
   test('of the preparation show the image as it is then', async () => {
     await app.page.click('summary:has-text("Preparation")');
     await app.page.selectOption('[data-prepare=binning]', '2');

@@ -153,6 +153,7 @@ export class TrackLab implements Lab {
     this.#settings.adopt(setup, { ...opened, volume: undefined });
     this.#results.startOver();
     this.#ui.options.set({ ...viewOf(example), ...linked?.view });
+    if (setup.box) this.#ui.view.look(setup.box);
     const crosshair = (setup.at === example?.at && example?.crosshair) || setup.at;
     if (crosshair) this.#ui.view.goTo(crosshair);
     await this.#client.request('play', undefined);
@@ -161,8 +162,6 @@ export class TrackLab implements Lab {
   #takeVolume(volume: VolumeView, keep: boolean): void {
     this.#volume = volume;
     this.#results.setFilm(volume, this.#slices, this.#truth, keep);
-    const { box } = this.#settings.setup;
-    if (box && !keep) this.#ui.view.look(box);
   }
 
   /** The voxels that are looked at. */

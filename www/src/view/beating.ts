@@ -41,11 +41,11 @@ interface Scene {
 }
 
 /** Diameter of a point of the boundary as a part of the shortest side of a voxel. */
-const DISC = 1.6;
+const DISC = 1.1;
 /** Points that are so many of the shortest sides from a vertex are near the surface. */
 const NEAR = 2;
 /** The box that is looked at has room around what is in it. */
-const CLOSER = 0.3;
+const CLOSER = 0.44;
 
 /** The 3D view and the slices of one frame after the other, kept in step with each other. */
 export class BeatingView {
