@@ -94,8 +94,9 @@ export class Volume {
   }
 
   /**
-   * 3D volumes of one grid, in order, as the frames of a 4D one.
+   * Volumes of one grid, in order, as the frames of a 4D one. Of those that are 4D already all frames are taken, in order.
    *
+   * @param options - `frameSeconds`: from one frame to the next; default that of the first volume.
    * @throws {@link VesicleError} `invalid-argument` where the grids differ, or there is none.
    */
   static fromFrames(frames: Volume[], options_: { frameSeconds?: number } = {}): Volume {
@@ -122,6 +123,11 @@ export class Volume {
   /** Number of frames; 1 for a 3D volume. */
   get frames(): number {
     return this.#handle.use((raw) => raw.frames());
+  }
+
+  /** Seconds from one frame to the next; 0 where there is no such time. */
+  get frameSeconds(): number {
+    return this.#handle.use((raw) => raw.frameSeconds());
   }
 
   /** Voxel size along x, y and z, world units. */

@@ -55,12 +55,14 @@ export class Volume {
    * gzip is handled. A detached header takes its payload as `data`.
    */
   static parse(bytes: Uint8Array, options?: { data?: Uint8Array }): Volume;
-  /** 3D volumes of one grid, in order, as the frames of a 4D one. */
+  /** Volumes of one grid, in order, as the frames of a 4D one; of those that are 4D, all frames. */
   static fromFrames(frames: Volume[], options?: { frameSeconds?: number }): Volume;
   /** NIfTI-1 bytes, for saving what was computed. */
   toNifti(): Uint8Array;
   readonly dims: Vec3;
   readonly frames: number;
+  /** 0 where there is no such time. */
+  readonly frameSeconds: number;
   readonly spacing: Vec3;
   readonly affine: Float64Array;
   readonly space: 'RAS' | 'LPS';

@@ -40,6 +40,7 @@ test('what it says about itself', () => {
   const volume = grid({ space: 'LPS' });
   expect(volume.dims).toEqual([2, 3, 4]);
   expect(volume.frames).toBe(1);
+  expect(volume.frameSeconds).toBe(0);
   expect(volume.space).toBe('LPS');
   expect(grid().space).toBe('RAS');
 });
@@ -63,12 +64,24 @@ test('outside, the border is replicated', () => {
 
 test('frames', () => {
   const volume = Volume.fromFrames([grid(), grid({ intercept: 100 })], { frameSeconds: 0.5 });
-  expect(volume.frames).toBe(2);
+  expect([volume.frames, volume.frameSeconds]).toEqual([2, 0.5]);
   expect(volume.sample([1, 0, 0], 1)).toBe(101);
   expect(volume.range).toEqual([0, 123]);
   const four = new Volume({ data: counted(), dims: [2, 3, 2, 2], frameSeconds: 1 });
-  expect(four.frames).toBe(2);
+  expect([four.frames, four.frameSeconds]).toEqual([2, 1]);
   expect(four.intensities(1)[0]).toBe(12);
+  four.free();
+  expect(failure(() => four.frameSeconds).code).toBe('freed');
+});
+
+test('of 4D volumes all frames are taken, in order', () => {
+  const pair = (first: number, seconds: number) =>
+    new Volume({ data: Uint8Array.of(first, first + 1), dims: [1, 1, 1, 2], frameSeconds: seconds });
+  const still = new Volume({ data: Uint8Array.of(9), dims: [1, 1, 1] });
+  const joined = Volume.fromFrames([pair(1, 0.04), still, pair(3, 0.5)]);
+  expect(Array.from({ length: joined.frames }, (_, frame) => joined.intensities(frame)[0])).toEqual([1, 2, 9, 3, 4]);
+  expect(joined.frameSeconds).toBe(0.04);
+  expect(Volume.fromFrames([still, pair(3, 0.5)]).frameSeconds).toBe(0);
 });
 
 test('slices between thick ones go along with what moves from one to the next', () => {
