@@ -167,6 +167,11 @@ fn nrrd_and_metaimage_frames() {
     assert_ramp(&frames, 100.0, 2, "frames.nrrd");
     assert_world(&frames, MADE, "frames.nrrd");
     assert_ramp(&read(made!("frames.mha")), 100.0, 2, "frames.mha");
+    for (file, seconds) in [(TIME_FIRST, 0.0), (TIME_BETWEEN, 0.001)] {
+        let volume = read(file);
+        assert_eq!((volume.dims(), volume.frames(), volume.spacing()), ([5, 2, 3], 2, [2.0, 3.0, 4.0]));
+        assert_eq!(volume.frame_seconds(), seconds);
+    }
 }
 
 #[test]
@@ -224,7 +229,9 @@ fn formats_and_contents_that_are_not_read_are_named() {
     assert!(message(made!("rgb24.nii.gz")).contains("RGB24"));
     assert!(message(made!("complex64.nii.gz")).contains("complex64"));
     assert!(message(made!("bzip2.nrrd")).contains("bzip2"));
-    assert!(message(made!("vectors.nrrd")).contains("space directions"));
+    assert!(
+        message(made!("vectors.nrrd")).contains("kinds: 'vector' for axis 0, more than one number per voxel")
+    );
     assert!(message(b"").contains("signature"));
     assert!(message(b"a letter to a friend\n").contains("no known signature"));
     assert!(message(made!("pair.img")).contains("no known signature"));
@@ -272,7 +279,8 @@ fn wrong_nrrd_fields_are_named() {
         ("type: block", "type"),
         ("type: int16", "endian"),
         ("encoding: bz2", "encoding"),
-        ("space: right-anterior-superior-time", "space"),
+        ("space: superior-anterior-right", "space"),
+        ("space: right-anterior-superior-time\nspace directions: (1,0,0) (0,1,0) (0,0,1)", "spacedirections"),
         ("spacings: 1 0 1", "spacings"),
         ("spacings: 1 1", "spacings"),
         ("axis maxs: 3 3 3", "axismaxs"),
@@ -402,6 +410,15 @@ fn header_and_payload_that_do_not_belong_together_are_refused() {
     assert_eq!(refusal(made!("pair.hdr"), Some(&raw)).1, "voxel data");
 }
 
+/// Frames that alternate from voxel to voxel, and ones from row to row in a world with time: two of 5 x 2 x 3 voxels.
+const TIME_FIRST: &[u8] =
+    b"NRRD0005\ntype: uint8\ndimension: 4\nsizes: 2 5 2 3\nencoding: raw\nkinds: list domain \
+    domain domain\nspace: RAS\nspace directions: none (2,0,0) (0,3,0) (0,0,4)\n\n\
+    .,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;";
+const TIME_BETWEEN: &[u8] = b"NRRD0005\ntype: uint8\ndimension: 4\nsizes: 5 2 2 3\nencoding: raw\nkinds: space time \
+    space space\nspace: RAST\nspace directions: (2,0,0,0) (0,0,0,1) (0,3,0,0) (0,0,4,0)\nspace units: \"mm\" \"mm\" \
+    \"mm\" \"ms\"\n\n.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;.,:;";
+
 /// A file's name, its bytes, and its payload, where it has one.
 type Sample = (&'static str, &'static [u8], Option<&'static [u8]>);
 
@@ -418,6 +435,8 @@ fn corpus() -> Vec<Sample> {
         ("i8_big.nrrd", made!("i8_big.nrrd"), None),
         ("gzip_las.nrrd", made!("gzip_las.nrrd"), None),
         ("frames.nrrd", made!("frames.nrrd"), None),
+        ("time first", TIME_FIRST, None),
+        ("time between", TIME_BETWEEN, None),
         ("detached.nhdr", made!("detached.nhdr"), Some(made!("detached.raw"))),
         ("u2.mha", made!("u2.mha"), None),
         ("compressed.mha", made!("compressed.mha"), None),

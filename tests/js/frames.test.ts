@@ -113,24 +113,74 @@ test('NRRD frames whose spacings nobody knows, and frames of one slice', () => {
   expect([flat.dims, flat.frames, flat.intensities(1)[0]]).toEqual([[4, 6, 1], 2, FRAME]);
 });
 
-/** Frames whose numbers lie side by side are not read, and never taken for another axis. */
-const FIRST = ['dimension: 4', 'sizes: 2 2 3 4'];
+/** The same file with the axis of frames at another place: what the header says of each axis, and the voxels. */
+function moved(at: number, ...fields: string[]): Uint8Array {
+  const order = [0, 1, 2];
+  order.splice(at, 0, 3);
+  const reordered = (line: string) => {
+    const [, name, text] = /^(.*?: )(.*)$/.exec(line) as RegExpExecArray;
+    const words = (text as string).match(/\([^)]*\)|\S+/g) as string[];
+    return `${name}${order.map((axis) => words[axis]).join(' ')}`;
+  };
+  const perAxis = (line: string) => /^(sizes|spacings|units|kinds|space directions)/.test(line);
+  const lines = [...LAST, ...fields].map((line) => (perAxis(line) ? reordered(line) : line));
+  const header = bytesOf(['NRRD0005', 'type: uint8', 'encoding: raw', ...lines, '', '']);
+  const [sizes, steps] = [
+    [2, 3, 4, 2],
+    [1, 2, 6, 24],
+  ];
+  // Where a voxel of the file comes to lie.
+  const place = (index: number) => {
+    let [rest, sum] = [index, 0];
+    for (const axis of order) {
+      sum += (rest % (sizes[axis] as number)) * (steps[axis] as number);
+      rest = Math.floor(rest / (sizes[axis] as number));
+    }
+    return sum;
+  };
+  return joined(
+    header,
+    DATA.map((_, index) => place(index)),
+  );
+}
+
+const ROWS = '(2,0,0) (0,3,0) (0,0,4)';
+const TIMED = 'space directions: (2,0,0,0) (0,3,0,0) (0,0,4,0) (0,0,0,0.04)';
 test.each([
-  ['first, by its kind', 'kinds', [...FIRST, 'spacings: NaN 2 3 4', 'kinds: list domain domain domain']],
-  ['first, as time', 'kinds', [...FIRST, 'spacings: 0.04 2 3 4', 'kinds: time space space space']],
-  [
-    'first, by directions',
-    'space directions',
-    [...FIRST, 'space: RAS', 'space directions: none (2,0,0) (0,3,0) (0,0,4)'],
-  ],
-  [
-    'in the middle',
-    'space directions',
-    ['dimension: 4', 'sizes: 2 3 2 4', 'space: RAS', 'space directions: (2,0,0) (0,3,0) none (0,0,4)'],
-  ],
+  ['by its kind', 0, ['spacings: 2 3 4 NaN', 'kinds: domain domain domain list']],
+  ['as time', 0.04, ['spacings: 2 3 4 0.04', 'kinds: space space space time']],
+  ['by its unit', 0.04, ['spacings: 2 3 4 40', UNITS.replace('"s"', '"ms"')]],
+  ['by its unknown spacing', 0, ['spacings: 2 3 4 NaN']],
+  ['by directions', 0, ['space: RAS', DIRECTIONS]],
+  ['by both', 0, ['space: left-posterior-superior', DIRECTIONS, 'kinds: domain domain domain list']],
+  ['by a direction of zeros', 0, ['space: RAS', `space directions: ${ROWS} (0,0,0)`]],
+  ['by a direction of nothing', 0, ['space: RAS', `space directions: ${ROWS} (nan,nan,nan)`]],
+  ['in a world with time', 0.04, ['space: right-anterior-superior-time', TIMED, 'space origin: (0,0,0,9)']],
+  ['in a scanner with time', 0.04, ['space: scanner-xyz-time', TIMED, 'kinds: space space space time']],
+  ['in a world of four dimensions', 0, ['space dimension: 4', TIMED, 'kinds: domain domain domain domain']],
+])('NRRD frames as any axis, %s', (_, time, fields) => {
+  for (const at of [0, 1, 2, 3]) {
+    const volume = Volume.parse(moved(at, ...fields));
+    expectCounted(volume);
+    expect(volume.frameSeconds).toBeCloseTo(time, 9);
+  }
+});
+
+test('NRRD frames of one slice, without directions', () => {
+  const flat = Volume.parse(nrrdFile('dimension: 3', 'sizes: 4 6 2', 'kinds: domain domain time'));
+  expect([flat.dims, flat.frames, flat.intensities(1)[0]]).toEqual([[4, 6, 1], 2, FRAME]);
+});
+
+/** Numbers that are parts of one voxel are not read, and never taken for frames. */
+test.each([
   ['of vectors', 'kinds', [...LAST, 'space: RAS', DIRECTIONS, 'kinds: domain domain domain vector']],
   ['of colours', 'kinds', [...LAST, 'space: RAS', DIRECTIONS, 'kinds: domain domain domain RGB-color']],
-  ['of a fourth direction', 'spacedirections', [...LAST, 'space: RAS', DIRECTIONS.replace('none', '(0,0,0)')]],
+  ['of vectors, first', 'more than one number', [...LAST, 'kinds: vector domain domain domain']],
+  ['of colours, first', 'more than one number', [...LAST, 'kinds: 3-color domain domain domain']],
+  ['of time beside a list', 'kinds', [...LAST, 'kinds: list domain domain time']],
+  ['in space and time', 'spacedirections', [...LAST, 'space: RAST', TIMED.replace('(2,0,0,0)', '(2,0,0,1)')]],
+  ['of a fourth direction', 'spacedirections', [...LAST, 'space: RAS', DIRECTIONS.replace('none', '(1,1,1)')]],
+  ['like another', 'kinds', [...LAST, 'spacings: NaN NaN 3 4']],
   ['beside a fifth', 'dimension', ['dimension: 5', 'sizes: 2 3 4 2 1']],
 ])('a NRRD axis %s is refused, naming %s', (_, field, fields) => {
   const error = failure(() => Volume.parse(nrrdFile(...fields)));

@@ -1,0 +1,200 @@
+//! Which axes are in space and which is of frames, where they lie in the world and how far apart the frames are.
+//!
+//! Where axes have directions, the one without is of frames. Elsewhere its kind says so, or a unit of time, or that its
+//! spacing is unknown and those of the others are not; of four axes that nothing tells apart it is the last.
+
+use super::FORMAT;
+use super::axis::{Axis, KINDS, Kind, axes, words};
+use super::fields::Fields;
+use super::world::World;
+use crate::io::FormatError;
+use crate::io::text::Field;
+use crate::math::{DAffine3, DMat3, DVec3};
+use crate::volume::{LengthUnit, Space};
+
+/// All axes, in the order of the file.
+pub(super) struct Axes {
+    axes: Vec<Axis>,
+    /// Which of them is of frames.
+    frames: Option<usize>,
+    world: World,
+    affine: DAffine3,
+    space_units: Vec<String>,
+}
+
+impl Axes {
+    pub(super) fn read(fields: &Fields) -> Result<Self, FormatError> {
+        let world = World::read(fields)?;
+        let axes = axes(fields, &world)?;
+        let directions = fields.get("spacedirections");
+        let frames = match &directions {
+            Some(field) => undirected(field, &axes)?,
+            None => least_in_space(&axes)?,
+        };
+        let in_space: Vec<&Axis> = in_space(&axes, frames).collect();
+        let columns = match directions {
+            Some(_) => with_normals(&in_space),
+            None => spaced(fields, &in_space)?,
+        };
+        let affine = placed(fields, &world, columns)?;
+        Ok(Self { axes, frames, world, affine, space_units: words(fields, "spaceunits") })
+    }
+
+    /// Voxels along x, y and z, and the number of frames.
+    pub(super) fn dims(&self) -> [usize; 4] {
+        let mut dims = [1; 4];
+        for (size, axis) in dims.iter_mut().zip(in_space(&self.axes, self.frames)) {
+            *size = axis.size;
+        }
+        dims[3] = self.of_frames().map_or(1, |axis| axis.size);
+        dims
+    }
+
+    /// How many numbers of one frame are in a row in the file.
+    pub(super) fn run(&self) -> usize {
+        let faster = self.frames.unwrap_or(self.axes.len());
+        self.axes[..faster].iter().map(|axis| axis.size).fold(1, usize::saturating_mul)
+    }
+
+    /// Voxel index to world.
+    pub(super) fn affine(&self) -> DAffine3 {
+        self.affine
+    }
+
+    pub(super) fn space(&self) -> Space {
+        self.world.space
+    }
+
+    pub(super) fn unit(&self) -> LengthUnit {
+        let axes = in_space(&self.axes, self.frames);
+        let units: Vec<&str> = match self.space_units[..] {
+            [] => axes.map(|axis| axis.unit.as_str()).collect(),
+            _ => axes.zip(&self.space_units).map(|(_, unit)| unit.as_str()).collect(),
+        };
+        let all = |unit: &str| units.iter().all(|&u| u == unit);
+        match () {
+            () if all("mm") => LengthUnit::Millimetre,
+            () if all("um") || all("\u{b5}m") || all("\u{3bc}m") => LengthUnit::Micrometre,
+            () if all("m") => LengthUnit::Metre,
+            () => LengthUnit::Unknown,
+        }
+    }
+
+    /// Seconds from one frame to the next; 0 where the file does not say.
+    pub(super) fn frame_seconds(&self) -> f64 {
+        let Some(axis) = self.of_frames().filter(|axis| axis.size > 1) else { return 0.0 };
+        let step = axis.direction.map_or(axis.spacing, |direction| direction.time);
+        let unit = if axis.unit.is_empty() { self.space_units.get(3) } else { Some(&axis.unit) };
+        let second = match unit.map_or("", String::as_str) {
+            // What is called time is in seconds; frames may be apart in something else.
+            "" => f64::from(u8::from(axis.kind == Kind::Time || self.world.timed)),
+            unit => seconds(unit).unwrap_or(0.0),
+        };
+        let apart = step * second;
+        if apart > 0.0 && apart.is_finite() { apart } else { 0.0 }
+    }
+
+    fn of_frames(&self) -> Option<&Axis> {
+        self.axes.get(self.frames?)
+    }
+}
+
+fn in_space(axes: &[Axis], frames: Option<usize>) -> impl Iterator<Item = &Axis> {
+    axes.iter().enumerate().filter(move |&(i, _)| Some(i) != frames).map(|(_, axis)| axis)
+}
+
+/// The axis that has no direction in space, if there is one.
+fn undirected(field: &Field<'_>, axes: &[Axis]) -> Result<Option<usize>, FormatError> {
+    let mut frames = Vec::new();
+    for (i, axis) in axes.iter().enumerate() {
+        match axis.direction {
+            Some(v) if v.time == 0.0 && axis.kind.is_of_frames() => {
+                let found = format!("list or time for axis {i}, which has a direction in space,");
+                return Err(FormatError::unsupported(FORMAT, "kinds", found, KINDS));
+            }
+            Some(v) if v.time == 0.0 => {}
+            Some(v) if v.space != DVec3::ZERO => {
+                return Err(field.invalid("an axis is either in space or in time"));
+            }
+            _ => frames.push(i),
+        }
+    }
+    match frames[..] {
+        [] if axes.len() <= 3 => Ok(None),
+        [one] if axes.len() >= 2 => Ok(Some(one)),
+        _ => Err(field.invalid("one to three axes in space and at most one of frames are needed")),
+    }
+}
+
+/// Without directions: the axis that is of frames as far as kinds, units and spacings tell, if there is one.
+fn least_in_space(axes: &[Axis]) -> Result<Option<usize>, FormatError> {
+    let signs = |axis: &Axis| (axis.kind, seconds(&axis.unit).is_some(), axis.spacing.is_nan());
+    let Some(most) = axes.iter().map(signs).max() else { return Ok(None) };
+    if axes.len() < 4 && !most.0.is_of_frames() && !most.1 {
+        return Ok(None);
+    }
+    let alike: Vec<usize> = (0..axes.len()).filter(|&i| signs(&axes[i]) == most).collect();
+    match alike[..] {
+        [one] if axes.len() >= 2 => Ok(Some(one)),
+        [.., last] if last >= 1 && last == axes.len() - 1 => Ok(Some(last)),
+        _ => {
+            let problem =
+                "which axis is of frames is not clear, or there is no other; 'list' or 'time' says it";
+            Err(FormatError::invalid(FORMAT, "kinds", problem))
+        }
+    }
+}
+
+/// How many seconds a unit of time is.
+fn seconds(unit: &str) -> Option<f64> {
+    match unit {
+        "s" | "sec" | "second" | "seconds" => Some(1.0),
+        "ms" | "msec" | "millisecond" | "milliseconds" => Some(1e-3),
+        "us" | "usec" | "\u{b5}s" | "\u{3bc}s" | "microsecond" | "microseconds" => Some(1e-6),
+        _ => None,
+    }
+}
+
+/// Three columns out of one to three directions: missing axes stand across the others, one unit long.
+fn with_normals(axes: &[&Axis]) -> [DVec3; 3] {
+    let directions: Vec<DVec3> = axes.iter().filter_map(|axis| axis.direction).map(|v| v.space).collect();
+    match directions[..] {
+        [x, y, z] => [x, y, z],
+        [x, y] => [x, y, x.cross(y).normalize_or_zero()],
+        [x] => {
+            let (y, z) = x.normalize_or_zero().any_orthonormal_pair();
+            [x, y, z]
+        }
+        _ => [DVec3::ZERO; 3],
+    }
+}
+
+/// Axes along the world's, as long as `spacings` says; 1 where it is missing or NaN.
+fn spaced(fields: &Fields, axes: &[&Axis]) -> Result<[DVec3; 3], FormatError> {
+    let Some(field) = fields.get("spacings") else {
+        return match fields.get("axismaxs") {
+            None => Ok([DVec3::X, DVec3::Y, DVec3::Z]),
+            Some(field) => {
+                let accepted = "spacings or space directions";
+                Err(FormatError::unsupported(FORMAT, field.name, "positions by axis ends", accepted))
+            }
+        };
+    };
+    let mut lengths = DVec3::ONE.to_array();
+    for (length, axis) in lengths.iter_mut().zip(axes).filter(|(_, axis)| !axis.spacing.is_nan()) {
+        *length = axis.spacing;
+    }
+    if lengths.iter().any(|&l| l == 0.0 || !l.is_finite()) {
+        return Err(field.invalid("finite numbers other than 0 are needed"));
+    }
+    Ok([DVec3::X * lengths[0], DVec3::Y * lengths[1], DVec3::Z * lengths[2]])
+}
+
+/// The axes at the file's origin, in a space that Vesicle has.
+fn placed(fields: &Fields, world: &World, [x, y, z]: [DVec3; 3]) -> Result<DAffine3, FormatError> {
+    let origin = fields.get("spaceorigin").map(|field| world.vector(&field, field.text)).transpose()?;
+    let origin = origin.flatten().map(|v| v.space).filter(|v| !v.is_nan()).unwrap_or(DVec3::ZERO);
+    let affine = DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), origin);
+    let mirror = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+    Ok(if world.flip_x { mirror * affine } else { affine })
+}

@@ -1,0 +1,137 @@
+//! What the header says of each axis.
+
+use super::FORMAT;
+use super::fields::Fields;
+use super::world::{Vector, World};
+use crate::io::FormatError;
+use crate::io::text::Field;
+
+/// Kinds that can be read, for messages.
+pub(super) const KINDS: &str = "domain or space for axes in space, list or time for one of frames";
+
+/// One axis.
+pub(super) struct Axis {
+    pub(super) size: usize,
+    pub(super) kind: Kind,
+    /// NaN where it is unknown.
+    pub(super) spacing: f64,
+    /// Empty where there is none.
+    pub(super) unit: String,
+    pub(super) direction: Option<Vector>,
+}
+
+/// What an axis is along: the later, the less it may be in space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Kind {
+    Space,
+    Domain,
+    Unknown,
+    List,
+    Time,
+}
+
+impl Kind {
+    /// Whether an axis of this kind cannot be in space.
+    pub(super) fn is_of_frames(self) -> bool {
+        self >= Kind::List
+    }
+}
+
+/// All axes, in the order of the file.
+pub(super) fn axes(fields: &Fields, world: &World) -> Result<Vec<Axis>, FormatError> {
+    let rank = rank(&fields.need("dimension")?)?;
+    let sizes = fields.need("sizes")?.sizes(rank)?;
+    let kinds = kinds(fields, &sizes)?;
+    let spacings = fields.get("spacings").map(|field| field.numbers(rank)).transpose()?;
+    let mut units = words(fields, "units").into_iter();
+    let mut directions = directions(fields, world, &kinds)?.into_iter();
+    let axis = |(i, size)| Axis {
+        size,
+        kind: kinds[i],
+        spacing: spacings.as_ref().map_or(f64::NAN, |numbers| numbers[i]),
+        unit: units.next().unwrap_or_default(),
+        direction: directions.next().flatten(),
+    };
+    Ok(sizes.into_iter().enumerate().map(axis).collect())
+}
+
+fn rank(field: &Field<'_>) -> Result<usize, FormatError> {
+    match field.integer(1)? {
+        n @ 1..=4 => Ok(n as usize),
+        n => Err(FormatError::unsupported(FORMAT, "dimension", n.to_string(), "1 to 4")),
+    }
+}
+
+/// A field's words in double quotes; none where it is missing.
+pub(super) fn words(fields: &Fields, key: &'static str) -> Vec<String> {
+    let text = fields.get(key).map_or("", |field| field.text);
+    text.split('"').skip(1).step_by(2).map(|word| word.trim().to_owned()).collect()
+}
+
+/// The kind of each axis, none of which may hold the parts of one voxel.
+fn kinds(fields: &Fields, sizes: &[usize]) -> Result<Vec<Kind>, FormatError> {
+    let Some(field) = fields.get("kinds") else { return Ok(vec![Kind::Unknown; sizes.len()]) };
+    let words: Vec<&str> = field.text.split_whitespace().collect();
+    if words.len() != sizes.len() {
+        return Err(field.invalid(&format!("{} kinds are needed", sizes.len())));
+    }
+    let kinds: Result<Vec<Kind>, _> =
+        words.iter().zip(sizes).enumerate().map(|(axis, (word, &size))| kind(axis, word, size)).collect();
+    let kinds = kinds?;
+    if kinds.iter().filter(|kind| kind.is_of_frames()).count() > 1 {
+        return Err(field.invalid("at most one axis of frames can be read"));
+    }
+    Ok(kinds)
+}
+
+fn kind(axis: usize, word: &str, size: usize) -> Result<Kind, FormatError> {
+    match word.to_ascii_lowercase().as_str() {
+        "space" => Ok(Kind::Space),
+        "domain" => Ok(Kind::Domain),
+        "none" | "???" | "unknown" => Ok(Kind::Unknown),
+        "list" => Ok(Kind::List),
+        // A place-holder: the only frame.
+        "stub" | "scalar" if size == 1 => Ok(Kind::List),
+        "time" => Ok(Kind::Time),
+        _ => {
+            let found = format!("'{word}' for axis {axis}, more than one number per voxel,");
+            Err(FormatError::unsupported(FORMAT, "kinds", found, KINDS))
+        }
+    }
+}
+
+/// The direction of each axis, `None` for one that has none; nothing at all where the file has no directions.
+fn directions(fields: &Fields, world: &World, kinds: &[Kind]) -> Result<Vec<Option<Vector>>, FormatError> {
+    let Some(field) = fields.get("spacedirections") else { return Ok(Vec::new()) };
+    let vectors = vectors(&field, world)?;
+    if vectors.len() != kinds.len() {
+        return Err(field.invalid(&format!("{} entries are needed", kinds.len())));
+    }
+    let stated = |(vector, &kind): (Option<Vector>, &Kind)| {
+        let none = |v: &Vector| v.is_unknown() || v.is_zero() && means_none(kind, kinds.len());
+        vector.filter(|v| !none(v))
+    };
+    Ok(vectors.into_iter().zip(kinds).map(stated).collect())
+}
+
+/// Whether zeros in place of a direction say that an axis is not in space. With three axes it may be as well that nobody
+/// knew the distance of the slices: such a file has no place in the world.
+fn means_none(kind: Kind, rank: usize) -> bool {
+    kind.is_of_frames() || rank == 4 && kind != Kind::Space
+}
+
+fn vectors(field: &Field<'_>, world: &World) -> Result<Vec<Option<Vector>>, FormatError> {
+    // Blanks inside the parentheses are allowed: a vector ends at its ')'.
+    let mut entries = Vec::new();
+    let mut rest = field.text.trim();
+    while !rest.is_empty() {
+        let end = if rest.starts_with('(') {
+            rest.find(')').map(|at| at + 1).ok_or_else(|| field.invalid("a ')' is missing"))?
+        } else {
+            rest.find(char::is_whitespace).unwrap_or(rest.len())
+        };
+        entries.push(world.vector(field, &rest[..end])?);
+        rest = rest[end..].trim_start();
+    }
+    Ok(entries)
+}

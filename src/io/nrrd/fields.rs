@@ -1,0 +1,104 @@
+//! The header as fields: a name and a text each.
+
+use super::FORMAT;
+use crate::io::FormatError;
+use crate::io::text::{Field, Lines};
+
+/// Fields of the standard, names without blanks; any other is an error, as the standard has it.
+const KNOWN: [&str; 31] = [
+    "content",
+    "number",
+    "type",
+    "blocksize",
+    "dimension",
+    "space",
+    "spacedimension",
+    "sizes",
+    "spacings",
+    "thicknesses",
+    "axismins",
+    "axismaxs",
+    "centers",
+    "centerings",
+    "labels",
+    "units",
+    "kinds",
+    "min",
+    "max",
+    "oldmin",
+    "oldmax",
+    "endian",
+    "encoding",
+    "lineskip",
+    "byteskip",
+    "datafile",
+    "sampleunits",
+    "spaceunits",
+    "spaceorigin",
+    "spacedirections",
+    "measurementframe",
+];
+
+/// The header's fields, names in lower case without blanks.
+pub(super) struct Fields {
+    pairs: Vec<(String, String)>,
+}
+
+impl Fields {
+    /// Reads up to the blank line, or to the end of a detached header.
+    pub(super) fn read(lines: &mut Lines<'_>) -> Result<Self, FormatError> {
+        let magic = lines.next_line().unwrap_or_default();
+        if !matches!(magic.as_str(), "NRRD0001" | "NRRD0002" | "NRRD0003" | "NRRD0004" | "NRRD0005") {
+            let shown: String = magic.chars().take(12).collect();
+            return Err(FormatError::unsupported(
+                FORMAT,
+                "magic",
+                format!("'{shown}'"),
+                "NRRD0001 to NRRD0005",
+            ));
+        }
+        let mut fields = Self { pairs: Vec::new() };
+        while let Some(line) = lines.next_line() {
+            if line.is_empty() {
+                break;
+            }
+            if !line.starts_with('#') && fields.add(&line)? {
+                break;
+            }
+        }
+        Ok(fields)
+    }
+
+    /// Takes in one line. True when a list of files begins, which takes the rest of the header.
+    fn add(&mut self, line: &str) -> Result<bool, FormatError> {
+        let (name, value) = match (line.find(":="), line.find(": ")) {
+            (Some(at), colon) if colon.is_none_or(|colon| at < colon) => return Ok(false),
+            (_, Some(at)) => (&line[..at], &line[at + 2..]),
+            _ if line.ends_with(':') => (&line[..line.len() - 1], ""),
+            _ => {
+                let shown: String = line.chars().take(40).collect();
+                return Err(FormatError::invalid(
+                    FORMAT,
+                    "header",
+                    format!("'{shown}' is no 'field: value' line"),
+                ));
+            }
+        };
+        let key: String = name.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_lowercase).collect();
+        if !KNOWN.contains(&key.as_str()) {
+            return Err(FormatError::invalid(FORMAT, name, "not a field of the format"));
+        }
+        let files = key == "datafile" && value.trim_start().starts_with("LIST");
+        self.pairs.push((key, value.trim().to_owned()));
+        Ok(files)
+    }
+
+    pub(super) fn get(&self, key: &'static str) -> Option<Field<'_>> {
+        let (_, text) = self.pairs.iter().find(|(name, _)| name == key)?;
+        Some(Field { format: FORMAT, name: key, text })
+    }
+
+    pub(super) fn need(&self, key: &'static str) -> Result<Field<'_>, FormatError> {
+        self.get(key).ok_or_else(|| FormatError::invalid(FORMAT, key, "missing"))
+    }
+}

@@ -1,0 +1,241 @@
+//! NRRD 1 to 5: header and voxels in one file, or apart with the voxels as detached payload.
+//!
+//! Up to three axes are in space; one before, between or after them, if any, is of frames. Vectors and colours per
+//! voxel are refused. Encodings: raw, text, hex, gzip. A space of left-posterior-superior stays LPS;
+//! right-anterior-superior is RAS; left-anterior-superior becomes RAS by the sign of x; spaces without anatomical
+//! names, and none, keep their coordinates and count as RAS. Lengths stay in the file's unit, which [`Volume::unit`]
+//! names. Without directions, spacings along the axes count, and 1 where they are unknown too. A list of data files
+//! is taken as their bytes one after the other.
+
+mod axes;
+mod axis;
+mod fields;
+mod frames;
+#[cfg(test)]
+mod tests;
+mod world;
+
+use super::FormatError;
+use super::gzip::gunzip;
+use super::raw::{Place, SLACK, Scalar, decode, decode_text, exact, payload_size, refused};
+use super::text::{Field, Lines};
+use crate::math::DAffine3;
+use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
+use axes::Axes;
+use fields::Fields;
+use frames::one_after_the_other;
+
+const FORMAT: &str = "NRRD";
+const DATA: Place = Place { format: FORMAT, field: "voxel data" };
+
+/// Whether the bytes begin as a NRRD does.
+pub(super) fn is_nrrd(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"NRRD")
+}
+
+/// Reads a volume; `detached` is the payload where the header names a data file.
+///
+/// # Errors
+/// [`FormatError`] naming the header field.
+pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, FormatError> {
+    let mut lines = Lines::new(bytes);
+    let fields = Fields::read(&mut lines)?;
+    let header = Header::check(&fields)?;
+    let source = match (fields.get("datafile"), detached) {
+        (None, _) => lines.rest(),
+        (Some(_), Some(payload)) => payload,
+        (Some(file), None) => {
+            return Err(file.invalid("voxels are in another file; give its bytes as the detached payload"));
+        }
+    };
+    header.volume(source)
+}
+
+/// How numbers are written.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Encoding {
+    Raw,
+    Text,
+    Hex,
+    Gzip,
+}
+
+/// A header found consistent.
+struct Header {
+    scalar: Scalar,
+    /// Voxels along x, y and z, and the number of frames.
+    dims: [usize; 4],
+    /// How many numbers of one frame are in a row.
+    run: usize,
+    encoding: Encoding,
+    big: bool,
+    line_skip: usize,
+    /// `None` (-1 in the file): voxels are the last bytes.
+    byte_skip: Option<usize>,
+    affine: DAffine3,
+    space: Space,
+    unit: LengthUnit,
+    frame_seconds: f64,
+}
+
+impl Header {
+    fn check(fields: &Fields) -> Result<Self, FormatError> {
+        let scalar = scalar(&fields.need("type")?)?;
+        let encoding = encoding(&fields.need("encoding")?)?;
+        let axes = Axes::read(fields)?;
+        Ok(Self {
+            scalar,
+            dims: axes.dims(),
+            run: axes.run(),
+            encoding,
+            big: big_endian(fields, scalar, encoding)?,
+            line_skip: fields.get("lineskip").map_or(Ok(0), |f| f.offset())?,
+            byte_skip: byte_skip(fields, encoding)?,
+            affine: axes.affine(),
+            space: axes.space(),
+            unit: axes.unit(),
+            frame_seconds: axes.frame_seconds(),
+        })
+    }
+
+    fn volume(&self, source: &[u8]) -> Result<Volume, FormatError> {
+        let voxels = self.voxels(self.after_lines(source)?)?;
+        let volume = Volume::new(VolumeInit {
+            voxels: one_after_the_other(voxels, self.run, self.dims[3])?,
+            dims: self.dims,
+            affine: self.affine,
+            slope: 1.0,
+            intercept: 0.0,
+            frame_seconds: self.frame_seconds,
+            space: self.space,
+        });
+        Ok(volume.map_err(|error| refused(FORMAT, error))?.with_unit(self.unit))
+    }
+
+    fn after_lines<'a>(&self, source: &'a [u8]) -> Result<&'a [u8], FormatError> {
+        let mut rest = source;
+        for _ in 0..self.line_skip {
+            let end = rest.iter().position(|&b| b == b'\n');
+            let end =
+                end.ok_or_else(|| FormatError::invalid(FORMAT, "line skip", "fewer lines than that"))?;
+            rest = &rest[end + 1..];
+        }
+        Ok(rest)
+    }
+
+    fn voxels(&self, source: &[u8]) -> Result<Voxels, FormatError> {
+        let size = payload_size(DATA, self.dims, self.scalar)?;
+        let count = size / self.scalar.size();
+        match self.encoding {
+            Encoding::Raw => self.binary(source, size),
+            Encoding::Gzip => {
+                let limit = size.saturating_add(self.byte_skip.unwrap_or(0)).saturating_add(SLACK);
+                self.binary(&gunzip(FORMAT, source, limit)?, size)
+            }
+            Encoding::Hex => self.binary(&unhex(self.after_bytes(source, size)?, size)?, size),
+            Encoding::Text => decode_text(DATA, self.after_bytes(source, size)?, self.scalar, count),
+        }
+    }
+
+    fn binary(&self, bytes: &[u8], size: usize) -> Result<Voxels, FormatError> {
+        let skipped = if self.encoding == Encoding::Hex { bytes } else { self.after_bytes(bytes, size)? };
+        decode(DATA, exact(DATA, skipped, size)?, self.scalar, self.big)
+    }
+
+    /// What is left after the byte skip.
+    fn after_bytes<'a>(&self, bytes: &'a [u8], size: usize) -> Result<&'a [u8], FormatError> {
+        let skip = self.byte_skip.unwrap_or_else(|| bytes.len().saturating_sub(size));
+        bytes.get(skip..).ok_or_else(|| FormatError::truncated(FORMAT, "byte skip", skip, bytes.len()))
+    }
+}
+
+fn scalar(field: &Field<'_>) -> Result<Scalar, FormatError> {
+    let words: Vec<&str> = field.text.split_whitespace().collect();
+    Ok(match words.join(" ").as_str() {
+        "signed char" | "int8" | "int8_t" => Scalar::I8,
+        "uchar" | "unsigned char" | "uint8" | "uint8_t" => Scalar::U8,
+        "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => Scalar::I16,
+        "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => Scalar::U16,
+        "int" | "signed int" | "int32" | "int32_t" => Scalar::I32,
+        "uint" | "unsigned int" | "uint32" | "uint32_t" => Scalar::U32,
+        "longlong"
+        | "long long"
+        | "long long int"
+        | "signed long long"
+        | "signed long long int"
+        | "int64"
+        | "int64_t" => Scalar::I64,
+        "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => Scalar::U64,
+        "float" => Scalar::F32,
+        "double" => Scalar::F64,
+        other => {
+            return Err(FormatError::unsupported(
+                FORMAT,
+                "type",
+                format!("'{other}'"),
+                "integers of 8 to 64 bits, float, double",
+            ));
+        }
+    })
+}
+
+fn encoding(field: &Field<'_>) -> Result<Encoding, FormatError> {
+    match field.text.to_ascii_lowercase().as_str() {
+        "raw" => Ok(Encoding::Raw),
+        "txt" | "text" | "ascii" => Ok(Encoding::Text),
+        "hex" => Ok(Encoding::Hex),
+        "gz" | "gzip" => Ok(Encoding::Gzip),
+        other => {
+            Err(FormatError::unsupported(FORMAT, "encoding", format!("'{other}'"), "raw, text, hex, gzip"))
+        }
+    }
+}
+
+fn big_endian(fields: &Fields, scalar: Scalar, encoding: Encoding) -> Result<bool, FormatError> {
+    if scalar.size() == 1 || encoding == Encoding::Text {
+        return Ok(false);
+    }
+    let field = fields.need("endian")?;
+    match field.text.to_ascii_lowercase().as_str() {
+        "big" => Ok(true),
+        "little" => Ok(false),
+        _ => Err(field.invalid("'big' or 'little' is needed")),
+    }
+}
+
+fn byte_skip(fields: &Fields, encoding: Encoding) -> Result<Option<usize>, FormatError> {
+    let Some(field) = fields.get("byteskip") else { return Ok(Some(0)) };
+    match field.integer(-1)? {
+        -1 if encoding == Encoding::Raw => Ok(None),
+        -1 => Err(field.invalid("-1 goes with encoding raw only")),
+        _ => Ok(Some(field.offset()?)),
+    }
+}
+
+/// Bytes from pairs of hexadecimal digits, blanks skipped; at most `size` and a little more.
+fn unhex(text: &[u8], size: usize) -> Result<Vec<u8>, FormatError> {
+    let digits = text.iter().filter(|b| !b.is_ascii_whitespace());
+    let mut out = Vec::new();
+    let mut high = None;
+    for &digit in digits {
+        let Some(value) = char::from(digit).to_digit(16) else {
+            return Err(FormatError::invalid(
+                FORMAT,
+                "voxel data",
+                "a character that is no hexadecimal digit",
+            ));
+        };
+        match high.take() {
+            None => high = Some(value as u8),
+            Some(first) => out.push(first << 4 | value as u8),
+        }
+        if out.len() > size.saturating_add(SLACK) {
+            return Err(FormatError::invalid(
+                FORMAT,
+                "voxel data",
+                format!("more than the {size} bytes the header accounts for"),
+            ));
+        }
+    }
+    Ok(out)
+}

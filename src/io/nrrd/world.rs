@@ -1,0 +1,150 @@
+//! The world the axes lie in: what its name says, and vectors of as many numbers as it has dimensions.
+
+use super::FORMAT;
+use super::fields::Fields;
+use crate::io::FormatError;
+use crate::io::text::Field;
+use crate::math::DVec3;
+use crate::volume::Space;
+
+const SPACES: &str = "right-anterior-superior, left-anterior-superior, left-posterior-superior, scanner-xyz, \
+                      3D-right-handed, 3D-left-handed, each also with -time";
+
+/// The space that a header names or counts the dimensions of.
+pub(super) struct World {
+    pub(super) space: Space,
+    /// Whether x must change sign to get there.
+    pub(super) flip_x: bool,
+    /// Whether it names time as its fourth dimension.
+    pub(super) timed: bool,
+    /// How many numbers a vector has, where the file says.
+    dimension: Option<usize>,
+}
+
+/// A vector of the world. What it has no number for is 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Vector {
+    pub(super) space: DVec3,
+    pub(super) time: f64,
+}
+
+impl World {
+    pub(super) fn read(fields: &Fields) -> Result<Self, FormatError> {
+        match fields.get("space") {
+            Some(field) => named(&field),
+            None => {
+                let dimension = fields.get("spacedimension").map(|field| dimension(&field)).transpose()?;
+                Ok(Self { space: Space::Ras, flip_x: false, timed: false, dimension })
+            }
+        }
+    }
+
+    /// `(x,y,z)` or `(x,y,z,t)`, or `None` for `none`.
+    pub(super) fn vector(&self, field: &Field<'_>, text: &str) -> Result<Option<Vector>, FormatError> {
+        let text = text.trim();
+        if text == "none" {
+            return Ok(None);
+        }
+        let inner = text.strip_prefix('(').and_then(|t| t.strip_suffix(')'));
+        let numbers: Option<Vec<f64>> =
+            inner.and_then(|t| t.split(',').map(|word| word.trim().parse().ok()).collect());
+        let numbers = numbers.ok_or_else(|| field.invalid("vectors like (1,0,0) are needed"))?;
+        if self.dimension.is_some_and(|n| n != numbers.len()) {
+            return Err(field.invalid("vectors of as many numbers as the space has dimensions are needed"));
+        }
+        match numbers[..] {
+            [x, y] => Ok(Some(Vector { space: DVec3::new(x, y, 0.0), time: 0.0 })),
+            [x, y, z] => Ok(Some(Vector { space: DVec3::new(x, y, z), time: 0.0 })),
+            [x, y, z, time] => Ok(Some(Vector { space: DVec3::new(x, y, z), time })),
+            _ => {
+                let found = format!("'{text}'");
+                Err(FormatError::unsupported(FORMAT, field.name, found, "vectors of two to four numbers"))
+            }
+        }
+    }
+}
+
+impl Vector {
+    /// Whether it says no more than `none` does.
+    pub(super) fn is_unknown(&self) -> bool {
+        self.space.is_nan_mask().all()
+    }
+
+    pub(super) fn is_zero(&self) -> bool {
+        self.space == DVec3::ZERO && self.time == 0.0
+    }
+}
+
+/// The space of a name, which may have blanks or nothing in place of hyphens, or be short, as RAST is.
+fn named(field: &Field<'_>) -> Result<World, FormatError> {
+    let letters = field.text.chars().filter(|&c| c != '-' && !c.is_whitespace());
+    let name: String = letters.flat_map(char::to_lowercase).collect();
+    let untimed = name.strip_suffix("time").or_else(|| name.strip_suffix('t'));
+    let (space, flip_x) = match untimed.unwrap_or(&name) {
+        "rightanteriorsuperior" | "ras" => (Space::Ras, false),
+        "leftanteriorsuperior" | "las" => (Space::Ras, true),
+        "leftposteriorsuperior" | "lps" => (Space::Lps, false),
+        "scannerxyz" | "3drighthanded" | "3dlefthanded" => (Space::Ras, false),
+        _ => {
+            let found = format!("'{}'", field.text);
+            return Err(FormatError::unsupported(FORMAT, "space", found, SPACES));
+        }
+    };
+    let timed = untimed.is_some();
+    Ok(World { space, flip_x, timed, dimension: Some(if timed { 4 } else { 3 }) })
+}
+
+fn dimension(field: &Field<'_>) -> Result<usize, FormatError> {
+    match field.integer(1)? {
+        n @ 2..=4 => Ok(n as usize),
+        n => Err(FormatError::unsupported(FORMAT, "space dimension", n.to_string(), "2 to 4")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn field<'a>(name: &'a str, text: &'a str) -> Field<'a> {
+        Field { format: FORMAT, name, text }
+    }
+
+    #[test]
+    fn names_in_all_their_spellings() {
+        let facts = |text| named(&field("space", text)).map(|w| (w.space, w.flip_x, w.timed)).unwrap();
+        for text in ["right-anterior-superior", "Right Anterior Superior", "rightanteriorsuperior", "RAS"] {
+            assert_eq!(facts(text), (Space::Ras, false, false), "{text}");
+        }
+        for text in ["left-anterior-superior-time", "leftanteriorsuperiortime", "LAST"] {
+            assert_eq!(facts(text), (Space::Ras, true, true), "{text}");
+        }
+        assert_eq!(facts("left-posterior-superior-time"), (Space::Lps, false, true));
+        for text in ["scanner-xyz-time", "scanner-xyzt", "3D-right-handed-time", "3D-left-handed-time"] {
+            assert_eq!(facts(text), (Space::Ras, false, true), "{text}");
+        }
+        for text in ["", "time", "t", "left", "superior-anterior-right"] {
+            assert!(named(&field("space", text)).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn vectors_have_the_dimension_of_the_space() {
+        let read = |world: &World, text| world.vector(&field("space origin", text), text);
+        let timed = named(&field("space", "RAST")).unwrap();
+        let found = Vector { space: DVec3::new(1.0, 2.0, -3.0), time: 0.5 };
+        assert_eq!(read(&timed, "( 1, 2,-3e0, .5 )"), Ok(Some(found)));
+        assert_eq!(read(&timed, "none"), Ok(None));
+        let still = named(&field("space", "RAS")).unwrap();
+        for (world, text) in
+            [(&timed, "(1,2,3)"), (&still, "(1,2,3,4)"), (&still, "(1,2)"), (&still, "(1,,3)")]
+        {
+            assert!(read(world, text).is_err(), "{text}");
+        }
+        let unknown = World { space: Space::Ras, flip_x: false, timed: false, dimension: None };
+        for (text, fits) in [("(1)", false), ("(1,2)", true), ("(1,2,3,4)", true), ("(1,2,3,4,5)", false)] {
+            assert_eq!(read(&unknown, text).is_ok(), fits, "{text}");
+        }
+    }
+}
