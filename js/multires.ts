@@ -239,7 +239,7 @@ export class MultiresolutionModel implements Stepper {
 }
 
 function triangles(parameter: string, mesh: Mesh | undefined): TrianglesOf | undefined {
-  return mesh && meshHandle(parameter, mesh).use((raw) => new TrianglesOf(raw));
+  return mesh === undefined ? undefined : meshHandle(parameter, mesh).use((raw) => new TrianglesOf(raw));
 }
 
 function packedEllipsoids(ellipsoids: readonly ControlEllipsoid[]): Float64Array<ArrayBuffer> {

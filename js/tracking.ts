@@ -282,5 +282,5 @@ function point(component: TrackingOptions['component']): Float64Array | undefine
 }
 
 function triangles(mesh: Mesh | undefined): TrianglesOf | undefined {
-  return mesh && meshHandle('start', mesh).use((raw) => new TrianglesOf(raw));
+  return mesh === undefined ? undefined : meshHandle('start', mesh).use((raw) => new TrianglesOf(raw));
 }

@@ -164,6 +164,12 @@ test('wrong arguments are named', async () => {
   expect(code(() => model({ base: hole }))).toBe('not-closed');
   for (let k = 0; k < 3; k++) open.positions[k] = -3 * (open.positions[k] as number);
   expect(code(() => model({ base: Mesh.fromArrays(open.positions, open.indices) }))).toBe('self-intersecting');
+  for (const none of [null, 0, '', false]) {
+    for (const name of ['detail', 'base']) {
+      const error = failure(() => model({ [name]: wrong(none) }));
+      expect([error.code, error.message]).toEqual(['invalid-argument', expect.stringContaining(name)]);
+    }
+  }
   const skin = model();
   expect(code(() => skin.setEllipsoids([]))).toBe('invalid-argument');
   expect(code(() => skin.setParams({ edgeMin: 0.2, edgeMax: 0.3 }))).toBe('invalid-argument');

@@ -597,3 +597,8 @@ test('the volume may go, the tracker stays; a freed tracker is gone', () => {
   scoped[Symbol.dispose]();
   expect(failure(() => scoped.step()).code).toBe('freed');
 });
+
+test.each([null, 0, '', false])('%o as a start is refused by name', (start) => {
+  const error = failure(() => tracker({ start: wrong(start) }));
+  expect([error.code, error.message]).toEqual(['invalid-argument', expect.stringContaining('start')]);
+});
