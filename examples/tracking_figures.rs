@@ -3,7 +3,8 @@
 //! `<files>`: enrichment of the 4D volumes named, on slices left out, and of a synthetic heart.
 //! `CENTER=x,y,z,mm <files>`: what is nearest to a voxel is followed in a box of so many mm around it.
 //! `TRACK=<beats>`: a synthetic heart of the paper's size against its truth, or `TRACK=small` one of a few voxels.
-//! `TH`, `RADIUS`, `SCALE`, `FRAMES` are parameters of the tracker (the middle two in pixels), `PLAIN=1` does not enrich.
+//! `TH`, `RADIUS`, `SCALE`, `FRAMES` are parameters of the tracker (the middle two in pixels for `TRACK`), `PLAIN=1` does not
+//! enrich, `BOX=<first and last voxel>` is looked at in files, `BIN=<n>` takes means of n × n voxels of a slice first.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program for the terminal")]
 
 #[path = "../tests/common/cine.rs"]
@@ -16,7 +17,7 @@ use std::time::Instant;
 use vesicle::io::parse_volume;
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::{count_crossings, measure};
-use vesicle::methods::tracking::{Component, SurfaceTracker, TrackingOptions, TrackingParams};
+use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
 use vesicle::spatial::surface_distance;
 use vesicle::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
 
@@ -63,27 +64,6 @@ fn tell_enrichment(given: &Volume, truth: &Volume) {
     println!("  left out: flow {flow:.3}, linear {linear:.3}, ratio {:.3}; {took:.2} s", flow / linear);
 }
 
-fn folds(mesh: &vesicle::mesh::TriangleMesh) -> f64 {
-    use std::collections::BTreeMap;
-    let mut across: BTreeMap<(u32, u32), Vec<usize>> = BTreeMap::new();
-    for (i, t) in mesh.triangles.iter().enumerate() {
-        for k in 0..3 {
-            let (a, b) = (t[k], t[(k + 1) % 3]);
-            across.entry((a.min(b), a.max(b))).or_default().push(i);
-        }
-    }
-    let normal: Vec<_> = mesh.corners().map(|[a, b, c]| (b - a).cross(c - a)).collect();
-    let mut sums = normal.clone();
-    for pair in across.values() {
-        if let [a, b] = pair[..] {
-            sums[a] += normal[b];
-            sums[b] += normal[a];
-        }
-    }
-    let folded = (0..normal.len()).filter(|&i| (sums[i] - normal[i]).dot(normal[i]) < 0.0).count();
-    folded as f64 / normal.len() as f64
-}
-
 fn track(cine: &Cine) {
     let began = Instant::now();
     let mut volume = cine.volume();
@@ -107,7 +87,7 @@ fn track(cine: &Cine) {
     };
     let options = TrackingOptions {
         volume,
-        bounds: Some(cine.cavity_box()),
+        bounds: Some(Bounds::World(cine.cavity_box())),
         component: Component::Largest,
         start: None,
         params,
@@ -118,15 +98,15 @@ fn track(cine: &Cine) {
         let began = Instant::now();
         tracker.step().unwrap();
         let took = began.elapsed().as_secs_f64();
-        let Some(mesh) = tracker.meshes().last() else { continue };
-        let frame = tracker.meshes().len() - 1;
+        let (Some(mesh), None) = (tracker.meshes().last(), tracker.closing()) else { continue };
+        let (frame, facts) = (tracker.frame(), tracker.facts()[tracker.frame()]);
         let truth = cine.truth(frame as f64, 0.8);
         let (a, b) = (measure(mesh), measure(&truth));
         let off = surface_distance(mesh, &truth).unwrap();
         println!(
-            "{frame} {:.0} ms () {:?}\n   volume {:.2} of {:.2} ({:+.1} %), area {:+.1} %, mean {:.2}, p95 {:.2}, max {:.1}, folds {:.2} %, chi {}, crossings {}",
+            "{frame} {:.0} ms {:?}\n   volume {:.2} of {:.2} ({:+.1} %), area {:+.1} %, mean {:.2}, p95 {:.2}, max {:.1}, folds {:.2} %, chi {}, crossings {}",
             took * 1e3,
-            tracker.facts()[frame],
+            facts,
             a.volume / 1000.0,
             b.volume / 1000.0,
             100.0 * (a.volume / b.volume - 1.0),
@@ -134,53 +114,68 @@ fn track(cine: &Cine) {
             off.mean,
             off.p95,
             off.hausdorff,
-            100.0 * folds(mesh),
+            100.0 * facts.folded as f64 / facts.triangles as f64,
             a.euler,
             count_crossings(mesh)
         );
     }
+    println!("closes with {:.3} mm", tracker.closing().unwrap_or(f64::NAN));
     println!("tracked in {:.1} s", began.elapsed().as_secs_f64());
 }
 
 /// Follows what is nearest to a voxel, in a box of `reach` world units around it.
 fn follow_file(volume: &Volume, voxel: DVec3, reach: f64) {
-    let center = volume.affine().transform_point3(voxel);
-    let volume = volume.enrich_slices(None, Enrichment::Flow).unwrap();
+    let affine = volume.affine();
+    let center = affine.transform_point3(voxel);
     let number = |name: &str| std::env::var(name).ok().and_then(|v| v.parse().ok());
+    let bin = number("BIN").map_or(1, |n: f64| n as usize);
+    let volume = volume.binned([bin, bin, 1]).unwrap().enrich_slices(None, Enrichment::Flow).unwrap();
+    println!("{:?} x {}, {:?}", volume.dims(), volume.frames(), volume.spacing());
     let params = TrackingParams {
         threshold: number("TH").unwrap_or(0.0),
         radius: number("RADIUS").unwrap_or(0.0),
+        time_scale: number("SCALE").unwrap_or(0.0),
         cyclic: true,
         ..TrackingParams::default()
     };
     let component =
         if std::env::var("LARGEST").is_ok() { Component::Largest } else { Component::Nearest(center) };
-    let bounds = Some([center - reach, center + reach]);
+    let corners = [center - reach, center + reach];
+    // In voxels of the file, which are fewer or more now.
+    let voxels = |box_: String| {
+        let n: Vec<f64> = box_.split(',').map(|x| x.parse().unwrap()).collect();
+        let now = |k: usize| {
+            volume.inverse_affine().transform_point3(affine.transform_point3(DVec3::from_slice(&n[k..])))
+        };
+        Bounds::Voxels([0, 3].map(|k| now(k).round().max(DVec3::ZERO).to_array().map(|x| x as usize)))
+    };
+    let bounds = Some(std::env::var("BOX").map_or(Bounds::World(corners), voxels));
     let mut tracker =
         SurfaceTracker::new(TrackingOptions { volume, bounds, component, start: None, params }).unwrap();
     println!("noise {:.2}, {:?}", tracker.noise(), tracker.params());
     while !tracker.is_done() {
         let began = Instant::now();
         tracker.step().unwrap();
-        let Some(mesh) = tracker.meshes().last() else { continue };
-        let m = measure(mesh);
+        let (Some(mesh), None) = (tracker.meshes().last(), tracker.closing()) else { continue };
+        let (m, facts) = (measure(mesh), tracker.facts()[tracker.frame()]);
         println!(
             "{} {:.0} ms, {} triangles, volume {:.2}, area {:.1}, chi {}, crossings {}, folds {:.2} %, {:?}",
-            tracker.meshes().len() - 1,
+            tracker.frame(),
             began.elapsed().as_secs_f64() * 1e3,
             m.triangles,
             m.volume / 1000.0,
             m.area / 100.0,
             m.euler,
             count_crossings(mesh),
-            100.0 * folds(mesh),
-            tracker.facts().last().unwrap()
+            100.0 * facts.folded as f64 / facts.triangles as f64,
+            facts
         );
         if let Ok(folder) = std::env::var("OUT") {
             let bytes = vesicle::io::write_mesh(mesh, vesicle::io::MeshFormat::Ply).unwrap();
-            std::fs::write(format!("{folder}/frame{}.ply", tracker.meshes().len() - 1), bytes).unwrap();
+            std::fs::write(format!("{folder}/frame{}.ply", tracker.frame()), bytes).unwrap();
         }
     }
+    println!("closes with {:.3}", tracker.closing().unwrap_or(f64::NAN));
 }
 
 fn main() {
@@ -191,6 +186,14 @@ fn main() {
         };
         return track(&cine);
     }
+    if let Ok(center) = std::env::var("CENTER") {
+        let numbers: Vec<f64> = center.split(',').map(|x| x.parse().unwrap()).collect();
+        for file in std::env::args().skip(1) {
+            let volume = parse_volume(&std::fs::read(&file).unwrap(), None).unwrap();
+            follow_file(&volume, DVec3::from_slice(&numbers), numbers[3]);
+        }
+        return;
+    }
     let full = Cine { frames: 4, ..Cine::full() };
     let (noisy, clean) = (full.volume(), Cine { noise: 0.0, ..full }.volume());
     tell_enrichment(&noisy, &noisy);
@@ -199,11 +202,6 @@ fn main() {
     for file in std::env::args().skip(1) {
         let volume = parse_volume(&std::fs::read(&file).unwrap(), None).unwrap();
         println!("{file}: {:?} x {}, {:?}", volume.dims(), volume.frames(), volume.spacing());
-        if let Ok(center) = std::env::var("CENTER") {
-            let numbers: Vec<f64> = center.split(',').map(|x| x.parse().unwrap()).collect();
-            follow_file(&volume, DVec3::from_slice(&numbers), numbers[3]);
-            continue;
-        }
         tell_enrichment(&volume, &volume);
     }
 }

@@ -7,7 +7,7 @@ import { type Vec3, type Volume, volumeHandle } from './volume.js';
 
 /** Parameters of the tracker; `paramSpecs('tracking')` has ranges, defaults and a sentence on each. */
 export interface TrackingParams {
-  /** τ: the smallest step between the two cluster means, intensity units; by default above the noise. */
+  /** τ: the smallest step between the two cluster means, intensity units; by default, or where 0, above the noise. */
   threshold?: number;
   /** k: a window is 2k + 1 voxels wide along each axis. */
   window?: number;
@@ -33,9 +33,14 @@ export interface TrackingParams {
 export interface TrackingOptions {
   /** Two frames or more, voxel axes at right angles. */
   volume: Volume;
-  /** The part that is looked at, corners in the world; default all of it. */
+  /**
+   * The part that is looked at, corners in the world; default all of it. What is bright where it ends is closed there. Of a
+   * volume whose axes are not those of the world, the voxels around the box are taken.
+   */
   box?: { min: Vec3; max: Vec3 };
-  /** The surface of interest: the largest of the first frame (the default), or the one nearest to a point of the world. */
+  /** The same by the first and the last voxel; instead of `box`. */
+  voxels?: { min: Vec3; max: Vec3 };
+  /** The surface of interest: the largest of the first frame (the default), or the one around a point of the world, or nearest to it. */
   component?: 'largest' | Vec3;
   /** The surface in the first frame, closed and without crossings, in the world; instead of finding it. */
   start?: Mesh;
@@ -70,7 +75,7 @@ interface Facts {
   frames: FrameFacts[];
 }
 
-const OPTIONS = ['volume', 'box', 'component', 'start', 'params'];
+const OPTIONS = ['volume', 'box', 'voxels', 'component', 'start', 'params'];
 
 /** Seconds a frame is shown for in an animation, where the volume does not say. */
 const FRAME_SECONDS = 0.1;
@@ -95,24 +100,25 @@ export class SurfaceTracker implements Stepper {
   /**
    * A tracker before its first step.
    *
-   * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: a volume of one frame, without contrast or
-   *   with slanted axes, a box outside of it, an empty start or one inside out; `not-closed`, `self-intersecting` for a start
+   * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: a volume of one frame, of too few voxels,
+   *   without contrast or with slanted axes, a box outside of it, a start that is empty, inside out or outside the box; `not-closed`, `self-intersecting` for a start
    *   that is.
    */
   constructor(given: TrackingOptions) {
     const known = options('options', given, OPTIONS) as TrackingOptions;
     const image = volumeHandle('volume', known.volume);
-    const [box, nearest] = [corners(known.box), point(known.component)];
+    const [box, voxels, nearest] = [corners(known.box), ends(known.voxels), point(known.component)];
+    if (box && voxels) throw invalid('voxels', 'box cannot be given together with it: it says the same');
     const params = plain('params', known.params ?? {});
     this.#frameSeconds = image.use((raw) => raw.frameSeconds()) || FRAME_SECONDS;
     this.#handle = new Handle('SurfaceTracker', () =>
-      image.use((raw) => new RawTracker(raw, box, nearest, triangles(known.start), params)),
+      image.use((raw) => new RawTracker(raw, box, voxels, nearest, triangles(known.start), params)),
     );
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     this.#mesh = wrapMesh(this.#meshHandle, true);
   }
 
-  /** The surface of the current frame: the same live object always. Without triangles before the first frame is done. */
+  /** The surface of the current frame: the same live object always. Before the first frame is done it is the start, or has no triangles. */
   get mesh(): Mesh {
     return this.#mesh;
   }
@@ -240,7 +246,7 @@ export class SurfaceTracker implements Stepper {
     return this.#handle.use((raw) => raw.toGlb(seconds));
   }
 
-  /** The whole state but the image, for {@link SurfaceTracker.restore} of a tracker of the same volume, box and start. */
+  /** The whole state but the image, for {@link SurfaceTracker.restore} of a tracker of the same volume, box, component and start. */
   save(): Uint8Array {
     return this.#handle.use((raw) => raw.save());
   }
@@ -273,6 +279,13 @@ function corners(box: TrackingOptions['box']): Float64Array | undefined {
   if (box === undefined) return undefined;
   const { min, max } = options('box', box, ['min', 'max']);
   return Float64Array.of(...vec3('box.min', min), ...vec3('box.max', max));
+}
+
+function ends(voxels: TrackingOptions['voxels']): Uint32Array | undefined {
+  if (voxels === undefined) return undefined;
+  const { min, max } = options('voxels', voxels, ['min', 'max']);
+  const indices = [...vec3('voxels.min', min), ...vec3('voxels.max', max)];
+  return Uint32Array.from(indices, (index) => whole('voxels', index));
 }
 
 function point(component: TrackingOptions['component']): Float64Array | undefined {

@@ -15,7 +15,7 @@ use crate::io::write_animation;
 use crate::math::DVec3;
 use crate::mesh::TriangleMesh;
 use crate::methods::tracking::{
-    Component, FrameFacts, SurfaceTracker, TrackingOptions, TrackingParams, param_specs,
+    Bounds, Component, FrameFacts, SurfaceTracker, TrackingOptions, TrackingParams, param_specs,
 };
 
 /// A surface tracker, shared with its live mesh.
@@ -43,20 +43,23 @@ impl Live for Newest {
 
 #[wasm_bindgen]
 impl RawTracker {
-    /// A tracker of a volume. `bounds`: six numbers, the corners of the box; `nearest`: a point, for the surface nearest to it.
+    /// A tracker of a volume. `corners`: six numbers, of the box in the world; `voxels`: six, the first and the last voxel;
+    /// `nearest`: a point, for the surface around it or nearest to it.
     #[wasm_bindgen(constructor)]
     pub fn new(
         volume: &RawVolume,
-        bounds: Option<Float64Array>,
+        corners: Option<Float64Array>,
+        voxels: Option<Vec<u32>>,
         nearest: Option<Float64Array>,
         start: Option<TrianglesOf>,
         params: &JsValue,
     ) -> Result<RawTracker, JsValue> {
         let numbers = |array: Option<Float64Array>| array.as_ref().map(doubles).transpose();
-        let corners = |n: Vec<f64>| [DVec3::from_slice(&n), DVec3::from_slice(&n[3..])];
+        let world = |n: Vec<f64>| Bounds::World([DVec3::from_slice(&n), DVec3::from_slice(&n[3..])]);
+        let within = |n: Vec<u32>| Bounds::Voxels([0, 3].map(|k| [k, k + 1, k + 2].map(|i| n[i] as usize)));
         let options = TrackingOptions {
             volume: volume.0.clone(),
-            bounds: numbers(bounds)?.map(corners),
+            bounds: numbers(corners)?.map(world).or(voxels.map(within)),
             component: numbers(nearest)?
                 .map_or(Component::Largest, |n| Component::Nearest(DVec3::from_slice(&n))),
             start: start.map(|mesh| mesh.0),

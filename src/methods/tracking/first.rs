@@ -3,14 +3,12 @@
 use super::extremal::plane;
 use super::region::Region;
 use super::samples::{Falloff, Field};
+use super::sides::{LEAST_WEIGHT, Part, sides};
 use super::vote::{Faces, X, Y, Z};
-use crate::math::DVec3;
+use crate::math::{DAffine3, DVec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::volume::{Grid, marching_cubes};
-
-/// Faces with fewer votes are not what the first surface is made of.
-const LEAST_WEIGHT: f32 = 0.1;
 
 /// The distance is that from points within this share of the radius; further off only the side counts.
 const BAND: f64 = 0.8;
@@ -25,27 +23,27 @@ struct Oriented {
     weight: f64,
 }
 
-/// The surface of all that is bright in the first frame, in the world. `levels`: the level between bright and dark
-/// around each voxel, where there is one.
+/// The surface of all that is bright in the first frame, in the world.
 pub(super) fn bright_surface(
     region: &Region,
     faces: &Faces,
-    levels: &[Option<u8>],
     falloff: Falloff,
 ) -> Result<TriangleMesh, MethodError> {
+    let part = Part { ends: region.inner };
+    let Some(is_bright) = sides(region, 0, faces, part) else { return Ok(TriangleMesh::default()) };
     let points = oriented(region, faces, falloff);
     let band = BAND * falloff.radius;
     let distance = distances(region, &points, band);
-    let levels = spread(levels, region.dims);
-    let image = &region.frames[0];
-    let side = |i: usize| if image[i] > levels[i] { band } else { -band };
-    let values =
-        (0..image.len()).map(|i| distance[i].map_or(side(i), |d| d.clamp(-band, band)) as f32).collect();
-    let mut mesh = marching_cubes(&Grid::new(region.dims, values)?, 0.0)?;
-    for p in &mut mesh.positions {
-        *p = region.to_world.transform_point3(p.as_dvec3() * region.spacing).as_vec3();
-    }
-    Ok(mesh)
+    let value = |i: usize| {
+        let at = region.voxel(i as u32);
+        let side = if part.index(at).is_some_and(|i| is_bright[i]) { band } else { -band };
+        // Beyond the box there is nothing.
+        let most = -region.beyond(at);
+        distance[i].unwrap_or(side).clamp(-band, band).min(most) as f32
+    };
+    let values = (0..distance.len()).map(value).collect();
+    let mesh = marching_cubes(&Grid::new(region.dims, values)?, 0.0)?;
+    Ok(mesh.transformed(&(region.to_world * DAffine3::from_scale(region.spacing))))
 }
 
 /// The faces' middles, each with the normal of the plane through what is around it, turned to where intensity falls.
@@ -56,8 +54,9 @@ fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
         for face in faces[direction].iter().filter(|face| face.weight >= LEAST_WEIGHT) {
             let (at, _) = region.face(direction, face.voxel);
             let Some(fit) = plane(&field.sums(at)) else { continue };
-            let slope = slope(region, region.voxel(face.voxel));
-            let normal = if fit.normal.dot(slope) > 0.0 { -fit.normal } else { fit.normal };
+            let out =
+                region.cut(direction, face.voxel).unwrap_or_else(|| -slope(region, region.voxel(face.voxel)));
+            let normal = if fit.normal.dot(out) < 0.0 { -fit.normal } else { fit.normal };
             points.push(Oriented { at, normal, weight: f64::from(face.weight) });
         }
     }
@@ -110,33 +109,4 @@ fn distances(region: &Region, points: &[Oriented], band: f64) -> Vec<Option<f64>
         }
     }
     sums.into_iter().map(|(sum, total)| (total > 0.0).then(|| sum / total)).collect()
-}
-
-/// Levels for all voxels: those without one take that of the nearest with one, along the axes.
-fn spread(levels: &[Option<u8>], [nx, ny, nz]: [usize; 3]) -> Vec<u8> {
-    let mut all: Vec<u8> = levels.iter().map(|level| level.unwrap_or(0)).collect();
-    let mut known: Vec<bool> = levels.iter().map(Option::is_some).collect();
-    let mut front: Vec<usize> = (0..all.len()).filter(|&i| known[i]).collect();
-    while !front.is_empty() {
-        let mut next = Vec::new();
-        for i in front {
-            let [x, y, z] = [i % nx, i / nx % ny, i / (nx * ny)];
-            let neighbours = [
-                (x > 0).then(|| i - 1),
-                (x + 1 < nx).then_some(i + 1),
-                (y > 0).then(|| i - nx),
-                (y + 1 < ny).then_some(i + nx),
-                (z > 0).then(|| i - nx * ny),
-                (z + 1 < nz).then_some(i + nx * ny),
-            ];
-            for j in neighbours.into_iter().flatten() {
-                if !known[j] {
-                    (known[j], all[j]) = (true, all[i]);
-                    next.push(j);
-                }
-            }
-        }
-        front = next;
-    }
-    all
 }

@@ -15,11 +15,8 @@ const SMOOTHINGS: usize = 5;
 /// Projections in one frame, with a change of connectivity in between.
 const ROUNDS: usize = 2;
 
-/// Iterations in which what has no boundary draws together. A sheet between two walls that have met is gone after some.
-const RETRACTIONS: usize = 10;
-
-/// Between these, connectivity is changed, too.
-const RETRACTIONS_PER_CHANGE: usize = 3;
+/// How often the first frame is settled: its mesh comes from a grid, not from a frame before.
+const FIRST_SETTLINGS: usize = 3;
 
 /// A vertex with less of a step in intensity along its normal than this share of τ is on no boundary.
 const LEAST_STEP: f64 = 0.3;
@@ -59,13 +56,28 @@ pub(super) struct Going<'a> {
     pub into: &'a Moment,
 }
 
+impl Going<'_> {
+    /// Whether the image is brighter one voxel inside than one outside, or the box cuts what is bright.
+    pub fn is_boundary(&self, at: Vec3, normal: Vec3) -> bool {
+        let region = self.region;
+        let way = region.from_world.transform_vector3(normal.as_dvec3()).normalize_or_zero()
+            * region.spacing.min_element();
+        let place = region.place(at);
+        if let Some(voxel) = region.nearest_inside(place + way) {
+            return self.into.cut.binary_search(&voxel).is_ok();
+        }
+        let [inside, outside] = [place - way, place + way].map(|place| region.sample(self.frame, place));
+        inside - outside >= LEAST_STEP * region.threshold
+    }
+}
+
 /// Takes one mesh, in the world, through the frames.
 #[derive(Clone, Debug)]
 pub(super) struct Follower {
-    guard: Embedding,
+    pub(super) guard: Embedding,
     /// The mean edge of the first frame's mesh.
     pub edge: f64,
-    bounds: EdgeBounds,
+    pub(super) bounds: EdgeBounds,
 }
 
 impl Follower {
@@ -81,7 +93,10 @@ impl Follower {
         if let (Some(from), true) = (from, going.params.prediction) {
             self.predict(mesh, going.region, from, &mut facts);
         }
-        let changes = self.settle(mesh, going, &mut facts);
+        let mut changes = Changes::default();
+        for _ in 0..if from.is_some() { 1 } else { FIRST_SETTLINGS } {
+            changes += self.settle(mesh, going, &mut facts);
+        }
         let triangles = mesh.to_triangles();
         let measured = measure(&triangles);
         (facts.volume, facts.area, facts.triangles) = (measured.volume, measured.area, measured.triangles);
@@ -113,7 +128,7 @@ impl Follower {
                 self.space(mesh);
             }
         }
-        changes += self.retract(mesh, going.region, going.frame, facts);
+        changes += self.retract(mesh, going, facts);
         changes
     }
 
@@ -147,43 +162,14 @@ impl Follower {
         self.carry(mesh, ways);
     }
 
-    /// Draws together what lies where inside and outside look alike: a crevice between two walls that have met has no
-    /// boundary left to follow, and would stay as a sheet without volume, from which folds come.
-    fn retract(&mut self, mesh: &mut Mesh, region: &Region, frame: usize, facts: &mut FrameFacts) -> Changes {
-        let mut changes = Changes::default();
-        for iteration in 1..=RETRACTIONS {
-            let mut ways = vec![Vec3::ZERO; mesh.slots()];
-            let mut count = 0;
-            for v in mesh.vertices() {
-                if region.step_along(frame, mesh.position(v), mesh.area_normal(v))
-                    < LEAST_STEP * region.threshold
-                {
-                    ways[v.index()] = middle(mesh, v) - mesh.position(v);
-                    count += 1;
-                }
-            }
-            if iteration == 1 {
-                facts.retracted = count;
-            }
-            if count == 0 {
-                break;
-            }
-            self.carry(mesh, ways);
-            if iteration % RETRACTIONS_PER_CHANGE == 0 {
-                changes += restructure(mesh, self.bounds, &mut self.guard);
-            }
-        }
-        changes
-    }
-
     /// How many were held back.
-    fn carry(&mut self, mesh: &mut Mesh, mut ways: Vec<Vec3>) -> usize {
+    pub(super) fn carry(&mut self, mesh: &mut Mesh, mut ways: Vec<Vec3>) -> usize {
         self.guard.follow_with(mesh, self.bounds.max);
         self.guard.carry(mesh, &mut ways).len()
     }
 }
 
-fn middle(mesh: &Mesh, v: VertexId) -> Vec3 {
+pub(super) fn middle(mesh: &Mesh, v: VertexId) -> Vec3 {
     let ring = mesh.ring(v).as_slice();
     ring.iter().fold(Vec3::ZERO, |sum, &w| sum + mesh.position(w)) * (1.0 / ring.len() as f32)
 }

@@ -14,6 +14,8 @@
 //! The first frame's distance is that from oriented points (the plane's own, equation 6, has no sign away from them). Where
 //! two walls meet, the sheet between them has no boundary left; it is drawn together. Nothing is moved so that it crosses.
 
+mod crevice;
+mod cut;
 mod extremal;
 mod first;
 mod follow;
@@ -21,6 +23,7 @@ mod params;
 mod project;
 mod region;
 mod samples;
+mod sides;
 mod start;
 mod state;
 mod vote;
@@ -43,11 +46,20 @@ use vote::{Faces, Voting, Window};
 /// Which surface of the first frame is followed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Component {
-    /// The one with the most vertices.
+    /// The one that encloses most.
     #[default]
     Largest,
-    /// The one nearest to a point of the world.
+    /// The one around a point of the world, or nearest to it.
     Nearest(DVec3),
+}
+
+/// A part of a volume.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bounds {
+    /// Opposite corners in the world. Where voxel axes are not those of the world, the voxels around that box are taken.
+    World([DVec3; 2]),
+    /// The first and the last voxel.
+    Voxels([[usize; 3]; 2]),
 }
 
 /// How a [`SurfaceTracker`] is set up.
@@ -55,8 +67,8 @@ pub enum Component {
 pub struct TrackingOptions {
     /// Two frames or more.
     pub volume: Volume,
-    /// The part that is looked at: opposite corners in the world; all of it without.
-    pub bounds: Option<[DVec3; 2]>,
+    /// The part that is looked at; all of it without. What is bright where it ends is closed there.
+    pub bounds: Option<Bounds>,
     /// What is followed.
     pub component: Component,
     /// The surface in the first frame; else it is found.
@@ -122,11 +134,9 @@ impl SurfaceTracker {
             return Err(MethodError::invalid("volume", problem));
         }
         let pixel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
-        // Room for windows and planes beyond the box.
-        let margin = if params.radius > 0.0 { params.radius } else { LONGEST * pixel };
-        let region = Region::new(&volume, bounds, margin)?;
+        let region = Region::new(&volume, bounds)?;
         let image = ImageFacts { pixel, noise: region.noise() * region.step, range: volume.span() };
-        let start = start.as_ref().map_or(Ok(Mesh::default()), start::checked)?;
+        let start = start.as_ref().map_or(Ok(Mesh::default()), |mesh| start::checked(mesh, &region))?;
         let mut tracker = Self {
             voting: Voting::new(Window::default(), 0),
             mesh: start.clone(),
@@ -276,6 +286,9 @@ impl SurfaceTracker {
         let began = (self.clock)();
         let mut times = Times::default();
         let mut changes = Changes::default();
+        if self.is_done() {
+            return Ok(self.report(changes, times));
+        }
         if self.faces.len() < self.frames() {
             let frame = self.faces.len();
             let faces = self.voting.faces(&self.region, frame);
@@ -284,7 +297,7 @@ impl SurfaceTracker {
         } else if self.meshes.len() < self.frames() {
             changes = self.next_frame()?;
             times.add("surface", (self.clock)() - began);
-        } else if !self.is_done() {
+        } else {
             self.close();
             times.add("closing", (self.clock)() - began);
         }
@@ -343,7 +356,8 @@ impl SurfaceTracker {
         }
         let pixel = self.region.spacing.min_element();
         let (damping, time_scale) = (self.params.damping, self.params.time_scale);
-        Moment { field, time_scale, damping, still: STILL * pixel, longest: LONGEST * pixel }
+        let cut = self.region.cut_voxels(&self.faces[frame]);
+        Moment { field, cut, time_scale, damping, still: STILL * pixel, longest: LONGEST * pixel }
     }
 
     fn falloff(&self) -> Falloff {

@@ -55,8 +55,8 @@ const LEAST_THRESHOLD: f64 = 0.05;
 /// Two voxels of a slice and a half: less follows noise, more rounds off what is as thin.
 const RADIUS_IN_PIXELS: f64 = 2.4;
 
-/// A neighbouring frame counts half as much as this one does.
-const TIME_SCALE_IN_RADIUS: f64 = 0.5;
+/// Of neighbouring frames next to nothing counts, and of the changes in between all: what moves fast is followed then.
+const TIME_SCALE_IN_RADIUS: f64 = 0.9;
 
 impl TrackingParams {
     /// Tests all but what is taken from the volume.

@@ -18,6 +18,8 @@ const LEAST_SLOPE: f64 = 0.05;
 #[derive(Clone, Debug)]
 pub(super) struct Moment {
     pub field: Field,
+    /// Voxels of the frame at the sides of the box where they are bright, in order.
+    pub cut: Vec<u32>,
     /// World units that one frame counts as: c.
     pub time_scale: f64,
     pub damping: f64,
@@ -80,6 +82,7 @@ mod tests {
     fn region() -> Region {
         Region {
             dims: [20, 18, 16],
+            inner: [[0; 3], [19, 17, 15]],
             spacing: SPACING,
             to_world: DAffine3::IDENTITY,
             from_world: DAffine3::IDENTITY,
@@ -114,7 +117,7 @@ mod tests {
         for offset in FALLOFF.offsets() {
             field.add(&plane_faces(&region, normal, distance, speed, offset as f64), offset);
         }
-        Moment { field, time_scale: C, damping: 0.9, still: 1e-4, longest: 4.0 }
+        Moment { field, cut: Vec::new(), time_scale: C, damping: 0.9, still: 1e-4, longest: 4.0 }
     }
 
     #[test]

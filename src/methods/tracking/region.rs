@@ -1,7 +1,8 @@
 //! The part of a 4D image that is looked at, and its intensities in steps.
 
+use super::Bounds;
 use super::vote::TIME;
-use crate::math::{DAffine3, DMat3, DVec3, Vec3};
+use crate::math::{DAffine3, DMat3, DVec3};
 use crate::methods::MethodError;
 use crate::volume::{Volume, trilinear};
 
@@ -14,15 +15,24 @@ const OUTLIERS: f64 = 1e-3;
 /// Counts that the ends are found by.
 const BINS: usize = 4096;
 
+/// Voxels around the bounds that windows reach.
+const ROOM: usize = 2;
+
+/// A surface needs so many voxels along two axes at least; a single slice may be followed.
+const LEAST_VOXELS: usize = 5;
+
 /// Cosine of the angle by which voxel axes may be off the right one: rounding in headers stays far below.
 const ORTHOGONAL: f64 = 1e-3;
 
-/// Boxes of voxels of a 4D image, one a frame, in steps of intensity.
+/// Boxes of voxels of a 4D image, one a frame, in steps of intensity, with some room around: what is in the box is looked at,
+/// windows reach beyond. Where the image ends its border goes on.
 ///
 /// Places in it are in millimetres (world units) along the voxels' axes, from the centre of its first voxel.
 #[derive(Clone, Debug)]
 pub(super) struct Region {
     pub dims: [usize; 3],
+    /// The first and the last voxel of the box.
+    pub inner: [[usize; 3]; 2],
     /// World length of one voxel.
     pub spacing: DVec3,
     /// Places to the world.
@@ -38,11 +48,11 @@ pub(super) struct Region {
 }
 
 impl Region {
-    /// The voxels of `volume` within a box of the world, and `margin` world units around it; all of them without a box.
+    /// The voxels of `volume` within bounds, and some around them; all of them without bounds.
     ///
     /// # Errors
-    /// Voxel axes that are not at right angles; a box outside the volume; no contrast.
-    pub fn new(volume: &Volume, bounds: Option<[DVec3; 2]>, margin: f64) -> Result<Self, MethodError> {
+    /// Voxel axes that are not at right angles; a box outside the volume; too few voxels; no contrast.
+    pub fn new(volume: &Volume, bounds: Option<Bounds>) -> Result<Self, MethodError> {
         let spacing = DVec3::from(volume.spacing());
         let axes = volume.affine().matrix3;
         let directions =
@@ -53,12 +63,14 @@ impl Region {
                 "its voxel axes are not at right angles; resample it, or set an affine whose axes are";
             return Err(MethodError::invalid("volume", problem));
         }
-        let [low, high] = voxel_box(volume, bounds, margin / spacing)?;
-        let dims = [0, 1, 2].map(|k| high[k] - low[k] + 1);
-        let first = volume.affine().transform_point3(DVec3::from(low.map(|i| i as f64)));
+        let [low, high] = ends_of(volume, bounds)?;
+        let inner = [[ROOM; 3], [0, 1, 2].map(|k| high[k] - low[k] + ROOM)];
+        let dims = inner[1].map(|last| last + ROOM + 1);
+        let first = volume.affine().transform_point3(DVec3::from(low.map(|i| i as f64 - ROOM as f64)));
         let to_world = DAffine3::from_mat3_translation(directions, first);
         let mut region = Self {
             dims,
+            inner,
             spacing,
             to_world,
             from_world: to_world.inverse(),
@@ -106,11 +118,18 @@ impl Region {
         mut take: impl FnMut(&[f32]),
     ) -> Result<(), MethodError> {
         let grid = volume.normalised_grid(frame)?;
-        let [nx, ny, nz] = self.dims;
-        for z in 0..nz {
-            for y in 0..ny {
-                let start = ((low[2] + z) * grid.dims[1] + low[1] + y) * grid.dims[0] + low[0];
-                take(&grid.values[start..start + nx]);
+        // The voxel of the volume, or the nearest one where there is none.
+        let along = |axis: usize| -> Vec<usize> {
+            let (from, last) = (low[axis], grid.dims[axis] - 1);
+            (0..self.dims[axis]).map(|i| (from + i).saturating_sub(self.inner[0][axis]).min(last)).collect()
+        };
+        let [xs, ys, zs] = [along(0), along(1), along(2)];
+        let mut row = vec![0.0; xs.len()];
+        for z in zs {
+            for &y in &ys {
+                let start = (z * grid.dims[1] + y) * grid.dims[0];
+                row.iter_mut().zip(&xs).for_each(|(value, x)| *value = grid.values[start + x]);
+                take(&row);
             }
         }
         Ok(())
@@ -132,16 +151,8 @@ impl Region {
         (at * self.spacing, 0.0)
     }
 
-    /// By how much the image is brighter one voxel inside of a place of the world than one outside, in steps.
-    pub fn step_along(&self, frame: usize, at: Vec3, normal: Vec3) -> f64 {
-        let way = self.from_world.transform_vector3(normal.as_dvec3()).normalize_or_zero()
-            * self.spacing.min_element();
-        let place = self.from_world.transform_point3(at.as_dvec3());
-        self.sample(frame, place - way) - self.sample(frame, place + way)
-    }
-
     /// Trilinear, the border replicated.
-    fn sample(&self, frame: usize, place: DVec3) -> f64 {
+    pub fn sample(&self, frame: usize, place: DVec3) -> f64 {
         trilinear(self.dims, place / self.spacing, |i| f64::from(self.frames[frame][i]))
     }
 
@@ -187,15 +198,33 @@ fn ends(counts: &[u64]) -> [f64; 2] {
     [false, true].map(beyond)
 }
 
-/// First and last voxel of a box, with `margin` voxels around, within the volume.
-fn voxel_box(
-    volume: &Volume,
-    bounds: Option<[DVec3; 2]>,
-    margin: DVec3,
-) -> Result<[[usize; 3]; 2], MethodError> {
-    let dims = volume.dims();
-    let last = dims.map(|n| n - 1);
-    let Some([low, high]) = bounds else { return Ok([[0; 3], last]) };
+/// The first and the last voxel within bounds.
+fn ends_of(volume: &Volume, bounds: Option<Bounds>) -> Result<[[usize; 3]; 2], MethodError> {
+    let last = volume.dims().map(|n| n - 1);
+    let (parameter, [low, high]) = match bounds {
+        None => ("volume", [[0; 3], last]),
+        Some(Bounds::World(corners)) => ("box", voxels_around(volume, corners)?),
+        Some(Bounds::Voxels([low, high])) if (0..3).all(|k| low[k] <= high[k] && high[k] <= last[k]) => {
+            ("voxels", [low, high])
+        }
+        Some(Bounds::Voxels([low, high])) => {
+            let problem = format!(
+                "min {low:?} and max {high:?} given; min up to max, and max up to {last:?}, are needed"
+            );
+            return Err(MethodError::invalid("voxels", problem));
+        }
+    };
+    let counts = [0, 1, 2].map(|k| high[k] - low[k] + 1);
+    if counts.iter().filter(|&&count| count >= LEAST_VOXELS).count() < 2 {
+        let problem = format!("{counts:?} voxels; {LEAST_VOXELS} or more along two axes are needed");
+        return Err(MethodError::invalid(parameter, problem));
+    }
+    Ok([low, high])
+}
+
+/// The first and the last voxel of those around a box of the world.
+fn voxels_around(volume: &Volume, [low, high]: [DVec3; 2]) -> Result<[[usize; 3]; 2], MethodError> {
+    let last = volume.dims().map(|n| n - 1);
     if !low.is_finite() || !high.is_finite() || low.cmpge(high).any() {
         let problem = format!(
             "min {low} and max {high} given; finite corners, min below max along every axis, are needed"
@@ -216,7 +245,7 @@ fn voxel_box(
         return Err(MethodError::invalid("box", problem));
     }
     let inside = |value: f64, axis: usize| value.clamp(0.0, last[axis] as f64) as usize;
-    let first = [0, 1, 2].map(|axis| inside((from[axis] - margin[axis]).floor(), axis));
-    let end = [0, 1, 2].map(|axis| inside((to[axis] + margin[axis]).ceil(), axis));
+    let first = [0, 1, 2].map(|axis| inside(from[axis].ceil(), axis));
+    let end = [0, 1, 2].map(|axis| inside(to[axis].floor(), axis));
     Ok([first, end])
 }

@@ -1,8 +1,10 @@
 //! The mesh to begin with: the caller's, or that of the first frame (section 4.1).
 
 use super::first::bright_surface;
+use super::region::Region;
 use super::{Component, SurfaceTracker};
-use crate::mesh::{Mesh, MeshError, TriangleMesh, VertexId, count_crossings, measure};
+use crate::math::{Vec3, triangle};
+use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure};
 use crate::methods::MethodError;
 use crate::remesh::{EdgeBounds, remesh};
 
@@ -13,13 +15,18 @@ const EDGE: f64 = 1.2;
 const EDGE_SPREAD: f32 = 1.5;
 
 /// A mesh of the caller's, as it is.
-pub(super) fn checked(start: &TriangleMesh) -> Result<Mesh, MethodError> {
+pub(super) fn checked(start: &TriangleMesh, region: &Region) -> Result<Mesh, MethodError> {
     if start.triangles.is_empty() {
         return Err(MethodError::invalid("start", "the mesh is empty; a closed surface is needed"));
     }
     let mesh = Mesh::from_triangles(start)?;
     if measure(start).volume <= 0.0 {
         let problem = "the triangles face inwards; counter-clockwise seen from outside is needed";
+        return Err(MethodError::invalid("start", problem));
+    }
+    if start.positions.iter().all(|&p| region.nearest_inside(region.place(p)).is_some()) {
+        let problem =
+            "no vertex of the mesh is in the box; a surface of the first frame, in the world, is needed";
         return Err(MethodError::invalid("start", problem));
     }
     match count_crossings(start) {
@@ -35,51 +42,43 @@ impl SurfaceTracker {
             return Ok(());
         }
         if self.faces.iter().flatten().all(Vec::is_empty) {
-            let largest = self.voting.largest_refused * self.region.step;
+            let largest = self.voting.largest_step(&self.region) * self.region.step;
             let problem = format!(
                 "{} given, no boundary found: the largest step in the box is {largest:.4}; less than that is needed",
                 self.params.threshold
             );
             return Err(MethodError::invalid("threshold", problem));
         }
-        let levels = self.voting.levels(&self.region, 0);
-        let surface = bright_surface(&self.region, &self.faces[0], &levels, self.falloff())?;
-        if surface.triangles.is_empty() {
-            let problem = "no surface is in the first frame; choose a larger box, or a lower threshold";
+        let surface = bright_surface(&self.region, &self.faces[0], self.falloff())?;
+        let Some(part) = self.chosen(surface.components()) else {
+            let problem =
+                "no closed surface is in the first frame; choose a larger box, or a lower threshold";
             return Err(MethodError::invalid("box", problem));
-        }
-        let mut mesh = Mesh::from_triangles(&surface)?;
-        self.keep_component(&mut mesh);
+        };
+        let mut mesh = Mesh::from_triangles(&part)?;
         let edge = (EDGE * self.region.spacing.min_element()) as f32;
         remesh(&mut mesh, EdgeBounds { min: edge / EDGE_SPREAD, max: edge * EDGE_SPREAD })?;
         self.mesh = mesh;
         Ok(())
     }
 
-    /// Removes all components but the one that is followed.
-    fn keep_component(&self, mesh: &mut Mesh) {
-        let mut left: Vec<VertexId> = mesh.vertices().collect();
-        let mut parts: Vec<(VertexId, f64)> = Vec::new();
-        while let Some(&first) = left.first() {
-            let members = mesh.component_of(first, usize::MAX);
-            let score = match self.component {
-                Component::Largest => -(members.len() as f64),
-                Component::Nearest(p) => {
-                    let away = |v: &VertexId| mesh.position(*v).as_dvec3().distance(p);
-                    members.iter().map(away).fold(f64::INFINITY, f64::min)
-                }
-            };
-            parts.push((first, score));
-            let mut is_member = vec![false; mesh.slots()];
-            members.iter().for_each(|v| is_member[v.index()] = true);
-            left.retain(|v| !is_member[v.index()]);
-        }
-        let best = parts.iter().map(|part| part.1).fold(f64::INFINITY, f64::min);
-        let kept = parts.iter().position(|part| part.1 == best);
-        for (k, (v, _)) in parts.iter().enumerate() {
-            if Some(k) != kept {
-                mesh.remove_component(*v);
-            }
-        }
+    /// The part that is followed. Holes in others are none.
+    fn chosen(&self, parts: Vec<TriangleMesh>) -> Option<TriangleMesh> {
+        let with_volume = parts.into_iter().map(|part| (measure(&part).volume, part));
+        let solids = with_volume.filter(|(volume, _)| *volume > 0.0);
+        let scored = solids.map(|(volume, part)| match self.component {
+            Component::Largest => (-volume, part),
+            Component::Nearest(p) => (distance(&part, p.as_vec3()), part),
+        });
+        scored.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, part)| part)
     }
+}
+
+/// Of a point from a solid: 0 inside, else that from its nearest vertex.
+fn distance(part: &TriangleMesh, p: Vec3) -> f64 {
+    let angle: f64 = part.corners().map(|corners| triangle::solid_angle(corners, p)).sum();
+    if angle.abs() > std::f64::consts::TAU {
+        return 0.0;
+    }
+    part.positions.iter().map(|q| f64::from(q.distance(p))).fold(f64::INFINITY, f64::min)
 }

@@ -3,7 +3,7 @@
 
 use super::follow::{Follower, FrameFacts};
 use super::vote::{Faces, TIME};
-use super::{SurfaceTracker, TrackingParams};
+use super::{Component, SurfaceTracker, TrackingParams};
 use crate::math::Vec3;
 use crate::mesh::{Mesh, TriangleMesh};
 use crate::methods::MethodError;
@@ -18,7 +18,6 @@ struct State {
     fingerprint: u64,
     params: TrackingParams,
     faces: Vec<Faces>,
-    largest_refused: f64,
     mesh: Mesh,
     /// The mean edge of the first frame's mesh, once there is one.
     edge: Option<f64>,
@@ -39,7 +38,6 @@ impl SurfaceTracker {
                 fingerprint: self.fingerprint(),
                 params: self.params.clone(),
                 faces: self.faces.clone(),
-                largest_refused: self.voting.largest_refused,
                 mesh: self.mesh.clone(),
                 edge: self.follower.as_ref().map(|follower| follower.edge),
                 meshes: self.meshes.iter().map(plain).collect(),
@@ -50,7 +48,7 @@ impl SurfaceTracker {
         )
     }
 
-    /// Goes on from bytes that [`Self::save`] gave, for a tracker of the same volume, box and start.
+    /// Goes on from bytes that [`Self::save`] gave, for a tracker of the same volume, box, component and start.
     ///
     /// # Errors
     /// [`MethodError::BadState`] where the bytes are none of those; the run is then as it was.
@@ -58,7 +56,7 @@ impl SurfaceTracker {
         let state: State = opened(&MARK, bytes)?;
         let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
         if state.fingerprint != self.fingerprint() {
-            return bad("volume", "the state belongs to another volume, box or start");
+            return bad("volume", "the state belongs to another volume, box, component or start");
         }
         let Ok(params) = self.completed(state.params) else {
             return bad("parameters", "they are out of range");
@@ -81,7 +79,7 @@ impl SurfaceTracker {
         self.begin();
         let replaced = std::mem::replace(&mut self.mesh, state.mesh);
         self.mesh.count_on_from(&replaced);
-        (self.faces, self.voting.largest_refused) = (state.faces, state.largest_refused);
+        self.faces = state.faces;
         (self.meshes, self.facts) = (meshes, state.facts);
         (self.closing, self.steps) = (state.closing, state.steps);
         self.follower = state.edge.map(Follower::new);
@@ -107,6 +105,9 @@ impl SurfaceTracker {
         mix(&self.region.to_world.to_cols_array());
         mix(&self.region.spacing.to_array());
         mix(&[self.region.step]);
+        if let Component::Nearest(p) = self.component {
+            mix(&p.to_array());
+        }
         self.region.dims.iter().for_each(|&n| hash.mix(n as u64));
         for frame in &self.region.frames {
             let (words, rest) = frame.as_chunks::<8>();

@@ -53,13 +53,13 @@ pub(super) struct Voting {
     /// By frame, the level between the clusters of the window around each voxel, as rows with room at both ends; not
     /// there yet, or there no longer.
     levels: Vec<Option<Vec<u8>>>,
-    /// The largest difference of means that was too small.
-    pub largest_refused: f64,
+    /// The largest difference of means so far.
+    largest: f64,
 }
 
 impl Voting {
     pub fn new(window: Window, frames: usize) -> Self {
-        Self { window, levels: vec![None; frames], largest_refused: 0.0 }
+        Self { window, levels: vec![None; frames], largest: 0.0 }
     }
 
     /// The faces of a frame. Frames are asked for in order.
@@ -82,17 +82,16 @@ impl Voting {
                 self.window.around(next, count).into_iter().filter(|t| around.contains(t)).collect();
             faces[TIME] = self.votes(region, frame, next, TIME, &both);
         }
+        region.close(frame, &mut faces);
         self.forget(frame, count);
         faces
     }
 
-    /// The level of the window around each voxel of a frame, where there is one.
-    pub fn levels(&mut self, region: &Region, frame: usize) -> Vec<Option<u8>> {
-        let levels = self.levels_of(region, frame);
-        let rows = Rows::new(region.dims, self.window.reach);
-        let [nx, ny, nz] = region.dims;
-        let row = |r: usize| &levels[rows.at(r % ny, r / ny)..][..nx];
-        (0..ny * nz).flat_map(row).map(|&level| (level != NONE).then_some(level)).collect()
+    /// The largest difference of means in all frames, however small.
+    pub fn largest_step(&self, region: &Region) -> f64 {
+        let mut all = Self::new(Window { threshold: 0.0, ..self.window }, region.frames.len());
+        (0..region.frames.len()).for_each(|frame| drop(all.levels_of(region, frame)));
+        all.largest
     }
 
     /// Levels that no later frame asks for take no room.
@@ -137,8 +136,8 @@ impl Voting {
             return NONE;
         }
         let difference = high.mean() - low.mean();
+        self.largest = self.largest.max(difference);
         if difference <= self.window.threshold {
-            self.largest_refused = self.largest_refused.max(difference);
             return NONE;
         }
         ((low.mean() + high.mean()) / 2.0) as u8
@@ -437,6 +436,7 @@ mod tests {
         };
         Region {
             dims,
+            inner: [[0; 3], dims.map(|n| n - 1)],
             spacing: DVec3::ONE,
             to_world: DAffine3::IDENTITY,
             from_world: DAffine3::IDENTITY,
@@ -546,10 +546,10 @@ mod tests {
         let mut voting = Voting::new(Window { reach: 2, frames: 1, threshold: 100.0, cyclic: false }, 2);
         let faces = voting.faces(&region, 0);
         assert!(faces.iter().all(Vec::is_empty));
-        assert!(
-            voting.largest_refused > 60.0 && voting.largest_refused <= 100.0,
-            "{}",
-            voting.largest_refused
-        );
+        for threshold in [100.0, 1e6] {
+            voting.window.threshold = threshold;
+            let largest = voting.largest_step(&region);
+            assert!(largest > 60.0 && largest <= 100.0, "{largest}");
+        }
     }
 }

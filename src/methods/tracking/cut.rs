@@ -1,0 +1,107 @@
+//! Where the box cuts through what is bright. Blood goes on from a chamber into the next, and no step in intensity says where
+//! the one ends: the box does. Its sides are boundary there, as sure as any, and the surface is closed.
+
+use super::region::Region;
+use super::sides::{Part, sides};
+use super::vote::{Face, Faces, TIME, X, Y, Z};
+use crate::math::DVec3;
+
+impl Region {
+    fn is_inside(&self, at: [usize; 3]) -> bool {
+        let [first, last] = self.inner;
+        (0..3).all(|axis| (first[axis]..=last[axis]).contains(&at[axis]))
+    }
+
+    /// The voxels before and after a face; the same one for faces along time.
+    fn beside(&self, direction: usize, voxel: u32) -> [[usize; 3]; 2] {
+        let before = self.voxel(voxel);
+        let mut after = before;
+        if direction != TIME {
+            after[direction] += 1;
+        }
+        [before, after]
+    }
+
+    /// The way out through a face in a side of the box.
+    pub fn cut(&self, direction: usize, voxel: u32) -> Option<DVec3> {
+        match self.beside(direction, voxel).map(|at| self.is_inside(at)) {
+            [true, false] => Some(DVec3::AXES[direction]),
+            [false, true] => Some(-DVec3::AXES[direction]),
+            _ => None,
+        }
+    }
+
+    /// How far a voxel lies beyond the box, along the axis where it is furthest; no more than 0 inside.
+    pub fn beyond(&self, at: [usize; 3]) -> f64 {
+        let [first, last] = self.inner;
+        let beyond = |axis: usize| {
+            let voxels = (first[axis] as f64 - at[axis] as f64).max(at[axis] as f64 - last[axis] as f64);
+            if voxels > 0.0 { (voxels - 0.5) * self.spacing[axis] } else { f64::NEG_INFINITY }
+        };
+        (0..3).map(beyond).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// The voxel of the box that is nearest to a place outside of it; nothing for places inside.
+    pub fn nearest_inside(&self, place: DVec3) -> Option<u32> {
+        let [first, last] = self.inner.map(|at| DVec3::from(at.map(|i| i as f64)));
+        let at = place / self.spacing;
+        let is_inside = at.cmpge(first - 0.5).all() && at.cmple(last + 0.5).all();
+        let [x, y, z] = at.clamp(first, last).round().to_array().map(|i| i as u32);
+        let [nx, ny, _] = self.dims.map(|n| n as u32);
+        (!is_inside).then_some((z * ny + y) * nx + x)
+    }
+
+    /// Takes away the faces beyond the box, and adds its sides where a frame is bright.
+    pub fn close(&self, frame: usize, faces: &mut Faces) {
+        for (direction, list) in faces.iter_mut().enumerate() {
+            list.retain(|face| self.beside(direction, face.voxel).iter().all(|&at| self.is_inside(at)));
+        }
+        let added = [X, Y, Z].map(|direction| {
+            let [first, last] = self.inner.map(|at| at[direction]);
+            let mut list = Vec::new();
+            // A face comes after its voxel.
+            if let Some(before) = first.checked_sub(1) {
+                list.extend(self.cut_faces(frame, faces, direction, first, before));
+            }
+            if last + 1 < self.dims[direction] {
+                list.extend(self.cut_faces(frame, faces, direction, last, last));
+            }
+            list
+        });
+        faces.iter_mut().zip(added).for_each(|(list, added)| list.extend(added));
+    }
+
+    /// Faces in a side of the box where the `layer` of voxels along it is bright; they lie after the voxels `at` there.
+    fn cut_faces(&self, frame: usize, faces: &Faces, direction: usize, layer: usize, at: usize) -> Vec<Face> {
+        let mut part = Part { ends: self.inner };
+        part.ends.iter_mut().for_each(|end| end[direction] = layer);
+        let Some(is_bright) = sides(self, frame, faces, part) else { return Vec::new() };
+        let [nx, ny, _] = self.dims;
+        let bright = (0..is_bright.len()).filter(|&i| is_bright[i]);
+        let voxel = |i: usize| {
+            let mut voxel = part.at(i);
+            voxel[direction] = at;
+            ((voxel[2] * ny + voxel[1]) * nx + voxel[0]) as u32
+        };
+        bright.map(|i| Face { voxel: voxel(i), weight: 1.0 }).collect()
+    }
+
+    /// The voxels inside at the faces in the sides of the box, in order.
+    pub fn cut_voxels(&self, faces: &Faces) -> Vec<u32> {
+        let [nx, ny, _] = self.dims;
+        let mut voxels = Vec::new();
+        for direction in [X, Y, Z] {
+            let step = [1, nx, nx * ny][direction] as u32;
+            for face in &faces[direction] {
+                match self.cut(direction, face.voxel) {
+                    Some(way) if way[direction] > 0.0 => voxels.push(face.voxel),
+                    Some(_) => voxels.push(face.voxel + step),
+                    None => {}
+                }
+            }
+        }
+        voxels.sort_unstable();
+        voxels.dedup();
+        voxels
+    }
+}

@@ -1,0 +1,155 @@
+//! Which voxels are on the bright side of the boundary.
+//!
+//! No level of intensity tells: far from a coil, what is bright is as dark as what is dark near it. So the image is made
+//! again from its boundary alone. Every face says by how much intensity steps up there, by its votes; the image whose
+//! differences are nearest to these (a Poisson equation) has steps of about 1 at all walls, flat parts between, and hardly any
+//! trace of votes that make up no wall. A voxel is bright where it is above the middle of the step at the wall that is nearest.
+
+use super::region::Region;
+use super::vote::{Faces, X, Y, Z};
+
+/// Faces with fewer votes make up no wall.
+pub(super) const LEAST_WEIGHT: f32 = 0.3;
+
+/// The residual is down to this share of what it was when the image is solved for.
+const TOLERANCE: f64 = 1e-3;
+
+/// Iterations at most: across a box of 64 voxels a hundred are needed.
+const ITERATIONS: usize = 400;
+
+/// A box of voxels of a region.
+#[derive(Clone, Copy)]
+pub(super) struct Part {
+    /// First and last voxel.
+    pub ends: [[usize; 3]; 2],
+}
+
+impl Part {
+    fn dims(&self) -> [usize; 3] {
+        [0, 1, 2].map(|axis| self.ends[1][axis] - self.ends[0][axis] + 1)
+    }
+
+    /// The voxel of the region that comes `index`-th in the list of those of the part.
+    pub fn at(&self, index: usize) -> [usize; 3] {
+        let ([nx, ny, _], [x, y, z]) = (self.dims(), self.ends[0]);
+        [x + index % nx, y + index / nx % ny, z + index / (nx * ny)]
+    }
+
+    /// Where a voxel of the region is in the list of those of the part.
+    pub fn index(&self, at: [usize; 3]) -> Option<usize> {
+        let [first, last] = self.ends;
+        let is_inside = (0..3).all(|axis| (first[axis]..=last[axis]).contains(&at[axis]));
+        let [nx, ny, _] = self.dims();
+        is_inside.then(|| ((at[2] - first[2]) * ny + at[1] - first[1]) * nx + at[0] - first[0])
+    }
+}
+
+/// By voxel of a part of a frame, whether it is on the bright side; nothing where no wall is.
+pub(super) fn sides(region: &Region, frame: usize, faces: &Faces, part: Part) -> Option<Vec<bool>> {
+    let dims = part.dims();
+    let image = &region.frames[frame];
+    let mut steps = Vec::new();
+    for direction in [X, Y, Z] {
+        let stride = [1, region.dims[0], region.dims[0] * region.dims[1]][direction];
+        for face in &faces[direction] {
+            let before = region.voxel(face.voxel);
+            let mut after = before;
+            after[direction] += 1;
+            let (Some(i), Some(j)) = (part.index(before), part.index(after)) else { continue };
+            let is_up = image[face.voxel as usize] < image[face.voxel as usize + stride];
+            steps.push((i, j, if is_up { face.weight } else { -face.weight }));
+        }
+    }
+    let mut source = vec![0.0; dims.iter().product()];
+    for &(i, j, step) in &steps {
+        source[i] -= f64::from(step);
+        source[j] += f64::from(step);
+    }
+    let remade = solved(dims, source);
+    // The middles of the steps at walls.
+    let mut middles = vec![(0.0, 0.0); remade.len()];
+    for &(i, j, step) in steps.iter().filter(|(.., step)| step.abs() >= LEAST_WEIGHT) {
+        let (weight, middle) = (f64::from(step.abs()), (remade[i] + remade[j]) / 2.0);
+        for k in [i, j] {
+            middles[k].0 += weight * middle;
+            middles[k].1 += weight;
+        }
+    }
+    let known = middles.into_iter().map(|(sum, total)| (total > 0.0).then(|| sum / total)).collect();
+    let levels = spread(known, dims)?;
+    Some(remade.iter().zip(levels).map(|(value, level)| *value > level).collect())
+}
+
+/// The image whose sums of differences to its neighbours are `source`, by conjugate gradients.
+fn solved(dims: [usize; 3], source: Vec<f64>) -> Vec<f64> {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    let mut image = vec![0.0; source.len()];
+    let mut residual = source;
+    let mut way = residual.clone();
+    let mut square = dot(&residual, &residual);
+    let enough = TOLERANCE * TOLERANCE * square;
+    let mut product = vec![0.0; way.len()];
+    for _ in 0..ITERATIONS {
+        if square <= enough {
+            break;
+        }
+        differences(dims, &way, &mut product);
+        let step = square / dot(&way, &product);
+        image.iter_mut().zip(&way).for_each(|(x, p)| *x += step * p);
+        residual.iter_mut().zip(&product).for_each(|(r, q)| *r -= step * q);
+        let next = dot(&residual, &residual);
+        way.iter_mut().zip(&residual).for_each(|(p, r)| *p = r + next / square * *p);
+        square = next;
+    }
+    image
+}
+
+/// At each voxel the sum of its differences to its neighbours.
+fn differences([nx, ny, nz]: [usize; 3], values: &[f64], out: &mut [f64]) {
+    out.fill(0.0);
+    let mut add = |i: usize, j: usize| {
+        let difference = values[i] - values[j];
+        out[i] += difference;
+        out[j] -= difference;
+    };
+    for z in 0..nz {
+        for y in 0..ny {
+            let row = (z * ny + y) * nx;
+            (row + 1..row + nx).for_each(|i| add(i, i - 1));
+            if y > 0 {
+                (row..row + nx).for_each(|i| add(i, i - nx));
+            }
+            if z > 0 {
+                (row..row + nx).for_each(|i| add(i, i - nx * ny));
+            }
+        }
+    }
+}
+
+/// Numbers for all voxels: those without one take that of the nearest with one, along the axes. Nothing where none has.
+fn spread(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Vec<f64>> {
+    let mut all = known;
+    let mut front: Vec<usize> = (0..all.len()).filter(|&i| all[i].is_some()).collect();
+    while !front.is_empty() {
+        let mut next = Vec::new();
+        for i in front {
+            let [x, y, z] = [i % nx, i / nx % ny, i / (nx * ny)];
+            let neighbours = [
+                (x > 0).then(|| i - 1),
+                (x + 1 < nx).then_some(i + 1),
+                (y > 0).then(|| i - nx),
+                (y + 1 < ny).then_some(i + nx),
+                (z > 0).then(|| i - nx * ny),
+                (z + 1 < nz).then_some(i + nx * ny),
+            ];
+            for j in neighbours.into_iter().flatten() {
+                if all[j].is_none() {
+                    all[j] = all[i];
+                    next.push(j);
+                }
+            }
+        }
+        front = next;
+    }
+    all.into_iter().collect()
+}
