@@ -10,7 +10,7 @@ import { betweenSlices } from '../../www/src/track/between';
 import { boxOf, voxelsOf } from '../../www/src/track/box';
 import { canny } from '../../www/src/track/canny';
 import { cineVoxels, contraction, trueVolume, wallDistances } from '../../www/src/track/cine';
-import { boundaryPicture, isSplit, twoMeans, windowAt } from '../../www/src/track/clusters';
+import { boundaryPicture, isSplit, sliceVotes, twoMeans, windowAt } from '../../www/src/track/clusters';
 import { beatOf, warningsOf } from '../../www/src/track/curve';
 import { crossings, cutBy } from '../../www/src/track/cut';
 import { FILMS } from '../../www/src/track/examples';
@@ -150,6 +150,15 @@ describe('windows', () => {
     const picture = { width: 10, height: 8, values: [] };
     expect(windowAt(picture, 5, 4, 2)).toHaveLength(25);
     expect(windowAt(picture, 0, 0, 2)).toEqual([0, 1, 2, 10, 11, 12, 20, 21, 22]);
+  });
+
+  test('of a slice vote for the faces of a step, and for nothing else', () => {
+    // Bright from column 6 on.
+    const values = Float32Array.from({ length: 12 * 9 }, (_, i) => (i % 12 >= 6 ? 150 : 60));
+    const faces = sliceVotes({ width: 12, height: 9, values }, 2, 50);
+    expect(new Set(faces.map(({ x }) => x))).toEqual(new Set([6]));
+    expect(Math.max(...faces.map(({ weight }) => weight))).toBe(1);
+    expect(sliceVotes({ width: 12, height: 9, values }, 2, 90)).toEqual([]);
   });
 
   test('are brought together on pixels by the square roots of their votes', () => {

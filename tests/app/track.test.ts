@@ -338,8 +338,19 @@ describe('links', () => {
   test('whose settings cannot be are followed without them', async () => {
     await openAt('#track?example=ventricle&p.threshold=-1', 'running', 'done');
     await expect.poll(() => text('.banner')).toContain('The link’s settings are left out.');
-    await tracked(12);
   });
+});
+
+test('hands the surface of a frame to the Sculpt lab, and is there again on the way back', async () => {
+  await openAt('#track?example=ventricle&binning=2', 'done');
+  await app.page.click('[data-action=sculpt]');
+  await expect.poll(() => app.page.title()).toBe('Vesicle: Sculpt');
+  await expect.poll(state).toMatch(/running|done/);
+  expect(await text('.facts')).toContain('ventricle (frame 12)');
+  await app.page.click('[data-lab=track]');
+  await expect.poll(() => app.page.title()).toBe('Vesicle: Track');
+  expect(await hash()).toBe('#track?example=ventricle&binning=2');
+  await tracked(12);
 });
 
 test('is cancelled while an image is being opened: what was open is there again', async () => {

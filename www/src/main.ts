@@ -24,7 +24,7 @@ const LABS: [LabKind, ...LabKind[]] = [
     id: 'track',
     name: 'Track',
     tagline: 'A closed surface that follows what moves in a 4D image. Nothing leaves this machine.',
-    open: (root, help) => new TrackLab(root, help),
+    open: (root, help, passOn) => new TrackLab(root, help, passOn),
   },
   {
     id: 'sculpt',

@@ -50,6 +50,7 @@ export interface PartEvents extends TransportEvents, RegionEvents {
   onCompare: (other: Other) => void;
   onCancelCompare: () => void;
   onSave: (what: 'frames' | 'animation' | 'table') => void;
+  onSculpt: () => void;
   onCancel: () => void;
   onDismiss: () => void;
   onCopyLink: () => void;
@@ -84,11 +85,14 @@ export class TrackParts {
   readonly #figure: FigurePanel<TrackVariant, TrackPreset>;
   readonly #exports: ExportButtons;
   readonly #saves: HTMLButtonElement[];
+  readonly #sculpt: HTMLButtonElement;
   readonly #cancel: HTMLButtonElement;
   readonly #paramsHolder = h('div');
   readonly #thresholdHolder = h('div');
   #params: ParamControls | undefined;
   #threshold: StepHeight | undefined;
+  /** k. */
+  #window = 2;
 
   constructor(root: HTMLElement, client: TrackClient, signal: AbortSignal, events: PartEvents) {
     this.#root = root;
@@ -122,6 +126,7 @@ export class TrackParts {
       button('Animation (GLB)', () => events.onSave('animation'), 'save-animation'),
       button('Table of frames (CSV)', () => events.onSave('table'), 'save-table'),
     ];
+    this.#sculpt = button('Open in Sculpt', events.onSculpt, 'sculpt');
     this.options = new TrackOptionControls(INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
       this.#slices.hidden = options.below !== 'slices';
@@ -164,7 +169,7 @@ export class TrackParts {
       table: this.table.element,
       compare: this.compare.element,
       exports: this.#exports.element,
-      saves: h('div', {}, ...this.#saves),
+      saves: h('div', {}, ...this.#saves, this.#sculpt),
       link: button('Copy link to these settings', this.#events.onCopyLink, 'link'),
       exercises: exercises(TRACK_EXERCISES, this.#events.onExampleId),
     });
@@ -177,7 +182,11 @@ export class TrackParts {
     this.#paramsHolder.replaceWith(this.#params.element);
     const threshold = specs.find(({ name }) => name === 'threshold');
     if (!threshold) return;
-    this.#threshold = new StepHeight(threshold, (value) => onParam('threshold', value));
+    this.#threshold = new StepHeight(
+      threshold,
+      (value) => onParam('threshold', value),
+      (value) => this.view.preview(value, this.#window),
+    );
     this.#thresholdHolder.replaceWith(this.#threshold.element);
   }
 
@@ -193,6 +202,7 @@ export class TrackParts {
   }
 
   showParams(params: ParamValues, noise: number, suggested: number, most: number): void {
+    this.#window = Number(params.window);
     this.#params?.show(params);
     this.#threshold?.show(Number(params.threshold), noise, suggested, most);
   }
@@ -211,6 +221,7 @@ export class TrackParts {
     this.transport.showState(state, ready);
     const idle = ready && state !== 'loading';
     this.#exports.enabled = idle && here;
+    this.#sculpt.disabled = !idle || !here;
     for (const save of this.#saves) save.disabled = !idle || tracked === 0;
     this.compare.enabled = idle && state === 'done';
     this.#cancel.hidden = state !== 'loading' || !ready;

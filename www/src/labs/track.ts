@@ -10,14 +10,13 @@ import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { Other } from '../ui/track-compare';
 import { invert, sliceFrames } from '../view/anatomy';
 import { LabStates } from './lab-states';
-import type { Lab, PassedOn } from './labs';
+import type { Lab, PassedOn, PassOn } from './labs';
 import { compareWith } from './track-comparing';
-import { linkOf, toHash } from './track-link';
 import { Opening, type Source } from './track-opening';
 import { type PartEvents, TrackParts } from './track-parts';
 import { TrackResults } from './track-results';
-import { saveAnimation, saveFrames, saveTable } from './track-saving';
 import { TrackSettings } from './track-settings';
+import { TrackSharing } from './track-sharing';
 
 /** Frames between two reports in words. */
 const REPORT_EVERY = 5;
@@ -35,6 +34,8 @@ export class TrackLab implements Lab {
   readonly #results: TrackResults;
   readonly #settings: TrackSettings;
   readonly #opening: Opening;
+  readonly #sharing: TrackSharing;
+  readonly #passOn: PassOn;
   #volume: VolumeView | undefined;
   /** Slices of the image as it was opened. */
   #slices = 1;
@@ -43,8 +44,9 @@ export class TrackLab implements Lab {
   #began: number | undefined;
   #took: number | undefined;
 
-  constructor(root: HTMLElement, help: HTMLElement) {
+  constructor(root: HTMLElement, help: HTMLElement, passOn: PassOn) {
     this.#root = root;
+    this.#passOn = passOn;
     const { signal } = this.#closing;
     const ui = new TrackParts(root, this.#client, signal, this.#events());
     const states = new LabStates(ui.banner, ui.status, signal);
@@ -62,6 +64,7 @@ export class TrackLab implements Lab {
     this.#opening = new Opening(this.#client, ui, states, (opened, setup, source) =>
       this.#adopt(opened, setup, source),
     );
+    this.#sharing = new TrackSharing(this.#client, ui, states, this.#results, this.#settings, this.#opening);
     states.follow((state) => this.#showState(state));
     offerShortcuts(this.#shortcuts(), help, signal);
   }
@@ -92,7 +95,7 @@ export class TrackLab implements Lab {
   /** Also where a link could not be followed the address is that of what is open. */
   async #followLink(): Promise<void> {
     await this.#opening.link();
-    this.#updateAddress();
+    this.#sharing.updateAddress();
   }
 
   /** What is asked for on the page, and who does it. */
@@ -111,7 +114,8 @@ export class TrackLab implements Lab {
       onMoved: () => this.#results?.showStills(),
       onCompare: (other) => void this.#compare(other),
       onCancelCompare: () => this.#ask(this.#client.request('cancelCompare', undefined)),
-      onSave: (what) => void this.#save(what),
+      onSave: (what) => this.#sharing.save(what),
+      onSculpt: () => this.#sharing.toSculpt(this.#passOn),
       onCancel: () => void this.#opening.cancel(),
       onToggle: () => this.#toggle(),
       onStep: (steps) => this.#step(steps),
@@ -119,7 +123,7 @@ export class TrackLab implements Lab {
       onUndo: () => void this.#settings.travel('undo'),
       onRedo: () => void this.#settings.travel('redo'),
       onDismiss: () => this.#dismiss(),
-      onCopyLink: () => void this.#copyLink(),
+      onCopyLink: () => void this.#sharing.copyLink(),
       onError: (title, error) => this.#states.fail(title, error),
     };
   }
@@ -209,13 +213,13 @@ export class TrackLab implements Lab {
     const given = { ...preset?.params };
     const variant = preset && variantInForce(preset, params, given);
     this.#ui.showFigure(preset, variant);
-    this.#updateAddress();
+    this.#sharing.updateAddress();
   }
 
   #optionsChanged(): void {
     if (!this.#states?.ready) return;
     this.#results.showStills();
-    this.#updateAddress();
+    this.#sharing.updateAddress();
   }
 
   #toggle(): void {
@@ -270,41 +274,9 @@ export class TrackLab implements Lab {
     }
   }
 
-  async #save(what: 'frames' | 'animation' | 'table'): Promise<void> {
-    const { saving } = this.#ui;
-    try {
-      if (what === 'frames') await saveFrames(this.#client, saving, this.#results);
-      else if (what === 'animation') await saveAnimation(this.#client, saving);
-      else saveTable(saving, this.#results);
-    } catch (error) {
-      this.#states.fail('That could not be saved.', error);
-    }
-  }
-
   /** Waits for nothing; tells when it fails. */
   #ask(request: Promise<unknown>): void {
     request.catch((error) => this.#states.fail('That did not work.', error));
-  }
-
-  /** The page's address says what is open and how it is set. */
-  #updateAddress(): void {
-    const { source } = this.#opening;
-    if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
-    const { example, name: file } = source;
-    const { setup } = this.#settings;
-    const hash = toHash(linkOf({ example, file, setup, view: this.#ui.options.value }));
-    if (hash !== location.hash) window.history.replaceState(null, '', hash);
-  }
-
-  async #copyLink(): Promise<void> {
-    this.#updateAddress();
-    const lacks = this.#opening.source?.example ? '' : ' Your file is not in it: whoever opens it needs the file too.';
-    try {
-      await navigator.clipboard.writeText(location.href);
-      this.#ui.status.say(`Link copied.${lacks}`);
-    } catch {
-      this.#ui.status.say(`The link is in the address bar.${lacks}`);
-    }
   }
 
   #onEvent(event: WorkerEvent): void {
@@ -347,7 +319,7 @@ export class TrackLab implements Lab {
     const { frames, frame } = this.#results;
     this.#root.dataset.state = state;
     this.#ui.showState(beneath, ready, frames.length, frames[frame] !== undefined);
-    if (state === 'done' || state === 'paused') this.#updateAddress();
+    if (state === 'done' || state === 'paused') this.#sharing.updateAddress();
   }
 
   #dismiss(): void {

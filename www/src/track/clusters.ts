@@ -41,6 +41,58 @@ export function isSplit({ means, bright }: Clusters, threshold: number): boolean
   return Math.min(share, 1 - share) > LEAST_SHARE && means[1] - means[0] > threshold;
 }
 
+/**
+ * The faces between pixels that windows of one slice vote for, as the paper has it in 2D: to the right of and below each
+ * pixel, with the share of the windows around that do.
+ */
+export function sliceVotes(
+  { width, height, values }: Picture,
+  reach: number,
+  threshold: number,
+): { x: number; y: number; weight: number }[] {
+  const [right, below] = [new Float32Array(width * height), new Float32Array(width * height)];
+  for (let y = reach; y + reach < height; y++)
+    for (let x = reach; x + reach < width; x++) voteOf({ width, values }, x, y, reach, threshold, right, below);
+  // So many windows hold both pixels of a face.
+  const most = 2 * reach * (2 * reach + 1);
+  const out = [];
+  for (let i = 0; i < width * height; i++) {
+    const [x, y] = [i % width, Math.floor(i / width)];
+    if (right[i]) out.push({ x: x + 1, y: y + 0.5, weight: (right[i] ?? 0) / most });
+    if (below[i]) out.push({ x: x + 0.5, y: y + 1, weight: (below[i] ?? 0) / most });
+  }
+  return out;
+}
+
+function voteOf(
+  { width, values }: Pick<Picture, 'width' | 'values'>,
+  x: number,
+  y: number,
+  reach: number,
+  threshold: number,
+  right: Float32Array,
+  below: Float32Array,
+): void {
+  const side = 2 * reach + 1;
+  const from = (y - reach) * width + x - reach;
+  let [least, largest] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
+  for (let j = 0; j < side; j++)
+    for (let i = 0; i < side; i++) {
+      const value = values[from + j * width + i] ?? 0;
+      if (value < least) least = value;
+      if (value > largest) largest = value;
+    }
+  // Most windows end here.
+  if (largest - least <= threshold) return;
+  const inside = Array.from({ length: side * side }, (_, k) => from + Math.floor(k / side) * width + (k % side));
+  const found = twoMeans(inside.map((at) => values[at] ?? 0));
+  if (!isSplit(found, threshold)) return;
+  for (const [k, at] of inside.entries()) {
+    if ((k + 1) % side !== 0 && found.bright[k] !== found.bright[k + 1]) right[at] = (right[at] ?? 0) + 1;
+    if (k + side < side * side && found.bright[k] !== found.bright[k + side]) below[at] = (below[at] ?? 0) + 1;
+  }
+}
+
 /** The pixels of the window around a place, row by row; less of them at the border. */
 export function windowAt({ width, height }: Picture, x: number, y: number, reach: number): number[] {
   const out: number[] = [];

@@ -32,6 +32,8 @@ export class BeatTable {
   readonly warnings = h('p', { class: 'warning', role: 'status', 'data-warnings': '0' });
   readonly element: HTMLElement;
   readonly #table = h('table', { class: 'times' });
+  #facts: readonly FrameFacts[] = [];
+  #rows: HTMLElement[] = [];
 
   constructor() {
     const label = 'What happened in each frame';
@@ -48,18 +50,27 @@ export class BeatTable {
   }
 
   show(facts: readonly FrameFacts[], errors: readonly (SurfaceError | undefined)[], frame: number): void {
+    const isNew = facts.length !== this.#facts.length || facts.some((one, i) => one !== this.#facts[i]);
+    this.#facts = facts;
+    if (isNew) this.#fill(facts, errors);
+    for (const [i, row] of this.#rows.entries()) {
+      if (i === frame) row.setAttribute('aria-current', 'true');
+      else row.removeAttribute('aria-current');
+    }
+  }
+
+  #fill(facts: readonly FrameFacts[], errors: readonly (SurfaceError | undefined)[]): void {
     this.#warn(facts);
     const known = errors.some((error) => error);
     const heads = ['frame', ...COLUMNS.map(({ head }) => head), ...(known ? ['error'] : [])];
     const head = heads.map((title, i) => h('th', { scope: 'col', title: COLUMNS[i - 1]?.help }, title));
-    const rows = facts.map((one, i) => {
+    this.#rows = facts.map((one, i) => {
       const cells = COLUMNS.map(({ text }) => h('td', {}, text(one)));
       const error = errors[i];
       if (known) cells.push(h('td', {}, error ? figure(round(error.mean)) : ''));
-      const now = i === frame && 'true';
-      return h('tr', { 'aria-current': now }, h('th', { scope: 'row' }, String(i + 1)), ...cells);
+      return h('tr', {}, h('th', { scope: 'row' }, String(i + 1)), ...cells);
     });
-    this.#table.replaceChildren(h('thead', {}, h('tr', {}, ...head)), h('tbody', {}, ...rows));
+    this.#table.replaceChildren(h('thead', {}, h('tr', {}, ...head)), h('tbody', {}, ...this.#rows));
   }
 
   #warn(facts: readonly FrameFacts[]): void {

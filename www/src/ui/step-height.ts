@@ -16,7 +16,12 @@ export class StepHeight {
   readonly #error = h('p', { class: 'field-error', role: 'alert' });
   #suggested = 0;
 
-  constructor({ label, symbol: letter, help }: ParamSpec, onChange: (threshold: number) => void) {
+  /** `onTry`: what is being dragged to, before it is taken; nothing when that is over. */
+  constructor(
+    { label, symbol: letter, help }: ParamSpec,
+    onChange: (threshold: number) => void,
+    onTry: (threshold: number | undefined) => void,
+  ) {
     const id = uniqueId('threshold');
     this.#number = h('input', {
       type: 'number',
@@ -31,8 +36,12 @@ export class StepHeight {
     // Everything begins again with it: only where the slider is let go.
     this.#slider.addEventListener('input', () => {
       this.#number.value = String(rounded(this.#slider.valueAsNumber));
+      onTry(rounded(this.#slider.valueAsNumber));
     });
-    this.#slider.addEventListener('change', () => onChange(rounded(this.#slider.valueAsNumber)));
+    this.#slider.addEventListener('change', () => {
+      onTry(undefined);
+      onChange(rounded(this.#slider.valueAsNumber));
+    });
     this.#suggest = h('button', {
       type: 'button',
       'data-threshold': 'suggest',

@@ -1,6 +1,7 @@
 import { Box3, Vector3 } from 'three';
 import type { LevelView, Surface, Vec3, VolumeView } from '../protocol';
 import type { VoxelBox } from '../track/box';
+import { sliceVotes } from '../track/clusters';
 import { cutBy } from '../track/cut';
 import type { Votes } from '../track/protocol';
 import { onSchemeChange, token } from '../ui/dom';
@@ -12,10 +13,10 @@ import { Lines } from './lines';
 import { AXIS_TOKENS, SlicePanel } from './panel';
 import { SlicePlane } from './planes';
 import { RegionGrips, regionEdges } from './region';
-import { projectSegments } from './slicing';
+import { greysOf, pictureSize, projectSegments } from './slicing';
 import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
-import { drawVotes, voteColors, votesNear } from './votes';
+import { drawFaces, drawVotes, voteColors, votesNear } from './votes';
 
 /** What is shown under the view: the slices, or one of the paper's pictures. */
 export type Below = 'slices' | 'boundary' | 'time' | 'between';
@@ -67,6 +68,8 @@ export class BeatingView {
   #shown: Surface | undefined;
   #votes: Votes | undefined;
   #frame = 0;
+  /** By voxel axis. */
+  #preview: ReturnType<typeof sliceVotes>[] = [];
   #crosshair: Vec3 = [0, 0, 0];
 
   constructor(canvas: HTMLCanvasElement, slices: HTMLElement, options: TrackViewOptions) {
@@ -145,6 +148,23 @@ export class BeatingView {
     const reach = NEAR * Math.min(...(this.#scene?.volume.spacing ?? [1]));
     const near = votes === 'near' && this.#shown ? votesNear(this.#votes, this.#shown, reach) : this.#votes;
     this.#cloud.show(near.points, voteColors(near.weights));
+  }
+
+  /**
+   * While a step height is being chosen: what it would find in each slice by itself, windows so many pixels to each side;
+   * undefined takes it away.
+   */
+  preview(threshold: number | undefined, reach: number): void {
+    const level = this.#level;
+    this.#preview = [];
+    for (const { frame } of threshold !== undefined && level ? (this.#scene?.panels ?? []) : []) {
+      const [low, high] = this.#scene?.volume.window ?? [0, 1];
+      const values = greysOf(level as LevelView, frame, this.#crosshair[frame.axis]);
+      const { width, height } = pictureSize(level as LevelView, frame);
+      const least = ((threshold ?? 0) * 255) / (high - low || 1);
+      this.#preview[frame.axis] = sliceVotes({ width, height, values }, reach, least);
+    }
+    this.#redraw();
   }
 
   /** The voxels that are looked at. */
@@ -257,7 +277,9 @@ export class BeatingView {
     if (!scene) return;
     const { volume, inverse } = scene;
     const slice = this.#crosshair[panel.frame.axis];
-    if (this.#options.votes !== 'none' && this.#votes)
+    const preview = this.#preview[panel.frame.axis];
+    if (preview) drawFaces(context, preview, scaleX, scaleY);
+    else if (this.#options.votes !== 'none' && this.#votes)
       drawVotes(context, this.#votes, { volume, inverse, frame: panel.frame, slice, scaleX, scaleY });
     if (this.#options.region) this.#grips.draw(context, panel.frame, volume.dims, scaleX, scaleY);
   }

@@ -7,7 +7,7 @@ import type { Between, Votes } from '../track/protocol';
 import { h, token } from '../ui/dom';
 import { invert, sliceFrames } from './anatomy';
 import { voxelsOfFrame } from './beating';
-import { paintSlice, slicePicture } from './slicing';
+import { greysOf, slicePicture } from './slicing';
 import { votesIn } from './votes';
 
 /** Pixels of a picture's longer side: sharp on fine screens, too. */
@@ -211,14 +211,6 @@ function placeIn({ axis, flip }: Side['horizontal'], voxel: Vec3, dims: Vec3): n
 
 function pixelOfSide({ spacing }: VolumeView, side: Side): [number, number] {
   return [spacing[side.horizontal.axis], spacing[side.vertical.axis]];
-}
-
-/** Greys of a slice in reading order. */
-function greysOf(shown: { dims: Vec3; voxels: Uint8Array }, side: Side, index: number): Uint8Array {
-  const size = shown.dims[side.horizontal.axis] * shown.dims[side.vertical.axis];
-  const rgba = new Uint8ClampedArray(4 * size);
-  paintSlice(shown, side, index, rgba);
-  return Uint8Array.from({ length: size }, (_, i) => rgba[4 * i] ?? 0);
 }
 
 function inGrey(width: number, height: number, grey: (i: number) => number): HTMLCanvasElement {

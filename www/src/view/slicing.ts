@@ -29,6 +29,14 @@ export function paintSlice(volume: Voxels, frame: SliceFrame, index: number, out
   }
 }
 
+/** Greys of a slice in reading order. */
+export function greysOf(volume: Voxels, frame: SliceFrame, index: number): Uint8Array {
+  const { width, height } = pictureSize(volume, frame);
+  const rgba = new Uint8ClampedArray(4 * width * height);
+  paintSlice(volume, frame, index, rgba);
+  return Uint8Array.from({ length: width * height }, (_, i) => rgba[4 * i] ?? 0);
+}
+
 /** The slice of a coarser copy that lies where the volume's slice with that index lies. */
 export function levelIndex(volume: Voxels, level: LevelView, frame: SliceFrame, index: number): number {
   const last = level.dims[frame.axis] - 1;

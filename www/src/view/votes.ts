@@ -21,8 +21,10 @@ export function voteColors(weights: Float32Array): Float32Array {
 /** Those within reach of a vertex of the surface, about. */
 export function votesNear({ frame, points, weights }: Votes, { positions, vertices }: Surface, reach: number): Votes {
   const cell = (p: Float32Array, i: number, k: number, off = 0) => Math.floor((p[3 * i + k] ?? 0) / reach) + off;
-  const key = (x: number, y: number, z: number) => `${x} ${y} ${z}`;
-  const taken = new Set<string>();
+  // Two cells may share a key: then a point far off is shown as well.
+  const key = (x: number, y: number, z: number) =>
+    Math.imul(x, 73856093) ^ Math.imul(y, 19349663) ^ Math.imul(z, 83492791);
+  const taken = new Set<number>();
   for (let i = 0; i < vertices; i++)
     for (let off = 0; off < 27; off++) {
       const [dx, dy, dz] = [(off % 3) - 1, (Math.floor(off / 3) % 3) - 1, Math.floor(off / 9) - 1];
@@ -64,14 +66,23 @@ export function votesIn(
 }
 
 export function drawVotes(context: CanvasRenderingContext2D, votes: Votes, on: OnSlice): void {
-  const found = votesIn(votes, on);
+  drawFaces(context, votesIn(votes, on), on.scaleX, on.scaleY);
+}
+
+/** Faces in pixels of a slice's picture, as small squares. */
+export function drawFaces(
+  context: CanvasRenderingContext2D,
+  faces: readonly { x: number; y: number; weight: number }[],
+  scaleX: number,
+  scaleY: number,
+): void {
   const colors = voteColors(Float32Array.from({ length: SHADES }, (_, i) => i / (SHADES - 1)));
-  const size = Math.max(1.5, 0.5 * Math.min(on.scaleX, on.scaleY));
+  const size = Math.max(1.5, 0.5 * Math.min(scaleX, scaleY));
   for (let shade = 0; shade < SHADES; shade++) {
     const [r = 0, g = 0, b = 0] = colors.subarray(3 * shade, 3 * shade + 3);
     context.fillStyle = `rgb(${255 * r} ${255 * g} ${255 * b})`;
-    for (const { x, y, weight } of found)
+    for (const { x, y, weight } of faces)
       if (Math.round(Math.min(1, weight) * (SHADES - 1)) === shade)
-        context.fillRect(x * on.scaleX - size / 2, y * on.scaleY - size / 2, size, size);
+        context.fillRect(x * scaleX - size / 2, y * scaleY - size / 2, size, size);
   }
 }

@@ -1,0 +1,93 @@
+/** Gives on what the Track lab has: as an address, as files, and to the Sculpt lab. */
+import { zipSync } from 'three/addons/libs/fflate.module.js';
+import type { TrackClient } from '../track/client';
+import type { LabStates } from './lab-states';
+import type { PassOn } from './labs';
+import { linkOf, toHash } from './track-link';
+import { framesCsv } from './track-measures';
+import type { Opening } from './track-opening';
+import type { TrackParts } from './track-parts';
+import type { TrackResults } from './track-results';
+import type { TrackSettings } from './track-settings';
+
+export class TrackSharing {
+  readonly #client: TrackClient;
+  readonly #ui: TrackParts;
+  readonly #states: LabStates;
+  readonly #results: TrackResults;
+  readonly #settings: TrackSettings;
+  readonly #opening: Opening;
+
+  constructor(
+    client: TrackClient,
+    ui: TrackParts,
+    states: LabStates,
+    results: TrackResults,
+    settings: TrackSettings,
+    opening: Opening,
+  ) {
+    this.#client = client;
+    this.#ui = ui;
+    this.#states = states;
+    this.#results = results;
+    this.#settings = settings;
+    this.#opening = opening;
+  }
+
+  /** The page's address says what is open and how it is set. */
+  updateAddress(): void {
+    const { source } = this.#opening;
+    if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
+    const { example, name: file } = source;
+    const { setup } = this.#settings;
+    const hash = toHash(linkOf({ example, file, setup, view: this.#ui.options.value }));
+    if (hash !== location.hash) window.history.replaceState(null, '', hash);
+  }
+
+  async copyLink(): Promise<void> {
+    this.updateAddress();
+    const lacks = this.#opening.source?.example ? '' : ' Your file is not in it: whoever opens it needs the file too.';
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.#ui.status.say(`Link copied.${lacks}`);
+    } catch {
+      this.#ui.status.say(`The link is in the address bar.${lacks}`);
+    }
+  }
+
+  save(what: 'frames' | 'animation' | 'table'): void {
+    const work = { frames: () => this.#frames(), animation: () => this.#animation(), table: async () => this.#table() };
+    work[what]().catch((error) => this.#states.fail('That could not be saved.', error));
+  }
+
+  /** The surface of the frame that is shown, as a mesh to be deformed. */
+  toSculpt(passOn: PassOn): void {
+    const { frame } = this.#results;
+    this.#client.request('export', { frame, format: 'ply' }).then(
+      (bytes) => passOn({ lab: 'sculpt', name: `${this.#ui.saving.name} (frame ${frame + 1})`, bytes, params: {} }),
+      (error) => this.#states.fail('The surface could not be passed on.', error),
+    );
+  }
+
+  /** The surface of each frame that is done, as PLY, in one archive. */
+  async #frames(): Promise<void> {
+    const { frames } = this.#results;
+    const files: Record<string, Uint8Array> = {};
+    const digits = String(frames.length).length;
+    for (const frame of frames.keys()) {
+      const name = `frame-${String(frame + 1).padStart(digits, '0')}.ply`;
+      files[name] = await this.#client.request('export', { frame, format: 'ply' });
+    }
+    // Numbers hardly shrink: quick rather than small.
+    this.#ui.saving.bytes('zip', zipSync(files, { level: 1 }), 'application/zip');
+  }
+
+  async #animation(): Promise<void> {
+    this.#ui.saving.bytes('glb', await this.#client.request('animation', undefined), 'model/gltf-binary');
+  }
+
+  #table(): void {
+    const { frames, truth } = this.#results;
+    this.#ui.saving.bytes('csv', new TextEncoder().encode(framesCsv(frames, truth)), 'text/csv');
+  }
+}
