@@ -598,7 +598,33 @@ test('the volume may go, the tracker stays; a freed tracker is gone', () => {
   expect(failure(() => scoped.step()).code).toBe('freed');
 });
 
+test('a mirrored volume is followed, and faces outwards', () => {
+  followedAt([-1.5, 0, 0, 0, 0, 1.5, 0, 0, 0, 0, 1.5, 0, 5, 6, 7, 1]);
+});
+
+test('the largest step is told for thresholds beyond all intensities, too', () => {
+  const one = tracker({ volume: short, params: { threshold: 1000 } });
+  one.step(3);
+  const { message } = failure(() => one.step());
+  expect(Number(/largest step in the box is ([\d.]+)/.exec(message)?.[1])).toBeGreaterThan(90);
+});
+
 test.each([null, 0, '', false])('%o as a start is refused by name', (start) => {
   const error = failure(() => tracker({ start: wrong(start) }));
   expect([error.code, error.message]).toEqual(['invalid-argument', expect.stringContaining('start')]);
+});
+
+test('a state belongs to a volume, box and start, whatever the parameters were', () => {
+  const box = { min: MIDDLE.map((x) => x - 6) as Vec3, max: MIDDLE.map((x) => x + 6) as Vec3 };
+  for (const params of [{ radius: 3 }, { window: 1 }]) {
+    const [saved, resumed] = [tracker({ volume: short, box, params }), tracker({ volume: short, box })];
+    saved.step(2);
+    resumed.restore(saved.save());
+    expect(resumed.params).toEqual(saved.params);
+  }
+});
+
+test('steps beyond the end do not count', () => {
+  const one = tracked({ volume: short });
+  expect(one.step().iteration).toBe(6);
 });
