@@ -113,7 +113,7 @@ export const TRACK_PRESETS: TrackPreset[] = [
         name: 'Figure 6',
         params: {},
         view: { votes: 'near', edges: true },
-        came: 'Here a pig’s left ventricle in place of the volunteer’s heart, whose images cannot be passed on. It is smallest in about the thirteenth of twenty frames and fills again; triangles keep their size, as edges are split and collapsed.',
+        came: 'Here a pig’s left ventricle in place of the volunteer’s heart, whose images cannot be passed on. It is smallest in about the twelfth of twenty frames and fills again; triangles keep their size, as edges are split and collapsed.',
       },
     ],
     hint: 'Scrub with the slider under the view, or let it beat.',
