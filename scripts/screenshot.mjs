@@ -9,6 +9,7 @@ const SIZE = { width: 1440, height: 900 };
 const PICTURES = [
   { file: 'docs/extract.png', hash: '#extract' },
   { file: 'docs/reconstruct.jpg', hash: '#reconstruct', type: 'jpeg', quality: 85 },
+  { file: 'docs/track.jpg', hash: '#track', type: 'jpeg', quality: 85 },
   { file: 'docs/sculpt.jpg', hash: '#sculpt', type: 'jpeg', quality: 85 },
 ];
 

@@ -200,14 +200,14 @@ describe('boxes', () => {
   test('of voxels are exact where the image lies along the world', () => {
     const affine = [2, 0, 0, 0, 0, -2, 0, 0, 0, 0, 5, 0, 7, 8, 9, 1];
     const region = { low: [3, 0, 4], high: [20, 11, 9] } as Parameters<typeof boxOf>[0];
-    expect(voxelsOf(boxOf(region, affine, invert(affine)), invert(affine), [30, 30, 12])).toEqual(region);
+    expect(voxelsOf(boxOf(region, affine), invert(affine), [30, 30, 12])).toEqual(region);
   });
 
-  test('hold their middle and about their size where it stands askew', () => {
+  test('and where it stands askew', () => {
     const c = Math.SQRT1_2;
     const affine = [c, c, 0, 0, -c, c, 0, 0, 0, 0, 3, 0, 1, 2, 3, 1];
     const region = { low: [10, 20, 5], high: [29, 39, 9] } as Parameters<typeof boxOf>[0];
-    const found = voxelsOf(boxOf(region, affine, invert(affine)), invert(affine), [60, 60, 20]);
+    const found = voxelsOf(boxOf(region, affine), invert(affine), [60, 60, 20]);
     expect(found).toEqual(region);
   });
 });

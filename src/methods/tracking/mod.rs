@@ -376,7 +376,6 @@ impl SurfaceTracker {
         };
         let closing = usize::from(self.params.cyclic);
         let steps_done = found + done + usize::from(self.closing.is_some());
-        let measured = measure(&self.mesh.to_triangles());
         StepReport {
             iteration: self.steps,
             done: self.is_done(),
@@ -386,8 +385,8 @@ impl SurfaceTracker {
             tolerance: STILL * self.region.spacing.min_element(),
             vertices: self.mesh.vertex_count() as u32,
             triangles: self.mesh.triangle_count() as u32,
-            components: measured.components as u32,
-            euler: measured.euler as i32,
+            components: self.mesh.component_members().len() as u32,
+            euler: self.mesh.euler() as i32,
             events,
             times,
         }

@@ -153,3 +153,80 @@ fn spread(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Vec<f64>>
     }
     all.into_iter().collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::vote::{Voting, Window};
+    use super::*;
+    use crate::math::{DAffine3, DVec3, Random};
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    const DIMS: [usize; 3] = [30, 26, 28];
+    const CENTER: DVec3 = DVec3::new(14.0, 12.5, 13.5);
+    const RADIUS: f64 = 8.0;
+
+    fn depth(i: usize) -> f64 {
+        let [x, y, z] = [i % DIMS[0], i / DIMS[0] % DIMS[1], i / (DIMS[0] * DIMS[1])].map(|k| k as f64);
+        RADIUS - DVec3::new(x, y, z).distance(CENTER)
+    }
+
+    /// A ball whose far end is darker than what is around its near end.
+    fn shaded() -> Region {
+        let mut random = Random::new(3);
+        let value = |i: usize| {
+            let shading = 1.0 - 0.75 * (i / (DIMS[0] * DIMS[1])) as f64 / DIMS[2] as f64;
+            let clean = shading * (80.0 + 80.0 * (depth(i) + 0.5).clamp(0.0, 1.0));
+            (clean + f64::from(random.below(8)) - 4.0).clamp(0.0, 254.0) as u8
+        };
+        Region {
+            dims: DIMS,
+            inner: [[0; 3], DIMS.map(|n| n - 1)],
+            spacing: DVec3::ONE,
+            to_world: DAffine3::IDENTITY,
+            from_world: DAffine3::IDENTITY,
+            frames: vec![(0..DIMS.iter().product()).map(value).collect()],
+            step: 1.0,
+            threshold: 20.0,
+        }
+    }
+
+    fn faces(region: &Region, threshold: f64) -> Faces {
+        Voting::new(Window { reach: 2, frames: 0, threshold, cyclic: false }, 1).faces(region, 0)
+    }
+
+    #[test]
+    fn what_is_bright_is_told_by_its_wall_however_the_signal_falls() {
+        let region = shaded();
+        let whole = Part { ends: region.inner };
+        let found = sides(&region, 0, &faces(&region, 20.0), whole).unwrap();
+        for (i, &is_bright) in found.iter().enumerate().filter(|&(i, _)| depth(i).abs() > 1.5) {
+            assert_eq!(is_bright, depth(i) > 0.0, "{:?}", whole.at(i));
+        }
+        // No level does it: the far end inside is darker than the near end outside.
+        let image = &region.frames[0];
+        let [inside, outside] = [[14, 12, 21], [14, 12, 0]].map(|at| image[whole.index(at).unwrap()]);
+        assert!(inside < outside, "{inside} {outside}");
+    }
+
+    #[test]
+    fn a_sheet_of_voxels_has_its_own() {
+        let region = shaded();
+        let sheet = Part { ends: [[0, 0, 17], [DIMS[0] - 1, DIMS[1] - 1, 17]] };
+        let found = sides(&region, 0, &faces(&region, 20.0), sheet).unwrap();
+        let near_wall = |at: [usize; 3]| {
+            let [nx, ny, _] = DIMS;
+            depth((at[2] * ny + at[1]) * nx + at[0])
+        };
+        for (i, &is_bright) in found.iter().enumerate() {
+            let depth = near_wall(sheet.at(i));
+            assert!(depth.abs() < 1.5 || is_bright == (depth > 0.0), "{:?}", sheet.at(i));
+        }
+    }
+
+    #[test]
+    fn without_walls_there_are_no_sides() {
+        let region = shaded();
+        assert!(sides(&region, 0, &faces(&region, 250.0), Part { ends: region.inner }).is_none());
+    }
+}

@@ -157,7 +157,7 @@ export class TrackLab implements Lab {
     this.#settings.adopt(setup, { ...opened, volume: undefined });
     this.#results.startOver();
     this.#ui.options.set({ ...viewOf(example), ...linked?.view });
-    if (setup.box) this.#ui.view.look(setup.box);
+    if (setup.box && this.#region) this.#ui.view.look(this.#region);
     const crosshair = (setup.at === example?.at && example?.crosshair) || setup.at;
     if (crosshair) this.#ui.view.goTo(crosshair);
     await this.#client.request('play', undefined);
@@ -181,7 +181,7 @@ export class TrackLab implements Lab {
     const volume = this.#volume;
     const present = this.#region;
     if (!volume || JSON.stringify(region) === JSON.stringify(present)) return;
-    const box = region && boxOf(region, volume.affine, invert(volume.affine));
+    const box = region && boxOf(region, volume.affine);
     void this.#settings.change({ box }, 'box');
   }
 

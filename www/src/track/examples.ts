@@ -23,9 +23,8 @@ const PLAIN: Preparation = { binning: 1, enrichment: 'none', factor: 0 };
 /** What is done to an image of the user's: in-between slices are made where slices are thick. */
 export const OWN_PREPARATION: Preparation = { binning: 1, enrichment: 'flow', factor: 0 };
 
-/** The middle of the left ventricle's blood. */
-const LEFT_VENTRICLE: Vec3 = [0.85, 24.08, 1.77];
-const REACH = 42;
+/** Amid the left ventricle's blood. */
+const LEFT_VENTRICLE: Vec3 = [1.47, 37.05, -13.99];
 const around = (middle: Vec3, reach: number): Box => ({
   min: middle.map((x) => x - reach) as Vec3,
   max: middle.map((x) => x + reach) as Vec3,
@@ -38,9 +37,10 @@ export const HEART = {
   source: { file: 'heart.nii.gz' },
   unit: 'mm',
   preparation: { binning: 1, enrichment: 'flow', factor: 0 },
-  box: around(LEFT_VENTRICLE, REACH),
+  // From the apex to below the valves, where signal is weak and blood goes on into the next chamber.
+  box: { min: [38.01, 78.55, -16.5], max: [-41.86, 5.87, -24.59] },
   at: LEFT_VENTRICLE,
-  crosshair: [1.4, 36.1, 3.52],
+  crosshair: LEFT_VENTRICLE,
   params: { threshold: 25, cyclic: true },
   credit: HEART_CREDIT,
 } satisfies Partial<TrackExample>;

@@ -40,7 +40,7 @@ export const TRACK_PRESETS: TrackPreset[] = [
         name: 'Figure 2',
         params: {},
         view: { votes: 'near' },
-        came: 'Here the points of the boundary lie in a shell about a voxel thick, and the surface of the first frame runs through its middle; blood is inside. Where blood goes on into vessels there are no points, and the surface closes without them.',
+        came: 'Here the points of the boundary lie in a shell about a voxel thick, and the surface of the first frame runs through its middle; blood is inside. Where the box cuts through blood its side is boundary, too, and closes the surface.',
       },
     ],
     hint: 'Points are the darker the more windows voted for them. Turn the surface off to see the shell alone.',
@@ -73,7 +73,7 @@ export const TRACK_PRESETS: TrackPreset[] = [
     name: 'Figure 4: boundary beside Canny’s',
     ...HEART,
     // On the wall between the ventricles.
-    crosshair: [17.51, 34.41, 6.18],
+    crosshair: [14.19, 36.43, -5.39],
     saw: 'Windows are sorted into bright and dark by 2-means; what separates the two in many windows is the boundary. It is as good as Canny’s, whose four numbers had to be tried out, and has one: the step height τ.',
     variants: [
       {

@@ -50,7 +50,7 @@ export interface Preparation {
   factor: number;
 }
 
-/** Two corners in the world. */
+/** Opposite corners of a box along the axes of the voxels, in the world. */
 export interface Box {
   min: Vec3;
   max: Vec3;

@@ -1,7 +1,9 @@
 /** 4D images as the worker opens and prepares them. */
 import { SurfaceTracker, Volume } from 'vesicle';
+import { invert } from '../view/anatomy';
 import { Refusal } from '../worker/refusal';
 import { parseFiles } from '../worker/volumes';
+import { voxelsOf } from './box';
 import { cineVoxels } from './cine';
 import type { FilmSource, NamedBytes, Preparation, Setup } from './protocol';
 
@@ -83,7 +85,9 @@ export function buildTracker(
   { box, at, params }: Setup,
 ): { tracker: SurfaceTracker; suggested: number } {
   const { threshold, ...others } = params;
-  const options = { volume, component: at ?? ('largest' as const), params: others, ...(box && { box }) };
+  const region = box && voxelsOf(box, invert(volume.affine), volume.dims);
+  const voxels = region && { min: region.low, max: region.high };
+  const options = { volume, component: at ?? ('largest' as const), params: others, ...(voxels && { voxels }) };
   const tracker = new SurfaceTracker(options);
   try {
     const suggested = tracker.params.threshold;

@@ -115,9 +115,10 @@ export class BeatingView {
   }
 
   /** Looks from so near that a box fills the view. */
-  look(box: { min: Vec3; max: Vec3 }): void {
-    const { space } = this.#scene?.volume ?? { space: 'RAS' };
-    const all = new Box3(new Vector3(...box.min), new Vector3(...box.max));
+  look(region: VoxelBox): void {
+    if (!this.#scene) return;
+    const { space, affine } = this.#scene.volume;
+    const all = new Box3().setFromArray(regionEdges(region, affine));
     const [middle, size] = [all.getCenter(new Vector3()), all.getSize(new Vector3()).multiplyScalar(2 * CLOSER)];
     this.#viewport.frameBox(new Box3().setFromCenterAndSize(middle, size), space === 'LPS' ? 1 : -1, 0.5);
   }
