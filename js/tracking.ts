@@ -35,7 +35,7 @@ export interface TrackingOptions {
   volume: Volume;
   /**
    * The part that is looked at, corners in the world; default all of it. What is bright where it ends is closed there. Of a
-   * volume whose axes are not those of the world, the voxels around the box are taken.
+   * volume whose axes are not those of the world, the box along its axes around this one is taken.
    */
   box?: { min: Vec3; max: Vec3 };
   /** The same by the first and the last voxel; instead of `box`. */

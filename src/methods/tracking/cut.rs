@@ -2,9 +2,10 @@
 //! the one ends: the box does. Its sides are boundary there, as sure as any, and the surface is closed.
 
 use super::region::Region;
-use super::sides::{Part, sides};
+use super::sides::{Part, nearest_sides, sides};
 use super::vote::{Face, Faces, TIME, X, Y, Z};
 use crate::math::DVec3;
+use std::cell::OnceCell;
 
 impl Region {
     fn is_inside(&self, at: [usize; 3]) -> bool {
@@ -56,15 +57,19 @@ impl Region {
         for (direction, list) in faces.iter_mut().enumerate() {
             list.retain(|face| self.beside(direction, face.voxel).iter().all(|&at| self.is_inside(at)));
         }
+        // Where no wall goes through a side, the nearest one tells.
+        let whole = OnceCell::new();
+        let whole =
+            || whole.get_or_init(|| nearest_sides(self, frame, faces, Part { ends: self.inner })).as_deref();
         let added = [X, Y, Z].map(|direction| {
             let [first, last] = self.inner.map(|at| at[direction]);
             let mut list = Vec::new();
             // A face comes after its voxel.
             if let Some(before) = first.checked_sub(1) {
-                list.extend(self.cut_faces(frame, faces, direction, first, before));
+                list.extend(self.cut_faces(frame, faces, direction, [first, before], whole));
             }
             if last + 1 < self.dims[direction] {
-                list.extend(self.cut_faces(frame, faces, direction, last, last));
+                list.extend(self.cut_faces(frame, faces, direction, [last; 2], whole));
             }
             list
         });
@@ -72,12 +77,24 @@ impl Region {
     }
 
     /// Faces in a side of the box where the `layer` of voxels along it is bright; they lie after the voxels `at` there.
-    fn cut_faces(&self, frame: usize, faces: &Faces, direction: usize, layer: usize, at: usize) -> Vec<Face> {
+    fn cut_faces<'a>(
+        &self,
+        frame: usize,
+        faces: &Faces,
+        direction: usize,
+        [layer, at]: [usize; 2],
+        whole: impl Fn() -> Option<&'a [bool]>,
+    ) -> Vec<Face> {
         let mut part = Part { ends: self.inner };
         part.ends.iter_mut().for_each(|end| end[direction] = layer);
-        let Some(is_bright) = sides(self, frame, faces, part) else { return Vec::new() };
+        let inner = Part { ends: self.inner };
+        let own = sides(self, frame, faces, part);
+        let is_bright = |i: &usize| match &own {
+            Some(own) => own[*i],
+            None => inner.index(part.at(*i)).zip(whole()).is_some_and(|(i, whole)| whole[i]),
+        };
         let [nx, ny, _] = self.dims;
-        let bright = (0..is_bright.len()).filter(|&i| is_bright[i]);
+        let bright = (0..part.len()).filter(is_bright);
         let voxel = |i: usize| {
             let mut voxel = part.at(i);
             voxel[direction] = at;

@@ -19,6 +19,9 @@ pub(super) struct Fit {
 /// Points that weigh less than this, all together, are none.
 const LEAST_WEIGHT: f64 = 1e-3;
 
+/// Points spread over time by less than this share of what they do in space are of one moment.
+const LEAST_DURATION: f64 = 1e-6;
+
 /// In space: n is the direction in which the points spread least.
 pub(super) fn plane(sums: &Sums) -> Option<Fit> {
     let [mean, covariance] = moments(sums)?;
@@ -32,6 +35,10 @@ pub(super) fn plane(sums: &Sums) -> Option<Fit> {
 /// In space-time.
 pub(super) fn hyperplane(sums: &Sums) -> Option<Fit> {
     let [mean, c] = moments(sums)?;
+    // Of a single moment: in space-time all planes of that moment would fit, in space there is one.
+    if c[9] <= LEAST_DURATION * (c[0] + c[4] + c[7]) {
+        return plane(sums);
+    }
     let matrix = [
         [c[0], c[1], c[2], c[3]],
         [c[1], c[4], c[5], c[6]],

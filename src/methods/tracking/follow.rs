@@ -1,19 +1,19 @@
 //! From one frame to the next (section 4): prediction, projection, what has no boundary any more, and connectivity.
 
 use super::TrackingParams;
-use super::project::Moment;
+use super::project::{Moment, Onto};
 use super::region::Region;
 use crate::math::Vec3;
-use crate::mesh::{Mesh, TriangleMesh, VertexId, measure};
+use crate::mesh::{Mesh, TriangleMesh, VertexId, curvature, measure};
 use crate::remesh::{Changes, EdgeBounds, Embedding, restructure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How often predictions are smoothed over the mesh: raw, they are worse than none.
+/// How often predictions and bends are smoothed over the mesh: raw, they are worse than none.
 const SMOOTHINGS: usize = 5;
 
-/// Projections in one frame, with a change of connectivity in between.
-const ROUNDS: usize = 2;
+/// What a bend takes away is given back up to this, in the shortest side of a voxel: where it is more, it is a corner.
+const MOST_UNBENT: f64 = 0.3;
 
 /// How often the first frame is settled: its mesh comes from a grid, not from a frame before.
 const FIRST_SETTLINGS: usize = 3;
@@ -97,6 +97,7 @@ impl Follower {
         for _ in 0..if from.is_some() { 1 } else { FIRST_SETTLINGS } {
             changes += self.settle(mesh, going, &mut facts);
         }
+        self.unbend(mesh, going, &mut facts);
         let triangles = mesh.to_triangles();
         let measured = measure(&triangles);
         (facts.volume, facts.area, facts.triangles) = (measured.volume, measured.area, measured.triangles);
@@ -121,22 +122,37 @@ impl Follower {
     /// Onto the surface of a frame, with edges in bounds.
     fn settle(&mut self, mesh: &mut Mesh, going: &Going, facts: &mut FrameFacts) -> Changes {
         let mut changes = Changes::default();
-        for round in 0..ROUNDS {
-            self.project(mesh, going.region, going.into, facts);
-            if round + 1 < ROUNDS {
-                changes += restructure(mesh, self.bounds, &mut self.guard);
-                self.space(mesh);
-            }
-        }
+        self.project(mesh, going, Onto::SpaceTime, facts);
+        changes += restructure(mesh, self.bounds, &mut self.guard);
+        self.space(mesh);
+        self.project(mesh, going, Onto::Frame, facts);
         changes += self.retract(mesh, going, facts);
         changes
     }
 
-    fn project(&mut self, mesh: &mut Mesh, region: &Region, moment: &Moment, facts: &mut FrameFacts) {
+    /// The plane through the points of a bent surface lies on its inner side: by the spread of the points along it, R²/8 for
+    /// θ = exp(−4r²/R²), times the mean curvature. Vertices go back by as much.
+    fn unbend(&mut self, mesh: &mut Mesh, going: &Going, facts: &mut FrameFacts) {
+        let spread = (going.params.radius * going.params.radius / 8.0) as f32;
+        let most = (MOST_UNBENT * going.region.spacing.min_element()) as f32;
+        let bends = curvature(&mesh.to_triangles()).mean;
+        let mut ways = vec![Vec3::ZERO; mesh.slots()];
+        for (v, bend) in mesh.vertices().zip(bends) {
+            ways[v.index()] = mesh.area_normal(v).normalize_or_zero() * (spread * bend as f32);
+        }
+        for _ in 0..SMOOTHINGS {
+            ways = means(mesh, &ways);
+        }
+        ways.iter_mut().for_each(|way| *way = way.clamp_length_max(most));
+        facts.held += self.carry(mesh, ways);
+    }
+
+    fn project(&mut self, mesh: &mut Mesh, going: &Going, onto: Onto, facts: &mut FrameFacts) {
+        let Going { region, into, .. } = going;
         let mut ways: Vec<Option<Vec3>> = vec![None; mesh.slots()];
         let (mut steps, mut sum) = (0, 0.0);
         for v in mesh.vertices() {
-            if let Some((place, count)) = moment.project(region.place(mesh.position(v))) {
+            if let Some((place, count)) = into.project(region.place(mesh.position(v)), onto) {
                 let way = region.world(place) - mesh.position(v);
                 ways[v.index()] = Some(way);
                 steps += count;

@@ -11,8 +11,9 @@
 //! bits, natively and in wasm.
 //!
 //! # What is not the paper's
-//! The first frame's distance is that from oriented points (the plane's own, equation 6, has no sign away from them). Where
-//! two walls meet, the sheet between them has no boundary left; it is drawn together. Nothing is moved so that it crosses.
+//! The first frame's distance is that from oriented points (the plane's own, equation 6, has no sign away from them). A frame's
+//! last projection is onto its own points alone, and what planes take from bends is given back. Where two walls meet, the sheet
+//! between them has no boundary left; it is drawn together. Nothing is moved so that it crosses.
 
 mod crevice;
 mod cut;
@@ -56,7 +57,8 @@ pub enum Component {
 /// A part of a volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bounds {
-    /// Opposite corners in the world. Where voxel axes are not those of the world, the voxels around that box are taken.
+    /// Opposite corners in the world. Where voxel axes are not those of the world, the box along voxel axes around that one is
+    /// taken.
     World([DVec3; 2]),
     /// The first and the last voxel.
     Voxels([[usize; 3]; 2]),
@@ -113,6 +115,8 @@ pub struct SurfaceTracker {
 struct ImageFacts {
     /// The shortest side of a voxel.
     pixel: f64,
+    /// The longest along which there are several.
+    thickest: f64,
     /// The standard deviation of the noise, in intensity.
     noise: f64,
     /// The range of intensities.
@@ -135,7 +139,8 @@ impl SurfaceTracker {
         }
         let pixel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         let region = Region::new(&volume, bounds)?;
-        let image = ImageFacts { pixel, noise: region.noise() * region.step, range: volume.span() };
+        let noise = region.noise() * region.step;
+        let image = ImageFacts { pixel, thickest: region.thickest(), noise, range: region.span() };
         let start = start.as_ref().map_or(Ok(Mesh::default()), |mesh| start::checked(mesh, &region))?;
         let mut tracker = Self {
             voting: Voting::new(Window::default(), 0),
@@ -162,8 +167,8 @@ impl SurfaceTracker {
     /// Parameters, checked, with what is taken from the volume.
     fn completed(&self, params: TrackingParams) -> Result<TrackingParams, MethodError> {
         params.validate()?;
-        let ImageFacts { pixel, noise, range } = self.image;
-        let params = params.with_volume(pixel, noise, range);
+        let pixel = self.image.pixel;
+        let params = params.with_volume(&self.image);
         let most = samples::MOST / 2 - 1;
         let longest = pixel * most as f64;
         if params.radius < pixel || params.radius > longest {
@@ -201,7 +206,9 @@ impl SurfaceTracker {
         let params = self.completed(params)?;
         let stands = params.same_boundary(&self.params);
         self.params = params;
-        if !stands {
+        if stands {
+            self.moment = self.newest_moment();
+        } else {
             self.begin();
         }
         Ok(())
@@ -281,7 +288,8 @@ impl SurfaceTracker {
     /// from the last to the first.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] where there is no boundary at all, or no surface; [`MethodError::TooManyVertices`].
+    /// [`MethodError::InvalidArgument`] where there is no boundary at all, or no surface; [`MethodError::Mesh`] and
+    /// [`MethodError::Volume`] where there is no memory for it.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let began = (self.clock)();
         let mut times = Times::default();
@@ -301,7 +309,7 @@ impl SurfaceTracker {
             self.close();
             times.add("closing", (self.clock)() - began);
         }
-        self.steps += 1;
+        self.steps = self.steps.saturating_add(1);
         Ok(self.report(changes, times))
     }
 
@@ -342,22 +350,28 @@ impl SurfaceTracker {
         self.closing = Some(apart.map_or(f64::INFINITY, |distance| distance.mean));
     }
 
+    /// What is around the newest frame that is done.
+    fn newest_moment(&self) -> Option<Moment> {
+        self.meshes.len().checked_sub(1).map(|frame| self.moment_of(frame))
+    }
+
     /// What is around a frame.
     fn moment_of(&self, frame: usize) -> Moment {
-        let (count, falloff) = (self.frames() as i64, self.falloff());
+        let (count, falloff) = (self.frames(), self.falloff());
         let mut field = Field::new(&self.region, falloff);
         // No frame twice.
-        let may_wrap = self.params.cyclic && (falloff.offsets().count() as i64) < count;
-        for offset in falloff.offsets() {
+        let most = if self.params.cyclic { (count - 1) / 2 } else { count - 1 };
+        for offset in falloff.offsets(most) {
             let at = frame as i64 + offset;
-            if may_wrap || (0..count).contains(&at) {
-                field.add(&self.faces[at.rem_euclid(count) as usize], offset);
+            if self.params.cyclic || (0..count as i64).contains(&at) {
+                field.add(&self.faces[at.rem_euclid(count as i64) as usize], offset);
             }
         }
         let pixel = self.region.spacing.min_element();
         let (damping, time_scale) = (self.params.damping, self.params.time_scale);
         let cut = self.region.cut_voxels(&self.faces[frame]);
-        Moment { field, cut, time_scale, damping, still: STILL * pixel, longest: LONGEST * pixel }
+        let own = Field::still(&self.region, falloff, &self.faces[frame]);
+        Moment { field, own, cut, time_scale, damping, still: STILL * pixel, longest: LONGEST * pixel }
     }
 
     fn falloff(&self) -> Falloff {

@@ -1,5 +1,6 @@
 //! Parameters of the tracker, and what they may be.
 
+use super::ImageFacts;
 use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, ParamSpec};
 use serde::{Deserialize, Serialize};
 
@@ -55,6 +56,9 @@ const LEAST_THRESHOLD: f64 = 0.05;
 /// Two voxels of a slice and a half: less follows noise, more rounds off what is as thin.
 const RADIUS_IN_PIXELS: f64 = 2.4;
 
+/// More than from slice to slice, or the points of a single one would lie in its own plane.
+const RADIUS_IN_SLICES: f64 = 1.2;
+
 /// Of neighbouring frames next to nothing counts, and of the changes in between all: what moves fast is followed then.
 const TIME_SCALE_IN_RADIUS: f64 = 0.9;
 
@@ -90,11 +94,12 @@ impl TrackingParams {
         key(self) == key(others)
     }
 
-    /// With what the volume says where nothing is given: the length of a pixel, the noise and the range of intensities.
-    pub(super) fn with_volume(mut self, pixel: f64, noise: f64, range: f64) -> Self {
+    /// With what the volume says where nothing is given.
+    pub(super) fn with_volume(mut self, image: &ImageFacts) -> Self {
+        let ImageFacts { pixel, thickest, noise, range } = *image;
         let or = |value: f64, usual: f64| if value == 0.0 { usual } else { value };
         self.threshold = or(self.threshold, (THRESHOLD_IN_NOISE * noise).max(LEAST_THRESHOLD * range));
-        self.radius = or(self.radius, RADIUS_IN_PIXELS * pixel);
+        self.radius = or(self.radius, (RADIUS_IN_PIXELS * pixel).max(RADIUS_IN_SLICES * thickest));
         self.time_scale = or(self.time_scale, TIME_SCALE_IN_RADIUS * self.radius);
         self
     }

@@ -1,6 +1,6 @@
 //! Restricted projection onto the space-time surface in one frame (section 3.3), and prediction (section 4.2).
 
-use super::extremal::{Fit, hyperplane};
+use super::extremal::{Fit, hyperplane, plane};
 use super::samples::Field;
 use crate::math::DVec3;
 
@@ -17,7 +17,10 @@ const LEAST_SLOPE: f64 = 0.05;
 /// What is around one frame in time, and how places are projected there.
 #[derive(Clone, Debug)]
 pub(super) struct Moment {
+    /// The points of the frame and of those around it.
     pub field: Field,
+    /// Those of the frame alone.
+    pub own: Field,
     /// Voxels of the frame at the sides of the box where they are bright, in order.
     pub cut: Vec<u32>,
     /// World units that one frame counts as: c.
@@ -29,17 +32,31 @@ pub(super) struct Moment {
     pub longest: f64,
 }
 
+/// What a place is projected onto.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Onto {
+    /// The surface in space-time, where the frame cuts it: found from further off, and behind what moves faster and faster.
+    SpaceTime,
+    /// The surface of the frame's own points.
+    Frame,
+}
+
 impl Moment {
-    pub fn fit(&self, at: DVec3) -> Option<Fit> {
-        hyperplane(&self.field.sums(at)).filter(|fit| fit.normal.length_squared() >= LEAST_SLOPE)
+    fn fit(&self, at: DVec3, onto: Onto) -> Option<Fit> {
+        match onto {
+            Onto::SpaceTime => {
+                hyperplane(&self.field.sums(at)).filter(|fit| fit.normal.length_squared() >= LEAST_SLOPE)
+            }
+            Onto::Frame => plane(&self.own.sums(at)),
+        }
     }
 
-    /// Where a point comes to lie on the surface; nothing where it does not.
-    pub fn project(&self, p: DVec3) -> Option<(DVec3, usize)> {
+    /// Where a point comes to lie on the surface, and after how many steps; nothing where it does not.
+    pub fn project(&self, p: DVec3, onto: Onto) -> Option<(DVec3, usize)> {
         let mut x = p;
         let mut damping: f64 = 1.0;
         for step in 0..STEPS {
-            let fit = self.fit(x)?;
+            let fit = self.fit(x, onto)?;
             let n = fit.normal;
             // The plane through x's surroundings, cut with this frame: where p falls onto it.
             let above = n.dot(p - x) - fit.distance;
@@ -60,7 +77,7 @@ impl Moment {
 
     /// How far the surface goes at a point until the next frame.
     pub fn prediction(&self, at: DVec3) -> Option<DVec3> {
-        let fit = self.fit(at)?;
+        let fit = self.fit(at, Onto::SpaceTime)?;
         let square = fit.normal.length_squared();
         Some(fit.normal * (-self.time_scale * fit.along_time / square))
     }
@@ -114,10 +131,11 @@ mod tests {
     fn moment(normal: DVec3, distance: f64, speed: f64) -> Moment {
         let region = region();
         let mut field = Field::new(&region, FALLOFF);
-        for offset in FALLOFF.offsets() {
+        for offset in FALLOFF.offsets(9) {
             field.add(&plane_faces(&region, normal, distance, speed, offset as f64), offset);
         }
-        Moment { field, cut: Vec::new(), time_scale: C, damping: 0.9, still: 1e-4, longest: 4.0 }
+        let own = Field::still(&region, FALLOFF, &plane_faces(&region, normal, distance, speed, 0.0));
+        Moment { field, own, cut: Vec::new(), time_scale: C, damping: 0.9, still: 1e-4, longest: 4.0 }
     }
 
     #[test]
@@ -129,7 +147,7 @@ mod tests {
             let frames: Vec<Faces> =
                 (-5..=5).map(|t| plane_faces(&region, normal, 12.0, 0.3, f64::from(t))).collect();
             let mut field = Field::new(&region, falloff);
-            for offset in falloff.offsets() {
+            for offset in falloff.offsets(5) {
                 field.add(&frames[(offset + 5) as usize], offset);
             }
             for at in [DVec3::new(9.3, 10.1, 8.7), DVec3::new(0.2, 21.0, 15.0)] {
@@ -171,10 +189,13 @@ mod tests {
             for start in
                 [DVec3::new(10.0, 10.0, 10.2), DVec3::new(9.0, 9.5, 8.3), DVec3::new(10.5, 11.0, 8.0)]
             {
-                let (x, _) = moment.project(start).unwrap();
                 // A moving plane's points of other frames lie on it in space-time.
-                assert!((normal.dot(x) - 9.0).abs() < 0.03, "{speed} {start} {}", normal.dot(x));
-                assert!((x - start).cross(normal).length() < 0.05, "{}", x - start);
+                for onto in [Onto::SpaceTime, Onto::Frame] {
+                    let (x, _) = moment.project(start, onto).unwrap();
+                    assert!((normal.dot(x) - 9.0).abs() < 0.03, "{speed} {start} {}", normal.dot(x));
+                    assert!((x - start).cross(normal).length() < 0.05, "{}", x - start);
+                }
+                let (x, _) = moment.project(start, Onto::SpaceTime).unwrap();
                 let way = moment.prediction(x).unwrap();
                 assert!((way - normal * speed).length() < 0.04, "{speed} {way}");
             }
@@ -184,10 +205,10 @@ mod tests {
     #[test]
     fn where_there_are_no_points_or_they_are_too_far_nothing_is_found() {
         let moment = moment(DVec3::X, 10.0, 0.0);
-        assert!(moment.project(DVec3::new(1.0, 10.0, 10.0)).is_none());
-        assert!(moment.project(DVec3::new(-500.0, 1e6, 3.0)).is_none());
-        assert!(moment.project(DVec3::splat(1e300)).is_none());
+        assert!(moment.project(DVec3::new(1.0, 10.0, 10.0), Onto::SpaceTime).is_none());
+        assert!(moment.project(DVec3::new(-500.0, 1e6, 3.0), Onto::Frame).is_none());
+        assert!(moment.project(DVec3::splat(1e300), Onto::SpaceTime).is_none());
         let near = Moment { longest: 0.5, ..moment };
-        assert!(near.project(DVec3::new(12.0, 10.0, 10.0)).is_none());
+        assert!(near.project(DVec3::new(12.0, 10.0, 10.0), Onto::SpaceTime).is_none());
     }
 }

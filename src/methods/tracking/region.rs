@@ -135,6 +135,17 @@ impl Region {
         Ok(())
     }
 
+    /// The longest side of a voxel, of the axes along which there are several.
+    pub fn thickest(&self) -> f64 {
+        let [first, last] = self.inner;
+        (0..3).filter(|&axis| last[axis] > first[axis]).map(|axis| self.spacing[axis]).fold(0.0, f64::max)
+    }
+
+    /// The range of intensities, without outliers.
+    pub fn span(&self) -> f64 {
+        STEPS * self.step
+    }
+
     /// Where a voxel is in the grid.
     pub fn voxel(&self, index: u32) -> [usize; 3] {
         let ([nx, ny, _], i) = (self.dims, index as usize);
@@ -246,6 +257,7 @@ fn voxels_around(volume: &Volume, [low, high]: [DVec3; 2]) -> Result<[[usize; 3]
     }
     let inside = |value: f64, axis: usize| value.clamp(0.0, last[axis] as f64) as usize;
     let first = [0, 1, 2].map(|axis| inside(from[axis].ceil(), axis));
-    let end = [0, 1, 2].map(|axis| inside(to[axis].floor(), axis));
+    // Between the middles of two voxels there is the next one at least.
+    let end = [0, 1, 2].map(|axis| inside(to[axis].floor(), axis).max(first[axis]));
     Ok([first, end])
 }

@@ -22,8 +22,10 @@ impl Falloff {
     }
 
     /// Frames whose faces may be near, from a frame on.
-    pub fn offsets(&self) -> std::ops::RangeInclusive<i64> {
-        let reach = (self.radius / self.time_scale) as i64 + 1;
+    /// No more of them than `most` to either side.
+    pub fn offsets(&self, most: usize) -> std::ops::RangeInclusive<i64> {
+        let reach = (self.radius / self.time_scale).min(most as f64) as i64 + 1;
+        let reach = reach.min(most as i64);
         -reach..=reach
     }
 }

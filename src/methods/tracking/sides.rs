@@ -29,6 +29,11 @@ impl Part {
         [0, 1, 2].map(|axis| self.ends[1][axis] - self.ends[0][axis] + 1)
     }
 
+    /// How many voxels it has.
+    pub fn len(&self) -> usize {
+        self.dims().iter().product()
+    }
+
     /// The voxel of the region that comes `index`-th in the list of those of the part.
     pub fn at(&self, index: usize) -> [usize; 3] {
         let ([nx, ny, _], [x, y, z]) = (self.dims(), self.ends[0]);
@@ -47,19 +52,7 @@ impl Part {
 /// By voxel of a part of a frame, whether it is on the bright side; nothing where no wall is.
 pub(super) fn sides(region: &Region, frame: usize, faces: &Faces, part: Part) -> Option<Vec<bool>> {
     let dims = part.dims();
-    let image = &region.frames[frame];
-    let mut steps = Vec::new();
-    for direction in [X, Y, Z] {
-        let stride = [1, region.dims[0], region.dims[0] * region.dims[1]][direction];
-        for face in &faces[direction] {
-            let before = region.voxel(face.voxel);
-            let mut after = before;
-            after[direction] += 1;
-            let (Some(i), Some(j)) = (part.index(before), part.index(after)) else { continue };
-            let is_up = image[face.voxel as usize] < image[face.voxel as usize + stride];
-            steps.push((i, j, if is_up { face.weight } else { -face.weight }));
-        }
-    }
+    let steps = steps(region, frame, faces, part);
     let mut source = vec![0.0; dims.iter().product()];
     for &(i, j, step) in &steps {
         source[i] -= f64::from(step);
@@ -78,6 +71,36 @@ pub(super) fn sides(region: &Region, frame: usize, faces: &Faces, part: Part) ->
     let known = middles.into_iter().map(|(sum, total)| (total > 0.0).then(|| sum / total)).collect();
     let levels = spread(known, dims)?;
     Some(remade.iter().zip(levels).map(|(value, level)| *value > level).collect())
+}
+
+/// The same, told by the nearest wall alone: at once, and wrong where a stray vote is nearer.
+pub(super) fn nearest_sides(region: &Region, frame: usize, faces: &Faces, part: Part) -> Option<Vec<bool>> {
+    let mut known = vec![None; part.len()];
+    for (i, j, step) in steps(region, frame, faces, part) {
+        if step.abs() >= LEAST_WEIGHT {
+            known[i] = Some(f64::from(-step));
+            known[j] = Some(f64::from(step));
+        }
+    }
+    Some(spread(known, part.dims())?.into_iter().map(|side| side > 0.0).collect())
+}
+
+/// The steps at the faces within a part: the voxels before and after, and by how much it is brighter after, by votes.
+fn steps(region: &Region, frame: usize, faces: &Faces, part: Part) -> Vec<(usize, usize, f32)> {
+    let image = &region.frames[frame];
+    let mut steps = Vec::new();
+    for direction in [X, Y, Z] {
+        let stride = [1, region.dims[0], region.dims[0] * region.dims[1]][direction];
+        for face in &faces[direction] {
+            let before = region.voxel(face.voxel);
+            let mut after = before;
+            after[direction] += 1;
+            let (Some(i), Some(j)) = (part.index(before), part.index(after)) else { continue };
+            let is_up = image[face.voxel as usize] < image[face.voxel as usize + stride];
+            steps.push((i, j, if is_up { face.weight } else { -face.weight }));
+        }
+    }
+    steps
 }
 
 /// The image whose sums of differences to its neighbours are `source`, by conjugate gradients.

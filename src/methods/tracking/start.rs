@@ -38,9 +38,6 @@ pub(super) fn checked(start: &TriangleMesh, region: &Region) -> Result<Mesh, Met
 impl SurfaceTracker {
     /// The mesh to begin with, in the world, where none was given.
     pub(super) fn find_first_mesh(&mut self) -> Result<(), MethodError> {
-        if self.mesh.vertex_count() > 0 {
-            return Ok(());
-        }
         if self.faces.iter().flatten().all(Vec::is_empty) {
             let largest = self.voting.largest_step(&self.region) * self.region.step;
             let problem = format!(
@@ -48,6 +45,9 @@ impl SurfaceTracker {
                 self.params.threshold
             );
             return Err(MethodError::invalid("threshold", problem));
+        }
+        if self.mesh.vertex_count() > 0 {
+            return Ok(());
         }
         let surface = bright_surface(&self.region, &self.faces[0], self.falloff())?;
         let Some(part) = self.chosen(surface.components()) else {

@@ -10,6 +10,9 @@ use crate::methods::MethodError;
 use crate::methods::saved::{Hash, Mark, opened, sealed};
 use serde::{Deserialize, Serialize};
 
+/// Checking a mesh takes the square of this for a vertex; the surfaces of real runs stay far below.
+const MOST_NEIGHBOURS: usize = 4096;
+
 const MARK: Mark = *b"VSCLTRK\x01";
 
 /// Everything a run has beside its image.
@@ -69,10 +72,21 @@ impl SurfaceTracker {
             .collect();
         let frames_fit = meshes.len() <= self.frames() && meshes.len() == state.facts.len();
         let boundary_fits = meshes.is_empty() || state.faces.len() == self.frames();
+        let pixel = self.image.pixel;
+        let edge_fits = state.edge.is_none_or(|edge| (1e-3 * pixel..1e3 * pixel).contains(&edge));
+        let closing_fits = state.closing.is_none() || params.cyclic && meshes.len() == self.frames();
+        let begins_well = !meshes.is_empty() || state.mesh.to_triangles() == self.start.to_triangles();
+        if !edge_fits || !closing_fits || !begins_well {
+            return bad("frames", "they are none of this tracker's");
+        }
         if !frames_fit || !boundary_fits || state.edge.is_some() == meshes.is_empty() {
             return bad("frames", "their parts do not fit each other");
         }
-        if state.mesh.check().is_err() || meshes.iter().any(|mesh| mesh.validate().is_err()) {
+        if state.mesh.rings().iter().any(|ring| ring.valence() > MOST_NEIGHBOURS)
+            || state.mesh.attribute_counts() != self.start.attribute_counts()
+            || state.mesh.check().is_err()
+            || meshes.iter().any(|mesh| mesh.validate().is_err())
+        {
             return bad("surface", "its parts do not fit each other");
         }
         self.params = params;
@@ -83,7 +97,7 @@ impl SurfaceTracker {
         (self.meshes, self.facts) = (meshes, state.facts);
         (self.closing, self.steps) = (state.closing, state.steps);
         self.follower = state.edge.map(Follower::new);
-        self.moment = self.meshes.len().checked_sub(1).map(|frame| self.moment_of(frame));
+        self.moment = self.newest_moment();
         Ok(())
     }
 
@@ -114,9 +128,9 @@ impl SurfaceTracker {
             words.iter().for_each(|&word| hash.mix(u64::from_le_bytes(word)));
             rest.iter().for_each(|&level| hash.mix(u64::from(level)));
         }
-        for p in self.start.positions() {
-            p.to_array().iter().for_each(|x| hash.mix(u64::from(x.to_bits())));
-        }
+        let start = self.start.to_triangles();
+        start.positions.iter().flat_map(|p| p.to_array()).for_each(|x| hash.mix(u64::from(x.to_bits())));
+        start.triangles.iter().flatten().for_each(|&v| hash.mix(u64::from(v)));
         hash.value()
     }
 }

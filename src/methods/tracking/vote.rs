@@ -97,8 +97,8 @@ impl Voting {
     /// Levels that no later frame asks for take no room.
     fn forget(&mut self, frame: usize, count: usize) {
         for t in 0..count {
-            let needed = (frame + 1..count).any(|later| self.window.around(later, count).contains(&t));
-            if !needed {
+            // Windows reach as far back as forth.
+            if !self.window.around(t, count).iter().any(|&later| later > frame) {
                 self.levels[t] = None;
             }
         }
