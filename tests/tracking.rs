@@ -69,7 +69,7 @@ fn a_beating_ball_is_followed_through_all_frames_closed_and_without_crossings() 
 }
 
 /// Of the surfaces of all frames, natively and in wasm.
-const BITS: &str = "b0ad7990c3716784";
+const BITS: &str = "a6b29a54bd0d88d1";
 
 #[test]
 fn the_same_bits_everywhere() {

@@ -73,16 +73,21 @@ pub(super) fn sides(region: &Region, frame: usize, faces: &Faces, part: Part) ->
     Some(remade.iter().zip(levels).map(|(value, level)| *value > level).collect())
 }
 
-/// The same, told by the nearest wall alone: at once, and wrong where a stray vote is nearer.
+/// The same, told by the level in the middle of the nearest wall: at once, and right where the signal is as strong as there.
 pub(super) fn nearest_sides(region: &Region, frame: usize, faces: &Faces, part: Part) -> Option<Vec<bool>> {
+    let [nx, ny, _] = region.dims;
+    let level = |i: usize| {
+        let [x, y, z] = part.at(i);
+        f64::from(region.frames[frame][(z * ny + y) * nx + x])
+    };
     let mut known = vec![None; part.len()];
-    for (i, j, step) in steps(region, frame, faces, part) {
-        if step.abs() >= LEAST_WEIGHT {
-            known[i] = Some(f64::from(-step));
-            known[j] = Some(f64::from(step));
-        }
+    for (i, j, _) in steps(region, frame, faces, part).into_iter().filter(|step| step.2.abs() >= LEAST_WEIGHT)
+    {
+        let middle = (level(i) + level(j)) / 2.0;
+        (known[i], known[j]) = (Some(middle), Some(middle));
     }
-    Some(spread(known, part.dims())?.into_iter().map(|side| side > 0.0).collect())
+    let levels = spread(known, part.dims())?;
+    Some(levels.into_iter().enumerate().map(|(i, middle)| level(i) > middle).collect())
 }
 
 /// The steps at the faces within a part: the voxels before and after, and by how much it is brighter after, by votes.
