@@ -1,4 +1,4 @@
-//! Eigenvalues and eigenvectors of symmetric matrices, 3×3 and, for the least one, 4×4.
+//! Eigenvalues and eigenvectors of symmetric matrices: all of 3×3, the least of any.
 
 use super::{DMat3, DVec3};
 
@@ -57,47 +57,49 @@ fn sorted(values: DVec3, vectors: DMat3) -> (DVec3, DMat3) {
     (DVec3::from_array(order.map(|i| values[i])), DMat3::from_cols(x, y, x.cross(y)))
 }
 
-/// The eigenvector of length 1 of the least eigenvalue of a symmetric 4×4 matrix. Only its upper half is looked at.
-pub fn least_of_four(mut a: [[f64; 4]; 4]) -> [f64; 4] {
-    let mut vectors = [[0.0; 4]; 4];
-    for (k, row) in vectors.iter_mut().enumerate() {
-        row[k] = 1.0;
-    }
+/// The eigenvector of length 1 of the least eigenvalue of a symmetric matrix.
+pub fn least<const N: usize>(mut a: [[f64; N]; N]) -> [f64; N] {
+    let mut vectors = [[0.0; N]; N];
+    (0..N).for_each(|k| vectors[k][k] = 1.0);
     for _ in 0..SWEEPS {
-        if (0..4).all(|p| (p + 1..4).all(|q| a[p][q] == 0.0)) {
-            break;
-        }
-        for p in 0..3 {
-            for q in p + 1..4 {
-                rotate(&mut a, &mut vectors, p, q);
+        let mut is_diagonal = true;
+        for p in 0..N - 1 {
+            for q in p + 1..N {
+                is_diagonal &= !rotate(&mut a, &mut vectors, p, q);
             }
         }
+        if is_diagonal {
+            break;
+        }
     }
-    let least = (0..4).fold(0, |least, k| if a[k][k] < a[least][least] { k } else { least });
+    let least = (0..N).fold(0, |least, k| if a[k][k] < a[least][least] { k } else { least });
     vectors[least]
 }
 
-/// Clears the entry `(p, q)`; `vectors` has an eigenvector a row.
-fn rotate(a: &mut [[f64; 4]; 4], vectors: &mut [[f64; 4]; 4], p: usize, q: usize) {
-    let off = a[p][q];
-    let gap = a[q][q] - a[p][p];
-    if off.abs() <= f64::EPSILON * 1e-3 * (a[p][p].abs() + a[q][q].abs()) {
-        a[p][q] = 0.0;
-        return;
+/// Clears the entry `(p, q)`, where it is not as good as clear; `vectors` has an eigenvector a row.
+#[inline]
+fn rotate<const N: usize>(a: &mut [[f64; N]; N], vectors: &mut [[f64; N]; N], p: usize, q: usize) -> bool {
+    let (off, gap) = (a[p][q], a[q][q] - a[p][p]);
+    // Written so that what is not a number is left alone.
+    let counts = off.abs() > f64::EPSILON * 1e-3 * (a[p][p].abs() + a[q][q].abs());
+    if !counts {
+        return false;
     }
     let [tangent, cosine, sine] = clearing_angle(off, gap);
-    a[p][p] -= tangent * off;
-    a[q][q] += tangent * off;
-    a[p][q] = 0.0;
-    for k in (0..4).filter(|&k| k != p && k != q) {
-        let (at_p, at_q) = ((k.min(p), k.max(p)), (k.min(q), k.max(q)));
-        let (x, y) = (a[at_p.0][at_p.1], a[at_q.0][at_q.1]);
-        a[at_p.0][at_p.1] = cosine * x - sine * y;
-        a[at_q.0][at_q.1] = sine * x + cosine * y;
+    let diagonal = [a[p][p] - tangent * off, a[q][q] + tangent * off];
+    for rows in [&mut *a, vectors] {
+        let (before, after) = (rows[p], rows[q]);
+        for k in 0..N {
+            rows[p][k] = cosine * before[k] - sine * after[k];
+            rows[q][k] = sine * before[k] + cosine * after[k];
+        }
     }
-    let (before, after) = (vectors[p], vectors[q]);
-    vectors[p] = [0, 1, 2, 3].map(|k| cosine * before[k] - sine * after[k]);
-    vectors[q] = [0, 1, 2, 3].map(|k| sine * before[k] + cosine * after[k]);
+    let (along_p, along_q) = (a[p], a[q]);
+    for (k, row) in a.iter_mut().enumerate() {
+        (row[p], row[q]) = (along_p[k], along_q[k]);
+    }
+    (a[p][p], a[q][q], a[p][q], a[q][p]) = (diagonal[0], diagonal[1], 0.0, 0.0);
+    true
 }
 
 #[cfg(test)]
@@ -148,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn the_least_of_four_is_an_eigenvector_and_none_is_less() {
+    fn the_least_is_an_eigenvector_and_none_is_less() {
         let mut random = crate::math::Random::new(3);
         for round in 0..500 {
             let mut a = [[0.0; 4]; 4];
@@ -158,7 +160,7 @@ mod tests {
                 let size = if p == q { 1.0 } else { [1.0, 1e-9, 0.0][round % 3] };
                 (a[p][q], a[q][p]) = (size * value, size * value);
             }
-            let v = least_of_four(a);
+            let v = least(a);
             let times = |x: &[f64; 4]| a.map(|row| (0..4).map(|k| row[k] * x[k]).sum::<f64>());
             let dot = |x: &[f64; 4], y: &[f64; 4]| (0..4).map(|k| x[k] * y[k]).sum::<f64>();
             let value = dot(&v, &times(&v));
@@ -171,6 +173,8 @@ mod tests {
                 assert!(dot(&x, &times(&x)) >= (value - 1e-12) * dot(&x, &x));
             }
         }
-        assert_eq!(least_of_four([[0.0; 4]; 4]), [1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(least([[0.0; 4]; 4]), [1.0, 0.0, 0.0, 0.0]);
+        // Not a number in, not a number or an axis out; and an end.
+        assert_eq!(least([[f64::NAN; 3]; 3]), [1.0, 0.0, 0.0]);
     }
 }

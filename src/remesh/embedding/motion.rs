@@ -21,7 +21,7 @@ impl Embedding {
             *p += *way;
         }
         let mut shares = vec![1.0; ways.len()];
-        self.doubt_moved(mesh);
+        self.doubt_moved(mesh, ways);
         loop {
             let mut held = self.look(mesh);
             held.retain(|v| ways[v.index()] != Vec3::ZERO);
@@ -41,15 +41,18 @@ impl Embedding {
         shares.into_iter().enumerate().filter_map(held).collect()
     }
 
-    /// Doubts the vertices that have used up their freedom, with their neighbours, and what there is no room around.
-    fn doubt_moved(&mut self, mesh: &Mesh) {
+    /// Doubts the vertices that have used up their freedom, with their neighbours, and what there is no room around where
+    /// something goes its way.
+    fn doubt_moved(&mut self, mesh: &Mesh, ways: &[Vec3]) {
         self.doubts.resize(mesh.slots(), 0);
         let freedom = FREEDOM * self.edge;
+        let goes = |v: VertexId| ways[v.index()] != Vec3::ZERO;
         for v in mesh.vertices() {
+            let tight = self.tight[v.index()] & ALL;
             if self.grid.position(v).distance_squared(mesh.position(v)) > freedom * freedom {
                 self.doubt_star(mesh, v);
-            } else {
-                self.doubt(v, self.tight[v.index()] & ALL);
+            } else if tight != 0 && (goes(v) || mesh.ring(v).as_slice().iter().any(|&w| goes(w))) {
+                self.doubt(v, tight);
             }
         }
     }

@@ -5,6 +5,7 @@
 
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{Facet, Mesh, VertexId, facets_cross};
+use smallvec::SmallVec;
 
 /// Valence up to which quick tests of a star are tried.
 const MOST_SPOKES: usize = 16;
@@ -196,15 +197,17 @@ pub(super) fn crossings_around(mesh: &Mesh, v: VertexId, crossing: &mut Vec<Vert
 /// Puts the corners of all pairs of triangles that cross into `crossing`, one at `u` and one at `v`, with no corner in
 /// common; exact.
 pub(super) fn crossings_between(mesh: &Mesh, [u, v]: [VertexId; 2], crossing: &mut Vec<VertexId>) {
-    let around_v = star(mesh, v).fold(Bounds::EMPTY, |bounds, t| bounds.joined(&Bounds::of(&t.points)));
+    let others: SmallVec<[(Facet, Bounds); MOST_SPOKES]> =
+        star(mesh, v).map(|facet| (facet, Bounds::of(&facet.points))).collect();
+    let around_v = others.iter().fold(Bounds::EMPTY, |all, (_, bounds)| all.joined(bounds));
     for s in star(mesh, u).filter(|s| !s.corners.contains(&v.0)) {
         let bounds = Bounds::of(&s.points);
         if !bounds.meets(&around_v) {
             continue;
         }
-        for t in star(mesh, v) {
+        for (t, other) in &others {
             let apart = t.corners.iter().all(|w| !s.corners.contains(w));
-            if apart && bounds.meets(&Bounds::of(&t.points)) && facets_cross(&s, &t) {
+            if apart && bounds.meets(other) && facets_cross(&s, t) {
                 crossing.extend(s.corners.into_iter().chain(t.corners).map(VertexId));
             }
         }
