@@ -100,9 +100,8 @@ impl Volume {
         let intensities = self.normalised_grid(frame)?.values;
         let mut before = slices.picture(0, &intensities)?;
         for slice in 0..dims[axis] {
-            for at in 0..slices.len() {
-                values[out.index(slice * factor, at)] = stored(slices.index(slice, at));
-            }
+            let given = slices.places(slice).map(stored);
+            out.places(slice * factor).zip(given).for_each(|(at, value)| values[at] = value);
             if slice + 1 == dims[axis] {
                 break;
             }
@@ -113,9 +112,8 @@ impl Volume {
             };
             for step in 1..factor {
                 let picture = in_between(&before, &after, flow.as_ref(), step as f32 / factor as f32)?;
-                for (at, &value) in picture.values.iter().enumerate() {
-                    values[out.index(slice * factor + step, at)] = self.stored(f64::from(value));
-                }
+                let made = picture.values.iter().map(|&value| self.stored(f64::from(value)));
+                out.places(slice * factor + step).zip(made).for_each(|(at, value)| values[at] = value);
             }
             before = after;
         }
@@ -147,18 +145,15 @@ impl Slices {
         }
     }
 
-    fn len(&self) -> usize {
-        self.across * self.down
-    }
-
-    fn index(&self, slice: usize, at: usize) -> usize {
-        let [across, down, along] = self.steps;
-        slice * along + (at / self.across) * down + (at % self.across) * across
+    /// The indices of a slice's voxels, row by row.
+    fn places(&self, slice: usize) -> impl Iterator<Item = usize> + use<> {
+        let Self { across, down, steps: [step, row, along] } = *self;
+        (0..down).flat_map(move |y| (0..across).map(move |x| slice * along + y * row + x * step))
     }
 
     fn picture(&self, slice: usize, values: &[f32]) -> Result<Picture, VolumeError> {
-        let mut out = reserve(self.len())?;
-        out.extend((0..self.len()).map(|at| values[self.index(slice, at)]));
+        let mut out = reserve(self.across * self.down)?;
+        out.extend(self.places(slice).map(|at| values[at]));
         Ok(Picture { width: self.across, height: self.down, values: out })
     }
 }

@@ -9,8 +9,11 @@ use super::sampling::locate;
 /// Half the width of the window in which one flow is to explain all differences, pixels.
 const RADIUS: usize = 5;
 
-/// Steps on each level; more follow the noise.
-const STEPS: usize = 3;
+/// Rows that are summed up along at once.
+const TOGETHER: usize = 4;
+
+/// Steps on each level, from the coarsest on: those on the finest take most of the time and change least.
+const STEPS: [usize; LEVELS] = [4, 4, 2];
 
 /// No step is longer than this, in pixels of its level: further away the gradients are those of something else.
 const LONGEST: f32 = 1.0;
@@ -47,6 +50,10 @@ impl Picture {
         Ok(Self { width, height, values })
     }
 
+    fn rows(&self) -> std::slice::ChunksExact<'_, f32> {
+        self.values.chunks_exact(self.width)
+    }
+
     /// Bilinear, the border replicated.
     #[inline]
     fn at(&self, x: f32, y: f32) -> f32 {
@@ -64,10 +71,9 @@ impl Picture {
     /// The picture as seen through a flow: at each pixel, what is `share` of the flow away.
     pub fn warped(&self, flow: &Flow, share: f32) -> Result<Self, VolumeError> {
         let mut values = reserve(self.values.len())?;
-        let ways = flow.x.values.iter().zip(&flow.y.values);
-        for (i, (&u, &v)) in ways.enumerate() {
-            let (x, y) = ((i % self.width) as f32, (i / self.width) as f32);
-            values.push(self.at(x + share * u, y + share * v));
+        for (y, (us, vs)) in flow.x.rows().zip(flow.y.rows()).enumerate() {
+            let ways = us.iter().zip(vs).enumerate();
+            values.extend(ways.map(|(x, (u, v))| self.at(x as f32 + share * u, y as f32 + share * v)));
         }
         Ok(Self { values, ..*self })
     }
@@ -97,8 +103,10 @@ impl Picture {
     fn window_means(&self) -> Result<Self, VolumeError> {
         let mut means = self.window_sums()?;
         let count = |at: usize, n: usize| (at.min(RADIUS) + (n - 1 - at).min(RADIUS) + 1) as f32;
-        for (i, mean) in means.values.iter_mut().enumerate() {
-            *mean /= count(i % self.width, self.width) * count(i / self.width, self.height);
+        let along: Vec<f32> = (0..self.width).map(|x| count(x, self.width)).collect();
+        for (y, row) in means.values.chunks_exact_mut(self.width).enumerate() {
+            let down = count(y, self.height);
+            row.iter_mut().zip(&along).for_each(|(mean, along)| *mean /= along * down);
         }
         Ok(means)
     }
@@ -107,8 +115,14 @@ impl Picture {
     pub fn window_sums(&self) -> Result<Self, VolumeError> {
         let (width, height) = (self.width, self.height);
         let mut along = Self::flat(width, height, 0.0)?;
-        let rows = self.values.chunks_exact(width).zip(along.values.chunks_exact_mut(width));
-        rows.for_each(|(row, out)| running_sums(row, out));
+        let whole = height / TOGETHER * TOGETHER * width;
+        let ((rows, last), (to, last_to)) = (self.values.split_at(whole), along.values.split_at_mut(whole));
+        for (rows, to) in rows.chunks_exact(TOGETHER * width).zip(to.chunks_exact_mut(TOGETHER * width)) {
+            running_sums::<TOGETHER>(rows, to);
+        }
+        for (row, to) in last.chunks_exact(width).zip(last_to.chunks_exact_mut(width)) {
+            running_sums::<1>(row, to);
+        }
         // Down the columns, a whole row at a time.
         let mut out = Self::flat(width, height, 0.0)?;
         let mut sums = vec![0.0f32; width];
@@ -129,15 +143,30 @@ impl Picture {
     }
 }
 
-fn running_sums(row: &[f32], out: &mut [f32]) {
-    let mut sum: f32 = row.iter().take(RADIUS).sum();
-    for x in 0..row.len() {
-        sum += row.get(x + RADIUS).copied().unwrap_or(0.0);
-        if x > RADIUS {
-            sum -= row[x - RADIUS - 1];
+/// Along `R` rows at once: each addition has to wait for the one before it in its row.
+fn running_sums<const R: usize>(rows: &[f32], out: &mut [f32]) {
+    let width = rows.len() / R;
+    let mut sums: [f32; R] = std::array::from_fn(|r| rows[r * width..][..RADIUS.min(width)].iter().sum());
+    for x in 0..width {
+        for (r, sum) in sums.iter_mut().enumerate() {
+            let row = &rows[r * width..][..width];
+            *sum += row.get(x + RADIUS).copied().unwrap_or(0.0);
+            if x > RADIUS {
+                *sum -= row[x - RADIUS - 1];
+            }
+            out[r * width + x] = *sum;
         }
-        out[x] = sum;
     }
+}
+
+/// A quarter of the difference between the neighbours of each, the border replicated.
+fn slopes_along(row: &[f32], out: &mut [f32]) {
+    let last = row.len() - 1;
+    for (slope, pair) in out.iter_mut().skip(1).zip(row.windows(3)) {
+        *slope = 0.25 * (pair[2] - pair[0]);
+    }
+    out[0] = 0.25 * (row[last.min(1)] - row[0]);
+    out[last] = 0.25 * (row[last] - row[last.saturating_sub(1)]);
 }
 
 /// The two pixels around `x`, held within the picture, and the share of the way between them.
@@ -162,11 +191,13 @@ pub(super) fn symmetric_flow(a: &Picture, b: &Picture) -> Result<Flow, VolumeErr
     let (coarsest, _) = &levels[levels.len() - 1];
     let still = Picture::flat(coarsest.width, coarsest.height, 0.0)?;
     let mut flow = Flow { x: still.clone(), y: still };
-    for (a, b) in levels.iter().rev() {
+    // Small pictures begin further down.
+    let steps = &STEPS[LEVELS - levels.len()..];
+    for ((a, b), &steps) in levels.iter().rev().zip(steps) {
         if flow.x.width != a.width || flow.x.height != a.height {
             flow = Flow { x: flow.x.doubled(a.width, a.height)?, y: flow.y.doubled(a.width, a.height)? };
         }
-        for _ in 0..STEPS {
+        for _ in 0..steps {
             improve(a, b, &mut flow)?;
         }
     }
@@ -203,15 +234,17 @@ impl Normal {
         let (width, height) = (before.width, before.height);
         let empty = || Picture::flat(width, height, 0.0);
         let [mut xx, mut xy, mut yy, mut xd, mut yd] = [empty()?, empty()?, empty()?, empty()?, empty()?];
-        let both = |i: usize| before.values[i] + after.values[i];
+        let sums = before.values.iter().zip(&after.values).map(|(a, b)| a + b);
+        let both = Picture { width, height, values: sums.collect() };
+        let row = |y: usize| &both.values[y * width..][..width];
+        let mut slopes = vec![0.0; width];
         for y in 0..height {
-            let [above, below] = [y.saturating_sub(1), (y + 1).min(height - 1)];
+            // Of the mean of both pictures, over two pixels.
+            let (above, below) = (row(y.saturating_sub(1)), row((y + 1).min(height - 1)));
+            slopes_along(row(y), &mut slopes);
             for x in 0..width {
-                let [left, right] = [x.saturating_sub(1), (x + 1).min(width - 1)];
                 let i = y * width + x;
-                // Of the mean of both pictures, over two pixels.
-                let gx = 0.25 * (both(y * width + right) - both(y * width + left));
-                let gy = 0.25 * (both(below * width + x) - both(above * width + x));
+                let (gx, gy) = (slopes[x], 0.25 * (below[x] - above[x]));
                 let difference = after.values[i] - before.values[i];
                 xx.values[i] = gx * gx;
                 xy.values[i] = gx * gy;
