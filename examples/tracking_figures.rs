@@ -3,8 +3,8 @@
 //! `<files>`: enrichment of the 4D volumes named, on slices left out, and of a synthetic heart.
 //! `CENTER=x,y,z,mm <files>`: what is nearest to a voxel is followed in a box of so many mm around it.
 //! `TRACK=<beats>`: a synthetic heart of the paper's size against its truth, or `TRACK=small` one of a few voxels.
-//! `TH`, `RADIUS`, `SCALE`, `FRAMES` are parameters of the tracker (the middle two in pixels for `TRACK`), `PLAIN=1` does not
-//! enrich, `BOX=<first and last voxel>` is looked at in files, `BIN=<n>` takes means of n × n voxels of a slice first.
+//! `TH`, `RADIUS`, `SCALE`, `FRAMES` are parameters of the tracker (the middle two in pixels for `TRACK`), `PREDICTION=0` goes
+//! without, `PLAIN=1` does not enrich, `BOX=<first and last voxel>` is looked at in files, `BIN=<n>` takes means of n × n voxels of a slice first.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program for the terminal")]
 
 #[path = "../tests/common/cine.rs"]
@@ -82,6 +82,7 @@ fn track(cine: &Cine) {
         radius: number("RADIUS").unwrap_or(0.0) * pixel,
         time_scale: number("SCALE").unwrap_or(0.0) * pixel,
         window_frames: number("FRAMES").map_or(usual.window_frames, |n| n as u32),
+        prediction: number("PREDICTION") != Some(0.0),
         cyclic: true,
         ..usual
     };
@@ -94,10 +95,14 @@ fn track(cine: &Cine) {
     };
     let mut tracker = SurfaceTracker::new(options).unwrap();
     println!("noise {:.2}, {:?}", tracker.noise(), tracker.params());
+    let mut all = Worst::default();
     while !tracker.is_done() {
         let began = Instant::now();
         tracker.step().unwrap();
         let took = began.elapsed().as_secs_f64();
+        if tracker.meshes().is_empty() {
+            all.votes += took;
+        }
         let (Some(mesh), None) = (tracker.meshes().last(), tracker.closing()) else { continue };
         let (frame, facts) = (tracker.frame(), tracker.facts()[tracker.frame()]);
         let truth = cine.truth(frame as f64, 0.8);
@@ -118,9 +123,59 @@ fn track(cine: &Cine) {
             a.euler,
             count_crossings(mesh)
         );
+        all.mean = all.mean.max(off.mean);
+        all.p95 = all.p95.max(off.p95);
+        all.folds = all.folds.max(100.0 * facts.folded as f64 / facts.triangles as f64);
+        all.areas.push(100.0 * (a.area / b.area - 1.0));
+        all.crossings += count_crossings(mesh);
+        all.steps += facts.steps / tracker.frames() as f64;
+        all.volumes.push([a.volume, b.volume]);
+        all.times.push(took);
     }
+    all.tell();
     println!("closes with {:.3} mm", tracker.closing().unwrap_or(f64::NAN));
     println!("tracked in {:.1} s", began.elapsed().as_secs_f64());
+}
+
+/// The worst of all frames.
+#[derive(Default)]
+struct Worst {
+    mean: f64,
+    p95: f64,
+    folds: f64,
+    areas: Vec<f64>,
+    crossings: usize,
+    /// In the mean of the frames.
+    steps: f64,
+    /// By frame, found and true.
+    volumes: Vec<[f64; 2]>,
+    times: Vec<f64>,
+    votes: f64,
+}
+
+impl Worst {
+    fn tell(mut self) {
+        let ends = |list: &[f64]| list.iter().fold([f64::MAX, f64::MIN], |[a, b], &x| [a.min(x), b.max(x)]);
+        let [small, large] = ends(&self.areas);
+        let ejected = |k: usize| {
+            let [small, large] = ends(&self.volumes.iter().map(|pair| pair[k]).collect::<Vec<_>>());
+            100.0 * (1.0 - small / large)
+        };
+        self.times.sort_by(f64::total_cmp);
+        println!(
+            "worst: mean {:.2}, p95 {:.2}, folds {:.2} %, area {small:+.1} to {large:+.1} %, crossings {}; ejected {:.1} of {:.1} %; steps {:.1}; votes {:.2} s, frames {:.0} ms in the middle, {:.0} at most",
+            self.mean,
+            self.p95,
+            self.folds,
+            self.crossings,
+            ejected(0),
+            ejected(1),
+            self.steps,
+            self.votes,
+            1e3 * self.times[self.times.len() / 2],
+            1e3 * self.times[self.times.len() - 1],
+        );
+    }
 }
 
 /// Follows what is nearest to a voxel, in a box of `reach` world units around it.

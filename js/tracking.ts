@@ -61,7 +61,7 @@ export interface FrameFacts {
   rejected: number;
   /** Moves that were held back, so that nothing crosses. */
   held: number;
-  /** Vertices that had no boundary any more and were drawn together with their neighbours. */
+  /** Vertices that had no boundary: drawn together where a crevice has closed, grown where one has opened, else smoothed. */
   retracted: number;
   /** Steps of the projections, in the mean. */
   steps: number;

@@ -11,7 +11,7 @@ use vesicle::mesh::{MeshError, TriangleMesh, count_crossings, measure};
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
 use vesicle::spatial::surface_distance;
-use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
+use vesicle::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -69,7 +69,7 @@ fn a_beating_ball_is_followed_through_all_frames_closed_and_without_crossings() 
 }
 
 /// Of the surfaces of all frames, natively and in wasm.
-const BITS: &str = "a6b29a54bd0d88d1";
+const BITS: &str = "abb6ada6a5fa12d9";
 
 #[test]
 fn the_same_bits_everywhere() {
@@ -119,11 +119,23 @@ fn crevices_behind_papillary_muscles_close_and_open_without_sheets_or_folds() {
         let (found, truth) = (measure(mesh), measure(&cine.truth(frame as f64, 0.7)));
         assert_eq!((found.components, count_crossings(mesh)), (1, 0), "{frame}");
         let [area, volume] = [found.area / truth.area, found.volume / truth.volume];
-        assert!((area - 1.0).abs() < 0.1 && (volume - 1.0).abs() < 0.1, "{frame} {area} {volume}");
+        assert!((area - 1.0).abs() < 0.1 && (volume - 1.0).abs() < 0.05, "{frame} {area} {volume}");
         assert!(facts.folded * 100 < facts.triangles, "{frame} {facts:?}");
         retracted += facts.retracted;
     }
     assert!(retracted > 100, "{retracted}");
+}
+
+#[test]
+fn crevices_that_open_faster_than_the_boundary_pulls_are_grown_into() {
+    // Thick slices, and a beat in eight frames: it closes and opens by several voxels from one to the next.
+    let cine = Cine { dims: [48, 48, 23], beats: 3.0, ..Cine::full() }.first(6);
+    let volume = cine.volume().enrich_slices(None, Enrichment::Flow).unwrap();
+    let tracker = tracked(TrackingOptions { volume, ..open_ended(&cine) });
+    for (frame, mesh) in tracker.meshes().iter().enumerate() {
+        let off = surface_distance(mesh, &cine.truth(frame as f64, 0.8)).unwrap();
+        assert!(off.mean < 0.5 && off.p95 < 1.8, "{frame} {} {}", off.mean, off.p95);
+    }
 }
 
 /// A tube that beats, along the third axis through the whole of a volume; its signal falls to a third along the way.

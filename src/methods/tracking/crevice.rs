@@ -1,17 +1,24 @@
-//! What has no boundary any more. Where two walls of a crevice have met, inside and outside look alike, and the surface would
-//! stay between them as a sheet without volume, from which folds come.
+//! What has no boundary any more, or not yet. Where two walls of a crevice have met, inside and outside look alike, and the
+//! surface would stay between them as a sheet without volume, from which folds come. Where a crevice opens, what is bright goes
+//! on before the surface, too far for points of the boundary to pull it there.
 
-use super::follow::{Follower, FrameFacts, Going, middle};
+use super::follow::{Follower, FrameFacts, Going, Ground, middle};
+use super::project::Onto;
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use crate::remesh::{Changes, restructure};
 use crate::spatial::PointGrid;
 use std::cmp::Reverse;
+use std::collections::BTreeSet;
 
-/// How often what is left without a boundary is looked for.
-const ROUNDS: usize = 3;
+/// How often what is left without a boundary is looked for at most, and at least where there is any.
+const ROUNDS: usize = 10;
+const LEAST_ROUNDS: usize = 2;
 
-/// In each round, moves of what has no boundary towards the middle of its neighbours.
+/// Rounds end where this share is left of what was left before.
+const LITTLE_PROGRESS: f64 = 0.9;
+
+/// In each round, moves of what has no boundary.
 const MOVES: usize = 2;
 
 /// Walls of a sheet are no further apart, in the shortest side of a voxel.
@@ -20,30 +27,60 @@ const THICKNESS: f64 = 1.5;
 /// Walls of a sheet face away from each other: the greatest cosine of their normals.
 const OPPOSITE: f32 = -0.3;
 
+/// The share of the way to the middle of its neighbours that a vertex goes besides, where it goes on into what is bright.
+const SMOOTHING: f32 = 0.5;
+
 impl Follower {
-    /// Draws in the sheets in crevices that have closed, and smooths what else has no boundary.
+    /// Draws in the sheets in crevices that have closed, grows into those that open, and smooths what else has no boundary.
     pub fn retract(&mut self, mesh: &mut Mesh, going: &Going, facts: &mut FrameFacts) -> Changes {
         let mut changes = Changes::default();
+        let mut grown = BTreeSet::new();
+        let mut before = usize::MAX;
         for round in 0..ROUNDS {
             let lost = lost(mesh, going);
             if round == 0 {
                 facts.retracted = lost.len();
             }
-            if lost.is_empty() {
+            let progresses = (lost.len() as f64) < LITTLE_PROGRESS * before as f64;
+            if lost.is_empty() || round >= LEAST_ROUNDS && !progresses {
                 break;
             }
-            let sheets = sheets(mesh, &lost, THICKNESS * going.region.spacing.min_element());
-            changes.deletions += self.draw_in(mesh, &sheets);
-            changes += restructure(mesh, self.bounds, &mut self.guard);
+            before = lost.len();
+            let gone = self.draw_in(mesh, &sheets(mesh, &lost, going));
+            if gone > 0 {
+                changes.deletions += gone;
+                changes += restructure(mesh, self.bounds, &mut self.guard);
+            }
             for _ in 0..MOVES {
-                let mut ways = vec![Vec3::ZERO; mesh.slots()];
-                for v in self::lost(mesh, going) {
-                    ways[v.index()] = middle(mesh, v) - mesh.position(v);
-                }
-                self.carry(mesh, ways);
+                grown.extend(self.move_lost(mesh, going));
             }
         }
+        // They have come near points of the boundary.
+        let grown: Vec<VertexId> = grown.into_iter().filter(|&v| mesh.is_live(v)).collect();
+        let still = vec![Vec3::ZERO; mesh.slots()];
+        self.project(mesh, &grown, &still, going, Onto::Frame, facts);
         changes
+    }
+
+    /// Moves vertices without a boundary: into what is bright, if they are in the midst of it and on no sheet; else to the
+    /// middle of their neighbours. Returns those that grow.
+    fn move_lost(&mut self, mesh: &mut Mesh, going: &Going) -> Vec<VertexId> {
+        let lost = lost(mesh, going);
+        let sheets = sheets(mesh, &lost, going);
+        let far = going.region.spacing.min_element() as f32;
+        let mut ways = vec![Vec3::ZERO; mesh.slots()];
+        let mut grown = Vec::new();
+        for &(v, ground) in &lost {
+            let way = middle(mesh, v) - mesh.position(v);
+            let grows = ground == Ground::Bright && sheets.binary_search(&v).is_err();
+            ways[v.index()] = way;
+            if grows {
+                ways[v.index()] = mesh.area_normal(v).normalize_or_zero() * far + way * SMOOTHING;
+                grown.push(v);
+            }
+        }
+        self.carry(mesh, ways);
+        grown
     }
 
     /// Draws vertices together into their neighbours, from the innermost to the rim; returns how many are gone.
@@ -71,25 +108,27 @@ impl Follower {
     }
 }
 
-/// Vertices without a boundary.
-fn lost(mesh: &Mesh, going: &Going) -> Vec<VertexId> {
-    mesh.vertices().filter(|&v| !going.is_boundary(mesh.position(v), mesh.area_normal(v))).collect()
+/// Vertices without a boundary, and what they are in.
+fn lost(mesh: &Mesh, going: &Going) -> Vec<(VertexId, Ground)> {
+    let ground = |v: VertexId| (v, going.ground(mesh.position(v), mesh.area_normal(v)));
+    mesh.vertices().map(ground).filter(|(_, ground)| *ground != Ground::Boundary).collect()
 }
 
-/// Those among `lost` that have another one close by that faces the other way.
-fn sheets(mesh: &Mesh, lost: &[VertexId], thickness: f64) -> Vec<VertexId> {
-    let positions: Vec<Vec3> = lost.iter().map(|&v| mesh.position(v)).collect();
-    let normals: Vec<Vec3> = lost.iter().map(|&v| mesh.area_normal(v).normalize_or_zero()).collect();
-    let grid = PointGrid::of(&positions, thickness as f32);
+/// Those among `lost` that have another one close by that faces the other way, in order.
+fn sheets(mesh: &Mesh, lost: &[(VertexId, Ground)], going: &Going) -> Vec<VertexId> {
+    let thickness = (THICKNESS * going.region.spacing.min_element()) as f32;
+    let positions: Vec<Vec3> = lost.iter().map(|&(v, _)| mesh.position(v)).collect();
+    let normals: Vec<Vec3> = lost.iter().map(|&(v, _)| mesh.area_normal(v).normalize_or_zero()).collect();
+    let grid = PointGrid::of(&positions, thickness);
     let has_opposite = |i: usize| {
         let mut found = false;
-        grid.within(positions[i], thickness as f32, |j, _| {
+        grid.within(positions[i], thickness, |j, _| {
             found = normals[i].dot(normals[j as usize]) < OPPOSITE;
             !found
         });
         found
     };
-    (0..lost.len()).filter(|&i| has_opposite(i)).map(|i| lost[i]).collect()
+    (0..lost.len()).filter(|&i| has_opposite(i)).map(|i| lost[i].0).collect()
 }
 
 /// By slot, the edges from a vertex of the sheets to the nearest one of no sheet; 0 for those.

@@ -1,7 +1,7 @@
 //! The plane that fits the points around a place best (section 3): weighted least squares, in space or in space-time.
 
 use super::samples::Sums;
-use crate::math::{DMat3, DVec3, symmetric};
+use crate::math::{DVec3, symmetric};
 
 /// A plane through the points around a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,8 +26,7 @@ const LEAST_DURATION: f64 = 1e-6;
 pub(super) fn plane(sums: &Sums) -> Option<Fit> {
     let [mean, covariance] = moments(sums)?;
     let [xx, xy, xz, _, yy, yz, _, zz, ..] = covariance;
-    let (_, vectors) = symmetric::eigen(DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]));
-    let normal = vectors.x_axis;
+    let normal = DVec3::from(symmetric::least([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]));
     let distance = normal.dot(DVec3::new(mean[0], mean[1], mean[2]));
     Some(Fit { normal, along_time: 0.0, distance, weight: sums.weight })
 }
@@ -45,7 +44,7 @@ pub(super) fn hyperplane(sums: &Sums) -> Option<Fit> {
         [c[2], c[5], c[7], c[8]],
         [c[3], c[6], c[8], c[9]],
     ];
-    let n = symmetric::least_of_four(matrix);
+    let n = symmetric::least(matrix);
     let distance = (0..4).map(|k| n[k] * mean[k]).sum();
     Some(Fit { normal: DVec3::new(n[0], n[1], n[2]), along_time: n[3], distance, weight: sums.weight })
 }

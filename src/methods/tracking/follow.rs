@@ -1,19 +1,22 @@
-//! From one frame to the next (section 4): prediction, projection, what has no boundary any more, and connectivity.
+//! From one frame to the next (section 4): prediction, projection, what has no boundary, folds, and connectivity.
 
 use super::TrackingParams;
 use super::project::{Moment, Onto};
 use super::region::Region;
+use super::vote::Voting;
 use crate::math::Vec3;
-use crate::mesh::{Mesh, TriangleMesh, VertexId, curvature, measure};
+use crate::mesh::{Mesh, VertexId, curvature, measure};
 use crate::remesh::{Changes, EdgeBounds, Embedding, restructure};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 /// How often predictions and bends are smoothed over the mesh: raw, they are worse than none.
 const SMOOTHINGS: usize = 5;
 
 /// What a bend takes away is given back up to this, in the shortest side of a voxel: where it is more, it is a corner.
 const MOST_UNBENT: f64 = 0.3;
+
+/// How often folds are smoothed in a frame.
+const UNFOLDINGS: usize = 3;
 
 /// How often the first frame is settled: its mesh comes from a grid, not from a frame before.
 const FIRST_SETTLINGS: usize = 3;
@@ -39,7 +42,7 @@ pub struct FrameFacts {
     pub rejected: usize,
     /// Moves that were held back, so that nothing crosses.
     pub held: usize,
-    /// Vertices that had no boundary any more and were drawn together with their neighbours.
+    /// Vertices that had no boundary: drawn together where a crevice has closed, grown where one has opened, else smoothed.
     pub retracted: usize,
     /// Steps of the projections, in the mean.
     pub steps: f64,
@@ -54,20 +57,39 @@ pub(super) struct Going<'a> {
     pub frame: usize,
     /// What is around that frame.
     pub into: &'a Moment,
+    /// It knows the levels of that frame.
+    pub voting: &'a Voting,
+}
+
+/// What a piece of the surface lies on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ground {
+    /// It is brighter inside than outside, or the box cuts what is bright.
+    Boundary,
+    /// On both sides of it everything is bright.
+    Bright,
+    /// Neither.
+    Dark,
 }
 
 impl Going<'_> {
-    /// Whether the image is brighter one voxel inside than one outside, or the box cuts what is bright.
-    pub fn is_boundary(&self, at: Vec3, normal: Vec3) -> bool {
+    /// What is one voxel inside and one outside.
+    pub fn ground(&self, at: Vec3, normal: Vec3) -> Ground {
         let region = self.region;
         let way = region.from_world.transform_vector3(normal.as_dvec3()).normalize_or_zero()
             * region.spacing.min_element();
         let place = region.place(at);
         if let Some(voxel) = region.nearest_inside(place + way) {
-            return self.into.cut.binary_search(&voxel).is_ok();
+            let is_cut = self.into.cut.binary_search(&voxel).is_ok();
+            return if is_cut { Ground::Boundary } else { Ground::Dark };
         }
         let [inside, outside] = [place - way, place + way].map(|place| region.sample(self.frame, place));
-        inside - outside >= LEAST_STEP * region.threshold
+        if inside - outside >= LEAST_STEP * region.threshold {
+            return Ground::Boundary;
+        }
+        let level = self.voting.level_at(region, self.frame, region.nearest(place + way));
+        let is_bright = level.is_some_and(|level| inside.min(outside) > f64::from(level));
+        if is_bright { Ground::Bright } else { Ground::Dark }
     }
 }
 
@@ -90,42 +112,37 @@ impl Follower {
         let mut facts = FrameFacts::default();
         let bound = |share: f64| (share * self.edge) as f32;
         self.bounds = EdgeBounds { min: bound(going.params.edge_min), max: bound(going.params.edge_max) };
-        if let (Some(from), true) = (from, going.params.prediction) {
-            self.predict(mesh, going.region, from, &mut facts);
-        }
         let mut changes = Changes::default();
+        let mut predicted = match from {
+            Some(from) if going.params.prediction => prediction(mesh, going.region, from),
+            _ => vec![Vec3::ZERO; mesh.slots()],
+        };
         for _ in 0..if from.is_some() { 1 } else { FIRST_SETTLINGS } {
-            changes += self.settle(mesh, going, &mut facts);
+            changes += self.settle(mesh, predicted, going, &mut facts);
+            predicted = vec![Vec3::ZERO; mesh.slots()];
         }
         self.unbend(mesh, going, &mut facts);
-        let triangles = mesh.to_triangles();
-        let measured = measure(&triangles);
+        self.unfold(mesh);
+        let measured = measure(&mesh.to_triangles());
         (facts.volume, facts.area, facts.triangles) = (measured.volume, measured.area, measured.triangles);
-        facts.folded = folded(&triangles);
+        facts.folded = folded(mesh).len();
         (changes, facts)
     }
 
-    /// On to where the surface is going to be in the next frame, by how it passes through `moment`.
-    fn predict(&mut self, mesh: &mut Mesh, region: &Region, moment: &Moment, facts: &mut FrameFacts) {
-        let mut ways = vec![Vec3::ZERO; mesh.slots()];
-        for v in mesh.vertices() {
-            let at = region.place(mesh.position(v));
-            let way = moment.prediction(at).map_or(Vec3::ZERO, |way| region.direction(way));
-            ways[v.index()] = way;
-        }
-        for _ in 0..SMOOTHINGS {
-            ways = means(mesh, &ways);
-        }
-        facts.held += self.carry(mesh, ways);
-    }
-
-    /// Onto the surface of a frame, with edges in bounds.
-    fn settle(&mut self, mesh: &mut Mesh, going: &Going, facts: &mut FrameFacts) -> Changes {
+    /// Onto the surface of a frame, from so far on, with edges in bounds.
+    fn settle(
+        &mut self,
+        mesh: &mut Mesh,
+        ahead: Vec<Vec3>,
+        going: &Going,
+        facts: &mut FrameFacts,
+    ) -> Changes {
         let mut changes = Changes::default();
-        self.project(mesh, going, Onto::SpaceTime, facts);
+        let all: Vec<VertexId> = mesh.vertices().collect();
+        self.project(mesh, &all, &ahead, going, Onto::SpaceTime, facts);
         changes += restructure(mesh, self.bounds, &mut self.guard);
-        self.space(mesh);
-        self.project(mesh, going, Onto::Frame, facts);
+        let all: Vec<VertexId> = mesh.vertices().collect();
+        self.project(mesh, &all, &spacing(mesh), going, Onto::Frame, facts);
         changes += self.retract(mesh, going, facts);
         changes
     }
@@ -140,42 +157,53 @@ impl Follower {
         for (v, bend) in mesh.vertices().zip(bends) {
             ways[v.index()] = mesh.area_normal(v).normalize_or_zero() * (spread * bend as f32);
         }
-        for _ in 0..SMOOTHINGS {
-            ways = means(mesh, &ways);
-        }
+        ways = (0..SMOOTHINGS).fold(ways, |ways, _| means(mesh, &ways));
         ways.iter_mut().for_each(|way| *way = way.clamp_length_max(most));
         facts.held += self.carry(mesh, ways);
     }
 
-    fn project(&mut self, mesh: &mut Mesh, going: &Going, onto: Onto, facts: &mut FrameFacts) {
-        let Going { region, into, .. } = going;
-        let mut ways: Vec<Option<Vec3>> = vec![None; mesh.slots()];
-        let (mut steps, mut sum) = (0, 0.0);
-        for v in mesh.vertices() {
-            if let Some((place, count)) = into.project(region.place(mesh.position(v)), onto) {
-                let way = region.world(place) - mesh.position(v);
-                ways[v.index()] = Some(way);
-                steps += count;
-                sum += f64::from(way.length());
+    /// Where the surface is folded, vertices go to the middle of their neighbours.
+    fn unfold(&mut self, mesh: &mut Mesh) {
+        for _ in 0..UNFOLDINGS {
+            let mut ways = vec![Vec3::ZERO; mesh.slots()];
+            for v in folded(mesh).into_iter().flatten() {
+                ways[v.index()] = middle(mesh, v) - mesh.position(v);
             }
+            self.carry(mesh, ways);
         }
-        let count = mesh.vertex_count().max(1) as f64;
-        let found = mesh.vertices().filter(|v| ways[v.index()].is_some()).count();
-        facts.rejected += mesh.vertex_count() - found;
-        (facts.steps, facts.correction) = (steps as f64 / count, sum / count);
-        let filled = filled(mesh, &ways);
-        facts.held += self.carry(mesh, filled);
     }
 
-    /// Vertices along the surface towards the middle of their neighbours.
-    fn space(&mut self, mesh: &mut Mesh) {
-        let mut ways = vec![Vec3::ZERO; mesh.slots()];
-        for v in mesh.vertices() {
-            let normal = mesh.area_normal(v).normalize_or_zero();
-            let way = middle(mesh, v) - mesh.position(v);
-            ways[v.index()] = (way - normal * normal.dot(way)) * SPACING;
+    /// Vertices onto the surface, from where they are when they have gone `ahead`: one move, which is looked at once.
+    pub(super) fn project(
+        &mut self,
+        mesh: &mut Mesh,
+        vertices: &[VertexId],
+        ahead: &[Vec3],
+        going: &Going,
+        onto: Onto,
+        facts: &mut FrameFacts,
+    ) {
+        let mut ways: Vec<Option<Vec3>> = vec![None; mesh.slots()];
+        let mut rejected = Vec::new();
+        let (mut steps, mut sum) = (0, 0.0);
+        for &v in vertices {
+            let from = mesh.position(v) + ahead[v.index()];
+            let Some((place, count)) = going.into.project(going.region.place(from), onto) else {
+                rejected.push(v);
+                continue;
+            };
+            let to = going.region.world(place);
+            ways[v.index()] = Some(to - mesh.position(v));
+            steps += count;
+            sum += f64::from(to.distance(from));
         }
-        self.carry(mesh, ways);
+        facts.rejected += rejected.len();
+        if vertices.len() == mesh.vertex_count() {
+            let count = vertices.len().max(1) as f64;
+            (facts.steps, facts.correction) = (steps as f64 / count, sum / count);
+        }
+        let filled = filled(mesh, &ways, &rejected);
+        facts.held += self.carry(mesh, filled);
     }
 
     /// How many were held back.
@@ -183,6 +211,27 @@ impl Follower {
         self.guard.follow_with(mesh, self.bounds.max);
         self.guard.carry(mesh, &mut ways).len()
     }
+}
+
+/// On to where the surface is going to be in the next frame, by how it passes through `moment`.
+fn prediction(mesh: &Mesh, region: &Region, moment: &Moment) -> Vec<Vec3> {
+    let mut ways = vec![Vec3::ZERO; mesh.slots()];
+    for v in mesh.vertices() {
+        let at = region.place(mesh.position(v));
+        ways[v.index()] = moment.prediction(at).map_or(Vec3::ZERO, |way| region.direction(way));
+    }
+    (0..SMOOTHINGS).fold(ways, |ways, _| means(mesh, &ways))
+}
+
+/// Along the surface towards the middle of the neighbours.
+fn spacing(mesh: &Mesh) -> Vec<Vec3> {
+    let mut ways = vec![Vec3::ZERO; mesh.slots()];
+    for v in mesh.vertices() {
+        let normal = mesh.area_normal(v).normalize_or_zero();
+        let way = middle(mesh, v) - mesh.position(v);
+        ways[v.index()] = (way - normal * normal.dot(way)) * SPACING;
+    }
+    ways
 }
 
 pub(super) fn middle(mesh: &Mesh, v: VertexId) -> Vec3 {
@@ -201,30 +250,33 @@ fn means(mesh: &Mesh, ways: &[Vec3]) -> Vec<Vec3> {
     out
 }
 
-/// With the mean of their neighbours where there are none.
-fn filled(mesh: &Mesh, ways: &[Option<Vec3>]) -> Vec<Vec3> {
-    let mut out = vec![Vec3::ZERO; ways.len()];
-    for v in mesh.vertices() {
-        out[v.index()] = ways[v.index()].unwrap_or_else(|| {
-            let known = mesh.ring(v).as_slice().iter().filter_map(|w| ways[w.index()]);
-            let (sum, count) = known.fold((Vec3::ZERO, 0.0), |(sum, count), way| (sum + way, count + 1.0));
-            if count > 0.0 { sum * (1.0 / count) } else { Vec3::ZERO }
-        });
+/// Those that were `rejected` with the mean of their neighbours.
+fn filled(mesh: &Mesh, ways: &[Option<Vec3>], rejected: &[VertexId]) -> Vec<Vec3> {
+    let mut out: Vec<Vec3> = ways.iter().map(|way| way.unwrap_or(Vec3::ZERO)).collect();
+    for &v in rejected {
+        let known = mesh.ring(v).as_slice().iter().filter_map(|w| ways[w.index()]);
+        let (sum, count) = known.fold((Vec3::ZERO, 0.0f32), |(sum, count), way| (sum + way, count + 1.0));
+        out[v.index()] = sum * (1.0 / count.max(1.0));
     }
     out
 }
 
 /// Triangles that face away from the sum of their three neighbours.
-fn folded(mesh: &TriangleMesh) -> usize {
-    let normals: Vec<Vec3> = mesh.corners().map(|[a, b, c]| (b - a).cross(c - a)).collect();
-    // The triangle to the left of each edge, from end to end.
-    let left: BTreeMap<[u32; 2], usize> = (mesh.triangles.iter().enumerate())
-        .flat_map(|(t, &[a, b, c])| [([a, b], t), ([b, c], t), ([c, a], t)])
-        .collect();
-    let faces_away = |t: usize| {
-        let [a, b, c] = mesh.triangles[t];
-        let across = [[b, a], [c, b], [a, c]].map(|edge| left.get(&edge).map_or(Vec3::ZERO, |&t| normals[t]));
-        across.into_iter().fold(Vec3::ZERO, |sum, normal| sum + normal).dot(normals[t]) < 0.0
+fn folded(mesh: &Mesh) -> Vec<[VertexId; 3]> {
+    let normal = |[a, b, c]: [VertexId; 3]| {
+        let [a, b, c] = [a, b, c].map(|v| mesh.position(v));
+        (b - a).cross(c - a)
     };
-    (0..normals.len()).filter(|&t| faces_away(t)).count()
+    let across =
+        |a: VertexId, b: VertexId| mesh.ring(a).before(b).map_or(Vec3::ZERO, |tip| normal([b, a, tip]));
+    let mut folded = Vec::new();
+    for v in mesh.vertices() {
+        // Each triangle from its lowest corner.
+        for (a, b) in mesh.ring(v).pairs().filter(|&(a, b)| v < a && v < b) {
+            if (across(v, a) + across(a, b) + across(b, v)).dot(normal([v, a, b])) < 0.0 {
+                folded.push([v, a, b]);
+            }
+        }
+    }
+    folded
 }

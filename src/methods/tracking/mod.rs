@@ -331,7 +331,9 @@ impl SurfaceTracker {
         // There is one around every frame that was done.
         let from = self.moment.take();
         let into = self.moment_of(frame);
-        let going = Going { region: &self.region, params: &self.params, frame, into: &into };
+        self.voting.know_levels(&self.region, frame);
+        let going =
+            Going { region: &self.region, params: &self.params, frame, into: &into, voting: &self.voting };
         let (changes, facts) = follower.go(&mut self.mesh, from.as_ref(), &going);
         (self.follower, self.moment) = (Some(follower), Some(into));
         self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
@@ -344,7 +346,9 @@ impl SurfaceTracker {
         let (Some(mut follower), Some(first)) = (self.follower.clone(), self.meshes.first()) else { return };
         let mut mesh = self.mesh.clone();
         let into = self.moment_of(0);
-        let going = Going { region: &self.region, params: &self.params, frame: 0, into: &into };
+        self.voting.know_levels(&self.region, 0);
+        let going =
+            Going { region: &self.region, params: &self.params, frame: 0, into: &into, voting: &self.voting };
         follower.go(&mut mesh, self.moment.as_ref(), &going);
         let apart = surface_distance(&mesh.to_triangles(), first);
         self.closing = Some(apart.map_or(f64::INFINITY, |distance| distance.mean));

@@ -152,6 +152,12 @@ impl Region {
         [i % nx, i / nx % ny, i / (nx * ny)]
     }
 
+    /// The voxel that is nearest to a place.
+    pub fn nearest(&self, place: DVec3) -> [usize; 3] {
+        let last = DVec3::from(self.dims.map(|n| (n - 1) as f64));
+        (place / self.spacing).clamp(DVec3::ZERO, last).round().to_array().map(|i| i as usize)
+    }
+
     /// The middle of the face after a voxel along a direction, and by how much of a frame it is later than the voxel.
     pub fn face(&self, direction: usize, voxel: u32) -> (DVec3, f32) {
         let mut at = DVec3::from(self.voxel(voxel).map(|i| i as f64));

@@ -6,6 +6,7 @@
 use super::region::Region;
 use super::vote::{Faces, TIME, X, Y, Z};
 use crate::math::DVec3;
+use wide::f32x8;
 
 /// How weights fall with distance: θ(r) = exp(−r²/h²), with r in space-time, and 0 beyond 2h in space or in time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,20 +22,26 @@ impl Falloff {
         libm::exp(-4.0 * distance * distance / (self.radius * self.radius))
     }
 
-    /// Frames whose faces may be near, from a frame on.
-    /// No more of them than `most` to either side.
+    /// What θ at a distance is multiplied by a `step` further on.
+    fn ratio(&self, distance: f64, step: f64) -> f64 {
+        libm::exp(-4.0 * step * (2.0 * distance + step) / (self.radius * self.radius))
+    }
+
+    /// Frames whose faces may be near, from a frame on: no more of them than `most` to either side.
     pub fn offsets(&self, most: usize) -> std::ops::RangeInclusive<i64> {
-        let reach = (self.radius / self.time_scale).min(most as f64) as i64 + 1;
-        let reach = reach.min(most as i64);
+        let reach = ((self.radius / self.time_scale + 1.0) as i64).min(most as i64);
         -reach..=reach
     }
 }
 
-/// Most faces within the radius along one axis.
-pub(super) const MOST: usize = 32;
+/// Faces along x that are summed up at once; usually there are no more within the radius.
+const LANES: usize = 8;
 
-/// Usually there are no more than this.
-const FEW: usize = 8;
+/// So many times as many at most.
+const MOST_LANES: usize = 4;
+
+/// Most faces within the radius along one axis.
+pub(super) const MOST: usize = MOST_LANES * LANES;
 
 /// What is near in time to one frame.
 #[derive(Clone, Debug)]
@@ -45,11 +52,16 @@ pub(super) struct Field {
     /// From one row to the next, and zeroes before the first voxel of a row.
     row: usize,
     room: usize,
+    /// By axis, what the ratio of θ from each voxel to the next changes by with each.
+    changes: DVec3,
+    /// Whether there are points of several moments.
+    timed: bool,
     /// By direction of the faces; those along time lie in the middle of voxels.
     sites: [Sites; 4],
 }
 
-/// Weights times θ of the time, on the faces of one direction: as they are, times the time, and times its square.
+/// Weights times θ of the time, on the faces of one direction: as they are and, where there are several moments, times the
+/// time and times its square.
 #[derive(Clone, Debug, Default)]
 struct Sites {
     weights: [Vec<f32>; 3],
@@ -60,14 +72,25 @@ struct Sites {
 impl Field {
     /// Without points.
     pub fn new(region: &Region, falloff: Falloff) -> Self {
-        let room = (2.0 * falloff.radius / region.spacing.x) as usize + 2 + FEW;
+        let most = (2.0 * falloff.radius / region.spacing.x) as usize + 1;
+        let room = most + 1 + if most <= LANES { LANES } else { MOST };
+        let change = |k: usize| falloff.ratio(region.spacing[k] / 2.0, region.spacing[k]);
         let row = region.dims[0] + 2 * room;
-        Self { dims: region.dims, spacing: region.spacing, falloff, row, room, sites: Default::default() }
+        Self {
+            dims: region.dims,
+            spacing: region.spacing,
+            falloff,
+            row,
+            room,
+            changes: DVec3::new(change(0), change(1), change(2)),
+            timed: true,
+            sites: Default::default(),
+        }
     }
 
     /// The points of a single frame, without those along time.
     pub fn still(region: &Region, falloff: Falloff, faces: &Faces) -> Self {
-        let mut field = Self::new(region, falloff);
+        let mut field = Self { timed: false, ..Self::new(region, falloff) };
         for direction in [X, Y, Z] {
             field.add_direction(direction, faces, 0.0);
         }
@@ -93,11 +116,12 @@ impl Field {
         let Sites { weights, extents } = &mut self.sites[direction];
         if extents.is_empty() {
             extents.resize(ny * nz, [u32::MAX, 0]);
-            weights.iter_mut().for_each(|list| list.resize(self.row * ny * nz, 0.0));
+            let lists = weights.iter_mut().take(if self.timed { 3 } else { 1 });
+            lists.for_each(|list| list.resize(self.row * ny * nz, 0.0));
         }
         for face in &faces[direction] {
             let (line, x) = (face.voxel as usize / nx, face.voxel as usize % nx);
-            for (list, factor) in weights.iter_mut().zip(factors) {
+            for (list, factor) in weights.iter_mut().zip(factors).filter(|(list, _)| !list.is_empty()) {
                 list[line * self.row + self.room + x] += factor * face.weight;
             }
             let [first, end] = &mut extents[line];
@@ -109,8 +133,8 @@ impl Field {
     pub fn sums(&self, at: DVec3) -> Sums {
         let mut sums = Sums::default();
         let axis =
-            |k: usize| [0.0, 0.5].map(|offset| Axis::new(at[k], self.spacing[k], offset, &self.falloff));
-        let axes = [axis(0), axis(1), axis(2)];
+            |k: usize, offset: f64| Axis::new(at[k], self.spacing[k], offset, &self.falloff, self.changes[k]);
+        let axes = [[axis(0, 0.0), axis(0, 0.5)], [axis(1, 0.0), axis(1, 0.5)], [axis(2, 0.0), axis(2, 0.5)]];
         for direction in [X, Y, Z, TIME] {
             let [x, y, z] = [X, Y, Z].map(|k| &axes[k][usize::from(direction == k)]);
             // Off the grid there are none.
@@ -119,22 +143,30 @@ impl Field {
             if outside || self.sites[direction].extents.is_empty() {
                 continue;
             }
-            if x.count <= FEW {
-                self.gather::<FEW>(&self.sites[direction], [x, y, z], &mut sums);
-            } else {
-                self.gather::<MOST>(&self.sites[direction], [x, y, z], &mut sums);
+            let sites = &self.sites[direction];
+            match (x.count <= LANES, self.timed) {
+                (true, true) => self.gather::<1, true>(sites, [x, y, z], &mut sums),
+                (true, false) => self.gather::<1, false>(sites, [x, y, z], &mut sums),
+                (false, true) => self.gather::<MOST_LANES, true>(sites, [x, y, z], &mut sums),
+                (false, false) => self.gather::<MOST_LANES, false>(sites, [x, y, z], &mut sums),
             }
         }
         sums
     }
 
-    /// `LANES`: no less than the faces along x.
-    fn gather<const LANES: usize>(&self, sites: &Sites, [x, y, z]: [&Axis; 3], sums: &mut Sums) {
+    /// `N` times as many lanes as are no fewer than the faces along x.
+    fn gather<const N: usize, const TIMED: bool>(
+        &self,
+        sites: &Sites,
+        [x, y, z]: [&Axis; 3],
+        sums: &mut Sums,
+    ) {
         let square = self.falloff.radius * self.falloff.radius;
         let near = [x.first, x.end()];
+        let mut columns = Columns::<N>::default();
         for k in z.range(self.dims[2]) {
             let dz = z.distance(k);
-            let mut plane = Plane::<LANES>::default();
+            let mut plane = Plane::<N>::default();
             for j in y.range(self.dims[1]) {
                 let line = k as usize * self.dims[1] + j as usize;
                 let dy = y.distance(j);
@@ -143,12 +175,21 @@ impl Field {
                     continue;
                 }
                 let from = ((line * self.row + self.room) as i64 + x.first) as usize;
-                let rows = [0, 1, 2].map(|power| &sites.weights[power][from..from + x.count]);
-                plane.add(rows, dy as f32, y.weight(j));
+                let row = |power: usize| lanes(&sites.weights[power][from..from + N * LANES]);
+                plane.add(&row(0), dy as f32, y.weight(j));
+                if TIMED {
+                    plane.add_timed([row(1), row(2)], dy as f32, y.weight(j));
+                }
             }
             if plane.used {
-                plane.add_to(sums, x, dz, f64::from(z.weight(k)));
+                columns.add(&plane, dz as f32, z.weight(k));
+                if TIMED {
+                    columns.add_timed(&plane, dz as f32, z.weight(k));
+                }
             }
+        }
+        if columns.used {
+            columns.add_to(sums, x);
         }
     }
 }
@@ -164,14 +205,17 @@ struct Axis {
 }
 
 impl Axis {
-    fn new(at: f64, spacing: f64, offset: f64, falloff: &Falloff) -> Self {
-        let first = libm::ceil((at - falloff.radius) / spacing - offset) as i64;
-        let last = libm::floor((at + falloff.radius) / spacing - offset) as i64;
+    fn new(at: f64, spacing: f64, offset: f64, falloff: &Falloff, change: f64) -> Self {
+        let first = ((at - falloff.radius) / spacing - offset).ceil() as i64;
+        let last = ((at + falloff.radius) / spacing - offset).floor() as i64;
         let count = usize::try_from(last.saturating_sub(first) + 1).unwrap_or(0).min(MOST);
         let start = (first as f64 + offset) * spacing - at;
         let mut weights = [0.0; MOST];
-        for (i, weight) in weights.iter_mut().take(count).enumerate() {
-            *weight = falloff.theta(start + i as f64 * spacing) as f32;
+        let (mut theta, mut ratio) = (falloff.theta(start), falloff.ratio(start, spacing));
+        for weight in weights.iter_mut().take(count) {
+            *weight = theta as f32;
+            theta *= ratio;
+            ratio *= change;
         }
         Self { first, start, spacing, weights, count }
     }
@@ -196,53 +240,110 @@ impl Axis {
     }
 }
 
-/// Sums over y in one plane, still apart by x: of the weights times 1, y and y², of those with time times 1 and y, and of
-/// those with its square.
-struct Plane<const LANES: usize> {
-    plain: [[f32; LANES]; 3],
-    timed: [[f32; LANES]; 2],
-    squared: [f32; LANES],
+/// A sum for each of the faces along x.
+type Lanes<const N: usize> = [f32x8; N];
+
+fn lanes<const N: usize>(values: &[f32]) -> Lanes<N> {
+    let mut lanes = [f32x8::ZERO; N];
+    for (lane, values) in lanes.iter_mut().zip(values.chunks_exact(LANES)) {
+        *lane = f32x8::from(values);
+    }
+    lanes
+}
+
+fn add<const N: usize>(to: &mut Lanes<N>, lanes: &Lanes<N>, factor: f32) {
+    to.iter_mut().zip(lanes).for_each(|(to, lane)| *to += *lane * factor);
+}
+
+/// Sums over y in one plane: of the weights times 1, y and y², of those with time times 1 and y, and of those with its square.
+struct Plane<const N: usize> {
+    plain: [Lanes<N>; 3],
+    timed: [Lanes<N>; 2],
+    squared: Lanes<N>,
     used: bool,
 }
 
-impl<const LANES: usize> Default for Plane<LANES> {
+impl<const N: usize> Default for Plane<N> {
     fn default() -> Self {
-        let none = [0.0; LANES];
+        let none = [f32x8::ZERO; N];
         Self { plain: [none; 3], timed: [none; 2], squared: none, used: false }
     }
 }
 
-impl<const LANES: usize> Plane<LANES> {
+impl<const N: usize> Plane<N> {
     #[inline]
-    fn add(&mut self, [plain, timed, squared]: [&[f32]; 3], dy: f32, theta: f32) {
-        let (first, second) = (theta * dy, theta * dy * dy);
-        for (i, ((&w, &t), &s)) in plain.iter().zip(timed).zip(squared).enumerate().take(LANES) {
-            self.plain[0][i] += theta * w;
-            self.plain[1][i] += first * w;
-            self.plain[2][i] += second * w;
-            self.timed[0][i] += theta * t;
-            self.timed[1][i] += first * t;
-            self.squared[i] += theta * s;
-        }
+    fn add(&mut self, weights: &Lanes<N>, dy: f32, theta: f32) {
+        let powers = [theta, theta * dy, theta * dy * dy];
+        self.plain.iter_mut().zip(powers).for_each(|(to, power)| add(to, weights, power));
         self.used = true;
     }
 
-    fn add_to(&self, sums: &mut Sums, x: &Axis, dz: f64, weight: f64) {
-        let mut s = [0.0f64; 10];
-        for i in 0..x.count {
-            let (theta, dx) = (f64::from(x.weights[i]), x.start + i as f64 * x.spacing);
-            let [a, b, c] = self.plain.each_ref().map(|lanes| theta * f64::from(lanes[i]));
-            let [t, ty] = self.timed.each_ref().map(|lanes| theta * f64::from(lanes[i]));
-            let terms =
-                [a, a * dx, a * dx * dx, b, b * dx, c, t, t * dx, ty, theta * f64::from(self.squared[i])];
-            s.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+    #[inline]
+    fn add_timed(&mut self, [timed, squared]: [Lanes<N>; 2], dy: f32, theta: f32) {
+        let powers = [theta, theta * dy];
+        self.timed.iter_mut().zip(powers).for_each(|(to, power)| add(to, &timed, power));
+        add(&mut self.squared, &squared, theta);
+    }
+}
+
+/// Sums over the planes: of theirs times 1, and of some times z and z².
+struct Columns<const N: usize> {
+    plane: Plane<N>,
+    /// Times z: of weights times 1 and y, and of those with time.
+    high: [Lanes<N>; 3],
+    /// Times z².
+    higher: Lanes<N>,
+    used: bool,
+}
+
+impl<const N: usize> Default for Columns<N> {
+    fn default() -> Self {
+        let none = [f32x8::ZERO; N];
+        Self { plane: Plane::default(), high: [none; 3], higher: none, used: false }
+    }
+}
+
+impl<const N: usize> Columns<N> {
+    #[inline]
+    fn add(&mut self, plane: &Plane<N>, dz: f32, theta: f32) {
+        let [one, y, _] = &plane.plain;
+        self.plane.plain.iter_mut().zip(&plane.plain).for_each(|(to, lanes)| add(to, lanes, theta));
+        self.high.iter_mut().zip([one, y]).for_each(|(to, lanes)| add(to, lanes, theta * dz));
+        add(&mut self.higher, one, theta * dz * dz);
+        self.used = true;
+    }
+
+    #[inline]
+    fn add_timed(&mut self, plane: &Plane<N>, dz: f32, theta: f32) {
+        self.plane.timed.iter_mut().zip(&plane.timed).for_each(|(to, lanes)| add(to, lanes, theta));
+        add(&mut self.plane.squared, &plane.squared, theta);
+        add(&mut self.high[2], &plane.timed[0], theta * dz);
+    }
+
+    /// Over x, too.
+    fn add_to(&self, sums: &mut Sums, x: &Axis) {
+        let theta = lanes::<N>(&x.weights);
+        let mut away = [f32x8::ZERO; N];
+        for (k, lane) in away.iter_mut().enumerate() {
+            *lane =
+                f32x8::new(std::array::from_fn(|i| (x.start + (k * LANES + i) as f64 * x.spacing) as f32));
         }
-        let [one, x, xx, y, xy, yy, t, xt, yt, tt] = s.map(|sum| weight * sum);
-        sums.weight += one;
-        let first = [x, y, dz * one, t];
-        let second = [xx, xy, dz * x, xt, yy, dz * y, yt, dz * dz * one, dz * t, tt];
+        let times = |a: &Lanes<N>, b: &Lanes<N>| -> Lanes<N> { std::array::from_fn(|k| a[k] * b[k]) };
+        let powers = [theta, times(&theta, &away), times(&times(&theta, &away), &away)];
+        // In this order on any machine.
+        let sum = |lanes: &Lanes<N>, power: usize| -> f64 {
+            let lane = lanes.iter().zip(&powers[power]).fold(f32x8::ZERO, |sum, (a, b)| sum + *a * *b);
+            let [a, b, c, d, e, f, g, h] = lane.to_array();
+            f64::from(((a + e) + (b + f)) + ((c + g) + (d + h)))
+        };
+        let ([one, y, yy], [t, yt]) = (&self.plane.plain, &self.plane.timed);
+        let [z, yz, zt] = &self.high;
+        sums.weight += sum(one, 0);
+        let first = [sum(one, 1), sum(y, 0), sum(z, 0), sum(t, 0)];
+        let along_x = [sum(one, 2), sum(y, 1), sum(z, 1), sum(t, 1)];
+        let across = [yy, yz, yt, &self.higher, zt, &self.plane.squared].map(|lanes| sum(lanes, 0));
         sums.first.iter_mut().zip(first).for_each(|(sum, term)| *sum += term);
-        sums.second.iter_mut().zip(second).for_each(|(sum, term)| *sum += term);
+        sums.second.iter_mut().zip(along_x.into_iter().chain(across)).for_each(|(sum, term)| *sum += term);
     }
 }
 

@@ -2,12 +2,13 @@
 
 use super::region::Region;
 use serde::{Deserialize, Serialize};
+use wide::u8x16;
 
 /// No level: this window has no boundary in it. Levels of intensity end below.
 const NONE: u8 = u8::MAX;
 
-/// Faces that are counted at once: bytes of a vector.
-const LANES: usize = 16;
+/// Faces that are counted at once.
+const LANES: usize = u8x16::LANES as usize;
 
 /// A cluster must hold more than this share of its window.
 const LEAST_SHARE: f64 = 0.1;
@@ -50,8 +51,8 @@ pub(super) type Faces = [Vec<Face>; 4];
 #[derive(Clone, Debug)]
 pub(super) struct Voting {
     window: Window,
-    /// By frame, the level between the clusters of the window around each voxel, as rows with room at both ends; not
-    /// there yet, or there no longer.
+    /// By frame, the level between the clusters of the window around each voxel, as rows with room at both ends, once it
+    /// was asked for.
     levels: Vec<Option<Vec<u8>>>,
     /// The largest difference of means so far.
     largest: f64,
@@ -65,11 +66,7 @@ impl Voting {
     /// The faces of a frame. Frames are asked for in order.
     pub fn faces(&mut self, region: &Region, frame: usize) -> Faces {
         let around = self.window.around(frame, region.frames.len());
-        for &t in &around {
-            if self.levels[t].is_none() {
-                self.levels[t] = Some(self.levels_of(region, t));
-            }
-        }
+        around.iter().for_each(|&t| self.know_levels(region, t));
         let mut faces = Faces::default();
         for direction in [X, Y, Z] {
             faces[direction] = self.votes(region, frame, frame, direction, &around);
@@ -83,7 +80,6 @@ impl Voting {
             faces[TIME] = self.votes(region, frame, next, TIME, &both);
         }
         region.close(frame, &mut faces);
-        self.forget(frame, count);
         faces
     }
 
@@ -94,14 +90,18 @@ impl Voting {
         all.largest
     }
 
-    /// Levels that no later frame asks for take no room.
-    fn forget(&mut self, frame: usize, count: usize) {
-        for t in 0..count {
-            // Windows reach as far back as forth.
-            if !self.window.around(t, count).iter().any(|&later| later > frame) {
-                self.levels[t] = None;
-            }
+    /// Finds the levels of a frame, if they are not known yet.
+    pub fn know_levels(&mut self, region: &Region, frame: usize) {
+        if self.levels[frame].is_none() {
+            self.levels[frame] = Some(self.levels_of(region, frame));
         }
+    }
+
+    /// The level between the clusters of the window around a voxel, in a frame whose levels are known: nothing where it
+    /// holds no boundary.
+    pub fn level_at(&self, region: &Region, frame: usize, [x, y, z]: [usize; 3]) -> Option<u8> {
+        let level = self.levels[frame].as_ref()?[Rows::new(region.dims, self.window.reach).at(y, z) + x];
+        (level != NONE).then_some(level)
     }
 
     /// The level of each window whose middle is in a frame.
@@ -253,13 +253,13 @@ impl Window {
 /// Adds, for each of the pairs, the windows of a row whose level separates it.
 #[inline]
 fn count(levels: &[u8], windows: usize, pairs: &Pairs, votes: &mut [u16; LANES]) {
-    let mut few = [0u8; LANES];
-    for row in levels.windows(LANES).take(windows) {
-        for (i, vote) in few.iter_mut().enumerate() {
-            *vote += u8::from(row[i].wrapping_sub(pairs.low[i]) < pairs.span[i]);
-        }
+    let (low, span) = (u8x16::new(pairs.low), u8x16::new(pairs.span));
+    let mut few = u8x16::ZERO;
+    // Compilers do not make vectors of this by themselves for wasm, and it is most of the work of the votes.
+    for row in levels.windows(LANES).take(windows).filter_map(<[u8]>::first_chunk) {
+        few += span.saturating_sub(u8x16::new(*row) - low).min(u8x16::ONE);
     }
-    votes.iter_mut().zip(few).for_each(|(all, few)| *all += u16::from(few));
+    votes.iter_mut().zip(few.to_array()).for_each(|(all, few)| *all += u16::from(few));
 }
 
 /// Where rows of levels begin: with room for windows beyond both ends.

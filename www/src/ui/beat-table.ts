@@ -22,7 +22,11 @@ const COLUMNS: Column[] = [
   { head: 'steps', help: 'Of the projections, in the mean', text: ({ steps }) => figure(round(steps)) },
   { head: 'held', help: 'Moves held back, so that nothing crosses', text: ({ held }) => count(held) },
   { head: 'rejected', help: 'Projections that led nowhere or too far', text: ({ rejected }) => count(rejected) },
-  { head: 'retracted', help: 'Vertices without a boundary, drawn together', text: ({ retracted }) => count(retracted) },
+  {
+    head: 'retracted',
+    help: 'Vertices without a boundary: drawn together where a crevice closed, grown where one opened',
+    text: ({ retracted }) => count(retracted),
+  },
 ];
 
 const round = (value: number) => Number(value.toPrecision(3));

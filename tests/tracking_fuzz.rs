@@ -1,0 +1,119 @@
+//! Random sequences, parameters and boxes, tracked: closed, without crossings and of one piece after every frame, or refused
+//! by name.
+//!
+//! `FUZZ_SEEDS=<first>..<last>` chooses other seeds; a seed that fails is said.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "the lints spare tests, but not their helpers")]
+
+mod common;
+
+use common::{Named, Random, seeds};
+use vesicle::math::{DAffine3, DVec3};
+use vesicle::mesh::{count_crossings, measure};
+use vesicle::methods::MethodError;
+use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
+use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
+#[cfg(target_arch = "wasm32")]
+use wasm_bindgen_test::wasm_bindgen_test as test;
+
+/// Blobs that move, grow and vanish, in noise; with voxels that are no numbers now and then.
+fn random_volume(random: &mut Random) -> Volume {
+    let mut size = || 4 + random.below(10);
+    let [nx, ny] = [size(), size()];
+    let (nz, nt) = (1 + random.below(9), 2 + random.below(4));
+    let count = nx * ny * nz;
+    let blobs: Vec<[DVec3; 2]> = (0..1 + random.below(3))
+        .map(|_| {
+            let mut place = || DVec3::new(random.within(0.0, nx as f64), random.within(0.0, ny as f64), 0.0);
+            let (from, mut way) = (place(), place());
+            way = (way - from) / 3.0;
+            [DVec3 { z: random.within(0.0, nz as f64), ..from }, way]
+        })
+        .collect();
+    let radius = random.within(1.0, 6.0);
+    let (noise, holes) = (random.within(0.0, 40.0), if random.below(4) == 0 { 40 } else { usize::MAX });
+    let mut values = Vec::with_capacity(count * nt);
+    for i in 0..count * nt {
+        let (t, at) = ((i / count) as f64, i % count);
+        let p = DVec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64);
+        let is_bright = blobs.iter().any(|[from, way]| p.distance(*from + *way * t) < radius + 0.5 * t);
+        let value = if is_bright { 150.0 } else { 40.0 } + random.within(-1.0, 1.0) * noise;
+        values.push(if random.below(holes) == 0 { f32::NAN } else { value as f32 });
+    }
+    let mut length = || random.within(0.8, 2.5);
+    let spacing = DVec3::new(length(), length(), length());
+    let turned = DAffine3::from_rotation_z(random.within(-3.0, 3.0));
+    Volume::new(VolumeInit {
+        voxels: Voxels::F32(values),
+        dims: [nx, ny, nz, nt],
+        affine: turned * DAffine3::from_scale(spacing),
+        slope: 1.0,
+        intercept: 0.0,
+        frame_seconds: 0.0,
+        space: Space::Ras,
+    })
+    .unwrap()
+}
+
+fn random_params(random: &mut Random) -> TrackingParams {
+    let mut or_zero = |low: f64, high: f64| if random.below(2) == 0 { 0.0 } else { random.within(low, high) };
+    let (threshold, radius, time_scale) = (or_zero(10.0, 90.0), or_zero(1.0, 12.0), or_zero(0.1, 10.0));
+    let edge_min = random.within(0.05, 0.5);
+    TrackingParams {
+        threshold,
+        window: 1 + random.below(4) as u32,
+        window_frames: random.below(5) as u32,
+        radius,
+        time_scale,
+        damping: random.within(0.5, 1.0),
+        edge_min,
+        edge_max: edge_min * random.within(2.1, 5.0) + 0.9,
+        prediction: random.below(2) == 0,
+        cyclic: random.below(2) == 0,
+    }
+}
+
+fn random_options(random: &mut Random) -> TrackingOptions {
+    let volume = random_volume(random);
+    let last = volume.dims().map(|n| n - 1);
+    let bounds = (random.below(3) == 0).then(|| {
+        let low = last.map(|n| random.below(n / 2 + 1));
+        Bounds::Voxels([low, [0, 1, 2].map(|k| low[k] + random.below(last[k] - low[k] + 1))])
+    });
+    let component = match random.below(2) {
+        0 => Component::Largest,
+        _ => Component::Nearest(DVec3::splat(random.within(-10.0, 20.0))),
+    };
+    TrackingOptions { volume, bounds, component, start: None, params: random_params(random) }
+}
+
+/// The frames that were tracked; none where that is refused.
+fn track(options: TrackingOptions) -> Result<usize, MethodError> {
+    let mut tracker = SurfaceTracker::new(options)?;
+    while !tracker.is_done() {
+        let frames = tracker.meshes().len();
+        tracker.step()?;
+        assert!(tracker.mesh().check().is_ok());
+        if let Some(mesh) = tracker.meshes().get(frames) {
+            let found = measure(mesh);
+            assert_eq!((found.components, count_crossings(mesh)), (1, 0));
+            assert!(mesh.positions.iter().all(|p| p.is_finite()));
+        }
+    }
+    Ok(tracker.meshes().len())
+}
+
+#[test]
+fn whatever_is_tracked_stays_a_surface_of_one_piece() {
+    let all = seeds(20);
+    let (mut tracked, whole) = (0, all == (0..20));
+    for seed in all {
+        let named = Named::new(seed);
+        match track(random_options(&mut Random(seed))) {
+            Ok(frames) => tracked += usize::from(frames > 1),
+            Err(MethodError::InvalidArgument { .. }) => {}
+            Err(other) => panic!("{other}"),
+        }
+        std::mem::drop(named);
+    }
+    assert!(!whole || tracked > 3, "{tracked}");
+}
