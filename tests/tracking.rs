@@ -335,6 +335,17 @@ fn what_cannot_be_tracked_is_refused_by_name() {
     for bounds in [[DVec3::ONE, DVec3::ZERO], [DVec3::NAN, DVec3::ONE]] {
         assert_eq!(refused(TrackingOptions { bounds: Some(Bounds::World(bounds)), ..good() }).0, "box");
     }
+    let huge = Volume::new(VolumeInit {
+        voxels: Voxels::U8(vec![0; 280 * 280 * 280 * 2]),
+        dims: [280, 280, 280, 2],
+        affine: DAffine3::IDENTITY,
+        slope: 1.0,
+        intercept: 0.0,
+        frame_seconds: 0.0,
+        space: Space::Ras,
+    });
+    let (parameter, problem) = refused(TrackingOptions { volume: huge.unwrap(), bounds: None, ..good() });
+    assert!(parameter == "box" && problem.contains("a smaller box"), "{problem}");
     for voxels in [[[0; 3], [36; 3]], [[9; 3], [8; 3]], [[0; 3], [3, 3, 30]]] {
         assert_eq!(refused(TrackingOptions { bounds: Some(Bounds::Voxels(voxels)), ..good() }).0, "voxels");
     }

@@ -21,6 +21,12 @@ const ROOM: usize = 2;
 /// A surface needs so many voxels along two axes at least; a single slice may be followed.
 const LEAST_VOXELS: usize = 5;
 
+/// What is kept for a voxel at most, bytes: weights around two frames, and in each frame its intensity and its level.
+const BYTES: [u64; 2] = [140, 2];
+
+/// The most for a whole region: what a browser gives to one page, less the volume.
+const MOST_BYTES: u64 = 3_000_000_000;
+
 /// Cosine of the angle by which voxel axes may be off the right one: rounding in headers stays far below.
 const ORTHOGONAL: f64 = 1e-3;
 
@@ -66,6 +72,7 @@ impl Region {
         let [low, high] = ends_of(volume, bounds)?;
         let inner = [[ROOM; 3], [0, 1, 2].map(|k| high[k] - low[k] + ROOM)];
         let dims = inner[1].map(|last| last + ROOM + 1);
+        check_size(dims, volume.frames())?;
         let first = volume.affine().transform_point3(DVec3::from(low.map(|i| i as f64 - ROOM as f64)));
         let to_world = DAffine3::from_mat3_translation(directions, first);
         let mut region = Self {
@@ -194,6 +201,21 @@ impl Region {
         // The median of |a − b| for two of one normal distribution, in its deviation.
         median.max(0.0) / (0.674_49 * std::f64::consts::SQRT_2)
     }
+}
+
+fn check_size(dims: [usize; 3], frames: usize) -> Result<(), MethodError> {
+    let voxels = dims.iter().fold(1u64, |product, &n| product.saturating_mul(n as u64));
+    let bytes = voxels.saturating_mul(BYTES[0] + BYTES[1] * frames as u64);
+    if bytes <= MOST_BYTES {
+        return Ok(());
+    }
+    let problem = format!(
+        "{dims:?} voxels, with those around, in {frames} frames need {} MB and {} are accepted; a smaller box, or means of \
+         several voxels (binned), need less",
+        bytes / 1_000_000,
+        MOST_BYTES / 1_000_000
+    );
+    Err(MethodError::invalid("box", problem))
 }
 
 fn bin_of(value: f32) -> usize {
