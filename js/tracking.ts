@@ -63,7 +63,7 @@ export interface FrameFacts {
   held: number;
   /** Vertices that had no boundary: drawn together where a crevice has closed, grown where one has opened, else smoothed. */
   retracted: number;
-  /** Steps of the projections, in the mean. */
+  /** Steps of a vertex's projections, onto space-time and onto the frame, in the mean. */
   steps: number;
   /** How far the last projection moved the vertices, in the mean, world units. */
   correction: number;

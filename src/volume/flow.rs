@@ -12,8 +12,11 @@ const RADIUS: usize = 5;
 /// Rows that are summed up along at once.
 const TOGETHER: usize = 4;
 
-/// Steps on each level, from the coarsest on: those on the finest take most of the time and change least.
-const STEPS: [usize; LEVELS] = [4, 4, 2];
+/// Steps on each level.
+const STEPS: usize = 4;
+
+/// Steps on the finest where there are coarser ones: they take most of the time and change least.
+const LAST_STEPS: usize = 2;
 
 /// No step is longer than this, in pixels of its level: further away the gradients are those of something else.
 const LONGEST: f32 = 1.0;
@@ -191,13 +194,11 @@ pub(super) fn symmetric_flow(a: &Picture, b: &Picture) -> Result<Flow, VolumeErr
     let (coarsest, _) = &levels[levels.len() - 1];
     let still = Picture::flat(coarsest.width, coarsest.height, 0.0)?;
     let mut flow = Flow { x: still.clone(), y: still };
-    // Small pictures begin further down.
-    let steps = &STEPS[LEVELS - levels.len()..];
-    for ((a, b), &steps) in levels.iter().rev().zip(steps) {
+    for (level, (a, b)) in levels.iter().enumerate().rev() {
         if flow.x.width != a.width || flow.x.height != a.height {
             flow = Flow { x: flow.x.doubled(a.width, a.height)?, y: flow.y.doubled(a.width, a.height)? };
         }
-        for _ in 0..steps {
+        for _ in 0..if level == 0 && levels.len() > 1 { LAST_STEPS } else { STEPS } {
             improve(a, b, &mut flow)?;
         }
     }

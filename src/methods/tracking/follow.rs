@@ -44,7 +44,7 @@ pub struct FrameFacts {
     pub held: usize,
     /// Vertices that had no boundary: drawn together where a crevice has closed, grown where one has opened, else smoothed.
     pub retracted: usize,
-    /// Steps of the projections, in the mean.
+    /// Steps of a vertex's projections, onto space-time and onto the frame, in the mean.
     pub steps: f64,
     /// How far the last projection moved the vertices, in the mean, world units.
     pub correction: f64,
@@ -200,7 +200,8 @@ impl Follower {
         facts.rejected += rejected.len();
         if vertices.len() == mesh.vertex_count() {
             let count = vertices.len().max(1) as f64;
-            (facts.steps, facts.correction) = (steps as f64 / count, sum / count);
+            facts.steps += steps as f64 / count;
+            facts.correction = sum / count;
         }
         let filled = filled(mesh, &ways, &rejected);
         facts.held += self.carry(mesh, filled);
