@@ -108,6 +108,8 @@ fn track(cine: &Cine) {
         let truth = cine.truth(frame as f64, 0.8);
         let (a, b) = (measure(mesh), measure(&truth));
         let off = surface_distance(mesh, &truth).unwrap();
+        let crossings = count_crossings(mesh);
+        let folds = 100.0 * facts.folded as f64 / facts.triangles as f64;
         println!(
             "{frame} {:.0} ms {:?}\n   volume {:.2} of {:.2} ({:+.1} %), area {:+.1} %, mean {:.2}, p95 {:.2}, max {:.1}, folds {:.2} %, chi {}, crossings {}",
             took * 1e3,
@@ -119,15 +121,15 @@ fn track(cine: &Cine) {
             off.mean,
             off.p95,
             off.hausdorff,
-            100.0 * facts.folded as f64 / facts.triangles as f64,
+            folds,
             a.euler,
-            count_crossings(mesh)
+            crossings
         );
         all.mean = all.mean.max(off.mean);
         all.p95 = all.p95.max(off.p95);
-        all.folds = all.folds.max(100.0 * facts.folded as f64 / facts.triangles as f64);
+        all.folds = all.folds.max(folds);
         all.areas.push(100.0 * (a.area / b.area - 1.0));
-        all.crossings += count_crossings(mesh);
+        all.crossings += crossings;
         all.steps += facts.steps / tracker.frames() as f64;
         all.volumes.push([a.volume, b.volume]);
         all.times.push(took);

@@ -165,7 +165,7 @@ fn running_sums<const R: usize>(rows: &[f32], out: &mut [f32]) {
 /// A quarter of the difference between the neighbours of each, the border replicated.
 fn slopes_along(row: &[f32], out: &mut [f32]) {
     let last = row.len() - 1;
-    for (slope, pair) in out.iter_mut().skip(1).zip(row.windows(3)) {
+    for (slope, pair) in out[1..].iter_mut().zip(row.windows(3)) {
         *slope = 0.25 * (pair[2] - pair[0]);
     }
     out[0] = 0.25 * (row[last.min(1)] - row[0]);
@@ -235,9 +235,9 @@ impl Normal {
         let (width, height) = (before.width, before.height);
         let empty = || Picture::flat(width, height, 0.0);
         let [mut xx, mut xy, mut yy, mut xd, mut yd] = [empty()?, empty()?, empty()?, empty()?, empty()?];
-        let sums = before.values.iter().zip(&after.values).map(|(a, b)| a + b);
-        let both = Picture { width, height, values: sums.collect() };
-        let row = |y: usize| &both.values[y * width..][..width];
+        let mut both = reserve(before.values.len())?;
+        both.extend(before.values.iter().zip(&after.values).map(|(a, b)| a + b));
+        let row = |y: usize| &both[y * width..][..width];
         let mut slopes = vec![0.0; width];
         for y in 0..height {
             // Of the mean of both pictures, over two pixels.

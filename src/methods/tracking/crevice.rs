@@ -57,8 +57,10 @@ impl Follower {
         }
         // They have come near points of the boundary.
         let grown: Vec<VertexId> = grown.into_iter().filter(|&v| mesh.is_live(v)).collect();
-        let still = vec![Vec3::ZERO; mesh.slots()];
-        self.project(mesh, &grown, &still, going, Onto::Frame, facts);
+        if !grown.is_empty() {
+            let still = vec![Vec3::ZERO; mesh.slots()];
+            self.project(mesh, &grown, &still, going, Onto::Frame, facts);
+        }
         changes
     }
 

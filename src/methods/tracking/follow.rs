@@ -122,10 +122,9 @@ impl Follower {
             predicted = vec![Vec3::ZERO; mesh.slots()];
         }
         self.unbend(mesh, going, &mut facts);
-        self.unfold(mesh);
+        facts.folded = self.unfold(mesh);
         let measured = measure(&mesh.to_triangles());
         (facts.volume, facts.area, facts.triangles) = (measured.volume, measured.area, measured.triangles);
-        facts.folded = folded(mesh).len();
         (changes, facts)
     }
 
@@ -138,11 +137,9 @@ impl Follower {
         facts: &mut FrameFacts,
     ) -> Changes {
         let mut changes = Changes::default();
-        let all: Vec<VertexId> = mesh.vertices().collect();
-        self.project(mesh, &all, &ahead, going, Onto::SpaceTime, facts);
+        self.project_all(mesh, &ahead, going, Onto::SpaceTime, facts);
         changes += restructure(mesh, self.bounds, &mut self.guard);
-        let all: Vec<VertexId> = mesh.vertices().collect();
-        self.project(mesh, &all, &spacing(mesh), going, Onto::Frame, facts);
+        self.project_all(mesh, &spacing(mesh), going, Onto::Frame, facts);
         changes += self.retract(mesh, going, facts);
         changes
     }
@@ -162,18 +159,41 @@ impl Follower {
         facts.held += self.carry(mesh, ways);
     }
 
-    /// Where the surface is folded, vertices go to the middle of their neighbours.
-    fn unfold(&mut self, mesh: &mut Mesh) {
+    /// Where the surface is folded, vertices go to the middle of their neighbours. Returns how many triangles stay folded.
+    fn unfold(&mut self, mesh: &mut Mesh) -> usize {
+        let mut folds = folded(mesh);
         for _ in 0..UNFOLDINGS {
+            if folds.is_empty() {
+                break;
+            }
             let mut ways = vec![Vec3::ZERO; mesh.slots()];
-            for v in folded(mesh).into_iter().flatten() {
+            for v in folds.into_iter().flatten() {
                 ways[v.index()] = middle(mesh, v) - mesh.position(v);
             }
             self.carry(mesh, ways);
+            folds = folded(mesh);
         }
+        folds.len()
     }
 
-    /// Vertices onto the surface, from where they are when they have gone `ahead`: one move, which is looked at once.
+    /// All vertices onto the surface, and how far that was.
+    fn project_all(
+        &mut self,
+        mesh: &mut Mesh,
+        ahead: &[Vec3],
+        going: &Going,
+        onto: Onto,
+        facts: &mut FrameFacts,
+    ) {
+        let all: Vec<VertexId> = mesh.vertices().collect();
+        let (steps, way) = self.project(mesh, &all, ahead, going, onto, facts);
+        let count = all.len().max(1) as f64;
+        facts.steps += steps as f64 / count;
+        facts.correction = way / count;
+    }
+
+    /// Vertices onto the surface, from where they are when they have gone `ahead`: one move, which is looked at once. Returns
+    /// the steps and the way that it took them from there, all together.
     pub(super) fn project(
         &mut self,
         mesh: &mut Mesh,
@@ -182,7 +202,7 @@ impl Follower {
         going: &Going,
         onto: Onto,
         facts: &mut FrameFacts,
-    ) {
+    ) -> (usize, f64) {
         let mut ways: Vec<Option<Vec3>> = vec![None; mesh.slots()];
         let mut rejected = Vec::new();
         let (mut steps, mut sum) = (0, 0.0);
@@ -198,13 +218,9 @@ impl Follower {
             sum += f64::from(to.distance(from));
         }
         facts.rejected += rejected.len();
-        if vertices.len() == mesh.vertex_count() {
-            let count = vertices.len().max(1) as f64;
-            facts.steps += steps as f64 / count;
-            facts.correction = sum / count;
-        }
         let filled = filled(mesh, &ways, &rejected);
         facts.held += self.carry(mesh, filled);
+        (steps, sum)
     }
 
     /// How many were held back.

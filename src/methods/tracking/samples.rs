@@ -188,7 +188,7 @@ impl Field {
                 }
             }
         }
-        if columns.used {
+        if columns.plane.used {
             columns.add_to(sums, x);
         }
     }
@@ -293,13 +293,12 @@ struct Columns<const N: usize> {
     high: [Lanes<N>; 3],
     /// Times z².
     higher: Lanes<N>,
-    used: bool,
 }
 
 impl<const N: usize> Default for Columns<N> {
     fn default() -> Self {
         let none = [f32x8::ZERO; N];
-        Self { plane: Plane::default(), high: [none; 3], higher: none, used: false }
+        Self { plane: Plane::default(), high: [none; 3], higher: none }
     }
 }
 
@@ -310,7 +309,7 @@ impl<const N: usize> Columns<N> {
         self.plane.plain.iter_mut().zip(&plane.plain).for_each(|(to, lanes)| add(to, lanes, theta));
         self.high.iter_mut().zip([one, y]).for_each(|(to, lanes)| add(to, lanes, theta * dz));
         add(&mut self.higher, one, theta * dz * dz);
-        self.used = true;
+        self.plane.used = true;
     }
 
     #[inline]
