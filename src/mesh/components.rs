@@ -31,6 +31,28 @@ impl Mesh {
         components
     }
 
+    /// The number of components.
+    pub fn component_count(&self) -> usize {
+        let mut seen = vec![false; self.slots()];
+        let mut stack = Vec::new();
+        let mut count = 0;
+        for v in self.vertices() {
+            if std::mem::replace(&mut seen[v.index()], true) {
+                continue;
+            }
+            count += 1;
+            stack.push(v);
+            while let Some(u) = stack.pop() {
+                for &w in self.ring(u).as_slice() {
+                    if !std::mem::replace(&mut seen[w.index()], true) {
+                        stack.push(w);
+                    }
+                }
+            }
+        }
+        count
+    }
+
     /// Everything connected with `v`, breadth first.
     fn flood(&self, v: VertexId, seen: &mut [bool]) -> Vec<VertexId> {
         let mut found = vec![v];

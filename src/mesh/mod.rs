@@ -232,10 +232,14 @@ impl Mesh {
         self.attributes.scalar_mut(key)
     }
 
-    /// The positions to be moved, and a vector attribute to be written with them.
-    pub fn positions_and_vector_mut(&mut self, key: VectorKey) -> (&mut [Vec3], &mut [Vec3]) {
-        self.geometry_version = self.geometry_version.wrapping_add(1);
-        (&mut self.positions, self.attributes.vector_mut(key))
+    /// The positions, and a vector attribute to be written with them.
+    pub fn positions_and_vector_mut(&mut self, key: VectorKey) -> (&[Vec3], &mut [Vec3]) {
+        (&self.positions, self.attributes.vector_mut(key))
+    }
+
+    /// The rings, and a scalar attribute to be written with them.
+    pub fn rings_and_scalar_mut(&mut self, key: ScalarKey) -> (&[Ring], &mut [f32]) {
+        (&self.rings, self.attributes.scalar_mut(key))
     }
 
     /// The sum of the cross products of the triangles around `v`: twice their area, along the outward normal.

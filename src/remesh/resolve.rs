@@ -147,9 +147,21 @@ impl Resolver {
 
     /// Moves the vertices as [`Embedding::carry`] does.
     pub fn carry(&mut self, mesh: &mut Mesh, sampling: Sampling, ways: &mut [Vec3]) -> Vec<(VertexId, f32)> {
+        let all: Vec<VertexId> = mesh.vertices().collect();
+        self.carry_some(mesh, sampling, &all, ways)
+    }
+
+    /// Moves some of the vertices as [`Embedding::carry_some`] does.
+    pub fn carry_some(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        moving: &[VertexId],
+        ways: &mut [Vec3],
+    ) -> Vec<(VertexId, f32)> {
         self.small.find(mesh);
         self.embedding.follow_with(mesh, sampling.longest());
-        let held = self.embedding.carry(mesh, ways);
+        let held = self.embedding.carry_some(mesh, moving, ways);
         self.stuck.clear();
         self.stuck.extend(held.iter().filter(|(_, share)| *share == 0.0).map(|(v, _)| *v));
         held

@@ -23,6 +23,9 @@ const WIDER: f64 = 1.001;
 /// column is finer than the steps of single precision, unless its stars are smaller than them.
 const LAST: f64 = 1_073_741_824.0;
 
+/// Columns without a star for each star, up to which they are counted one by one.
+const MOST_EMPTY: usize = 8;
+
 /// Bits for each column around a large star, in the filter of small ones: fewer let more of the others through.
 const BITS: usize = 8;
 
@@ -97,6 +100,37 @@ fn floor(x: f64) -> i32 {
     whole - i32::from(f64::from(whole) > x)
 }
 
+/// The indices of `places` in their order. Where they lie as close as the columns of a mesh, they are counted; sorting takes
+/// several times as long.
+fn in_order_of_columns(places: &[[i32; 2]]) -> Vec<u32> {
+    let extent = |axis: usize| {
+        let of_axis = || places.iter().map(|place| i64::from(place[axis]));
+        let (low, high) = (of_axis().min().unwrap_or(0), of_axis().max().unwrap_or(0));
+        (low, high - low + 1)
+    };
+    let ([x, wide], [y, deep]) = (extent(0).into(), extent(1).into());
+    if wide * deep > 64 + (MOST_EMPTY * places.len()) as i64 {
+        let mut order: Vec<u32> = (0..places.len() as u32).collect();
+        order.sort_unstable_by_key(|&i| places[i as usize]);
+        return order;
+    }
+    let number = |place: &[i32; 2]| ((i64::from(place[0]) - x) * deep + i64::from(place[1]) - y) as usize;
+    let mut ends = vec![0u32; (wide * deep) as usize];
+    places.iter().for_each(|place| ends[number(place)] += 1);
+    let mut end = 0;
+    for count in &mut ends {
+        end += *count;
+        *count = end;
+    }
+    let mut order = vec![0; places.len()];
+    for (i, place) in places.iter().enumerate().rev() {
+        let slot = &mut ends[number(place)];
+        *slot -= 1;
+        order[*slot as usize] = i as u32;
+    }
+    order
+}
+
 /// Stars sorted by column, and by height in each.
 struct Columns {
     stars: Vec<Star>,
@@ -107,24 +141,21 @@ struct Columns {
 impl Columns {
     fn new<'a>(width: Width, stars: impl Iterator<Item = &'a Star>) -> Self {
         let stars: Vec<&Star> = stars.collect();
-        let mut order: Vec<u128> = (0u32..)
-            .zip(&stars)
-            .map(|(i, star)| {
-                let [x, y] = width.column(star).map(|k| u128::from(ascending(k)));
-                x << 96 | y << 64 | u128::from(ascending(height(star.position.z))) << 32 | u128::from(i)
-            })
-            .collect();
-        order.sort_unstable();
+        let places: Vec<[i32; 2]> = stars.iter().map(|star| width.column(star)).collect();
+        let mut order = in_order_of_columns(&places);
+        for column in order.chunk_by_mut(|&a, &b| places[a as usize] == places[b as usize]) {
+            column.sort_unstable_by_key(|&i| (height(stars[i as usize].position.z), i));
+        }
         let mut columns: Vec<([i32; 2], usize)> = Vec::new();
         let mut before = None;
-        for (k, key) in order.iter().enumerate() {
-            let column = key >> 64;
-            if before.replace(column) != Some(column) {
-                columns.push(([(column >> 32) as u32, column as u32].map(|k| (k ^ 1 << 31) as i32), k));
+        for (k, &i) in order.iter().enumerate() {
+            let place = places[i as usize];
+            if before.replace(place) != Some(place) {
+                columns.push((place, k));
             }
         }
         columns.push(([i32::MAX; 2], order.len()));
-        Self { stars: order.iter().map(|&key| *stars[key as u32 as usize]).collect(), columns }
+        Self { stars: order.iter().map(|&i| *stars[i as usize]).collect(), columns }
     }
 
     fn count(&self) -> usize {
@@ -208,12 +239,6 @@ fn meet(stars: &[Star], others: &[Star], reach: f32, test: &mut impl FnMut(&Star
 fn height(z: f32) -> i32 {
     let bits = z.to_bits() as i32;
     bits ^ ((bits >> 31) as u32 >> 1) as i32
-}
-
-/// An integer of the same order that is not negative.
-#[inline]
-fn ascending(k: i32) -> u32 {
-    k as u32 ^ 1 << 31
 }
 
 /// Tells most columns that are not beside any of some.

@@ -1,29 +1,28 @@
 //! Where the mesh is in doubt, looked at for crossings and for room to move.
 
 use super::star::{
-    crossings_around, crossings_between, divided_between, divided_through, flatness, longest_edge, spread_out,
+    crossings_around, crossings_between, divided_as_sheets, divided_at, divided_between, divided_through,
+    divided_upright, flatness, spread_out,
 };
-use super::{Embedding, FREEDOM, NEAREST_CORNER, PIERCING};
-use crate::math::Bounds;
+use super::{Embedding, FREEDOM};
 use crate::mesh::{Mesh, VertexId};
-use crate::spatial::{Nearness, Star, near_pairs};
 
 /// What a vertex may move between two looks, its freedom before and its freedom after some other vertex was looked at.
 const TWICE: f32 = 2.0;
-
-/// Where at least one vertex of so many is looked across from, the whole mesh is swept. With more, sweeps over what nobody asked
-/// for take longer than the search around those that are in doubt; with less, that search does.
-const MANY: usize = 8;
 
 /// The pairs of triangles that a vertex is looked at for: both at the vertex; one at a neighbour of it; one at a near
 /// vertex that is none.
 const AROUND: u8 = 1;
 const ALONG: u8 = 2;
-const ACROSS: u8 = 4;
-pub(super) const ALL: u8 = AROUND | ALONG | ACROSS;
+pub(super) const ACROSS: u8 = 4;
+pub(super) const PAIRS: u8 = AROUND | ALONG | ACROSS;
+
+/// Whether a vertex looks for the others that are near.
+pub(super) const SEARCH: u8 = 8;
+pub(super) const ALL: u8 = PAIRS | SEARCH;
 
 /// Whether a vertex that is no neighbour may be within the contact distance.
-const CLOSE: u8 = 8;
+pub(super) const CLOSE: u8 = 16;
 
 /// What is to be thought of a vertex that an edit made or changed.
 pub(super) const UNKNOWN: u8 = ALL | CLOSE;
@@ -41,21 +40,9 @@ impl Embedding {
     /// cross another, in order.
     pub(super) fn look(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         let doubtful = std::mem::take(&mut self.doubtful);
-        let across = doubtful.iter().filter(|v| self.doubts[v.index()] & ACROSS != 0).count();
-        let many = MANY * across >= mesh.vertex_count();
-        if many {
-            self.grid.empty_cells();
-        } else {
-            self.grid.fill_cells();
-        }
-        let is_entered = self.entered == Some(mesh.geometry_version());
+        self.find_near(mesh, &doubtful);
         for &v in &doubtful {
-            let doubts = self.doubts[v.index()];
-            if doubts == ALL && !is_entered {
-                self.grid.set(v, mesh.position(v), longest_edge(mesh, v));
-            }
-            let known = if doubts & ACROSS != 0 { doubts | CLOSE } else { doubts };
-            self.tight[v.index()] &= !known;
+            self.tight[v.index()] &= !self.doubts[v.index()];
         }
         let mut crossing = Vec::new();
         for &v in &doubtful {
@@ -66,11 +53,9 @@ impl Embedding {
             if doubts & ALONG != 0 {
                 self.look_along(mesh, v, &mut crossing);
             }
-        }
-        if many {
-            self.sweep_across(mesh, &mut crossing);
-        } else {
-            self.look_across(mesh, &doubtful, &mut crossing);
+            if doubts & ACROSS != 0 {
+                self.look_across(mesh, v, &mut crossing);
+            }
         }
         doubtful.iter().for_each(|v| self.doubts[v.index()] = 0);
         self.doubtful = doubtful;
@@ -81,7 +66,7 @@ impl Embedding {
     }
 
     fn look_around(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
-        let room = flatness(mesh, v, self.grid.longest(v));
+        let room = flatness(mesh, v, self.seen[v.index()].1);
         if !self.settle(room, AROUND, [v, v]) {
             crossings_around(mesh, v, crossing);
         }
@@ -107,92 +92,39 @@ impl Embedding {
         }
     }
 
-    /// Looks across from all doubtful vertices, in one sweep over the mesh.
-    fn sweep_across(&mut self, mesh: &Mesh, crossing: &mut Vec<VertexId>) {
-        let nearness = self.nearness();
-        let stars = mesh.vertices().map(|v| self.grid.star(v)).collect();
-        near_pairs(stars, nearness, |a, b| {
-            if (self.doubts[a.vertex.index()] | self.doubts[b.vertex.index()]) & ACROSS != 0 {
-                let square = a.position.distance_squared(b.position);
-                self.look_at_pair(mesh, [a.vertex, b.vertex], square, nearness, crossing);
+    fn look_across(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
+        for k in 0..self.near[v.index()].len() {
+            let w = self.near[v.index()][k];
+            // Since they were found to be near, edits may have changed the one or the other.
+            if self.is_left_to(w, v, ACROSS) || !mesh.is_live(w) || w == v || mesh.ring(v).contains(w) {
+                continue;
             }
-        });
-    }
-
-    /// Looks across from all doubtful vertices, those of a cell together.
-    fn look_across(&mut self, mesh: &Mesh, doubtful: &[VertexId], crossing: &mut Vec<VertexId>) {
-        let nearness = self.nearness();
-        let in_doubt = doubtful.iter().filter(|v| self.doubts[v.index()] & ACROSS != 0);
-        let mut in_doubt: Vec<(u32, VertexId)> = in_doubt.map(|&v| (self.grid.cell_name(v), v)).collect();
-        in_doubt.sort_unstable();
-        let mut near = Vec::new();
-        for cell in in_doubt.chunk_by(|a, b| a.0 == b.0) {
-            let mut bounds = Bounds::EMPTY;
-            let mut longest = 0.0f32;
-            for &(_, v) in cell {
-                bounds = bounds.joined(&Bounds::of(&[mesh.position(v)]));
-                longest = longest.max(self.grid.longest(v));
-            }
-            self.grid.near_stars(&bounds, longest, nearness, &mut near);
-            for &(_, v) in cell {
-                self.look_across_to(mesh, v, nearness, &near, crossing);
+            let room = self.room_across(mesh, [v, w]);
+            if !self.settle(room, ACROSS, [v, w]) {
+                crossings_between(mesh, [v, w], crossing);
             }
         }
     }
 
-    /// Where a pair can be that crosses or is in contact before one of both has used up its freedom.
-    fn nearness(&self) -> Nearness {
-        // Positions that are known are one freedom old, longest edges two; then all may change by as much again.
-        let freedom = FREEDOM * self.edge;
-        Nearness {
-            least: NEAREST_CORNER * self.edge + 4.0 * freedom,
-            margin: 4.0 * freedom * (1.0 + PIERCING),
-            share: PIERCING,
-        }
-    }
-
-    fn look_across_to(
-        &mut self,
-        mesh: &Mesh,
-        v: VertexId,
-        nearness: Nearness,
-        near: &[Star],
-        crossing: &mut Vec<VertexId>,
-    ) {
-        let (p, own) = (mesh.position(v), self.grid.longest(v));
-        for star in near {
-            let square = star.position.distance_squared(p);
-            let reach = nearness.between(own, star.longest);
-            let w = star.vertex;
-            if square <= reach * reach && w != v && !self.is_left_to(w, v, ACROSS) {
-                self.look_at_pair(mesh, [v, w], square, nearness, crossing);
-            }
-        }
-    }
-
-    /// Looks at two vertices that may be neighbours, and are near each other at this squared distance.
-    fn look_at_pair(
-        &mut self,
-        mesh: &Mesh,
-        [v, w]: [VertexId; 2],
-        square: f32,
-        nearness: Nearness,
-        crossing: &mut Vec<VertexId>,
-    ) {
-        if mesh.ring(v).contains(w) {
-            return;
-        }
-        if square < nearness.least * nearness.least {
-            self.tight[v.index()] |= CLOSE;
-            self.tight[w.index()] |= CLOSE;
-        }
+    /// By how much the vertices around two that are no neighbours may move; not positive where it must be worked out.
+    fn room_across(&self, mesh: &Mesh, [v, w]: [VertexId; 2]) -> f32 {
         let longest = self.longest_of(v, w);
-        let room = match common_edge(mesh, v, w) {
-            Some(edge) => divided_through(mesh, [v, w], edge, longest),
-            None => divided_between(mesh, [v, w], longest),
+        let or_else = |room: f32, other: &dyn Fn() -> f32| {
+            let other = if self.suffices(room) { room } else { other() };
+            if other > room { other } else { room }
         };
-        if !self.settle(room, ACROSS, [v, w]) {
-            crossings_between(mesh, [v, w], crossing);
+        if let Some(edge @ [a, b]) = common_edge(mesh, v, w) {
+            return or_else(divided_through(mesh, [v, w], edge, longest), &|| {
+                divided_upright(mesh, [v, w], edge, mesh.area_normal(a) + mesh.area_normal(b), longest)
+            });
+        }
+        match *mesh.common_neighbours(v, w) {
+            [] => {
+                or_else(divided_between(mesh, [v, w], longest), &|| divided_as_sheets(mesh, [v, w], longest))
+            }
+            [c] => divided_at(mesh, [v, w], c, longest),
+            [c, d] => divided_through(mesh, [v, w], [c, d], longest),
+            _ => 0.0,
         }
     }
 
@@ -210,32 +142,12 @@ impl Embedding {
     }
 
     /// Whether a pair at `w` and `v` is looked at from `w`, too, and it is the turn of `w`.
-    fn is_left_to(&self, w: VertexId, v: VertexId, pairs: u8) -> bool {
+    pub(super) fn is_left_to(&self, w: VertexId, v: VertexId, pairs: u8) -> bool {
         w < v && self.doubts[w.index()] & pairs != 0
     }
 
-    /// Whether [`Self::company`] of `v` may find any.
-    pub fn may_have_company(&self, v: VertexId) -> bool {
-        self.tight[v.index()] & CLOSE != 0
-    }
-
-    /// Calls `found` with every vertex that is no neighbour of `v` and nearer than `distance`, which is at most the contact
-    /// distance of the sampling with this ordinary edge; and with its squared distance.
-    pub fn company(&self, mesh: &Mesh, v: VertexId, distance: f32, mut found: impl FnMut(VertexId, f32)) {
-        if !self.may_have_company(v) {
-            return;
-        }
-        let (p, ring) = (mesh.position(v), mesh.ring(v));
-        self.grid.near_point(p, distance, |w| {
-            let square = mesh.position(w).distance_squared(p);
-            if square < distance * distance && w != v && !ring.contains(w) {
-                found(w, square);
-            }
-        });
-    }
-
     fn longest_of(&self, v: VertexId, w: VertexId) -> f32 {
-        let (a, b) = (self.grid.longest(v), self.grid.longest(w));
+        let (a, b) = (self.seen[v.index()].1, self.seen[w.index()].1);
         if a > b { a } else { b }
     }
 }
@@ -335,15 +247,13 @@ mod tests {
             doubtful.iter().for_each(|&v| embedding.doubt(v, ALL));
             embedding.tight.fill(0);
             let (mut swept, mut searched) = (embedding.clone(), embedding);
-            let [mut by_sweep, mut by_search] = [Vec::new(), Vec::new()];
-            swept.sweep_across(&mesh, &mut by_sweep);
+            swept.sweep(&mesh);
             searched.grid.fill_cells();
-            searched.look_across(&mesh, &doubtful, &mut by_search);
-            for found in [&mut by_sweep, &mut by_search] {
-                found.sort_unstable();
-                found.dedup();
+            searched.search(&mesh, &doubtful);
+            for v in mesh.vertices() {
+                [&mut swept, &mut searched].into_iter().for_each(|e| e.near[v.index()].sort_unstable());
             }
-            assert_eq!(by_sweep, by_search, "seed {seed}");
+            assert_eq!(swept.near, searched.near, "seed {seed}");
             assert_eq!(swept.tight, searched.tight, "seed {seed}");
         }
     }

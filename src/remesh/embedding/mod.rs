@@ -12,13 +12,16 @@
 
 mod look;
 mod motion;
+mod near;
 mod patch;
 mod refine;
 mod star;
 
+use crate::math::Vec3;
 use crate::mesh::{EditError, Mesh, VertexId};
 use crate::spatial::StarGrid;
 use look::UNKNOWN;
+use smallvec::SmallVec;
 use star::longest_edge;
 
 /// 1/√3, rounded up: the distance of a point of a triangle from its nearest corner, in the triangle's longest edge.
@@ -31,6 +34,10 @@ const PIERCING: f32 = 0.763_763;
 /// fewer vertices have the room for it; with less, they are looked at more often.
 const FREEDOM: f32 = 0.008;
 
+/// How far it may move from where it is in the grid before it looks again for what is near, in the ordinary edge. With more,
+/// more is near; with less, they look more often. Few vertices of an ordinary mesh have anything near.
+const SEARCH_FREEDOM: f32 = 0.03;
+
 /// Keeps one mesh embedded.
 ///
 /// A vertex that was looked at and found to have room around it is free: it is not looked at again before it has moved by
@@ -40,8 +47,14 @@ pub struct Embedding {
     grid: StarGrid,
     /// An edge that is longer than most of the mesh.
     edge: f32,
+    /// By vertex, where it was looked at, and its longest edge then.
+    seen: Vec<(Vec3, f32)>,
+    /// By vertex, the others that were near when it or they searched for them.
+    near: Vec<SmallVec<[VertexId; 4]>>,
     /// By vertex, the pairs of triangles it has no room for to move freely, and must be looked at for after every move.
     tight: Vec<u8>,
+    /// Vertices that edits made or changed since the last move: those near them do not know yet.
+    fresh: Vec<VertexId>,
     /// By vertex, the pairs it is to be looked at for now, and the vertices that have any.
     doubts: Vec<u8>,
     doubtful: Vec<VertexId>,
@@ -53,6 +66,8 @@ pub struct Embedding {
     marks: Vec<u32>,
     newest: u32,
     found: Vec<VertexId>,
+    /// Where vertices were before they moved.
+    from: Vec<Vec3>,
     effort: u64,
 }
 
@@ -78,10 +93,15 @@ impl Embedding {
         if self.version == Some(mesh.geometry_version()) {
             return;
         }
-        self.grid = StarGrid::new(self.edge, FREEDOM * self.edge, mesh.slots());
+        self.grid = StarGrid::new(self.edge, SEARCH_FREEDOM * self.edge, mesh.slots());
         self.tight = vec![UNKNOWN; mesh.slots()];
+        self.seen.resize(mesh.slots(), (Vec3::ZERO, 0.0));
+        self.near.clear();
+        self.near.resize(mesh.slots(), SmallVec::new());
+        self.fresh.clear();
         for v in mesh.vertices() {
-            self.grid.set(v, mesh.position(v), longest_edge(mesh, v));
+            self.see(mesh, v);
+            self.enter(v);
         }
         self.version = Some(mesh.geometry_version());
         self.entered = self.version;
@@ -135,13 +155,28 @@ impl Embedding {
         count
     }
 
+    /// Notes where `v` is now, and its longest edge.
+    fn see(&mut self, mesh: &Mesh, v: VertexId) {
+        self.seen[v.index()] = (mesh.position(v), longest_edge(mesh, v));
+    }
+
+    /// Enters `v` in the grid as it was seen.
+    fn enter(&mut self, v: VertexId) {
+        let (position, longest) = self.seen[v.index()];
+        self.grid.set(v, position, longest);
+    }
+
     /// Takes the changes since [`Mesh::begin`] into the grid.
     fn follow_changes(&mut self, mesh: &Mesh, changed: &[[VertexId; 3]]) {
         self.tight.resize(mesh.slots(), UNKNOWN);
+        self.seen.resize(mesh.slots(), (Vec3::ZERO, 0.0));
+        self.near.resize(mesh.slots(), SmallVec::new());
         for v in mesh.touched() {
             self.tight[v.index()] = UNKNOWN;
+            self.fresh.push(v);
             if mesh.is_live(v) {
-                self.grid.set(v, mesh.position(v), longest_edge(mesh, v));
+                self.see(mesh, v);
+                self.enter(v);
             } else {
                 self.grid.remove(v);
             }
@@ -150,9 +185,14 @@ impl Embedding {
         for names in changed {
             let [a, b, c] = names.map(|v| mesh.position(v));
             let square = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
+            let longest = square.sqrt();
             for &v in names {
-                self.tight[v.index()] = UNKNOWN;
-                self.grid.stretch(v, square.sqrt());
+                if std::mem::replace(&mut self.tight[v.index()], UNKNOWN) != UNKNOWN {
+                    self.fresh.push(v);
+                }
+                let seen = &mut self.seen[v.index()].1;
+                *seen = if longest > *seen { longest } else { *seen };
+                self.grid.stretch(v, longest);
             }
         }
     }

@@ -7,8 +7,8 @@ use crate::math::{Bounds, Vec3};
 use crate::mesh::{Facet, Mesh, VertexId, facets_cross};
 use smallvec::SmallVec;
 
-/// Valence up to which quick tests of a star are tried.
-const MOST_SPOKES: usize = 16;
+/// Triangles around a vertex for which there is room without a heap allocation.
+const ORDINARY_STAR: usize = 16;
 
 /// What rounding may do to lengths and areas, in the longest edge and its square; a hundred times what it does.
 const ROUNDING: f32 = 1e-4;
@@ -26,55 +26,27 @@ pub(super) fn longest_edge(mesh: &Mesh, v: VertexId) -> f32 {
     square.sqrt()
 }
 
-/// The edges at a vertex, as ways from it.
-struct Spokes {
-    ways: [Vec3; MOST_SPOKES],
-    count: usize,
-}
-
-impl Spokes {
-    /// `None` where there are too many.
-    fn new(mesh: &Mesh, v: VertexId) -> Option<Self> {
-        let ring = mesh.ring(v).as_slice();
-        let centre = mesh.position(v);
-        let mut ways = [Vec3::ZERO; MOST_SPOKES];
-        if ring.len() > MOST_SPOKES {
-            return None;
-        }
-        for (way, &w) in ways.iter_mut().zip(ring) {
-            *way = mesh.position(w) - centre;
-        }
-        Some(Self { ways, count: ring.len() })
+/// Twice the least area that a triangle at `v` shows along a direction, where they turn about it once in all; else nothing.
+fn shown_along(mesh: &Mesh, v: VertexId, direction: Vec3) -> f32 {
+    let ring = mesh.ring(v).as_slice();
+    let [Some(&first), Some(&last)] = [ring.first(), ring.last()] else { return 0.0 };
+    let centre = mesh.position(v);
+    let across = direction.cross(mesh.position(first) - centre);
+    let mut previous = mesh.position(last) - centre;
+    let mut least = f32::INFINITY;
+    // Spokes that turn one way, by less than half a turn each, make a turn each time they come from behind the first one.
+    let (mut turns, mut before) = (0, false);
+    for (k, &w) in ring.iter().enumerate() {
+        let way = mesh.position(w) - centre;
+        least = lower(least, previous.cross(way).dot(direction));
+        let behind = k > 0 && across.dot(way) < 0.0;
+        turns += u32::from(before && !behind);
+        before = behind;
+        previous = way;
     }
-
-    /// Twice the areas of the triangles, along their normals.
-    #[inline]
-    fn areas(&self) -> impl Iterator<Item = Vec3> + '_ {
-        (0..self.count).map(|k| self.ways[k].cross(self.ways[if k + 1 == self.count { 0 } else { k + 1 }]))
-    }
-
-    /// Twice the least area that a triangle shows along a direction, where they turn about it once in all; else nothing.
-    fn shown_along(&self, direction: Vec3) -> f32 {
-        let least = self.areas().fold(f32::INFINITY, |least, area| lower(least, area.dot(direction)));
-        if least > 0.0 && self.go_round_once(direction) { least } else { 0.0 }
-    }
-
-    /// Whether spokes that turn one way about `axis`, by less than half a turn each, make one turn in all.
-    fn go_round_once(&self, axis: Vec3) -> bool {
-        // With fewer than five no second turn is possible.
-        if self.count < 5 {
-            return true;
-        }
-        let across = axis.cross(self.ways[0]);
-        let mut turns = 0;
-        let mut before = false;
-        for way in &self.ways[1..self.count] {
-            let behind = across.dot(*way) < 0.0;
-            turns += u32::from(before && !behind);
-            before = behind;
-        }
-        turns + u32::from(before) == 1
-    }
+    // With fewer than five no second turn is possible.
+    let once = ring.len() < 5 || turns + u32::from(before) == 1;
+    if least > 0.0 && once { least } else { 0.0 }
 }
 
 /// A star that can be seen as a whole from one side has no triangles that cross. Returns by how much every vertex may
@@ -83,9 +55,7 @@ impl Spokes {
 /// Twice the area that a triangle shows along a fixed direction changes by less than 4·f·L + 4·f² < 4.5·f·L, where its
 /// vertices move by f and its edges are no longer than L > 8·f.
 pub(super) fn flatness(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
-    let Some(spokes) = Spokes::new(mesh, v) else { return 0.0 };
-    let normal = spokes.areas().fold(Vec3::ZERO, |sum, area| sum + area).normalize_or_zero();
-    let shown = spokes.shown_along(normal);
+    let shown = shown_along(mesh, v, mesh.area_normal(v).normalize_or_zero());
     lower((shown - ROUNDING * longest * longest) / (4.5 * longest), SMALL * longest)
 }
 
@@ -109,8 +79,7 @@ pub(super) fn spread_out(
 ) -> f32 {
     let at = |w: VertexId| mesh.position(w);
     let normal = (at(v) - at(u)).cross(at(left) - at(right)).normalize_or_zero();
-    let (Some(around_u), Some(around_v)) = (Spokes::new(mesh, u), Spokes::new(mesh, v)) else { return 0.0 };
-    let shown = lower(around_u.shown_along(normal), around_v.shown_along(normal));
+    let shown = lower(shown_along(mesh, u, normal), shown_along(mesh, v, normal));
     if shown <= 0.0 {
         return 0.0;
     }
@@ -141,22 +110,59 @@ pub(super) fn divided_through(
     [p, q]: [VertexId; 2],
     longest: f32,
 ) -> f32 {
+    let way = mesh.position(v) - mesh.position(u);
+    divided_along(mesh, [u, v], [p, q], way, longest)
+}
+
+/// As [`divided_through`], with a plane that `up` lies in as far as it can.
+pub(super) fn divided_upright(
+    mesh: &Mesh,
+    ends: [VertexId; 2],
+    [p, q]: [VertexId; 2],
+    up: Vec3,
+    longest: f32,
+) -> f32 {
+    let across = up.cross(mesh.position(q) - mesh.position(p));
+    let way = mesh.position(ends[1]) - mesh.position(ends[0]);
+    divided_along(mesh, ends, [p, q], if way.dot(across) < 0.0 { -across } else { across }, longest)
+}
+
+/// As [`divided_through`], with the plane most across `way`.
+fn divided_along(mesh: &Mesh, ends: [VertexId; 2], [p, q]: [VertexId; 2], way: Vec3, longest: f32) -> f32 {
     let origin = mesh.position(p);
     let divider = mesh.position(q) - origin;
     let square = divider.length_squared();
-    let way = mesh.position(v) - mesh.position(u);
     // Without length there is no plane, and no room: the distances are NaN or 0.
     let normal = (way - divider * (way.dot(divider) / square)).normalize_or_zero();
-    let gap = gap(mesh, [u, v], [p, q], origin, normal) - ROUNDING * longest;
+    let gap = gap(mesh, ends, [p, q], origin, normal) - ROUNDING * longest;
     let length = square.sqrt();
     let room = gap / (2.0 + 6.0 * longest / length);
     lower(room, SMALL * lower(length, longest))
+}
+
+/// As [`divided_through`], with a plane across the way from `u` to `v` that goes through `p`, a neighbour of both.
+pub(super) fn divided_at(mesh: &Mesh, [u, v]: [VertexId; 2], p: VertexId, longest: f32) -> f32 {
+    let normal = (mesh.position(v) - mesh.position(u)).normalize_or_zero();
+    // The plane follows p and keeps its direction.
+    0.5 * (gap(mesh, [u, v], [p, p], mesh.position(p), normal) - ROUNDING * longest)
 }
 
 /// As [`divided_through`], with the plane in the middle between `u` and `v`.
 pub(super) fn divided_between(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) -> f32 {
     let (p, q) = (mesh.position(u), mesh.position(v));
     gap(mesh, [u, v], [u, v], (p + q) * 0.5, (q - p).normalize_or_zero()) - ROUNDING * longest
+}
+
+/// As [`divided_through`], with a plane between two sheets that face each other, or turn their backs on each other.
+pub(super) fn divided_as_sheets(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) -> f32 {
+    let normal = (mesh.area_normal(u) - mesh.area_normal(v)).normalize_or_zero();
+    let (p, q) = (mesh.position(u), mesh.position(v));
+    let normal = if normal.dot(q - p) < 0.0 { -normal } else { normal };
+    let height = |w: &VertexId| (mesh.position(*w) - p).dot(normal);
+    let own = mesh.ring(u).as_slice().iter().map(height).fold(0.0, |top, h| if h > top { h } else { top });
+    let other = mesh.ring(v).as_slice().iter().map(height).fold(height(&v), lower);
+    // The plane stays where it is.
+    0.5 * (other - own) - ROUNDING * longest
 }
 
 /// The least distance from the plane, on their side, of `u` and its neighbours, which should be behind, and of `v` and its
@@ -197,7 +203,7 @@ pub(super) fn crossings_around(mesh: &Mesh, v: VertexId, crossing: &mut Vec<Vert
 /// Puts the corners of all pairs of triangles that cross into `crossing`, one at `u` and one at `v`, with no corner in
 /// common; exact.
 pub(super) fn crossings_between(mesh: &Mesh, [u, v]: [VertexId; 2], crossing: &mut Vec<VertexId>) {
-    let others: SmallVec<[(Facet, Bounds); MOST_SPOKES]> =
+    let others: SmallVec<[(Facet, Bounds); ORDINARY_STAR]> =
         star(mesh, v).map(|facet| (facet, Bounds::of(&facet.points))).collect();
     let around_v = others.iter().fold(Bounds::EMPTY, |all, (_, bounds)| all.joined(bounds));
     for s in star(mesh, u).filter(|s| !s.corners.contains(&v.0)) {
