@@ -50,7 +50,8 @@ export interface Attractor {
 }
 
 /**
- * The first surface: around the whole volume; n by n by n bubbles; spheres at packed world points; the iso-surface
+ * The first surface: around all that is brighter than `iso`, as it is when the model is made (around the whole volume where
+ * nothing is, or where `isoForce` is not negative); n by n by n bubbles; spheres at packed world points; the iso-surface
  * at an intensity; or a closed mesh that does not cross itself, in world space (which is copied).
  */
 export type DeformableStart =

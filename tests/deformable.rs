@@ -381,6 +381,40 @@ fn flat_and_tiny_volumes_have_an_enclosing_start() {
     }
 }
 
+/// Around what is bright, not around all of the image; with room, and wherever it lies.
+#[test]
+fn the_enclosing_start_is_around_the_object() {
+    for (dims, centres, radius) in [
+        ([60, 50, 40], vec![Vec3::new(14.0, 36.0, 12.0)], 6.0),
+        ([60, 50, 40], vec![Vec3::new(10.0, 10.0, 10.0), Vec3::new(50.0, 40.0, 30.0)], 4.0),
+        ([90, 20, 12], vec![Vec3::new(8.0, 9.0, 5.0), Vec3::new(80.0, 9.0, 6.0)], 3.0),
+    ] {
+        let to_balls =
+            |p: Vec3| centres.iter().map(|c| p.distance(*c) - radius).fold(f32::INFINITY, f32::min);
+        let volume = scenes::volume(dims, |p| (0.5 - 0.25 * to_balls(p)).clamp(0.0, 1.0));
+        let params = Some(params(&volume, 0.5, 0.1, 0.0));
+        let model =
+            DeformableModel::new(&volume, DeformableOptions { params, ..Default::default() }).unwrap();
+        let start = model.surface();
+        assert!(start.positions.iter().all(|&p| to_balls(p) > 0.5), "{dims:?}");
+        let winding = |p: Vec3| {
+            let solid_angle = |t: &[u32; 3]| {
+                let [a, b, c] = t.map(|v| (start.positions[v as usize] - p).as_dvec3().normalize());
+                2.0 * libm::atan2(a.dot(b.cross(c)), 1.0 + a.dot(b) + b.dot(c) + c.dot(a))
+            };
+            start.triangles.iter().map(solid_angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
+        };
+        for c in &centres {
+            for way in [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z] {
+                assert!(winding(*c + way * radius) > 0.99, "{dims:?}");
+            }
+        }
+        let image = dims.iter().product::<usize>() as f64;
+        let volume = measure(&start).volume;
+        assert!(centres.len() > 1 || volume < 0.1 * image, "{volume} of {image}");
+    }
+}
+
 #[test]
 fn an_empty_image_lets_the_surface_vanish() {
     let volume = scenes::volume([12, 12, 12], |_| 0.0);

@@ -39,7 +39,7 @@ pub use contour::{marching_cubes, marching_cubes_world};
 pub use enrich::Enrichment;
 pub use error::VolumeError;
 pub use follow::{Follower, Lattice};
-pub use grid::{Grid, VectorGrid};
+pub use grid::{Grid, KnownCell, VectorGrid};
 pub(crate) use sampling::trilinear;
 pub use voxels::Voxels;
 

@@ -30,6 +30,28 @@ impl Cell {
         }
     }
 
+    /// The index of the lowest voxel.
+    #[inline]
+    pub(super) fn base(&self) -> usize {
+        self.base
+    }
+
+    /// The values at the eight voxels, x fastest.
+    #[inline]
+    pub(super) fn corners(&self, values: &[f32]) -> [f32; 8] {
+        let [sx, sy, sz] = self.step;
+        let [a, b] = [self.base, self.base + sz];
+        [a, a + sx, a + sy, a + sx + sy, b, b + sx, b + sy, b + sx + sy].map(|index| values[index])
+    }
+
+    /// Interpolates what [`Self::corners`] gave; the same bits as [`Self::blend`].
+    #[inline]
+    pub(super) fn blend_corners(&self, corners: &[f32; 8]) -> f32 {
+        let [fx, fy, fz] = self.fraction;
+        let along_x = |k: usize| mix(corners[k], corners[k + 1], fx);
+        mix(mix(along_x(0), along_x(2), fy), mix(along_x(4), along_x(6), fy), fz)
+    }
+
     /// Interpolates what `value` gives for the eight voxels.
     #[inline]
     pub(super) fn blend<T, F>(&self, value: F) -> T

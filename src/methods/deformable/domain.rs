@@ -24,13 +24,18 @@ pub(super) struct Domain {
     pub(super) bounds: Bounds,
 }
 
+/// The half axes of a rounded box that is neither too small for a mesh with the invariant `delta` nor too flat, at least
+/// `around`.
+pub(super) fn rounded_axes(around: Vec3, delta: f32) -> Vec3 {
+    let least = (4.0 * delta).max(around.max_element() / MOST_ELONGATED);
+    around.max(Vec3::splat(least))
+}
+
 impl Domain {
     /// For an image of `dims` voxels and a surface that starts with the invariant `delta`.
     pub(super) fn new(dims: [usize; 3], delta: f32) -> Self {
         let centre = Vec3::from(dims.map(|n| 0.5 * (n as f32 - 1.0)));
-        let around = Vec3::from(dims.map(|n| THROUGH_CORNERS * 0.5 * (n as f32 + 1.0)));
-        let least = (4.0 * delta).max(around.max_element() / MOST_ELONGATED);
-        let axes = around.max(Vec3::splat(least));
+        let axes = rounded_axes(Vec3::from(dims.map(|n| THROUGH_CORNERS * 0.5 * (n as f32 + 1.0))), delta);
         Self { centre, axes, bounds: Bounds { min: centre - axes * ROOM, max: centre + axes * ROOM } }
     }
 

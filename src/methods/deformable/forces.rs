@@ -3,7 +3,8 @@
 use super::image::LevelImage;
 use super::params::{DeformableParams, RestLength};
 use crate::math::{Mat3, Vec3};
-use crate::mesh::Ring;
+use crate::mesh::{Ring, VertexId};
+use crate::volume::KnownCell;
 
 /// Speed along the normal, in δ per unit of time, from which on rigidity evens out the sampling with its full force.
 ///
@@ -38,11 +39,11 @@ pub(super) struct ForceScale {
 }
 
 impl ForceScale {
-    /// `iso` is normalised, `voxel` the world length of a unit of the model.
-    pub(super) fn new(params: &DeformableParams, iso: f32, voxel: f64, delta: f32) -> Self {
+    /// `iso` is normalised, `gain` by how much α_I is larger here, `voxel` the world length of a unit of the model.
+    pub(super) fn new(params: &DeformableParams, [iso, gain]: [f32; 2], voxel: f64, delta: f32) -> Self {
         Self {
             iso,
-            iso_force: params.iso_force as f32,
+            iso_force: params.iso_force as f32 * gain,
             gradient_across: (params.gradient_normal - params.gradient_tangent) as f32,
             gradient_along: params.gradient_tangent as f32,
             gradient_bound: params.gradient_bound as f32,
@@ -59,6 +60,13 @@ impl ForceScale {
     }
 }
 
+/// What pushes and pulls from outside.
+pub(super) struct Field<'a> {
+    pub(super) image: &'a LevelImage,
+    pub(super) scale: ForceScale,
+    pub(super) pulls: &'a [Pull],
+}
+
 /// Forces and what they are made of, by vertex slot; kept between steps to save allocations.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Forces {
@@ -66,6 +74,8 @@ pub(super) struct Forces {
     laplacian: Vec<Vec3>,
     /// Unit normals, outwards.
     pub(super) normal: Vec<Vec3>,
+    /// The image around each vertex, where it was last felt.
+    cells: Vec<KnownCell>,
     /// The sum of all forces.
     pub(super) force: Vec<Vec3>,
     /// Milliseconds of evaluating forces that no report has told of.
@@ -73,12 +83,19 @@ pub(super) struct Forces {
 }
 
 impl Forces {
-    /// Normals and L of every vertex.
-    pub(super) fn look_around(&mut self, rings: &[Ring], positions: &[Vec3]) {
+    /// Forgets the image, which is another one from now on.
+    pub(super) fn forget_image(&mut self) {
+        self.cells.fill(KnownCell::default());
+    }
+
+    /// Normals and L of some vertices.
+    pub(super) fn look_around(&mut self, rings: &[Ring], positions: &[Vec3], vertices: &[VertexId]) {
         self.laplacian.resize(rings.len(), Vec3::ZERO);
         self.normal.resize(rings.len(), Vec3::ZERO);
         self.force.resize(rings.len(), Vec3::ZERO);
-        for (v, ring) in rings.iter().enumerate() {
+        self.cells.resize(rings.len(), KnownCell::default());
+        for v in vertices.iter().map(|v| v.index()) {
+            let ring = &rings[v];
             let Some(&last) = ring.as_slice().last() else { continue };
             let centre = positions[v];
             let mut previous = positions[last.index()] - centre;
@@ -94,23 +111,19 @@ impl Forces {
         }
     }
 
-    /// The force on every vertex; needs [`Self::look_around`] at the same positions.
+    /// The forces on some vertices; needs [`Self::look_around`] of them and their neighbours at the same positions.
     pub(super) fn evaluate(
         &mut self,
         rings: &[Ring],
         positions: &[Vec3],
         velocities: &[Vec3],
-        image: &LevelImage,
-        scale: &ForceScale,
-        pulls: &[Pull],
+        field: &Field,
+        vertices: &[VertexId],
     ) {
+        let &Field { image, ref scale, pulls } = field;
         let rest = rest_length(rings, positions, scale);
-        for (v, ring) in rings.iter().enumerate() {
-            if ring.is_empty() {
-                // Free slots hold what anybody would compute, so that a run that was restored has the same bits.
-                self.force[v] = Vec3::ZERO;
-                continue;
-            }
+        for v in vertices.iter().map(|v| v.index()) {
+            let ring = &rings[v];
             let x = positions[v];
             let mut force = self.curvature(v, ring, velocities[v], scale.delta) * scale.rigidity;
             if scale.stiffness != 0.0 {
@@ -150,8 +163,9 @@ impl Forces {
 
     /// f_I = δ α_I (π_I − Π(x)) n (7).
     #[inline]
-    fn iso_attraction(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> Vec3 {
-        self.normal[v] * (scale.delta * scale.iso_force * (scale.iso - image.intensity(x)))
+    fn iso_attraction(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> Vec3 {
+        let intensity = image.intensity(x, &mut self.cells[v]);
+        self.normal[v] * (scale.delta * scale.iso_force * (scale.iso - intensity))
     }
 
     /// f_∇I = δ ((α_g − β_g)(∇Π·n) n + β_g ∇Π) (8).

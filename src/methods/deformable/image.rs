@@ -5,7 +5,7 @@
 
 use crate::math::Vec3;
 use crate::methods::MethodError;
-use crate::volume::{Grid, VectorGrid, Volume};
+use crate::volume::{Grid, KnownCell, VectorGrid, Volume};
 
 /// Reduction factor ρ of the pyramid: the one that belongs to √3 refinement (15).
 pub(super) const REDUCTION: f64 = 1.732_050_807_568_877_2;
@@ -34,10 +34,11 @@ impl LevelImage {
         p * self.scale + self.offset
     }
 
-    /// Π: trilinear intensity in 0..1, and 0 beyond the image, so that an enclosing surface comes in.
+    /// Π: trilinear intensity in 0..1, and 0 beyond the image, so that an enclosing surface comes in. `known` is what the last
+    /// call for the same vertex left there.
     #[inline]
-    pub(super) fn intensity(&self, p: Vec3) -> f32 {
-        self.grid.sample_padded(self.index(p))
+    pub(super) fn intensity(&self, p: Vec3, known: &mut KnownCell) -> f32 {
+        self.grid.sample_padded_again(self.index(p), known)
     }
 
     /// ∇Π by the Sobel operator, per voxel of this level, no longer than `bound`; zero where none was prepared.
@@ -62,6 +63,43 @@ impl LevelImage {
         let beyond = self.grid.values.iter().filter(|&&value| if above { value > iso } else { value < iso });
         let (sum, count) = beyond.fold((0.0, 0), |(sum, count), &value| (sum + f64::from(value), count + 1));
         (count > 0).then(|| (sum / f64::from(count)) as f32)
+    }
+
+    /// The first and the last voxel brighter than `iso` of each row that has one, as positions of the model.
+    pub(super) fn ends_of_rows(&self, iso: f32) -> Vec<Vec3> {
+        let (Grid { dims: [nx, ny, _], values }, position) = (&self.grid, self.grid().1);
+        let mut ends = Vec::new();
+        for (k, row) in values.chunks_exact(*nx).enumerate() {
+            let at = |i: usize| position(Vec3::new(i as f32, (k % ny) as f32, (k / ny) as f32));
+            let [first, last] = [row.iter().position(|&v| v > iso), row.iter().rposition(|&v| v > iso)];
+            ends.extend([first, last].into_iter().flatten().map(at));
+        }
+        ends
+    }
+
+    /// How steep the image is where it passes `iso`: the root mean square of the differences between neighbouring voxels on
+    /// either side, per unit of the model. 0 where there are none.
+    pub(super) fn steepness(&self, iso: f32) -> f32 {
+        let [nx, ny, nz] = self.grid.dims;
+        let (mut sum, mut count) = (0.0f64, 0usize);
+        let mut pass = |a: &[f32], b: &[f32]| {
+            for (&a, &b) in a.iter().zip(b).filter(|&(&a, &b)| (a < iso) != (b < iso)) {
+                sum += f64::from((a - b) * (a - b));
+                count += 1;
+            }
+        };
+        let rows: Vec<&[f32]> = self.grid.values.chunks_exact(nx).collect();
+        for (k, row) in rows.iter().enumerate() {
+            pass(&row[1..], row);
+            if k % ny + 1 < ny {
+                pass(rows[k + 1], row);
+            }
+            if k / ny + 1 < nz {
+                pass(rows[k + ny], row);
+            }
+        }
+        let mean = if count > 0 { sum / count as f64 } else { 0.0 };
+        mean.sqrt() as f32 * self.scale.max_element()
     }
 
     /// The grid of this level, and the way from its voxel indices to positions of the model.

@@ -42,6 +42,8 @@
 //! # }
 //! ```
 
+mod awake;
+mod coarse;
 mod domain;
 mod forces;
 mod image;
@@ -60,9 +62,9 @@ use crate::mesh::{Mesh, ScalarKey, TriangleMesh, VectorKey, VertexId};
 use crate::remesh::{Changes, Resolver, Sampling};
 use crate::volume::Volume;
 use domain::Domain;
-use forces::{ForceScale, Forces, Pull};
+use forces::{Field, ForceScale, Pull};
 use image::Pyramid;
-use motion::{Movement, World, advance};
+use motion::{Motion, Movement, World};
 use schedule::Rest;
 use start::Frame;
 use std::ops::RangeInclusive;
@@ -118,19 +120,11 @@ const FURTHEST: f64 = 1e6;
 /// A vertex is looked at again when it has gone this far since the last time, in δ…
 const CHECK_TRAVEL: f32 = 0.1;
 
-/// …or after so many iterations. Rules by momentary speed miss slow vertices that go far.
-const CHECK_PERIOD: f32 = 50.0;
+/// …and every so many iterations. Rules by momentary speed miss slow vertices that go far.
+const CHECK_PERIOD: usize = 50;
 
 /// Slots in use below which the mesh is put in order again.
 const LEAST_OCCUPANCY: f32 = 0.7;
-
-/// How far outside π_I the surface rests on coarse levels, as a share of the way to the mean intensity out there.
-///
-/// A wall thinner than the contact distance of a coarse level is pierced and eaten up, and rigidity keeps it from growing
-/// back on a finer one. A little outside, where the blurred wall is thicker, it is kept; the finer level takes back what
-/// is too much, since the surface comes from outside anyway. On computed tomographies the area found through one coarse
-/// level was 1.2 % to 15 % too small with 0, and is up to 0.9 % off; with 0.4 and more the finest level has much to do.
-const COARSE_MARGIN: f32 = 0.35;
 
 /// The per-vertex attributes of the model.
 #[derive(Clone, Copy, Debug)]
@@ -138,8 +132,8 @@ struct Keys {
     velocity: VectorKey,
     /// Where the vertex was when its bounds were last looked at.
     checked: VectorKey,
-    /// Iterations since then.
-    age: ScalarKey,
+    /// Iterations that it has hardly moved.
+    still: ScalarKey,
     /// Iterations since an edit made or displaced the vertex.
     calm: ScalarKey,
 }
@@ -158,15 +152,19 @@ pub struct DeformableModel {
     level: usize,
     /// π_I on this level, normalised.
     level_iso: f32,
+    /// By how much α_I is larger on this level.
+    gain: f32,
     mesh: Mesh,
     keys: Keys,
     resolver: Resolver,
-    forces: Forces,
+    motion: Motion,
     iteration: u32,
     rest: Rest,
     movement: Movement,
     components: u32,
     clock: fn() -> f64,
+    /// Storage of [`Self::vertices_to_check`].
+    active: Vec<VertexId>,
 }
 
 impl DeformableModel {
@@ -184,6 +182,7 @@ impl DeformableModel {
         let domain = Domain::new(volume.dims(), delta);
         let frame = Frame {
             image: &pyramid.levels[options.levels],
+            brighter_than: (params.iso_force < 0.0).then(|| coarse::iso(&pyramid, &params, options.levels)),
             dims: volume.dims(),
             domain,
             from_world: volume.inverse_affine(),
@@ -194,7 +193,7 @@ impl DeformableModel {
         let keys = Keys {
             velocity: mesh.add_vector(),
             checked: mesh.add_vector(),
-            age: mesh.add_scalar(),
+            still: mesh.add_scalar(),
             calm: mesh.add_scalar(),
         };
         let mut model = Self {
@@ -208,15 +207,17 @@ impl DeformableModel {
             finest_delta,
             level: options.levels,
             level_iso: 0.0,
+            gain: 1.0,
             mesh,
             keys,
             resolver: Resolver::with_room_for(domain.most_vertices(delta_at(finest_delta, 0))),
-            forces: Forces::default(),
+            motion: Motion::default(),
             iteration: 0,
             rest: Rest::default(),
             movement: Movement::default(),
             components: 0,
             clock: || 0.0,
+            active: Vec::new(),
         };
         model.settle_in();
         model.prepare_level()?;
@@ -238,6 +239,7 @@ impl DeformableModel {
             if self.params.topology == Topology::Adaptive {
                 let active = self.vertices_to_check();
                 changes += self.restore_bounds(&active, &mut times);
+                self.active = active;
             }
             self.iteration += 1;
             changes += self.come_to_rest(&mut times)?;
@@ -251,54 +253,50 @@ impl DeformableModel {
 
     fn move_vertices(&mut self, times: &mut Times) {
         let begin = (self.clock)();
-        self.forces.look_around(self.mesh.rings(), self.mesh.positions());
+        self.motion.look_around(&self.mesh, self.keys);
         let normals = (self.clock)();
         let delta = self.model_delta();
         let pulls = self.pulls();
         let world = World {
-            image: &self.pyramid.levels[self.level],
-            scale: ForceScale::new(&self.params, self.level_iso, self.voxel, delta),
-            pulls: &pulls,
+            field: Field {
+                image: &self.pyramid.levels[self.level],
+                scale: ForceScale::new(&self.params, [self.level_iso, self.gain], self.voxel, delta),
+                pulls: &pulls,
+            },
             domain: self.domain,
             params: &self.params,
             delta,
             clock: self.clock,
         };
         let (clock, mut embedding) = (self.clock, 0.0);
-        let carry = |mesh: &mut Mesh, ways: &mut [Vec3]| {
+        let carry = |mesh: &mut Mesh, moving: &[VertexId], ways: &mut [Vec3]| {
             let begin = clock();
-            let held = self.resolver.carry(mesh, Sampling::new(delta), ways);
+            let held = self.resolver.carry_some(mesh, Sampling::new(delta), moving, ways);
             embedding = clock() - begin;
             held
         };
-        self.movement = advance(&mut self.mesh, self.keys, &mut self.forces, &world, carry);
-        let forces = std::mem::take(&mut self.forces.spent);
+        self.movement = self.motion.advance(&mut self.mesh, self.keys, &world, carry);
+        let forces = std::mem::take(&mut self.motion.forces.spent);
         times.add("normals", normals - begin);
         times.add("forces", forces);
         times.add("embedding", embedding);
         times.add("motion", (self.clock)() - normals - forces - embedding);
     }
 
-    /// Vertices that have travelled far enough since their bounds were last looked at, and those long not looked at.
+    /// Vertices that have travelled far enough since their bounds were last looked at, and those that have moved at all
+    /// where it is their turn.
     fn vertices_to_check(&mut self) -> Vec<VertexId> {
         let limit = CHECK_TRAVEL * self.model_delta();
-        let far = limit * limit;
-        let mut active = Vec::new();
-        for i in 0..self.mesh.slots() {
-            let v = VertexId::from_index(i);
-            if !self.mesh.is_live(v) {
-                continue;
-            }
-            let position = self.mesh.position(v);
-            let age = self.mesh.scalar(self.keys.age)[i] + 1.0;
-            let travelled = self.mesh.vector(self.keys.checked)[i].distance_squared(position);
-            let due = travelled > far || age >= CHECK_PERIOD;
-            self.mesh.scalar_mut(self.keys.age)[i] = if due { 0.0 } else { age };
-            if due {
-                self.mesh.vector_mut(self.keys.checked)[i] = position;
-                active.push(v);
-            }
-        }
+        let turn = self.iteration as usize % CHECK_PERIOD;
+        let mut active = std::mem::take(&mut self.active);
+        active.clear();
+        let checked = self.mesh.vector(self.keys.checked);
+        let travelled = |v: VertexId| checked[v.index()].distance_squared(self.mesh.position(v));
+        active.extend(self.motion.awake.moving.iter().filter(|&&v| travelled(v) > limit * limit));
+        let in_turn = (turn..self.mesh.slots()).step_by(CHECK_PERIOD).map(VertexId::from_index);
+        active.extend(in_turn.filter(|&v| self.mesh.is_live(v) && travelled(v) > 0.0));
+        let (positions, checked) = self.mesh.positions_and_vector_mut(self.keys.checked);
+        active.iter().for_each(|v| checked[v.index()] = positions[v.index()]);
         active
     }
 
@@ -309,6 +307,11 @@ impl DeformableModel {
         let changes = self.resolver.resolve(&mut self.mesh, sampling, active);
         let calm = self.mesh.scalar_mut(self.keys.calm);
         self.resolver.edited().iter().for_each(|v| calm[v.index()] = 0.0);
+        let (rings, still) = self.mesh.rings_and_scalar_mut(self.keys.still);
+        for v in self.resolver.edited().iter().map(|v| v.index()) {
+            still[v] = 0.0;
+            rings[v].as_slice().iter().for_each(|w| still[w.index()] = 0.0);
+        }
         if self.mesh.occupancy() < LEAST_OCCUPANCY {
             self.reorder();
         }
@@ -324,7 +327,7 @@ impl DeformableModel {
 
     fn count_components(&mut self, changes: Changes) {
         if changes.changed_topology() {
-            self.components = self.mesh.component_members().len() as u32;
+            self.components = self.mesh.component_count() as u32;
         }
     }
 
@@ -333,8 +336,7 @@ impl DeformableModel {
         self.reorder();
         let positions = self.mesh.positions().to_vec();
         self.mesh.vector_mut(self.keys.checked).copy_from_slice(&positions);
-        self.mesh.scalar_mut(self.keys.age).fill(0.0);
-        self.components = self.mesh.component_members().len() as u32;
+        self.components = self.mesh.component_count() as u32;
     }
 
     fn report(&self, events: Changes, times: Times) -> StepReport {
@@ -367,7 +369,7 @@ impl DeformableModel {
             self.params = before;
             return Err(error);
         }
-        self.rest.wake();
+        self.wake_all();
         Ok(())
     }
 
@@ -395,7 +397,7 @@ impl DeformableModel {
             }
         }
         self.attractors = attractors;
-        self.rest.wake();
+        self.wake_all();
         Ok(())
     }
 
@@ -414,20 +416,11 @@ impl DeformableModel {
         if self.params.gradient_normal != 0.0 || self.params.gradient_tangent != 0.0 {
             self.pyramid.levels[self.level].prepare_gradient()?;
         }
-        self.level_iso = self.iso_of_level();
+        self.motion.forces.forget_image();
+        self.level_iso = coarse::iso(&self.pyramid, &self.params, self.level);
+        let here = [self.level_iso, self.model_delta()];
+        self.gain = coarse::gain(&self.pyramid, &self.params, self.level, here);
         Ok(())
-    }
-
-    /// π_I as the surface meets it on this level; see [`COARSE_MARGIN`].
-    fn iso_of_level(&self) -> f32 {
-        let iso = self.pyramid.normalised(self.params.iso);
-        if self.level == 0 {
-            return iso;
-        }
-        let outside = self.pyramid.levels[self.level].mean_beyond(iso, self.params.iso_force > 0.0);
-        outside.map_or(iso, |outside| {
-            outside + libm::powf(1.0 - COARSE_MARGIN, self.level as f32) * (iso - outside)
-        })
     }
 
     /// The pyramid level the surface is on; 0 is the volume itself.

@@ -1,9 +1,9 @@
 //! The law of motion m ẍ + γ ẋ = f (4), integrated over one iteration.
 
 use super::Keys;
+use super::awake::{Awake, PATIENCE, stillness};
 use super::domain::Domain;
-use super::forces::{ForceScale, Forces, Pull};
-use super::image::LevelImage;
+use super::forces::{Field, Forces};
 use super::params::{DeformableParams, Integrator};
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
@@ -24,9 +24,7 @@ const CALM: f32 = 6.0;
 
 /// What pushes and what holds the vertices.
 pub(super) struct World<'a> {
-    pub(super) image: &'a LevelImage,
-    pub(super) scale: ForceScale,
-    pub(super) pulls: &'a [Pull],
+    pub(super) field: Field<'a>,
     /// Where vertices are held back.
     pub(super) domain: Domain,
     pub(super) params: &'a DeformableParams,
@@ -34,112 +32,145 @@ pub(super) struct World<'a> {
     pub(super) clock: fn() -> f64,
 }
 
-impl World<'_> {
-    /// The forces at given positions, with the normals there.
-    fn act(&self, forces: &mut Forces, mesh: &Mesh, positions: &[Vec3], velocities: &[Vec3]) {
-        let begin = (self.clock)();
-        forces.evaluate(mesh.rings(), positions, velocities, self.image, &self.scale, self.pulls);
-        forces.spent += (self.clock)() - begin;
+/// Moves the vertices of a mesh; what it needs is kept between steps to save allocations.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Motion {
+    pub(super) awake: Awake,
+    pub(super) forces: Forces,
+    /// The way of each vertex in this iteration, by slot; zero before and after.
+    ways: Vec<Vec3>,
+}
+
+impl Motion {
+    /// Finds the vertices that are awake, their normals and L.
+    pub(super) fn look_around(&mut self, mesh: &Mesh, keys: Keys) {
+        self.awake.find(mesh, keys.still);
+        self.forces.look_around(mesh.rings(), mesh.positions(), &self.awake.around);
+        self.ways.resize(mesh.slots(), Vec3::ZERO);
+    }
+
+    /// Moves the vertices by one time step, as far as `carry` can; needs [`Self::look_around`] of the mesh as it is.
+    ///
+    /// `carry` moves some vertices by ways, by slot; it leaves there what they went, and tells which share of its way each
+    /// of the vertices went that it held back.
+    pub(super) fn advance(
+        &mut self,
+        mesh: &mut Mesh,
+        keys: Keys,
+        world: &World,
+        carry: impl FnOnce(&mut Mesh, &[VertexId], &mut [Vec3]) -> Vec<(VertexId, f32)>,
+    ) -> Movement {
+        match world.params.integrator {
+            Integrator::Euler => self.euler(mesh, keys, world),
+            Integrator::RungeKutta => self.runge_kutta(mesh, keys, world),
+        }
+        self.bound(mesh, keys, world);
+        let held = carry(mesh, &self.awake.moving, &mut self.ways);
+        let velocities = mesh.vector_mut(keys.velocity);
+        held.into_iter().for_each(|(v, share)| velocities[v.index()] *= share);
+        let movement = self.measure(mesh, keys, world);
+        self.awake.moving.iter().for_each(|v| self.ways[v.index()] = Vec3::ZERO);
+        movement
+    }
+
+    /// Semi-implicit Euler: the new velocity moves the vertex.
+    fn euler(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
+        self.act(mesh, mesh.positions(), mesh.vector(keys.velocity), world);
+        let &DeformableParams { time_step, mass, damping, .. } = world.params;
+        let (step, damping) = (time_step as f32 / mass as f32, damping as f32);
+        let velocities = mesh.vector_mut(keys.velocity);
+        for i in self.awake.moving.iter().map(|v| v.index()) {
+            velocities[i] += (self.forces.force[i] - velocities[i] * damping) * step;
+            self.ways[i] = velocities[i] * time_step as f32;
+        }
+    }
+
+    /// The classical fourth-order method on positions and velocities.
+    fn runge_kutta(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
+        let &DeformableParams { time_step, mass, damping, .. } = world.params;
+        let (step, mass, damping) = (time_step as f32, mass as f32, damping as f32);
+        let (x0, v0) = (mesh.positions().to_vec(), mesh.vector(keys.velocity).to_vec());
+        let normals = self.forces.normal.clone();
+        let (mut x, mut v) = (x0.clone(), v0.clone());
+        let mut gain = vec![Vec3::ZERO; x.len()];
+        for (stage, (weight, ahead)) in
+            [(1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)].into_iter().enumerate()
+        {
+            if stage > 0 {
+                self.forces.look_around(mesh.rings(), &x, &self.awake.around);
+            }
+            self.act(mesh, &x, &v, world);
+            for i in self.awake.moving.iter().map(|v| v.index()) {
+                let acceleration = (self.forces.force[i] - v[i] * damping) * (1.0 / mass);
+                self.ways[i] += v[i] * (weight * step / 6.0);
+                gain[i] += acceleration * (weight * step / 6.0);
+                x[i] = x0[i] + v[i] * (ahead * step);
+                v[i] = v0[i] + acceleration * (ahead * step);
+            }
+        }
+        self.forces.normal = normals;
+        let velocities = mesh.vector_mut(keys.velocity);
+        self.awake.moving.iter().map(|v| v.index()).for_each(|i| velocities[i] += gain[i]);
+    }
+
+    /// The forces on the vertices that are awake, at given positions and with the normals there.
+    fn act(&mut self, mesh: &Mesh, positions: &[Vec3], velocities: &[Vec3], world: &World) {
+        let begin = (world.clock)();
+        self.forces.evaluate(mesh.rings(), positions, velocities, &world.field, &self.awake.moving);
+        self.forces.spent += (world.clock)() - begin;
+    }
+
+    /// Shortens ways that are too long or lead out of the domain, and the velocities with them.
+    fn bound(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
+        let &World { domain, params, delta, .. } = world;
+        let limit = params.max_move as f32 * delta;
+        for i in self.awake.moving.iter().map(|v| v.index()) {
+            let way = &mut self.ways[i];
+            let length = way.length();
+            if length > limit {
+                *way *= limit / length;
+                mesh.vector_mut(keys.velocity)[i] *= limit / length;
+            }
+            let from = mesh.positions()[i];
+            if !domain.bounds.contains(from + *way) {
+                *way = domain.hold(from + *way) - from;
+                mesh.vector_mut(keys.velocity)[i] = *way * (1.0 / params.time_step as f32);
+            }
+        }
+    }
+
+    /// How much the mesh moved; puts vertices to sleep and wakes others.
+    fn measure(&self, mesh: &mut Mesh, keys: Keys, world: &World) -> Movement {
+        let per_time = 1.0 / (world.params.time_step as f32 * world.delta);
+        let stillness = stillness(world.params.mass, world.params.energy_tolerance);
+        let mut movement = Movement::default();
+        for &v in &self.awake.moving {
+            let i = v.index();
+            let along = (self.ways[i].dot(self.forces.normal[i]) * per_time).abs();
+            movement.energy += f64::from(along) * f64::from(along);
+            let calm = &mut mesh.scalar_mut(keys.calm)[i];
+            if along > movement.fastest && *calm >= CALM {
+                movement.fastest = along;
+            }
+            *calm += 1.0;
+            rouse(mesh, keys, v, along > stillness);
+        }
+        movement.energy *= 0.5 * world.params.mass / mesh.vertex_count().max(1) as f64;
+        movement
     }
 }
 
-/// Moves every vertex by one time step, as far as `carry` can. `forces` holds normals and L of the mesh as it is.
-///
-/// `carry` moves vertices by ways, by slot; it leaves there what they went, and tells which share of its way each of the
-/// vertices went that it held back.
-pub(super) fn advance(
-    mesh: &mut Mesh,
-    keys: Keys,
-    forces: &mut Forces,
-    world: &World,
-    carry: impl FnOnce(&mut Mesh, &mut [Vec3]) -> Vec<(VertexId, f32)>,
-) -> Movement {
-    let mut ways = match world.params.integrator {
-        Integrator::Euler => euler(mesh, keys, forces, world),
-        Integrator::RungeKutta => runge_kutta(mesh, keys, forces, world),
-    };
-    bound(mesh, keys, world, &mut ways);
-    let held = carry(mesh, &mut ways);
-    let velocities = mesh.vector_mut(keys.velocity);
-    held.into_iter().for_each(|(v, share)| velocities[v.index()] *= share);
-    measure(mesh, keys, forces, world, &ways)
-}
-
-/// Semi-implicit Euler: the new velocity moves the vertex. Returns the way of each vertex.
-fn euler(mesh: &mut Mesh, keys: Keys, forces: &mut Forces, world: &World) -> Vec<Vec3> {
-    world.act(forces, mesh, mesh.positions(), mesh.vector(keys.velocity));
-    let &DeformableParams { time_step, mass, damping, .. } = world.params;
-    let (step, damping) = (time_step as f32 / mass as f32, damping as f32);
-    for (v, force) in mesh.vector_mut(keys.velocity).iter_mut().zip(&forces.force) {
-        *v += (*force - *v * damping) * step;
+/// Counts the iterations that a vertex has hardly moved, or wakes it and its neighbours.
+fn rouse(mesh: &mut Mesh, keys: Keys, v: VertexId, moves: bool) {
+    let (rings, still) = mesh.rings_and_scalar_mut(keys.still);
+    if moves {
+        still[v.index()] = 0.0;
+        rings[v.index()].as_slice().iter().for_each(|w| still[w.index()] = 0.0);
+        return;
     }
-    mesh.vector(keys.velocity).iter().map(|v| *v * time_step as f32).collect()
-}
-
-/// The classical fourth-order method on positions and velocities; returns the way of each vertex.
-fn runge_kutta(mesh: &mut Mesh, keys: Keys, forces: &mut Forces, world: &World) -> Vec<Vec3> {
-    let &DeformableParams { time_step, mass, damping, .. } = world.params;
-    let (step, mass, damping) = (time_step as f32, mass as f32, damping as f32);
-    let (x0, v0) = (mesh.positions().to_vec(), mesh.vector(keys.velocity).to_vec());
-    let normals = forces.normal.clone();
-    let (mut x, mut v) = (x0.clone(), v0.clone());
-    let (mut way, mut gain) = (vec![Vec3::ZERO; x.len()], vec![Vec3::ZERO; x.len()]);
-    for (stage, (weight, ahead)) in [(1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)].into_iter().enumerate() {
-        if stage > 0 {
-            forces.look_around(mesh.rings(), &x);
-        }
-        world.act(forces, mesh, &x, &v);
-        for i in 0..x.len() {
-            let acceleration = (forces.force[i] - v[i] * damping) * (1.0 / mass);
-            way[i] += v[i] * (weight * step / 6.0);
-            gain[i] += acceleration * (weight * step / 6.0);
-            x[i] = x0[i] + v[i] * (ahead * step);
-            v[i] = v0[i] + acceleration * (ahead * step);
-        }
+    let still = &mut still[v.index()];
+    *still += 1.0;
+    if *still >= PATIENCE {
+        mesh.vector_mut(keys.velocity)[v.index()] = Vec3::ZERO;
     }
-    forces.normal = normals;
-    for (v, gain) in mesh.vector_mut(keys.velocity).iter_mut().zip(gain) {
-        *v += gain;
-    }
-    way
-}
-
-/// Shortens ways that are too long or lead out of the domain, and the velocities with them. Free slots stay where they
-/// are.
-fn bound(mesh: &mut Mesh, keys: Keys, world: &World, ways: &mut [Vec3]) {
-    let &World { domain, params, delta, .. } = world;
-    let limit = params.max_move as f32 * delta;
-    for (i, way) in ways.iter_mut().enumerate() {
-        if mesh.rings()[i].is_empty() {
-            *way = Vec3::ZERO;
-            continue;
-        }
-        let length = way.length();
-        if length > limit {
-            *way *= limit / length;
-            mesh.vector_mut(keys.velocity)[i] *= limit / length;
-        }
-        let from = mesh.positions()[i];
-        if !domain.bounds.contains(from + *way) {
-            *way = domain.hold(from + *way) - from;
-            mesh.vector_mut(keys.velocity)[i] = *way * (1.0 / params.time_step as f32);
-        }
-    }
-}
-
-/// How much the mesh moved by `ways`.
-fn measure(mesh: &mut Mesh, keys: Keys, forces: &Forces, world: &World, ways: &[Vec3]) -> Movement {
-    let per_time = 1.0 / (world.params.time_step as f32 * world.delta);
-    let mut movement = Movement::default();
-    for (i, calm) in mesh.scalar_mut(keys.calm).iter_mut().enumerate() {
-        // Free slots have no way.
-        let along = (ways[i].dot(forces.normal[i]) * per_time).abs();
-        movement.energy += f64::from(along) * f64::from(along);
-        if along > movement.fastest && *calm >= CALM {
-            movement.fastest = along;
-        }
-        *calm += 1.0;
-    }
-    movement.energy *= 0.5 * world.params.mass / mesh.vertex_count().max(1) as f64;
-    movement
 }

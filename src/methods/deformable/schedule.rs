@@ -20,16 +20,11 @@ const REST_SPEED: f32 = 0.03;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Rest {
     quiet: u32,
+    /// Whether all vertices were awake when the quiet iterations began.
+    woken: bool,
     done: bool,
     /// The iteration at whose end this level began.
     began: u32,
-}
-
-impl Rest {
-    /// Something changed from outside: the surface may move again.
-    pub(super) fn wake(&mut self) {
-        *self = Self::default();
-    }
 }
 
 impl DeformableModel {
@@ -53,11 +48,23 @@ impl DeformableModel {
         ((levels - 1 - self.level) as f64 + way.clamp(0.0, 1.0)) / levels as f64
     }
 
+    /// Wakes all vertices: something changed that may move them.
+    pub(super) fn wake_all(&mut self) {
+        self.mesh.scalar_mut(self.keys.still).fill(0.0);
+        self.rest = Rest { began: self.rest.began, ..Rest::default() };
+    }
+
     /// Counts quiet iterations; after enough of them checks the whole mesh and goes one level down, or ends.
     pub(super) fn come_to_rest(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let quiet = self.movement.energy < self.params.energy_tolerance && self.movement.fastest < REST_SPEED;
         self.rest.quiet = if quiet { self.rest.quiet + 1 } else { 0 };
+        self.rest.woken &= quiet;
         if self.rest.quiet < self.quiet_iterations() {
+            return Ok(Changes::default());
+        }
+        if !self.rest.woken {
+            self.wake_all();
+            self.rest.woken = true;
             return Ok(Changes::default());
         }
         let mut changes = self.check_everything(times);
@@ -103,6 +110,7 @@ impl DeformableModel {
         self.level -= 1;
         self.rest = Rest { began: self.iteration, ..Rest::default() };
         self.settle_in();
+        self.wake_all();
         self.prepare_level()
     }
 }

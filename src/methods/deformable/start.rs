@@ -1,6 +1,6 @@
 //! The surface a run starts from (section 3.6), made in the space of the model and resolved before the first step.
 
-use super::domain::Domain;
+use super::domain::{Domain, rounded_axes};
 use super::image::LevelImage;
 use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure};
@@ -11,7 +11,8 @@ use crate::volume::marching_cubes;
 /// What a run starts from; lengths and points in world units.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Start {
-    /// A refined icosahedron around the whole image.
+    /// A refined icosahedron around all of the image that is brighter than π_I; around the whole image where nothing is, or
+    /// where the surface does not look for what is brighter.
     Enclosing,
     /// A grid of n³ small spheres that fills the image.
     Bubbles(u32),
@@ -31,6 +32,8 @@ pub enum Start {
 /// What a start shape is made for.
 pub(super) struct Frame<'a> {
     pub(super) image: &'a LevelImage,
+    /// The intensity, normalised, of what an enclosing surface looks for.
+    pub(super) brighter_than: Option<f32>,
     /// Voxels of the finest level.
     pub(super) dims: [usize; 3],
     pub(super) domain: Domain,
@@ -42,6 +45,9 @@ pub(super) struct Frame<'a> {
 
 /// The smallest sphere in δ that has its edges within bounds as an icosahedron, with room for one that is hit.
 const SMALLEST_RADIUS: f32 = 1.2;
+
+/// Room between an object and the surface that encloses it, in δ.
+const OBJECT_ROOM: f32 = 1.5;
 
 /// Radius of a bubble as a share of its cell: neighbours stay further apart than contact reaches.
 const BUBBLE_SHARE: f32 = 0.3;
@@ -95,7 +101,7 @@ fn resolve_all(mesh: &mut Mesh, frame: &Frame, sampling: Sampling) -> Result<Res
     Ok(resolver)
 }
 
-/// A rounded box around the image: |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1 through the image's corners.
+/// A rounded box around the object, |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1, or around the whole image.
 ///
 /// It is refined from an icosahedron, each level pulled onto the shape and resolved: a fine icosahedron squashed onto
 /// a flat box would have triangles that no edit can mend.
@@ -105,11 +111,10 @@ fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
     if frame.domain.enclosing_vertices(delta) > most {
         return Err(MethodError::TooManyVertices { most });
     }
-    let Domain { centre, axes, .. } = frame.domain;
+    let (centre, axes) = around_object(frame).unwrap_or((frame.domain.centre, frame.domain.axes));
     let onto_box = |p: Vec3| {
         let unit = (p - centre) / axes;
-        let fourth = unit * unit * unit * unit;
-        centre + unit / fourth.element_sum().sqrt().sqrt() * axes
+        centre + unit / rounded_distance(unit) * axes
     };
     let mut mesh = Mesh::icosahedron(Vec3::ZERO, 1.0);
     mesh.positions_mut().iter_mut().for_each(|p| *p = onto_box(centre + *p * axes));
@@ -126,6 +131,30 @@ fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
         }
     }
     Ok(mesh)
+}
+
+/// Centre and half axes of a rounded box around all of the object, in the proportions of the box around it. `None` where
+/// there is no object.
+fn around_object(frame: &Frame) -> Option<(Vec3, Vec3)> {
+    let ends = frame.image.ends_of_rows(frame.brighter_than?);
+    let Bounds { min, max } = Bounds::of(&ends);
+    if ends.is_empty() {
+        return None;
+    }
+    let delta = frame.sampling.shortest();
+    let centre = (min + max) * 0.5;
+    let axes = rounded_axes((max - min) * 0.5 + OBJECT_ROOM * delta, delta);
+    let furthest = ends.iter().fold(1.0f32, |furthest, &p| {
+        let far = rounded_distance((p - centre) / (axes - OBJECT_ROOM * delta));
+        if far > furthest { far } else { furthest }
+    });
+    Some((centre, axes * furthest))
+}
+
+/// The fourth root of x⁴ + y⁴ + z⁴.
+fn rounded_distance(p: Vec3) -> f32 {
+    let square = p * p;
+    (square * square).element_sum().sqrt().sqrt()
 }
 
 fn sphere(frame: &Frame, centre: Vec3, radius: f32) -> Result<Mesh, MeshError> {

@@ -11,7 +11,7 @@ use crate::remesh::{Resolver, Waiting};
 use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
 
-const MARK: Mark = *b"VSCLDEF\x01";
+const MARK: Mark = *b"VSCLDEF\x02";
 
 /// More neighbours than any edit leaves a vertex, and few enough to check.
 const MOST_NEIGHBOURS: usize = 4096;
@@ -111,7 +111,7 @@ impl DeformableModel {
         next.iteration = state.iteration;
         next.rest = state.rest;
         next.movement = Movement { energy: state.energy, fastest: state.fastest };
-        next.components = next.mesh.component_members().len() as u32;
+        next.components = next.mesh.component_count() as u32;
         next.prepare_level()?;
         *self = next;
         Ok(())

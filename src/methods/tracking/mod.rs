@@ -403,7 +403,7 @@ impl SurfaceTracker {
             tolerance: STILL * self.region.spacing.min_element(),
             vertices: self.mesh.vertex_count() as u32,
             triangles: self.mesh.triangle_count() as u32,
-            components: self.mesh.component_members().len() as u32,
+            components: self.mesh.component_count() as u32,
             euler: self.mesh.euler() as i32,
             events,
             times,

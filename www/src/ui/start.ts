@@ -11,7 +11,7 @@ const SHAPES: { kind: Kind; label: string; help: string }[] = [
   {
     kind: 'enclosing',
     label: 'Enclosing surface',
-    help: 'One surface around the whole volume, shrinking onto the object.',
+    help: 'One surface around all that is brighter than the iso value, shrinking onto it.',
   },
   { kind: 'bubbles', label: 'Grid of bubbles', help: 'Many small spheres that grow, meet and join.' },
   { kind: 'sphere', label: 'Sphere at the crosshair', help: 'One sphere where the three slices meet.' },

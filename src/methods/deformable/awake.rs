@@ -1,0 +1,96 @@
+//! Which vertices move: where the surface has come to rest, nothing is worked out any more.
+//!
+//! A vertex falls asleep when it has hardly moved for some iterations. It wakes when a neighbour moves, when an edit reaches
+//! it, and now and then to look whether it should. A level ends only after all have been awake and still.
+
+use crate::mesh::{Mesh, ScalarKey, VertexId};
+
+/// Iterations a vertex must hardly move before it sleeps.
+pub(super) const PATIENCE: f32 = 6.0;
+
+/// What hardly moves, in the speed of a surface that is at rest in the mean.
+const STILLNESS: f64 = 0.5;
+
+/// With a smaller share asleep all are looked at: it takes no longer.
+const FEW_ASLEEP: f64 = 0.25;
+
+/// The vertices that are awake.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Awake {
+    /// Those that may move.
+    pub(super) moving: Vec<VertexId>,
+    /// Those and their neighbours.
+    pub(super) around: Vec<VertexId>,
+    is_around: Vec<bool>,
+}
+
+impl Awake {
+    /// Finds them by the iterations that each has hardly moved, `still`.
+    pub(super) fn find(&mut self, mesh: &Mesh, still: ScalarKey) {
+        let still = mesh.scalar(still);
+        self.moving.clear();
+        let awake = still.iter().enumerate().filter(|(_, still)| **still < PATIENCE);
+        self.moving.extend(awake.map(|(i, _)| VertexId::from_index(i)).filter(|&v| mesh.is_live(v)));
+        self.around.clear();
+        let asleep = mesh.vertex_count() - self.moving.len();
+        if (asleep as f64) < FEW_ASLEEP * mesh.vertex_count() as f64 {
+            self.moving.clear();
+            self.moving.extend(mesh.vertices());
+            self.around.extend_from_slice(&self.moving);
+            return;
+        }
+        self.is_around.clear();
+        self.is_around.resize(mesh.slots(), false);
+        for &v in &self.moving {
+            for &w in mesh.ring(v).as_slice().iter().chain([&v]) {
+                if !std::mem::replace(&mut self.is_around[w.index()], true) {
+                    self.around.push(w);
+                }
+            }
+        }
+    }
+}
+
+/// The speed along the normal, in δ per unit of time, below which a vertex hardly moves.
+pub(super) fn stillness(mass: f64, energy_tolerance: f64) -> f32 {
+    (STILLNESS * (2.0 * energy_tolerance / mass).sqrt()) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn those_that_move_and_their_neighbours_are_found() {
+        let mut mesh = Mesh::icosphere(Vec3::ZERO, 8.0, 1.0).unwrap();
+        let still = mesh.add_scalar();
+        mesh.scalar_mut(still).fill(PATIENCE);
+        let tip = mesh.vertices().last().unwrap();
+        mesh.scalar_mut(still)[tip.index()] = PATIENCE - 1.0;
+        let mut awake = Awake::default();
+        awake.find(&mesh, still);
+        assert_eq!(awake.moving, [tip]);
+        let mut expected = mesh.ring(tip).as_slice().to_vec();
+        expected.push(tip);
+        expected.sort_unstable();
+        awake.around.sort_unstable();
+        assert_eq!(awake.around, expected);
+    }
+
+    #[test]
+    fn with_few_asleep_all_are_looked_at() {
+        let mut mesh = Mesh::icosphere(Vec3::ZERO, 8.0, 1.0).unwrap();
+        let still = mesh.add_scalar();
+        let few = mesh.vertex_count() / 5;
+        mesh.scalar_mut(still)[..few].fill(PATIENCE);
+        let mut awake = Awake::default();
+        awake.find(&mesh, still);
+        assert_eq!((awake.moving.len(), awake.around.len()), (mesh.vertex_count(), mesh.vertex_count()));
+        mesh.scalar_mut(still)[..2 * few].fill(PATIENCE);
+        awake.find(&mesh, still);
+        assert_eq!(awake.moving.len(), mesh.vertex_count() - 2 * few);
+    }
+}
