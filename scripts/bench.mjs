@@ -1,5 +1,5 @@
-// Times points to a surface, remeshing, sculpting, tracking and the head CT, in Node and in Chromium; prints tables and
-// writes bench.json.
+// Times points to a surface, remeshing, sculpting, tracking, single steps and the head CT, in Node, in Chromium and, where a
+// program for it is there, natively; prints tables and writes bench.json.
 // `npm run bench -- points` does one of them, and writes nothing.
 import { readFile, writeFile } from 'node:fs/promises';
 import { cpus } from 'node:os';
@@ -7,7 +7,7 @@ import { build } from './build.mjs';
 import { launchChromium } from './chromium.mjs';
 import { serve } from './serve.mjs';
 import { setup } from './setup.mjs';
-import { at, root, script } from './shell.mjs';
+import { at, must, root, script } from './shell.mjs';
 
 const SCAN = 'www/public/data/visible-human-head-full.nii.gz';
 const BUST = 'www/public/data/nefertiti.ply';
@@ -31,6 +31,11 @@ const BENCHES = {
   track: {
     inNode: async () => (await import('../bench/track.mjs')).measure(REPEATS),
     rows: trackRows,
+  },
+  steps: {
+    native: 'step_figures',
+    inNode: async () => (await import('../bench/steps.mjs')).measure(),
+    rows: stepRows,
   },
   head: {
     file: SCAN,
@@ -131,17 +136,34 @@ function trackRows({ host, dims, frames, cubes, run, ratio, trueEjection, bytes 
   ];
 }
 
+/** Sizes against the smallest, and, natively measured before, one processor against the other. */
+function stepRows({ host, rows }, native) {
+  const row = ({ vertices, step, topology }, k) => {
+    const remarks = [`${(step / rows[0].step).toFixed(2)} of the smallest`, `topology ${topology.toFixed(1)} ms`];
+    if (native) remarks.push(`${(step / native.rows[k].step).toFixed(2)} of native`);
+    return [`  ${vertices} vertices`, `${step.toFixed(0)} ns`, `a vertex and step; ${remarks.join(', ')}`];
+  };
+  return [[host, '', 'all vertices moving, best of 6 steps'], ...rows.map(row)];
+}
+
 function print(rows) {
   for (const [what, figure, remark] of rows) {
     process.stdout.write(`${what.padEnd(28)}${figure.padStart(10)}  ${remark}\n`);
   }
 }
 
+/** What the program for it prints, as one more host. */
+async function natively(example) {
+  const printed = await must('cargo', ['run', '--quiet', '--locked', '--release', '--example', example]);
+  return { host: 'native', rows: JSON.parse(printed) };
+}
+
 async function run(name) {
-  const { inNode, rows } = BENCHES[name];
+  const { native, inNode, rows } = BENCHES[name];
+  const reference = native && (await natively(native));
   const results = [{ host: `Node ${process.versions.node}`, ...(await inNode()) }, await inChromium(name)];
-  print(results.flatMap(rows));
-  return results;
+  print([...(reference ? rows(reference) : []), ...results.flatMap((result) => rows(result, reference))]);
+  return reference ? [reference, ...results] : results;
 }
 
 await script(async () => {

@@ -1,0 +1,82 @@
+//! Figures of a step of the deformable model while every vertex moves, at several sizes: JSON, a row for each.
+//!
+//! The same work as `bench/steps.mjs`, which is in the package's language; `npm run bench -- steps` puts them side by side.
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program for the terminal")]
+#![allow(clippy::disallowed_methods, reason = "it measures time")]
+
+use std::sync::OnceLock;
+use std::time::Instant;
+use vesicle::math::{DAffine3, DVec3};
+use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Start};
+use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
+
+/// Voxels along each side, the radius of the ball in the middle and of the sphere that closes in on it.
+const SIDE: usize = 256;
+const BALL: f64 = 96.0;
+const SPHERE: f64 = 112.0;
+
+/// Mean edges. The spheres have 7,000, 66,000 and 1.7 million vertices: sizes go in steps of three.
+const EDGES: [f64; 3] = [4.6, 1.6, 0.46];
+
+/// Steps that are not counted, while the sphere takes up speed, and steps that are.
+const BEFORE: usize = 4;
+const COUNTED: usize = 6;
+
+fn milliseconds() -> f64 {
+    static BEGAN: OnceLock<Instant> = OnceLock::new();
+    BEGAN.get_or_init(Instant::now).elapsed().as_secs_f64() * 1e3
+}
+
+fn ball() -> Volume {
+    let middle = 0.5 * (SIDE as f64 - 1.0);
+    let value = |i: usize| {
+        let p = DVec3::new((i % SIDE) as f64, (i / SIDE % SIDE) as f64, (i / SIDE / SIDE) as f64) - middle;
+        (128.0 - 32.0 * (p.length() - BALL)).clamp(0.0, 255.0).floor() as u8
+    };
+    Volume::new(VolumeInit {
+        voxels: Voxels::U8((0..SIDE * SIDE * SIDE).map(value).collect()),
+        dims: [SIDE, SIDE, SIDE, 1],
+        affine: DAffine3::IDENTITY,
+        slope: 1.0,
+        intercept: 0.0,
+        frame_seconds: 0.0,
+        space: Space::Ras,
+    })
+    .unwrap()
+}
+
+/// Nanoseconds of a step for each vertex, and milliseconds of its topology: the best of all counted steps.
+fn row(volume: &Volume, edge: f64) -> String {
+    let params =
+        DeformableParams { iso: 128.0, iso_force: -1.0, rigidity: 0.2, ..DeformableParams::default() };
+    let start = Start::Seeds { points: vec![DVec3::splat(0.5 * (SIDE as f64 - 1.0))], radius: SPHERE };
+    let options = DeformableOptions { start, edge: Some(edge), params: Some(params), ..Default::default() };
+    let mut model = DeformableModel::new(volume, options).unwrap();
+    model.set_clock(milliseconds);
+    let (mut best, mut topology) = (f64::INFINITY, f64::INFINITY);
+    let mut vertices = 0;
+    for step in 0..BEFORE + COUNTED {
+        let began = milliseconds();
+        let report = model.step().unwrap();
+        let spent = milliseconds() - began;
+        if step >= BEFORE {
+            best = best.min(1e6 * spent / f64::from(report.vertices));
+            topology = report
+                .times
+                .0
+                .iter()
+                .filter(|(part, _)| *part == "topology")
+                .fold(topology, |t, p| t.min(p.1));
+            vertices = report.vertices;
+        }
+    }
+    format!(
+        "{{\"edge\": {edge}, \"vertices\": {vertices}, \"step\": {best:.1}, \"topology\": {topology:.3}}}"
+    )
+}
+
+fn main() {
+    let volume = ball();
+    let rows: Vec<String> = EDGES.iter().map(|&edge| row(&volume, edge)).collect();
+    println!("[{}]", rows.join(", "));
+}
