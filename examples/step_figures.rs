@@ -77,6 +77,8 @@ fn row(volume: &Volume, edge: f64) -> String {
 
 fn main() {
     let volume = ball();
+    // As in the package, where code is compiled while it runs.
+    row(&volume, EDGES[0]);
     let rows: Vec<String> = EDGES.iter().map(|&edge| row(&volume, edge)).collect();
     println!("[{}]", rows.join(", "));
 }
