@@ -1,6 +1,7 @@
 /** What a person does in the Extract lab beyond playing: looks, places, compares, goes back, passes on. */
 import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
+import { PRESETS } from '../../www/src/presets';
 import { type App, iteration, measures, openApp, reach } from './browser';
 
 let app: App;
@@ -19,6 +20,9 @@ async function openAt(hash: string): Promise<void> {
   await app.page.goto(app.address + hash);
   await reach(app.page, 'done');
 }
+
+/** Iterations of the chain of figure 7 from the start to rest. */
+const CHAIN = PRESETS.find(({ id }) => id === 'figure-7')?.variants[0].outcome.iterations;
 
 const text = (selector: string) => app.page.locator(selector).textContent();
 /** Of a canvas as it is shown. */
@@ -264,7 +268,7 @@ describe('undo', () => {
     const before = await measures(app.page);
     const captions = () => app.page.locator('figcaption').allTextContents();
     // They follow at the next frame, which a busy machine draws late.
-    await expect.poll(async () => (await captions())[0]).toContain('After 80 iterations');
+    await expect.poll(async () => (await captions())[0]).toContain(`After ${CHAIN} iterations`);
     const told = await captions();
     await app.page.click('text=Reset');
     await reach(app.page, 'paused');
@@ -272,7 +276,7 @@ describe('undo', () => {
     await undo();
     await reach(app.page, 'done');
     expect(await measures(app.page)).toEqual(before);
-    expect(await iteration(app.page)).toBe(80);
+    expect(await iteration(app.page)).toBe(CHAIN);
     await expect.poll(captions).toEqual(told);
     await redo();
     await reach(app.page, 'paused');
@@ -285,7 +289,7 @@ describe('undo', () => {
     const before = await measures(app.page);
     await rigidity().fill('0.3');
     await rigidity().press('Enter');
-    await expect.poll(() => iteration(app.page)).toBeGreaterThan(80);
+    await expect.poll(() => iteration(app.page)).toBeGreaterThan(CHAIN ?? 0);
     await reach(app.page, 'done');
     // The focus is in the field, but nothing is being typed.
     await app.page.keyboard.press('Control+z');

@@ -68,7 +68,7 @@ test('table 1: both ways end alike, within the bounds of the paper', async () =>
   const coarseToFine = await outcomeOf(preset, variant);
   const direct = await outcomeOf(preset, variant, 0);
   expect([direct.components, direct.genus]).toEqual([coarseToFine.components, coarseToFine.genus]);
-  expect(Math.abs(coarseToFine.area / direct.area - 1)).toBeLessThan(0.002);
+  expect(Math.abs(coarseToFine.area / direct.area - 1)).toBeLessThan(0.003);
   expect(Math.abs(coarseToFine.volume / direct.volume - 1)).toBeLessThan(0.002);
 });
 
