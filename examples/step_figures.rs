@@ -4,15 +4,20 @@
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program for the terminal")]
 #![allow(clippy::disallowed_methods, reason = "it measures time")]
 
+#[path = "../tests/common/mod.rs"]
+mod common;
+#[path = "../tests/common/scenes.rs"]
+mod scenes;
+
 use std::sync::OnceLock;
 use std::time::Instant;
-use vesicle::math::{DAffine3, DVec3};
+use vesicle::math::{DVec3, Vec3};
 use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Start};
-use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
+use vesicle::volume::Volume;
 
 /// Voxels along each side, the radius of the ball in the middle and of the sphere that closes in on it.
 const SIDE: usize = 256;
-const BALL: f64 = 96.0;
+const BALL: f32 = 96.0;
 const SPHERE: f64 = 112.0;
 
 /// Mean edges. The spheres have 7,000, 66,000 and 1.7 million vertices: sizes go in steps of three.
@@ -28,21 +33,8 @@ fn milliseconds() -> f64 {
 }
 
 fn ball() -> Volume {
-    let middle = 0.5 * (SIDE as f64 - 1.0);
-    let value = |i: usize| {
-        let p = DVec3::new((i % SIDE) as f64, (i / SIDE % SIDE) as f64, (i / SIDE / SIDE) as f64) - middle;
-        (128.0 - 32.0 * (p.length() - BALL)).clamp(0.0, 255.0).floor() as u8
-    };
-    Volume::new(VolumeInit {
-        voxels: Voxels::U8((0..SIDE * SIDE * SIDE).map(value).collect()),
-        dims: [SIDE, SIDE, SIDE, 1],
-        affine: DAffine3::IDENTITY,
-        slope: 1.0,
-        intercept: 0.0,
-        frame_seconds: 0.0,
-        space: Space::Ras,
-    })
-    .unwrap()
+    let middle = Vec3::splat(0.5 * (SIDE as f32 - 1.0));
+    scenes::volume([SIDE; 3], |p| (128.0 - 32.0 * (p.distance(middle) - BALL)).clamp(0.0, 255.0).floor())
 }
 
 /// Nanoseconds of a step for each vertex, and milliseconds of its topology: the best of all counted steps.

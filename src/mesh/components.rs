@@ -21,36 +21,18 @@ impl Mesh {
 
     /// The vertices of each component, components in the order of their lowest slot.
     pub fn component_members(&self) -> Vec<Vec<VertexId>> {
-        let mut seen = vec![false; self.slots()];
-        let mut components = Vec::new();
-        for v in self.vertices() {
-            if !seen[v.index()] {
-                components.push(self.flood(v, &mut seen));
-            }
-        }
-        components
+        self.components().collect()
     }
 
     /// The number of components.
     pub fn component_count(&self) -> usize {
+        self.components().count()
+    }
+
+    fn components(&self) -> impl Iterator<Item = Vec<VertexId>> + '_ {
         let mut seen = vec![false; self.slots()];
-        let mut stack = Vec::new();
-        let mut count = 0;
-        for v in self.vertices() {
-            if std::mem::replace(&mut seen[v.index()], true) {
-                continue;
-            }
-            count += 1;
-            stack.push(v);
-            while let Some(u) = stack.pop() {
-                for &w in self.ring(u).as_slice() {
-                    if !std::mem::replace(&mut seen[w.index()], true) {
-                        stack.push(w);
-                    }
-                }
-            }
-        }
-        count
+        self.vertices()
+            .filter_map(move |v| if seen[v.index()] { None } else { Some(self.flood(v, &mut seen)) })
     }
 
     /// Everything connected with `v`, breadth first.

@@ -65,13 +65,15 @@ impl Grid {
     #[inline]
     pub fn sample(&self, p: Vec3) -> f32 {
         let cell = Cell::at(self.dims, p);
-        cell.blend(|index| self.values[index])
+        cell.blend(&cell.corners(|index| self.values[index]))
     }
 
-    /// [`Self::sample_padded`] with the same bits, faster where `p` is in the same cell as the last time with this `known`, which
-    /// is of this grid only.
+    /// Trilinear value at `p` as if the grid went on with voxels of value 0 on all sides; faster where `p` is in the same
+    /// cell as the last time with this `known`, which is of this grid only.
+    ///
+    /// Continuous, unlike a cut at the border: a surface that looks for a value there comes to rest.
     #[inline]
-    pub fn sample_padded_again(&self, p: Vec3, known: &mut KnownCell) -> f32 {
+    pub fn sample_padded(&self, p: Vec3, known: &mut KnownCell) -> f32 {
         let last = |n: usize| (n - 1) as f32;
         let share = inside(p.x, last(self.dims[0]))
             * inside(p.y, last(self.dims[1]))
@@ -79,24 +81,12 @@ impl Grid {
         if share > 0.0 {
             let cell = Cell::at(self.dims, p);
             if known.base != cell.base() {
-                *known = KnownCell { base: cell.base(), corners: cell.corners(&self.values) };
+                *known = KnownCell { base: cell.base(), corners: cell.corners(|index| self.values[index]) };
             }
-            share * cell.blend_corners(&known.corners)
+            share * cell.blend(&known.corners)
         } else {
             0.0
         }
-    }
-
-    /// Trilinear value at `p` as if the grid went on with voxels of value 0 on all sides.
-    ///
-    /// Continuous, unlike a cut at the border: a surface that looks for a value there comes to rest.
-    #[inline]
-    pub fn sample_padded(&self, p: Vec3) -> f32 {
-        let last = |n: usize| (n - 1) as f32;
-        let share = inside(p.x, last(self.dims[0]))
-            * inside(p.y, last(self.dims[1]))
-            * inside(p.z, last(self.dims[2]));
-        if share > 0.0 { share * self.sample(p) } else { 0.0 }
     }
 
     /// Sobel gradient in intensity per voxel: differences over two voxels, smoothed by [1 2 1] across, divided by
@@ -142,7 +132,7 @@ impl VectorGrid {
     #[inline]
     pub fn sample(&self, p: Vec3) -> Vec3 {
         let cell = Cell::at(self.dims, p);
-        cell.blend(|index| self.values[index])
+        cell.blend(&cell.corners(|index| self.values[index]))
     }
 }
 
@@ -248,9 +238,9 @@ mod tests {
             let p = Vec3::new((i % 17) as f32 * 0.45, (i / 17 % 15) as f32 * 0.43, (i / 255) as f32 * 0.57);
             let p = p - Vec3::splat(1.9);
             let expected = padded.sample(p + Vec3::splat(2.0));
-            assert!((g.sample_padded(p) - expected).abs() < 1e-4, "at {p}");
+            assert!((g.sample_padded(p, &mut KnownCell::default()) - expected).abs() < 1e-4, "at {p}");
         }
-        assert_eq!(g.sample_padded(Vec3::splat(f32::NAN)), 0.0);
+        assert_eq!(g.sample_padded(Vec3::splat(f32::NAN), &mut KnownCell::default()), 0.0);
     }
 
     #[test]
@@ -261,8 +251,8 @@ mod tests {
             let t = i as f32;
             let p = Vec3::new((t * 0.013) % 8.0, (t * 0.007) % 6.0, (t * 0.011) % 5.0) - 1.0;
             assert_eq!(
-                g.sample_padded_again(p, &mut known).to_bits(),
-                g.sample_padded(p).to_bits(),
+                g.sample_padded(p, &mut known).to_bits(),
+                g.sample_padded(p, &mut KnownCell::default()).to_bits(),
                 "at {p}"
             );
         }

@@ -36,34 +36,23 @@ impl Cell {
         self.base
     }
 
-    /// The values at the eight voxels, x fastest.
+    /// What `value` gives for the eight voxels, x fastest.
     #[inline]
-    pub(super) fn corners(&self, values: &[f32]) -> [f32; 8] {
+    pub(super) fn corners<T>(&self, value: impl Fn(usize) -> T) -> [T; 8] {
         let [sx, sy, sz] = self.step;
         let [a, b] = [self.base, self.base + sz];
-        [a, a + sx, a + sy, a + sx + sy, b, b + sx, b + sy, b + sx + sy].map(|index| values[index])
+        [a, a + sx, a + sy, a + sx + sy, b, b + sx, b + sy, b + sx + sy].map(value)
     }
 
-    /// Interpolates what [`Self::corners`] gave; the same bits as [`Self::blend`].
+    /// Interpolates what [`Self::corners`] gave.
     #[inline]
-    pub(super) fn blend_corners(&self, corners: &[f32; 8]) -> f32 {
+    pub(super) fn blend<T>(&self, corners: &[T; 8]) -> T
+    where
+        T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>,
+    {
         let [fx, fy, fz] = self.fraction;
         let along_x = |k: usize| mix(corners[k], corners[k + 1], fx);
         mix(mix(along_x(0), along_x(2), fy), mix(along_x(4), along_x(6), fy), fz)
-    }
-
-    /// Interpolates what `value` gives for the eight voxels.
-    #[inline]
-    pub(super) fn blend<T, F>(&self, value: F) -> T
-    where
-        T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>,
-        F: Fn(usize) -> T,
-    {
-        let [sx, sy, sz] = self.step;
-        let [fx, fy, fz] = self.fraction;
-        let along_x = |index: usize| mix(value(index), value(index + sx), fx);
-        let along_xy = |index: usize| mix(along_x(index), along_x(index + sy), fy);
-        mix(along_xy(self.base), along_xy(self.base + sz), fz)
     }
 }
 

@@ -38,7 +38,7 @@ impl LevelImage {
     /// call for the same vertex left there.
     #[inline]
     pub(super) fn intensity(&self, p: Vec3, known: &mut KnownCell) -> f32 {
-        self.grid.sample_padded_again(self.index(p), known)
+        self.grid.sample_padded(self.index(p), known)
     }
 
     /// ∇Π by the Sobel operator, per voxel of this level, no longer than `bound`; zero where none was prepared.

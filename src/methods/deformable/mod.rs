@@ -163,8 +163,6 @@ pub struct DeformableModel {
     movement: Movement,
     components: u32,
     clock: fn() -> f64,
-    /// Storage of [`Self::vertices_to_check`].
-    active: Vec<VertexId>,
 }
 
 impl DeformableModel {
@@ -217,7 +215,6 @@ impl DeformableModel {
             movement: Movement::default(),
             components: 0,
             clock: || 0.0,
-            active: Vec::new(),
         };
         model.settle_in();
         model.prepare_level()?;
@@ -239,7 +236,6 @@ impl DeformableModel {
             if self.params.topology == Topology::Adaptive {
                 let active = self.vertices_to_check();
                 changes += self.restore_bounds(&active, &mut times);
-                self.active = active;
             }
             self.iteration += 1;
             changes += self.come_to_rest(&mut times)?;
@@ -288,11 +284,10 @@ impl DeformableModel {
     fn vertices_to_check(&mut self) -> Vec<VertexId> {
         let limit = CHECK_TRAVEL * self.model_delta();
         let turn = self.iteration as usize % CHECK_PERIOD;
-        let mut active = std::mem::take(&mut self.active);
-        active.clear();
         let checked = self.mesh.vector(self.keys.checked);
         let travelled = |v: VertexId| checked[v.index()].distance_squared(self.mesh.position(v));
-        active.extend(self.motion.awake.moving.iter().filter(|&&v| travelled(v) > limit * limit));
+        let moving = self.motion.awake.moving.iter().copied();
+        let mut active: Vec<VertexId> = moving.filter(|&v| travelled(v) > limit * limit).collect();
         let in_turn = (turn..self.mesh.slots()).step_by(CHECK_PERIOD).map(VertexId::from_index);
         active.extend(in_turn.filter(|&v| self.mesh.is_live(v) && travelled(v) > 0.0));
         let (positions, checked) = self.mesh.positions_and_vector_mut(self.keys.checked);

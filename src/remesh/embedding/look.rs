@@ -2,7 +2,7 @@
 
 use super::star::{
     crossings_around, crossings_between, divided_as_sheets, divided_at, divided_between, divided_through,
-    divided_upright, flatness, spread_out,
+    flatness, spread_out,
 };
 use super::{Embedding, FREEDOM};
 use crate::mesh::{Mesh, VertexId};
@@ -109,18 +109,14 @@ impl Embedding {
     /// By how much the vertices around two that are no neighbours may move; not positive where it must be worked out.
     fn room_across(&self, mesh: &Mesh, [v, w]: [VertexId; 2]) -> f32 {
         let longest = self.longest_of(v, w);
-        let or_else = |room: f32, other: &dyn Fn() -> f32| {
-            let other = if self.suffices(room) { room } else { other() };
-            if other > room { other } else { room }
-        };
-        if let Some(edge @ [a, b]) = common_edge(mesh, v, w) {
-            return or_else(divided_through(mesh, [v, w], edge, longest), &|| {
-                divided_upright(mesh, [v, w], edge, mesh.area_normal(a) + mesh.area_normal(b), longest)
-            });
+        if let Some(edge) = common_edge(mesh, v, w) {
+            return divided_through(mesh, [v, w], edge, longest);
         }
         match *mesh.common_neighbours(v, w) {
             [] => {
-                or_else(divided_between(mesh, [v, w], longest), &|| divided_as_sheets(mesh, [v, w], longest))
+                let room = divided_between(mesh, [v, w], longest);
+                let other = if self.suffices(room) { room } else { divided_as_sheets(mesh, [v, w], longest) };
+                if other > room { other } else { room }
             }
             [c] => divided_at(mesh, [v, w], c, longest),
             [c, d] => divided_through(mesh, [v, w], [c, d], longest),

@@ -110,31 +110,13 @@ pub(super) fn divided_through(
     [p, q]: [VertexId; 2],
     longest: f32,
 ) -> f32 {
-    let way = mesh.position(v) - mesh.position(u);
-    divided_along(mesh, [u, v], [p, q], way, longest)
-}
-
-/// As [`divided_through`], with a plane that `up` lies in as far as it can.
-pub(super) fn divided_upright(
-    mesh: &Mesh,
-    ends: [VertexId; 2],
-    [p, q]: [VertexId; 2],
-    up: Vec3,
-    longest: f32,
-) -> f32 {
-    let across = up.cross(mesh.position(q) - mesh.position(p));
-    let way = mesh.position(ends[1]) - mesh.position(ends[0]);
-    divided_along(mesh, ends, [p, q], if way.dot(across) < 0.0 { -across } else { across }, longest)
-}
-
-/// As [`divided_through`], with the plane most across `way`.
-fn divided_along(mesh: &Mesh, ends: [VertexId; 2], [p, q]: [VertexId; 2], way: Vec3, longest: f32) -> f32 {
     let origin = mesh.position(p);
     let divider = mesh.position(q) - origin;
     let square = divider.length_squared();
+    let way = mesh.position(v) - mesh.position(u);
     // Without length there is no plane, and no room: the distances are NaN or 0.
     let normal = (way - divider * (way.dot(divider) / square)).normalize_or_zero();
-    let gap = gap(mesh, ends, [p, q], origin, normal) - ROUNDING * longest;
+    let gap = gap(mesh, [u, v], [p, q], origin, normal) - ROUNDING * longest;
     let length = square.sqrt();
     let room = gap / (2.0 + 6.0 * longest / length);
     lower(room, SMALL * lower(length, longest))
