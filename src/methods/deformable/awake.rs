@@ -1,7 +1,7 @@
 //! Which vertices move: where the surface has come to rest, nothing is worked out any more.
 //!
-//! A vertex falls asleep when it has hardly moved for some iterations. It wakes when a neighbour moves, when an edit reaches
-//! it, and now and then to look whether it should. A level ends only after all have been awake and still.
+//! A vertex falls asleep when it has hardly moved for some iterations. It wakes when a neighbour moves or an edit reaches
+//! it. A level ends only after all have been awake and still.
 
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 

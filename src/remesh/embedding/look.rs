@@ -1,38 +1,25 @@
 //! Where the mesh is in doubt, looked at for crossings and for room to move.
 
+use super::Embedding;
+use super::room::{Concern, Concerns};
 use super::star::{
     crossings_around, crossings_between, divided_as_sheets, divided_at, divided_between, divided_through,
     flatness, spread_out,
 };
-use super::{Embedding, FREEDOM};
 use crate::mesh::{Mesh, VertexId};
 
-/// What a vertex may move between two looks, its freedom before and its freedom after some other vertex was looked at.
-const TWICE: f32 = 2.0;
+/// With less room than this, in the ordinary edge, a better plane is looked for.
+const ENOUGH: f32 = 0.03;
 
-/// The pairs of triangles that a vertex is looked at for: both at the vertex; one at a neighbour of it; one at a near
-/// vertex that is none.
-const AROUND: u8 = 1;
-const ALONG: u8 = 2;
-pub(super) const ACROSS: u8 = 4;
-pub(super) const PAIRS: u8 = AROUND | ALONG | ACROSS;
-
-/// Whether a vertex looks for the others that are near.
-pub(super) const SEARCH: u8 = 8;
-pub(super) const ALL: u8 = PAIRS | SEARCH;
-
-/// Whether a vertex that is no neighbour may be within the contact distance.
-pub(super) const CLOSE: u8 = 16;
-
-/// What is to be thought of a vertex that an edit made or changed.
-pub(super) const UNKNOWN: u8 = ALL | CLOSE;
+/// Concerns with pairs of triangles.
+const PAIRS: [Concern; 2] = [Concern::AtHand, Concern::Across];
 
 impl Embedding {
     /// Looks at every vertex; see [`Self::look`].
     pub(super) fn look_everywhere(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         self.know(mesh);
-        self.doubts.resize(mesh.slots(), 0);
-        mesh.vertices().for_each(|v| self.doubt(v, ALL));
+        self.doubts.resize(mesh.slots(), Concerns::default());
+        mesh.vertices().for_each(|v| self.doubt(v, Concerns::ALL));
         self.look(mesh)
     }
 
@@ -41,23 +28,23 @@ impl Embedding {
     pub(super) fn look(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         let doubtful = std::mem::take(&mut self.doubtful);
         self.find_near(mesh, &doubtful);
-        for &v in &doubtful {
-            self.tight[v.index()] &= !self.doubts[v.index()];
+        for (&v, concern) in doubtful.iter().flat_map(|v| PAIRS.map(|concern| (v, concern))) {
+            if self.doubts[v.index()].has(concern) {
+                self.room[v.index()].set(concern, f32::INFINITY);
+            }
         }
         let mut crossing = Vec::new();
         for &v in &doubtful {
             let doubts = self.doubts[v.index()];
-            if doubts & AROUND != 0 {
+            if doubts.has(Concern::AtHand) {
                 self.look_around(mesh, v, &mut crossing);
-            }
-            if doubts & ALONG != 0 {
                 self.look_along(mesh, v, &mut crossing);
             }
-            if doubts & ACROSS != 0 {
+            if doubts.has(Concern::Across) {
                 self.look_across(mesh, v, &mut crossing);
             }
         }
-        doubtful.iter().for_each(|v| self.doubts[v.index()] = 0);
+        doubtful.iter().for_each(|v| self.doubts[v.index()] = Concerns::default());
         self.doubtful = doubtful;
         self.doubtful.clear();
         crossing.sort_unstable();
@@ -66,8 +53,8 @@ impl Embedding {
     }
 
     fn look_around(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
-        let room = flatness(mesh, v, self.seen[v.index()].1);
-        if !self.settle(room, AROUND, [v, v]) {
+        let room = flatness(mesh, v, self.longest[v.index()]);
+        if !self.settle(room, Concern::AtHand, [v, v]) {
             crossings_around(mesh, v, crossing);
         }
     }
@@ -77,14 +64,14 @@ impl Embedding {
         let mut right = ring[ring.len() - 1];
         for (k, &w) in ring.iter().enumerate() {
             let left = ring[if k + 1 == ring.len() { 0 } else { k + 1 }];
-            if !self.is_left_to(w, v, ALONG) {
+            if !self.is_left_to(w, v, Concern::AtHand) {
                 let longest = self.longest_of(v, w);
                 let mut room = divided_through(mesh, [v, w], [left, right], longest);
                 if !self.suffices(room) {
                     let other = spread_out(mesh, [v, w], [left, right], longest);
                     room = if other > room { other } else { room };
                 }
-                if !self.settle(room, ALONG, [v, w]) {
+                if !self.settle(room, Concern::AtHand, [v, w]) {
                     crossings_between(mesh, [v, w], crossing);
                 }
             }
@@ -96,11 +83,15 @@ impl Embedding {
         for k in 0..self.near[v.index()].len() {
             let w = self.near[v.index()][k];
             // Since they were found to be near, edits may have changed the one or the other.
-            if self.is_left_to(w, v, ACROSS) || !mesh.is_live(w) || w == v || mesh.ring(v).contains(w) {
+            if self.is_left_to(w, v, Concern::Across)
+                || !mesh.is_live(w)
+                || w == v
+                || mesh.ring(v).contains(w)
+            {
                 continue;
             }
             let room = self.room_across(mesh, [v, w]);
-            if !self.settle(room, ACROSS, [v, w]) {
+            if !self.settle(room, Concern::Across, [v, w]) {
                 crossings_between(mesh, [v, w], crossing);
             }
         }
@@ -124,26 +115,25 @@ impl Embedding {
         }
     }
 
-    /// Notes where two vertices have too little room for their freedom, and says whether there is any.
-    fn settle(&mut self, room: f32, pairs: u8, ends: [VertexId; 2]) -> bool {
-        if !self.suffices(room) {
-            ends.into_iter().for_each(|v| self.tight[v.index()] |= pairs);
-        }
-        room > 0.0
+    /// Notes how much room two vertices have for each other, and says whether there is any.
+    fn settle(&mut self, room: f32, concern: Concern, ends: [VertexId; 2]) -> bool {
+        let is_room = room > 0.0;
+        let room = if is_room { room } else { 0.0 };
+        ends.into_iter().for_each(|v| self.room[v.index()].bound(concern, room));
+        is_room
     }
 
-    /// Whether there is so much room that both vertices may use up their freedom.
     fn suffices(&self, room: f32) -> bool {
-        room > TWICE * FREEDOM * self.edge
+        room > ENOUGH * self.edge
     }
 
     /// Whether a pair at `w` and `v` is looked at from `w`, too, and it is the turn of `w`.
-    pub(super) fn is_left_to(&self, w: VertexId, v: VertexId, pairs: u8) -> bool {
-        w < v && self.doubts[w.index()] & pairs != 0
+    pub(super) fn is_left_to(&self, w: VertexId, v: VertexId, concern: Concern) -> bool {
+        w < v && self.doubts[w.index()].has(concern)
     }
 
     fn longest_of(&self, v: VertexId, w: VertexId) -> f32 {
-        let (a, b) = (self.seen[v.index()].1, self.seen[w.index()].1);
+        let (a, b) = (self.longest[v.index()], self.longest[w.index()]);
         if a > b { a } else { b }
     }
 }
@@ -239,9 +229,9 @@ mod tests {
             let mut embedding = Embedding::default();
             embedding.follow_with(&mesh, one_of(random, [1.0, 0.3, 5.0]));
             let doubtful: Vec<VertexId> = mesh.vertices().filter(|_| random.below(3) > 0).collect();
-            embedding.doubts.resize(mesh.slots(), 0);
-            doubtful.iter().for_each(|&v| embedding.doubt(v, ALL));
-            embedding.tight.fill(0);
+            embedding.doubts.resize(mesh.slots(), Concerns::default());
+            doubtful.iter().for_each(|&v| embedding.doubt(v, Concerns::ALL));
+            embedding.close.fill(false);
             let (mut swept, mut searched) = (embedding.clone(), embedding);
             swept.sweep(&mesh);
             searched.grid.fill_cells();
@@ -250,7 +240,7 @@ mod tests {
                 [&mut swept, &mut searched].into_iter().for_each(|e| e.near[v.index()].sort_unstable());
             }
             assert_eq!(swept.near, searched.near, "seed {seed}");
-            assert_eq!(swept.tight, searched.tight, "seed {seed}");
+            assert_eq!(swept.close, searched.close, "seed {seed}");
         }
     }
 }

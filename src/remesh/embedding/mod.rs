@@ -15,12 +15,13 @@ mod motion;
 mod near;
 mod patch;
 mod refine;
+mod room;
 mod star;
 
 use crate::math::Vec3;
 use crate::mesh::{EditError, Mesh, VertexId};
 use crate::spatial::StarGrid;
-use look::UNKNOWN;
+use room::{Concerns, Room};
 use smallvec::SmallVec;
 use star::longest_edge;
 
@@ -30,33 +31,34 @@ const NEAREST_CORNER: f32 = 0.577_351;
 /// √(1/4 + 1/3), rounded up: the distance between corners of two triangles that cross, in the longest edge of both.
 const PIERCING: f32 = 0.763_763;
 
-/// How far a vertex may move from where it was looked at before it is looked at again, in the ordinary edge. With more,
-/// fewer vertices have the room for it; with less, they are looked at more often.
-const FREEDOM: f32 = 0.008;
-
-/// How far it may move from where it is in the grid before it looks again for what is near, in the ordinary edge. With more,
-/// more is near; with less, they look more often. Few vertices of an ordinary mesh have anything near.
-const SEARCH_FREEDOM: f32 = 0.03;
+/// How far a star may move before its vertex looks again for what is near, in the ordinary edge. With more, more is near;
+/// with less, they look more often. Few vertices of an ordinary mesh have anything near.
+const SEARCH_ROOM: f32 = 0.04;
 
 /// Keeps one mesh embedded.
 ///
-/// A vertex that was looked at and found to have room around it is free: it is not looked at again before it has moved by
-/// its freedom. Which vertices are free has no influence on what is found.
+/// A vertex that was looked at has some room: it is not looked at again before the vertices of its star have used it up.
+/// How much room is found has no influence on what is found to cross.
 #[derive(Clone, Debug, Default)]
 pub struct Embedding {
     grid: StarGrid,
     /// An edge that is longer than most of the mesh.
     edge: f32,
-    /// By vertex, where it was looked at, and its longest edge then.
-    seen: Vec<(Vec3, f32)>,
+    /// By vertex, its longest edge when it was looked at.
+    longest: Vec<f32>,
     /// By vertex, the others that were near when it or they searched for them.
     near: Vec<SmallVec<[VertexId; 4]>>,
-    /// By vertex, the pairs of triangles it has no room for to move freely, and must be looked at for after every move.
-    tight: Vec<u8>,
+    /// By vertex, whether one that is no neighbour may be within the contact distance.
+    close: Vec<bool>,
+    /// By vertex, how far its star may still go before it is looked at again.
+    room: Vec<Room>,
+    /// By vertex, the longest way in its star, while the mesh moves, and the vertices where it is not 0.
+    gone: Vec<f32>,
+    touched: Vec<VertexId>,
     /// Vertices that edits made or changed since the last move: those near them do not know yet.
     fresh: Vec<VertexId>,
-    /// By vertex, the pairs it is to be looked at for now, and the vertices that have any.
-    doubts: Vec<u8>,
+    /// By vertex, what it is to be looked at for now, and the vertices that have any.
+    doubts: Vec<Concerns>,
     doubtful: Vec<VertexId>,
     /// The version of the mesh's geometry that is known here.
     version: Option<u32>,
@@ -93,15 +95,15 @@ impl Embedding {
         if self.version == Some(mesh.geometry_version()) {
             return;
         }
-        self.grid = StarGrid::new(self.edge, SEARCH_FREEDOM * self.edge, mesh.slots());
-        self.tight = vec![UNKNOWN; mesh.slots()];
-        self.seen.resize(mesh.slots(), (Vec3::ZERO, 0.0));
+        self.grid = StarGrid::new(self.edge, SEARCH_ROOM * self.edge, mesh.slots());
+        self.room.clear();
         self.near.clear();
-        self.near.resize(mesh.slots(), SmallVec::new());
+        self.close.clear();
+        self.make_room(mesh.slots());
         self.fresh.clear();
         for v in mesh.vertices() {
             self.see(mesh, v);
-            self.enter(v);
+            self.enter(mesh, v);
         }
         self.version = Some(mesh.geometry_version());
         self.entered = self.version;
@@ -155,28 +157,33 @@ impl Embedding {
         count
     }
 
-    /// Notes where `v` is now, and its longest edge.
-    fn see(&mut self, mesh: &Mesh, v: VertexId) {
-        self.seen[v.index()] = (mesh.position(v), longest_edge(mesh, v));
+    /// Has room for what is known of so many vertices; of new ones nothing is.
+    fn make_room(&mut self, slots: usize) {
+        self.longest.resize(slots, 0.0);
+        self.near.resize(slots, SmallVec::new());
+        self.close.resize(slots, true);
+        self.room.resize(slots, Room::NONE);
     }
 
-    /// Enters `v` in the grid as it was seen.
-    fn enter(&mut self, v: VertexId) {
-        let (position, longest) = self.seen[v.index()];
-        self.grid.set(v, position, longest);
+    /// Notes the longest edge at `v`.
+    fn see(&mut self, mesh: &Mesh, v: VertexId) {
+        self.longest[v.index()] = longest_edge(mesh, v);
+    }
+
+    /// Enters `v` in the grid as it is, and as it was seen.
+    fn enter(&mut self, mesh: &Mesh, v: VertexId) {
+        self.grid.set(v, mesh.position(v), self.longest[v.index()]);
     }
 
     /// Takes the changes since [`Mesh::begin`] into the grid.
     fn follow_changes(&mut self, mesh: &Mesh, changed: &[[VertexId; 3]]) {
-        self.tight.resize(mesh.slots(), UNKNOWN);
-        self.seen.resize(mesh.slots(), (Vec3::ZERO, 0.0));
-        self.near.resize(mesh.slots(), SmallVec::new());
+        self.make_room(mesh.slots());
         for v in mesh.touched() {
-            self.tight[v.index()] = UNKNOWN;
             self.fresh.push(v);
+            self.forget(v);
             if mesh.is_live(v) {
                 self.see(mesh, v);
-                self.enter(v);
+                self.enter(mesh, v);
             } else {
                 self.grid.remove(v);
             }
@@ -185,15 +192,21 @@ impl Embedding {
         for names in changed {
             let [a, b, c] = names.map(|v| mesh.position(v));
             let square = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
-            let longest = square.sqrt();
+            let edge = square.sqrt();
             for &v in names {
-                if std::mem::replace(&mut self.tight[v.index()], UNKNOWN) != UNKNOWN {
-                    self.fresh.push(v);
-                }
-                let seen = &mut self.seen[v.index()].1;
-                *seen = if longest > *seen { longest } else { *seen };
-                self.grid.stretch(v, longest);
+                self.forget(v);
+                let longest = &mut self.longest[v.index()];
+                *longest = if edge > *longest { edge } else { *longest };
+                self.grid.stretch(v, edge);
             }
+        }
+    }
+
+    /// Nothing is known any more of `v`, which an edit made or changed.
+    fn forget(&mut self, v: VertexId) {
+        self.close[v.index()] = true;
+        if std::mem::replace(&mut self.room[v.index()], Room::NONE) != Room::NONE {
+            self.fresh.push(v);
         }
     }
 

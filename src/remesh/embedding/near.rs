@@ -1,7 +1,7 @@
 //! Which vertices are near each other and no neighbours: their triangles may cross soon.
 
-use super::look::{CLOSE, PAIRS, SEARCH};
-use super::{Embedding, NEAREST_CORNER, PIERCING, SEARCH_FREEDOM};
+use super::room::Concern;
+use super::{Embedding, NEAREST_CORNER, PIERCING, SEARCH_ROOM};
 use crate::math::Bounds;
 use crate::mesh::{Mesh, VertexId};
 use crate::spatial::{Nearness, Star, near_pairs};
@@ -14,8 +14,7 @@ impl Embedding {
     /// Notes where doubtful vertices are now, and finds what is near those that search.
     pub(super) fn find_near(&mut self, mesh: &Mesh, doubtful: &[VertexId]) {
         let is_entered = self.entered == Some(mesh.geometry_version());
-        let searches = |doubts: u8| doubts & SEARCH != 0;
-        let count = doubtful.iter().filter(|v| searches(self.doubts[v.index()])).count();
+        let count = doubtful.iter().filter(|&&v| self.searches(v)).count();
         let many = MANY * count >= mesh.vertex_count();
         if many {
             self.grid.empty_cells();
@@ -23,15 +22,15 @@ impl Embedding {
             self.grid.fill_cells();
         }
         for &v in doubtful {
-            let doubts = self.doubts[v.index()];
-            if doubts & PAIRS == PAIRS && !is_entered {
+            if !is_entered {
                 self.see(mesh, v);
             }
-            if searches(doubts) {
+            if self.searches(v) {
                 self.near[v.index()].clear();
-                self.tight[v.index()] &= !CLOSE;
+                self.close[v.index()] = false;
+                self.room[v.index()].set(Concern::Search, SEARCH_ROOM * self.edge);
                 if !is_entered {
-                    self.enter(v);
+                    self.enter(mesh, v);
                 }
             }
         }
@@ -42,12 +41,16 @@ impl Embedding {
         }
     }
 
+    fn searches(&self, v: VertexId) -> bool {
+        self.doubts[v.index()].has(Concern::Search)
+    }
+
     /// Finds what is near, in one sweep over the mesh.
     pub(super) fn sweep(&mut self, mesh: &Mesh) {
         let nearness = self.nearness();
         let stars = mesh.vertices().map(|v| self.grid.star(v)).collect();
         near_pairs(stars, nearness, |a, b| {
-            if (self.doubts[a.vertex.index()] | self.doubts[b.vertex.index()]) & SEARCH != 0 {
+            if self.searches(a.vertex) || self.searches(b.vertex) {
                 self.note_near(mesh, a, b, nearness);
             }
         });
@@ -56,7 +59,7 @@ impl Embedding {
     /// Finds what is near, around those that search, those of a cell together.
     pub(super) fn search(&mut self, mesh: &Mesh, doubtful: &[VertexId]) {
         let nearness = self.nearness();
-        let searching = doubtful.iter().filter(|v| self.doubts[v.index()] & SEARCH != 0);
+        let searching = doubtful.iter().filter(|&&v| self.searches(v));
         let mut searching: Vec<(u32, VertexId)> = searching.map(|&v| (self.grid.cell_name(v), v)).collect();
         searching.sort_unstable();
         let mut near = Vec::new();
@@ -78,7 +81,7 @@ impl Embedding {
         for star in near {
             let reach = nearness.between(own.longest, star.longest);
             let square = star.position.distance_squared(own.position);
-            if square <= reach * reach && !self.is_left_to(star.vertex, own.vertex, SEARCH) {
+            if square <= reach * reach && !self.is_left_to(star.vertex, own.vertex, Concern::Search) {
                 self.note_near(mesh, own, star, nearness);
             }
         }
@@ -95,25 +98,25 @@ impl Embedding {
                 self.near[v.index()].push(w);
             }
             if is_close {
-                self.tight[v.index()] |= CLOSE;
+                self.close[v.index()] = true;
             }
         }
     }
 
     /// Where a pair can be that crosses or is in contact before one of both searches again.
     fn nearness(&self) -> Nearness {
-        // Positions that are known are one freedom old, longest edges two; then all may change by as much again.
-        let freedom = SEARCH_FREEDOM * self.edge;
+        // Two vertices come nearer, and their edges get longer, by twice the room at most.
+        let change = 2.0 * SEARCH_ROOM * self.edge;
         Nearness {
-            least: NEAREST_CORNER * self.edge + 4.0 * freedom,
-            margin: 4.0 * freedom * (1.0 + PIERCING),
+            least: NEAREST_CORNER * self.edge + change,
+            margin: change * (1.0 + PIERCING),
             share: PIERCING,
         }
     }
 
     /// Whether [`Self::company`] of `v` may find any.
     pub fn may_have_company(&self, v: VertexId) -> bool {
-        self.tight[v.index()] & CLOSE != 0
+        self.close[v.index()]
     }
 
     /// Calls `found` with every vertex that is no neighbour of `v` and nearer than `distance`, which is at most the contact

@@ -16,6 +16,11 @@ const ROUNDING: f32 = 1e-4;
 /// The bounds on movement below hold for movements of less than this share of the lengths they were derived from.
 const SMALL: f32 = 0.125;
 
+/// The share of the distance from a plane that is left where the plane turns as far as two vertices in it, at least six
+/// times as far apart as they move, can turn it: the cosine of that, √(1 − (1/3)²), rounded down.
+const LEFT_BY_TURN: f32 = 0.94;
+const TURN: f32 = 1.0 / 6.0;
+
 /// The longest edge at `v`.
 pub(super) fn longest_edge(mesh: &Mesh, v: VertexId) -> f32 {
     let p = mesh.position(v);
@@ -26,37 +31,41 @@ pub(super) fn longest_edge(mesh: &Mesh, v: VertexId) -> f32 {
     square.sqrt()
 }
 
-/// Twice the least area that a triangle at `v` shows along a direction, where they turn about it once in all; else nothing.
-fn shown_along(mesh: &Mesh, v: VertexId, direction: Vec3) -> f32 {
+/// By how much all vertices may move and all triangles at `v` still show their front along a direction, and turn about it
+/// once in all; not positive where they do not. `longest` is the longest edge at `v`.
+///
+/// Twice the area that a triangle shows along a fixed direction changes by less than f·P + 3·f², where its vertices move
+/// by f and its edges are P in all.
+fn shown_along(mesh: &Mesh, v: VertexId, direction: Vec3, longest: f32) -> f32 {
     let ring = mesh.ring(v).as_slice();
     let [Some(&first), Some(&last)] = [ring.first(), ring.last()] else { return 0.0 };
     let centre = mesh.position(v);
     let across = direction.cross(mesh.position(first) - centre);
     let mut previous = mesh.position(last) - centre;
-    let mut least = f32::INFINITY;
+    let mut previous_length = previous.length();
+    let mut room = SMALL * longest;
+    let (rounding, spare) = (ROUNDING * longest * longest, 3.0 * SMALL * longest);
     // Spokes that turn one way, by less than half a turn each, make a turn each time they come from behind the first one.
     let (mut turns, mut before) = (0, false);
     for (k, &w) in ring.iter().enumerate() {
         let way = mesh.position(w) - centre;
-        least = lower(least, previous.cross(way).dot(direction));
+        let length = way.length();
+        let shown = previous.cross(way).dot(direction) - rounding;
+        room = lower(room, shown / (previous_length + length + way.distance(previous) + spare));
         let behind = k > 0 && across.dot(way) < 0.0;
         turns += u32::from(before && !behind);
         before = behind;
-        previous = way;
+        (previous, previous_length) = (way, length);
     }
     // With fewer than five no second turn is possible.
     let once = ring.len() < 5 || turns + u32::from(before) == 1;
-    if least > 0.0 && once { least } else { 0.0 }
+    if once { room } else { 0.0 }
 }
 
 /// A star that can be seen as a whole from one side has no triangles that cross. Returns by how much every vertex may
 /// move and it still can; not positive where it cannot be seen so. `longest` is the longest edge at `v`.
-///
-/// Twice the area that a triangle shows along a fixed direction changes by less than 4·f·L + 4·f² < 4.5·f·L, where its
-/// vertices move by f and its edges are no longer than L > 8·f.
 pub(super) fn flatness(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
-    let shown = shown_along(mesh, v, mesh.area_normal(v).normalize_or_zero());
-    lower((shown - ROUNDING * longest * longest) / (4.5 * longest), SMALL * longest)
+    shown_along(mesh, v, mesh.area_normal(v).normalize_or_zero(), longest)
 }
 
 /// The stars of two neighbours `u` and `v` that can both be seen from one side have no triangles that cross, if those of
@@ -79,7 +88,7 @@ pub(super) fn spread_out(
 ) -> f32 {
     let at = |w: VertexId| mesh.position(w);
     let normal = (at(v) - at(u)).cross(at(left) - at(right)).normalize_or_zero();
-    let shown = lower(shown_along(mesh, u, normal), shown_along(mesh, v, normal));
+    let shown = lower(shown_along(mesh, u, normal, longest), shown_along(mesh, v, normal, longest));
     if shown <= 0.0 {
         return 0.0;
     }
@@ -90,20 +99,19 @@ pub(super) fn spread_out(
         let areas = others.map(|&w| (at(w) - at(from)).dot(across));
         areas.fold((at(hub) - at(from)).dot(across), lower)
     };
-    let higher = |a: f32, b: f32| if a > b { a } else { b };
     let at_left = higher(before_line(u, [v, left]), before_line(v, [left, u]));
     let at_right = higher(before_line(u, [right, v]), before_line(v, [u, right]));
     let rounding = ROUNDING * longest * longest;
-    let room = lower(shown - rounding, lower(at_left, at_right) - rounding) / (6.5 * longest);
-    lower(room, SMALL * longest)
+    lower(shown, (lower(at_left, at_right) - rounding) / (6.5 * longest))
 }
 
 /// A plane through the vertices `p` and `q` may divide the triangles at `u` from those at `v`: then those that have no
 /// corner in common do not cross. Returns by how much every vertex may move and it still does; not positive where it does
 /// not divide them. `longest` is the longest edge at `u` and `v`; `p` and `q` are neighbours of both.
 ///
-/// The plane follows `p` and `q`: where all vertices move by f, the distance g of a corner from it changes by less than
-/// 2·f·(1 + 3·L/|pq|), with the longest edge L > 8·f and |pq| > 8·f.
+/// The plane follows `p` and `q`: it turns about the direction in it across the line through them. Where all vertices move
+/// by f, a corner with distance g from it, beside the point p + t·(q − p) of that line, has at least
+/// [`LEFT_BY_TURN`]·g − f·(1 + |t| + |1 − t|) afterwards.
 pub(super) fn divided_through(
     mesh: &Mesh,
     [u, v]: [VertexId; 2],
@@ -113,13 +121,24 @@ pub(super) fn divided_through(
     let origin = mesh.position(p);
     let divider = mesh.position(q) - origin;
     let square = divider.length_squared();
+    let per_length = divider * (1.0 / square);
     let way = mesh.position(v) - mesh.position(u);
     // Without length there is no plane, and no room: the distances are NaN or 0.
-    let normal = (way - divider * (way.dot(divider) / square)).normalize_or_zero();
-    let gap = gap(mesh, [u, v], [p, q], origin, normal) - ROUNDING * longest;
-    let length = square.sqrt();
-    let room = gap / (2.0 + 6.0 * longest / length);
-    lower(room, SMALL * lower(length, longest))
+    let normal = (way - divider * way.dot(per_length)).normalize_or_zero();
+    let (mut gap, mut reach) = (f32::INFINITY, 1.0);
+    let mut meet = |w: VertexId, side: f32| {
+        let from_origin = mesh.position(w) - origin;
+        gap = lower(gap, side * from_origin.dot(normal));
+        // |t| + |1 − t|
+        reach = higher(reach, (2.0 * from_origin.dot(per_length) - 1.0).abs());
+    };
+    let is_beside = |w: VertexId| w != p && w != q;
+    meet(u, -1.0);
+    meet(v, 1.0);
+    mesh.ring(u).as_slice().iter().filter(|&&w| is_beside(w) && w != v).for_each(|&w| meet(w, -1.0));
+    mesh.ring(v).as_slice().iter().filter(|&&w| is_beside(w) && w != u).for_each(|&w| meet(w, 1.0));
+    let room = (LEFT_BY_TURN * gap - ROUNDING * longest) / (1.0 + reach);
+    lower(room, TURN * square.sqrt())
 }
 
 /// As [`divided_through`], with a plane across the way from `u` to `v` that goes through `p`, a neighbour of both.
@@ -170,6 +189,12 @@ fn gap(mesh: &Mesh, [u, v]: [VertexId; 2], in_plane: [VertexId; 2], origin: Vec3
 #[inline]
 fn lower(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
+}
+
+/// The higher one; the first where one is NaN.
+#[inline]
+pub(super) fn higher(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
 }
 
 /// Puts the corners of all triangles around `v` that cross each other into `crossing`; exact.
