@@ -184,11 +184,14 @@ fn short_edge(
 
 /// Whether `gone` may be drawn into `kept`.
 pub(super) fn may_collapse(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone: VertexId) -> bool {
+    // First what most refusals are for.
+    if !may_move(mesh, bounds, kept, gone) {
+        return false;
+    }
     let Ok(Opposite { left, right }) = mesh.can_collapse(kept, gone) else { return false };
     let valences = mesh.ring(kept).valence() + mesh.ring(gone).valence() - 4;
-    let keeps_valences = (LEAST_VALENCE..=MOST_VALENCE).contains(&valences)
-        && [left, right].iter().all(|&w| mesh.ring(w).valence() > LEAST_VALENCE);
-    keeps_valences && may_move(mesh, bounds, kept, gone)
+    (LEAST_VALENCE..=MOST_VALENCE).contains(&valences)
+        && [left, right].iter().all(|&w| mesh.ring(w).valence() > LEAST_VALENCE)
 }
 
 /// Whether the star of `gone` may be drawn to the place of `kept`: no edge gets too long and no triangle turns over.

@@ -109,12 +109,14 @@ fn rounds<E: Edits>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E
     let mut changes = Changes::default();
     let inner = inside(bounds);
     for round in 0..ROUNDS {
-        changes += pass(mesh, inner, session);
+        let edits = pass(mesh, inner, session);
         if round == 0 {
             session.reorder(mesh);
         }
-        for _ in 0..SWEEPS {
-            relax(mesh, bounds, session);
+        let has_moved = (0..SWEEPS).take_while(|_| relax(mesh, bounds, session) > 0).count() > 0;
+        changes += edits;
+        if !has_moved && edits == Changes::default() {
+            break;
         }
     }
     changes += pass(mesh, bounds, session);

@@ -12,8 +12,9 @@ const FINE: f32 = 0.329;
 /// Shorter ways, in the aim, are not worth the search. With more, angles stay sharper.
 const STILL: f32 = 0.02;
 
-/// Moves every vertex once, one after the other.
-pub(super) fn relax<E: Edits>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) {
+/// Moves every vertex once, one after the other; returns how many went.
+pub(super) fn relax<E: Edits>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> usize {
+    let mut moves = 0;
     let still = STILL * session.aim();
     for slot in 0..mesh.slots() {
         let v = VertexId::from_index(slot);
@@ -29,7 +30,8 @@ pub(super) fn relax<E: Edits>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut
         if let Some(Move { sharpest: after, lost }) = moved(mesh, v, foot.point, bounds, session)
             && (after >= FINE || after >= sharpest(mesh, v))
         {
-            session.place(mesh, v, foot, lost);
+            moves += usize::from(session.place(mesh, v, foot, lost));
         }
     }
+    moves
 }

@@ -2,7 +2,7 @@
 
 use super::fan::Fan;
 use super::session::Session;
-use crate::math::{Mat3, Vec3};
+use crate::math::{Mat3, Vec3, Vec3Swizzles};
 use crate::mesh::{Mesh, VertexId};
 use crate::remesh::restructure::faces_alike;
 use crate::remesh::{EdgeBounds, Edits};
@@ -24,7 +24,9 @@ impl Star {
     /// That of `v`; `None` where it has no area.
     pub fn of(mesh: &Mesh, v: VertexId) -> Option<Self> {
         let p = mesh.position(v);
-        let (mut area, mut sum, mut planes) = (0.0, Vec3::ZERO, Mat3::ZERO);
+        let (mut area, mut sum) = (0.0, Vec3::ZERO);
+        // Of n nᵀ / |n|, summed: what is on the diagonal, and yz, zx, xy.
+        let (mut diagonal, mut beside) = (Vec3::ZERO, Vec3::ZERO);
         for (a, b) in mesh.ring(v).pairs() {
             let (a, b) = (mesh.position(a) - p, mesh.position(b) - p);
             let normal = a.cross(b);
@@ -33,13 +35,16 @@ impl Star {
                 area += size;
                 sum += (a + b) * size;
                 let share = normal / size;
-                planes += Mat3::from_cols(normal * share.x, normal * share.y, normal * share.z);
+                diagonal += normal * share;
+                beside += normal.yzx() * share.zxy();
             }
         }
         if area <= 0.0 || !area.is_finite() {
             return None;
         }
-        let stiff = planes * (1.0 / (SLACK * area)) + Mat3::IDENTITY;
+        let stiffness = 1.0 / (SLACK * area);
+        let (Vec3 { x, y, z }, d) = (beside * stiffness, diagonal * stiffness + Vec3::ONE);
+        let stiff = Mat3::from_cols(Vec3::new(d.x, z, y), Vec3::new(z, d.y, x), Vec3::new(y, x, d.z));
         Some(Self { to_centroid: sum / (3.0 * area), along: stiff.inverse() })
     }
 
@@ -50,9 +55,22 @@ impl Star {
 }
 
 /// The squared sine of the smallest angle of a triangle that is not obtuse there; 0 without area.
-pub(super) fn sharpness([a, b, c]: [Vec3; 3]) -> f32 {
+pub(super) fn sharpness(corners: [Vec3; 3]) -> f32 {
+    let [part, whole] = sharpness_parts(corners);
+    if whole > 0.0 { part / whole } else { 0.0 }
+}
+
+/// Whether a triangle has area and its [`sharpness`] is more than that.
+pub(super) fn is_blunter(corners: [Vec3; 3], sharpness: f32) -> bool {
+    let [part, whole] = sharpness_parts(corners);
+    part > sharpness * whole
+}
+
+/// [`sharpness`] as a fraction.
+#[inline]
+fn sharpness_parts([a, b, c]: [Vec3; 3]) -> [f32; 2] {
     let (ab, bc, ca) = (b - a, c - b, a - c);
-    let [x, y, z] = [ab, bc, ca].map(Vec3::length_squared);
+    let (x, y, z) = (ab.length_squared(), bc.length_squared(), ca.length_squared());
     // Twice the area over the two longer sides.
     let least = if x < y {
         if x < z { x } else { z }
@@ -61,8 +79,7 @@ pub(super) fn sharpness([a, b, c]: [Vec3; 3]) -> f32 {
     } else {
         z
     };
-    let sides = x * y * z;
-    if sides > 0.0 { ab.cross(ca).length_squared() * least / sides } else { 0.0 }
+    [ab.cross(ca).length_squared() * least, x * y * z]
 }
 
 /// What a move would make of the triangles around a vertex.
