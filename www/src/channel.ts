@@ -27,6 +27,24 @@ type Asked<Requests> = { [K in keyof Requests]: { body: unknown; reply: unknown 
 
 type Reply = { id: number; ok: true; body: unknown } | { id: number; ok: false; failure: Failure };
 
+/** Workers that were started before anybody had something to ask of them. */
+const ahead = new Map<() => Worker, Worker>();
+
+/** Starts a worker that a channel with the same `spawn` will take over: it loads while the page does. */
+export function spawnAhead(spawn: () => Worker): void {
+  if (ahead.has(spawn)) return;
+  const worker = spawn();
+  // The channel's own attempt will tell what is wrong.
+  worker.onerror = () => ahead.delete(spawn);
+  ahead.set(spawn, worker);
+}
+
+function takeWorker(spawn: () => Worker): Worker {
+  const worker = ahead.get(spawn) ?? spawn();
+  ahead.delete(spawn);
+  return worker;
+}
+
 /** The page's end of a worker: requests as promises, events to one listener. */
 export class Channel<Requests extends Asked<Requests>, Event extends { event: string }> {
   readonly #spawn: () => Worker;
@@ -72,7 +90,7 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
   }
 
   #start(): Worker {
-    const worker = this.#spawn();
+    const worker = takeWorker(this.#spawn);
     worker.onmessage = ({ data }: MessageEvent<Reply | Event>) => this.#receive(data);
     worker.onerror = (event) => this.#broken(event.message || 'the worker could not be started');
     worker.onmessageerror = () => this.#broken('a message could not be read');

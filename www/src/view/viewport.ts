@@ -40,8 +40,8 @@ export class Viewport {
   readonly #controls: OrbitControls;
   readonly #observer = new ResizeObserver(() => this.#resize());
   readonly #spherical = new Spherical();
-  /** Called before each drawing, with the camera's place. */
-  onDraw: (viewer: Vector3) => void = () => undefined;
+  /** Called before each drawing, with the camera's place. `hurried`: a hand turns the view, and there is no GPU to keep up with it. */
+  onDraw: (viewer: Vector3, hurried: boolean) => void = () => undefined;
   /** Called with the ray through the place that was clicked. */
   onClick: (ray: Raycaster) => void = () => undefined;
   /** Asked about a key first; true where it was meant for something else than the view. */
@@ -51,8 +51,13 @@ export class Viewport {
   #through: PinholeCamera | undefined;
   /** Pointer or wheel is at it: what moves now was meant to. */
   #dragged = false;
+  #inSoftware: boolean | undefined;
   #disposed = false;
   #pending = 0;
+  /** Something was added whose shaders may have to be made. */
+  #hasNews = true;
+  /** Waits for shaders; when none is left, all is drawn. */
+  #preparing = 0;
   /** To be done before the next drawing. */
   readonly #changes: (() => void)[] = [];
   #home = { position: new Vector3(), target: new Vector3() };
@@ -62,6 +67,8 @@ export class Viewport {
   constructor(canvas: HTMLCanvasElement) {
     this.canvas = canvas;
     this.#renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    // Who asks whether a shader has errors waits until it is compiled.
+    this.#renderer.debug.checkShaderErrors = false;
     this.#camera.up.set(0, 0, 1);
     this.#controls = new OrbitControls(this.#camera, canvas);
     this.#controls.addEventListener('change', () => this.#moved());
@@ -78,6 +85,7 @@ export class Viewport {
 
   add(object: Object3D): void {
     this.#world.add(object);
+    this.#hasNews = true;
   }
 
   remove(object: Object3D): void {
@@ -207,6 +215,14 @@ export class Viewport {
 
   #setDragged(dragged: boolean): void {
     this.#dragged = dragged;
+    // What was drawn in a hurry is drawn as it is.
+    if (!dragged) this.invalidate();
+  }
+
+  /** Asked only when it matters: the page has to wait for the answer. */
+  #drawsInSoftware(): boolean {
+    this.#inSoftware ??= isSoftware(this.#renderer.getContext());
+    return this.#inSoftware;
   }
 
   #moved(): void {
@@ -266,7 +282,21 @@ export class Viewport {
   }
 
   #draw(): void {
-    this.onDraw(this.#camera.position);
+    if (this.#hasNews) void this.#prepare();
+    else if (this.#preparing === 0) this.#render();
+  }
+
+  /** Shaders are compiled beside the page: in software that takes half a second, in which it could do nothing else. */
+  async #prepare(): Promise<void> {
+    this.#hasNews = false;
+    this.#preparing += 1;
+    await this.#renderer.compileAsync(this.#scene, this.#camera);
+    this.#preparing -= 1;
+    if (!this.#disposed) this.#draw();
+  }
+
+  #render(): void {
+    this.onDraw(this.#camera.position, this.#dragged && this.#drawsInSoftware());
     const viewer = this.#viewer();
     // The eye's is up to date; the other's is brought so before its light is placed.
     if (viewer === this.#camera) viewer.updateMatrixWorld();
@@ -323,6 +353,13 @@ export class Viewport {
     this.#controls.update();
     this.invalidate();
   }
+}
+
+/** Whether pictures are made by the processor: SwiftShader in Chromium, llvmpipe in Mesa, WARP in Windows. */
+function isSoftware(context: WebGLRenderingContext | WebGL2RenderingContext): boolean {
+  const info = context.getExtension('WEBGL_debug_renderer_info');
+  const renderer = context.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : context.RENDERER);
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(String(renderer));
 }
 
 function worldBox(grid: Grid): Box3 {
