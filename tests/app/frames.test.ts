@@ -43,7 +43,7 @@ test('the code of a lab is fetched when the lab is opened', async () => {
   expect(scripts.filter((name) => /^(reconstruct|track|sculpt)-/.test(name))).toEqual([]);
   expect(scripts.filter((name) => /^worker-/.test(name))).toHaveLength(1);
   await app.page.click('[data-lab=sculpt]');
-  await app.page.waitForSelector('[data-state=running], [data-state=done]');
+  await app.page.waitForSelector('.ellipsoids');
   expect(scripts.filter((name) => /^sculpt-/.test(name))).toHaveLength(1);
   expect(scripts.filter((name) => /^(reconstruct|track)-/.test(name))).toEqual([]);
 });
@@ -56,7 +56,7 @@ test('of labs asked for one after the other, the last one opens, alone', async (
   });
   await app.page.waitForSelector('.ellipsoids');
   await reach(app.page, 'running', 'done', 'paused');
-  expect(await app.page.locator('.view canvas').count()).toBe(1);
+  await expect.poll(() => app.page.workers().length).toBe(1);
   expect(await app.page.textContent('#lab-name')).toBe('Sculpt');
 });
 

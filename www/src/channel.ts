@@ -27,21 +27,26 @@ type Asked<Requests> = { [K in keyof Requests]: { body: unknown; reply: unknown 
 
 type Reply = { id: number; ok: true; body: unknown } | { id: number; ok: false; failure: Failure };
 
-/** Workers that were started before anybody had something to ask of them. */
-const ahead = new Map<() => Worker, Worker>();
+/** A worker that was started before anybody had something to ask of it. */
+let ahead: { spawn: () => Worker; worker: Worker } | undefined;
 
 /** Starts a worker that a channel with the same `spawn` will take over: it loads while the page does. */
 export function spawnAhead(spawn: () => Worker): void {
-  if (ahead.has(spawn)) return;
+  if (ahead?.spawn === spawn) return;
+  // That of a lab that was left before it was there.
+  ahead?.worker.terminate();
   const worker = spawn();
+  ahead = { spawn, worker };
   // The channel's own attempt will tell what is wrong.
-  worker.onerror = () => ahead.delete(spawn);
-  ahead.set(spawn, worker);
+  worker.onerror = () => {
+    ahead = undefined;
+  };
 }
 
 function takeWorker(spawn: () => Worker): Worker {
-  const worker = ahead.get(spawn) ?? spawn();
-  ahead.delete(spawn);
+  if (ahead?.spawn !== spawn) return spawn();
+  const { worker } = ahead;
+  ahead = undefined;
   return worker;
 }
 
