@@ -95,13 +95,16 @@ export function watchWorker() {
   const LARGE = 20_000;
   const watched = { wasm: 0, frames: 0, handedOver: 0, cloned: 0 };
   self.watched = watched;
+  // Whoever looks into the module's memory shows which it is.
+  const { get } = Object.getOwnPropertyDescriptor(WebAssembly.Memory.prototype, 'buffer');
   let memory;
-  const { instantiate } = WebAssembly;
-  WebAssembly.instantiate = async (...given) => {
-    const made = await instantiate.apply(WebAssembly, given);
-    memory = (made.instance ?? made).exports.memory;
-    return made;
-  };
+  Object.defineProperty(WebAssembly.Memory.prototype, 'buffer', {
+    configurable: true,
+    get() {
+      memory = this;
+      return get.call(this);
+    },
+  });
   const { postMessage } = self;
   const arraysIn = (value, depth = 0) => {
     if (ArrayBuffer.isView(value)) return [value];
@@ -113,7 +116,7 @@ export function watchWorker() {
       .map((array) => ({ array, bytes: array.byteLength }))
       .filter(({ bytes }) => bytes > LARGE);
     postMessage.call(self, message, ...rest);
-    watched.wasm = memory?.buffer.byteLength ?? 0;
+    watched.wasm = memory ? get.call(memory).byteLength : 0;
     if (large.length > 0) watched.frames += 1;
     // What was handed over is empty here afterwards.
     for (const { array, bytes } of large) watched[array.byteLength === 0 ? 'handedOver' : 'cloned'] += bytes;
