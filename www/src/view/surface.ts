@@ -107,6 +107,7 @@ export class SurfaceObject {
 
   /** What a ray can hit. */
   get target(): Mesh {
+    this.#dropCoarse();
     return this.#mesh;
   }
 

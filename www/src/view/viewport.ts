@@ -51,6 +51,8 @@ export class Viewport {
   #through: PinholeCamera | undefined;
   /** Pointer or wheel is at it: what moves now was meant to. */
   #dragged = false;
+  /** It has moved, and was not only touched. */
+  #turning = false;
   #inSoftware: boolean | undefined;
   #disposed = false;
   #pending = 0;
@@ -215,8 +217,10 @@ export class Viewport {
 
   #setDragged(dragged: boolean): void {
     this.#dragged = dragged;
+    if (dragged || !this.#turning) return;
+    this.#turning = false;
     // What was drawn in a hurry is drawn as it is.
-    if (!dragged) this.invalidate();
+    this.invalidate();
   }
 
   /** Asked only when it matters: the page has to wait for the answer. */
@@ -227,6 +231,7 @@ export class Viewport {
 
   #moved(): void {
     if (this.#dragged) this.lookThrough(undefined);
+    this.#turning = this.#dragged;
     this.invalidate();
   }
 
@@ -244,6 +249,8 @@ export class Viewport {
 
   /** At a place of the view, −1 to 1 each way. */
   #click(x: number, y: number): void {
+    // What was moved since the last drawing, or before the first.
+    this.#scene.updateMatrixWorld();
     const ray = new Raycaster();
     ray.setFromCamera(new Vector2(x, y), this.#viewer());
     this.onClick(ray);
@@ -296,7 +303,7 @@ export class Viewport {
   }
 
   #render(): void {
-    this.onDraw(this.#camera.position, this.#dragged && this.#drawsInSoftware());
+    this.onDraw(this.#camera.position, this.#turning && this.#drawsInSoftware());
     const viewer = this.#viewer();
     // The eye's is up to date; the other's is brought so before its light is placed.
     if (viewer === this.#camera) viewer.updateMatrixWorld();
