@@ -56,10 +56,6 @@ export class Viewport {
   #inSoftware: boolean | undefined;
   #disposed = false;
   #pending = 0;
-  /** Something was added whose shaders may have to be made. */
-  #hasNews = true;
-  /** Waits for shaders; when none is left, all is drawn. */
-  #preparing = 0;
   /** To be done before the next drawing. */
   readonly #changes: (() => void)[] = [];
   #home = { position: new Vector3(), target: new Vector3() };
@@ -87,7 +83,6 @@ export class Viewport {
 
   add(object: Object3D): void {
     this.#world.add(object);
-    this.#hasNews = true;
   }
 
   remove(object: Object3D): void {
@@ -289,20 +284,6 @@ export class Viewport {
   }
 
   #draw(): void {
-    if (this.#hasNews) void this.#prepare();
-    else if (this.#preparing === 0) this.#render();
-  }
-
-  /** Shaders are compiled beside the page: in software that takes half a second, in which it could do nothing else. */
-  async #prepare(): Promise<void> {
-    this.#hasNews = false;
-    this.#preparing += 1;
-    await this.#renderer.compileAsync(this.#scene, this.#camera);
-    this.#preparing -= 1;
-    if (!this.#disposed) this.#draw();
-  }
-
-  #render(): void {
     this.onDraw(this.#camera.position, this.#turning && this.#drawsInSoftware());
     const viewer = this.#viewer();
     // The eye's is up to date; the other's is brought so before its light is placed.
