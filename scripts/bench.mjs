@@ -1,8 +1,9 @@
 // Times points to a surface, remeshing, sculpting, tracking, single steps and the head CT, in Node, in Chromium and, where a
-// program for it is there, natively; prints tables and writes bench.json.
+// program for it is there, natively, and the app in Chromium; prints tables and writes bench.json.
 // `npm run bench -- points` does one of them, and writes nothing.
 import { readFile, writeFile } from 'node:fs/promises';
 import { cpus } from 'node:os';
+import { buildApp } from './app.mjs';
 import { build } from './build.mjs';
 import { launchChromium } from './chromium.mjs';
 import { serve } from './serve.mjs';
@@ -41,6 +42,14 @@ const BENCHES = {
     file: SCAN,
     inNode: async () => (await import('../bench/head.mjs')).measure(new Uint8Array(await readFile(at(SCAN))), REPEATS),
     rows: headRows,
+  },
+  page: {
+    // The whole app, in a browser only.
+    alone: async () => {
+      await buildApp();
+      return (await import('../bench/page.mjs')).measure(at('dist'), REPEATS);
+    },
+    rows: pageRows,
   },
 };
 
@@ -146,6 +155,49 @@ function stepRows({ host, rows }, native) {
   return [[host, '', 'all vertices moving, best of 6 steps'], ...rows.map(row)];
 }
 
+/** What a run does to the main thread; the view's frames; what is kept and how it came there. */
+function pageRows({ host, viewport, cold, warm, runs, motion, memory }) {
+  const megabytes = (bytes) => `${((bytes ?? 0) / 1e6).toFixed(1)} MB`;
+  const milliseconds = (took) => `${took.toFixed(0)} ms`;
+  const perSecond = ({ fps }) => `${fps.toFixed(1)} /s`;
+  const started = (name, { paint, engine, interactive, surface }) => [
+    `  ${name} start`,
+    milliseconds(engine),
+    `until the engine answers; first paint ${milliseconds(paint)}, a model to play ${milliseconds(interactive)}, ` +
+      `first surface ${milliseconds(surface)}`,
+  ];
+  const held = ({ name, triangles, over, longest, by }) => [
+    `  ${name}, ${triangles}`,
+    milliseconds(longest),
+    `the longest task while it runs, ${over} over 50 ms${by ? `; ${by}` : ''}`,
+  ];
+  const { frames, sent, onPage, buffers } = memory;
+  return [
+    [host, '', `${Object.values(viewport).join(' x ')}, ${motion.renderer}; the middle of ${REPEATS} starts`],
+    ...[started('cold', cold), started('warm', warm)],
+    ...runs.map(held),
+    [
+      `  turning, ${motion.triangles}`,
+      perSecond(motion.resting),
+      `frames; ${motion.resting.triangles} drawn meanwhile`,
+    ],
+    ['  turning, slices alone', perSecond(motion.without), 'frames: what there is without a surface'],
+    ['  turning, model runs', perSecond(motion.running), 'frames'],
+    ['  memory', megabytes(memory.heap), `heap, ${megabytes(memory.arrays)} arrays, ${megabytes(memory.wasm)} module`],
+    [
+      '  buffers of the GPU',
+      megabytes(memory.gpu),
+      `made ${buffers.made} times, filled again ${buffers.refilled} times`,
+    ],
+    [
+      '  sent by the worker',
+      megabytes(sent.handedOver),
+      `handed over in ${frames} messages, ${megabytes(sent.cloned)} copied`,
+    ],
+    ['  uploaded', megabytes(onPage.uploaded), `${megabytes(onPage.copied)} copied on the page before`],
+  ];
+}
+
 function print(rows) {
   for (const [what, figure, remark] of rows) {
     process.stdout.write(`${what.padEnd(28)}${figure.padStart(10)}  ${remark}\n`);
@@ -159,7 +211,12 @@ async function natively(example) {
 }
 
 async function run(name) {
-  const { native, inNode, rows } = BENCHES[name];
+  const { alone, native, inNode, rows } = BENCHES[name];
+  if (alone) {
+    const result = await alone();
+    print(rows(result));
+    return [result];
+  }
   const reference = native && (await natively(native));
   const results = [{ host: `Node ${process.versions.node}`, ...(await inNode()) }, await inChromium(name)];
   print([...(reference ? rows(reference) : []), ...results.flatMap((result) => rows(result, reference))]);

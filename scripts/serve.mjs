@@ -29,10 +29,22 @@ async function resolve(folder, address) {
   return found?.isDirectory() ? resolve(folder, `${pathname.replace(/\/$/, '')}/index.html`) : undefined;
 }
 
+// The build puts a hash of what is inside into these names: what was once fetched stays right.
+const isHashed = (path) => /[\\/]assets[\\/][^\\/]+-[\w-]{8}\.\w+$/.test(path);
+
+/** How long a browser may keep a file, and how it asks later whether it is still the same. */
+async function freshness(path) {
+  const { mtimeMs, size } = await stat(path);
+  const keep = isHashed(path) ? 'max-age=31536000, immutable' : 'no-cache';
+  return { 'Cache-Control': keep, ETag: `"${size.toString(36)}-${Math.round(mtimeMs).toString(36)}"` };
+}
+
 async function answer(folder, request, response) {
   const path = await resolve(folder, request.url).catch(() => undefined);
   if (!path) return response.writeHead(404, { 'Content-Type': 'text/plain' }).end('not found\n');
-  response.writeHead(200, { 'Content-Type': typeOf(path), 'Cache-Control': 'no-cache' });
+  const headers = await freshness(path);
+  if (request.headers['if-none-match'] === headers.ETag) return response.writeHead(304, headers).end();
+  response.writeHead(200, { 'Content-Type': typeOf(path), ...headers });
   if (request.method === 'HEAD') return response.end();
   createReadStream(path)
     .on('error', () => response.destroy())

@@ -27,6 +27,29 @@ type Asked<Requests> = { [K in keyof Requests]: { body: unknown; reply: unknown 
 
 type Reply = { id: number; ok: true; body: unknown } | { id: number; ok: false; failure: Failure };
 
+/** A worker that was started before anybody had something to ask of it. */
+let ahead: { spawn: () => Worker; worker: Worker } | undefined;
+
+/** Starts a worker that a channel with the same `spawn` will take over: it loads while the page does. */
+export function spawnAhead(spawn: () => Worker): void {
+  if (ahead?.spawn === spawn) return;
+  // That of a lab that was left before it was there.
+  ahead?.worker.terminate();
+  const worker = spawn();
+  ahead = { spawn, worker };
+  // The channel's own attempt will tell what is wrong.
+  worker.onerror = () => {
+    ahead = undefined;
+  };
+}
+
+function takeWorker(spawn: () => Worker): Worker {
+  if (ahead?.spawn !== spawn) return spawn();
+  const { worker } = ahead;
+  ahead = undefined;
+  return worker;
+}
+
 /** The page's end of a worker: requests as promises, events to one listener. */
 export class Channel<Requests extends Asked<Requests>, Event extends { event: string }> {
   readonly #spawn: () => Worker;
@@ -72,7 +95,7 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
   }
 
   #start(): Worker {
-    const worker = this.#spawn();
+    const worker = takeWorker(this.#spawn);
     worker.onmessage = ({ data }: MessageEvent<Reply | Event>) => this.#receive(data);
     worker.onerror = (event) => this.#broken(event.message || 'the worker could not be started');
     worker.onmessageerror = () => this.#broken('a message could not be read');

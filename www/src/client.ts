@@ -3,11 +3,13 @@ import type { Requests, ReturnMessage, SurfaceBuffers, WorkerEvent } from './pro
 
 export { RequestError, toFailure } from './channel';
 
+export const spawnExtract = () =>
+  new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'vesicle' });
+
 /** The Extract lab's worker, from the page. */
 export class Client extends Channel<Requests, WorkerEvent> {
   constructor(onEvent: (event: WorkerEvent) => void) {
-    const spawn = () => new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'vesicle' });
-    super(spawn, onEvent);
+    super(spawnExtract, onEvent);
   }
 
   /** Gives a snapshot's buffers back, which also tells the worker that the page is ready for another. */

@@ -1,9 +1,10 @@
 import './style.css';
-import { ExtractLab } from './labs/extract';
+import { spawnAhead } from './channel';
+import { spawnExtract } from './client';
 import type { Lab, LabKind, PassedOn } from './labs/labs';
-import { ReconstructLab } from './labs/reconstruct';
-import { SculptLab } from './labs/sculpt';
-import { TrackLab } from './labs/track';
+import { spawnReconstruct } from './reconstruct/client';
+import { spawnSculpt } from './sculpt/client';
+import { spawnTrack } from './track/client';
 import { h } from './ui/dom';
 
 /** The first is what an empty or unknown address opens. */
@@ -12,25 +13,29 @@ const LABS: [LabKind, ...LabKind[]] = [
     id: 'extract',
     name: 'Extract',
     tagline: 'A closed surface that splits and merges as it grows onto your data. Nothing leaves this machine.',
-    open: (root, help, passOn) => new ExtractLab(root, help, passOn),
+    spawn: spawnExtract,
+    load: async () => (await import('./labs/extract')).ExtractLab,
   },
   {
     id: 'reconstruct',
     name: 'Reconstruct',
     tagline: 'A smooth closed surface through sparse and noisy points. Nothing leaves this machine.',
-    open: (root, help, passOn) => new ReconstructLab(root, help, passOn),
+    spawn: spawnReconstruct,
+    load: async () => (await import('./labs/reconstruct')).ReconstructLab,
   },
   {
     id: 'track',
     name: 'Track',
     tagline: 'A closed surface that follows what moves in a 4D image. Nothing leaves this machine.',
-    open: (root, help, passOn) => new TrackLab(root, help, passOn),
+    spawn: spawnTrack,
+    load: async () => (await import('./labs/track')).TrackLab,
   },
   {
     id: 'sculpt',
     name: 'Sculpt',
     tagline: 'A detailed surface that follows ellipsoids, as far as you like. Nothing leaves this machine.',
-    open: (root, help) => new SculptLab(root, help),
+    spawn: spawnSculpt,
+    load: async () => (await import('./labs/sculpt')).SculptLab,
   },
 ];
 
@@ -41,6 +46,8 @@ class Labs {
   readonly #links = new Map<string, HTMLAnchorElement>();
   #kind: LabKind | undefined;
   #lab: Lab | undefined;
+  /** Counts what was opened: a lab whose code comes late is not wanted any more. */
+  #turn = 0;
 
   constructor(root: HTMLElement, help: HTMLElement, nav: HTMLElement) {
     this.#root = root;
@@ -59,17 +66,22 @@ class Labs {
 
   #follow(): void {
     const kind = LABS.find(({ id }) => location.hash === `#${id}` || location.hash.startsWith(`#${id}?`));
-    if (kind ? kind !== this.#kind : !this.#kind) this.#open(kind ?? LABS[0]);
+    if (kind ? kind !== this.#kind : !this.#kind) void this.#open(kind ?? LABS[0]);
   }
 
-  #open(kind: LabKind, passedOn?: PassedOn): void {
+  async #open(kind: LabKind, passedOn?: PassedOn): Promise<void> {
     this.#lab?.close();
     this.#lab = undefined;
     this.#kind = kind;
+    const turn = ++this.#turn;
     this.#present(kind);
     this.#root.dataset.state = 'loading';
     try {
-      this.#lab = kind.open(this.#root, this.#help, (passedOn) => this.#passOn(passedOn));
+      // The engine loads while the lab's own code does.
+      spawnAhead(kind.spawn);
+      const Kind = await kind.load();
+      if (turn !== this.#turn) return;
+      this.#lab = new Kind(this.#root, this.#help, (passedOn) => this.#passOn(passedOn));
       void this.#lab.start(passedOn);
     } catch (error) {
       this.#root.dataset.state = 'error';
@@ -82,7 +94,7 @@ class Labs {
     const kind = LABS.find(({ id }) => id === passedOn.lab) ?? LABS[0];
     // Without a hashchange: the lab is opened here, on what it is given.
     history.pushState(null, '', `#${kind.id}`);
-    this.#open(kind, passedOn);
+    void this.#open(kind, passedOn);
   }
 
   #remember(): void {

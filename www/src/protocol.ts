@@ -180,6 +180,11 @@ export interface SnapshotEvent {
   reports: StepReport[];
   measures?: Measures;
 }
+/** Steps that came faster than the page draws, so that it need not take in too many at once. */
+export interface ProgressEvent {
+  event: 'progress';
+  reports: StepReport[];
+}
 export interface SectionsEvent {
   event: 'sections';
   sections: Float32Array[];
@@ -199,5 +204,5 @@ export interface ComparingEvent {
   run: 'direct' | 'coarseToFine';
   report: StepReport;
 }
-export type WorkerEvent = SnapshotEvent | SectionsEvent | StateEvent | FailureEvent | ComparingEvent;
+export type WorkerEvent = SnapshotEvent | ProgressEvent | SectionsEvent | StateEvent | FailureEvent | ComparingEvent;
 export type FromWorker = ReplyMessage | WorkerEvent;

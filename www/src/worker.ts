@@ -5,6 +5,7 @@ import type {
   LevelView,
   Loaded,
   Measures,
+  MeshFormat,
   ParamValues,
   Plane,
   Ready,
@@ -21,13 +22,20 @@ import type {
 import { compare } from './worker/compare';
 import { buildModel, valuesFor } from './worker/models';
 import { Refusal, toFailure } from './worker/refusal';
-import { answer, buffersOf, stop, type Work } from './worker/serving';
+import { noArrays, surfaceIn, transferOf } from './worker/room';
+import { answer, buffersOf, givingAway, stop, type Work } from './worker/serving';
 import { levelsOf, viewOf, volumeFrom } from './worker/volumes';
 
-/** Two sets: one being shown while the next is filled. With one the run waits for the page; more only add delay. */
+/** Two sets: one on the screen, one on its way there or being filled. With more, surfaces would be made that nobody sees. */
 const BUFFER_SETS = 2;
 /** Milliseconds between two looks at area and volume while running; they cost as much as a step on small meshes. */
 const MEASURE_EVERY = 400;
+
+/** Steps told in one message. With fewer, the messages themselves cost more than what is in them. */
+const MOST_REPORTS = 50;
+
+/** How much is told of a surface beside itself. */
+type Detail = 'plain' | 'measured' | 'checked';
 
 type Handlers = {
   [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
@@ -37,10 +45,6 @@ function send(event: WorkerEvent, transfer: Transferable[] = []): void {
   self.postMessage(event, { transfer });
 }
 
-function emptyBuffers(): SurfaceBuffers {
-  return { positions: new Float32Array(0), normals: new Float32Array(0), indices: new Uint32Array(0) };
-}
-
 class Session {
   #volume: Volume | undefined;
   #model: DeformableModel | undefined;
@@ -48,7 +52,7 @@ class Session {
   #window: [number, number] = [0, 1];
   #planes: Plane[] = [];
   #shade: Shade | undefined;
-  #free: SurfaceBuffers[] = Array.from({ length: BUFFER_SETS }, emptyBuffers);
+  #free: SurfaceBuffers[] = Array.from({ length: BUFFER_SETS }, noArrays);
   /** Steps the page has not heard of yet. */
   #reports: StepReport[] = [];
   #done = false;
@@ -61,7 +65,7 @@ class Session {
 
   readonly handlers: Handlers = {
     hello: async () => {
-      await init();
+      await starting;
       return { version: version(), specs: paramSpecs('deformable') };
     },
     load: ({ name, source, setup }) => this.#load(name, source, setup),
@@ -71,7 +75,7 @@ class Session {
     step: ({ count }) => this.#step(count),
     setParams: (params) => this.#setParams(params),
     planes: (planes) => this.#setPlanes(planes),
-    export: ({ format }) => this.#current().mesh.toBytes(format),
+    export: ({ format }) => this.#export(format),
     pyramid: ({ levels }) => this.#pyramid(levels),
     setAttractors: (attractors) => this.#setAttractors(attractors),
     shade: (shade) => this.#setShade(shade),
@@ -90,11 +94,12 @@ class Session {
     const volume = volumeFrom(source);
     try {
       const view = viewOf(volume, name);
-      const ready = this.#adopt(buildModel(volume, setup));
+      // The page plays it at once: what a check would find, it would not show.
+      const ready = this.#adopt(buildModel(volume, setup), 'measured');
       this.#volume?.free();
       this.#volume = volume;
       this.#window = view.window;
-      return { ...ready, volume: view };
+      return givingAway({ ...ready, volume: view }, [view.voxels]);
     } catch (error) {
       volume.free();
       throw error;
@@ -106,14 +111,14 @@ class Session {
     return this.#adopt(buildModel(this.#image(), setup));
   }
 
-  #adopt(model: DeformableModel): Ready {
+  #adopt(model: DeformableModel, detail: Detail = 'checked'): Ready {
     this.#model?.free();
     this.#model = model;
     this.#levels = model.level;
     this.#iteration = 0;
     this.#reports = [];
     this.#done = false;
-    this.#snapshot('checked');
+    this.#snapshot(detail);
     return { params: { ...model.params }, delta: model.delta };
   }
 
@@ -150,9 +155,19 @@ class Session {
     this.#reports.push(report);
     this.#done = report.done;
     this.#iteration = report.iteration;
-    if (this.#free.length === 0) return;
+    if (this.#free.length === 0) {
+      this.#tell();
+      return;
+    }
     const due = performance.now() - this.#measuredAt > MEASURE_EVERY;
     this.#snapshot(due ? 'measured' : 'plain');
+  }
+
+  /** Lists that grow while the page draws are told in parts: a thousand steps in one message take it a tenth of a second. */
+  #tell(): void {
+    if (this.#reports.length < MOST_REPORTS) return;
+    send({ event: 'progress', reports: this.#reports });
+    this.#reports = [];
   }
 
   async #pause(): Promise<undefined> {
@@ -184,8 +199,17 @@ class Session {
     this.#done = false;
   }
 
+  #export(format: MeshFormat): Uint8Array {
+    const bytes = this.#current().mesh.toBytes(format);
+    return givingAway(bytes, [bytes]);
+  }
+
   #pyramid(levels: number): LevelView[] {
-    return levelsOf(this.#image(), levels, this.#window);
+    const views = levelsOf(this.#image(), levels, this.#window);
+    return givingAway(
+      views,
+      views.map(({ voxels }) => voxels),
+    );
   }
 
   #setShade(shade: Shade | undefined): undefined {
@@ -195,7 +219,8 @@ class Session {
 
   #save(): SavedRun {
     const model = this.#current();
-    return { state: model.save(), levels: this.#levels, iteration: this.#iteration, done: this.#done };
+    const state = model.save();
+    return givingAway({ state, levels: this.#levels, iteration: this.#iteration, done: this.#done }, [state]);
   }
 
   /** A state fits only a model with as many levels; whatever that one starts from is replaced at once. */
@@ -255,20 +280,17 @@ class Session {
     return this.#planes.map(({ origin, normal }) => mesh.crossSection(origin, normal));
   }
 
-  #snapshot(detail: 'plain' | 'measured' | 'checked'): void {
+  #snapshot(detail: Detail): void {
     const model = this.#current();
     const { mesh, level } = model;
-    const buffers = this.#free.pop() ?? emptyBuffers();
-    const counts = mesh.copyTo(buffers);
+    const surface = surfaceIn(this.#free.pop() ?? noArrays(), mesh);
     const sections = this.#sections(mesh);
     const measures = detail === 'plain' ? undefined : this.#measure(mesh, detail === 'checked');
     const reports = this.#reports;
     this.#reports = [];
-    const { positions, normals, indices } = buffers;
-    const values = this.#shade && valuesFor(model, this.#shade);
-    const surface = { ...buffers, ...counts, ...(values && { values }) };
+    if (this.#shade) surface.values = valuesFor(model, this.#shade);
     send({ event: 'snapshot', surface, level, sections, reports, ...(measures && { measures }) }, [
-      ...buffersOf([positions, normals, indices, ...(values ? [values] : [])]),
+      ...transferOf(surface),
       ...buffersOf(sections),
     ]);
   }
@@ -279,6 +301,10 @@ class Session {
     return measures;
   }
 }
+
+// At once, and not when it is asked for: the page is still on its way. What goes wrong is told then.
+const starting = init();
+starting.catch(() => undefined);
 
 const session = new Session();
 

@@ -12,6 +12,7 @@ import type {
   SnapshotEvent,
   StartShape,
   StepReport,
+  SurfaceBuffers,
   VolumeSource,
   VolumeView,
   WorkerEvent,
@@ -39,6 +40,7 @@ import { Transport } from '../ui/transport';
 import { ViewOptionControls, type ViewOptions } from '../ui/view-options';
 import { Stage } from '../view/stage';
 import { Attracting } from './attracting';
+import { fetchAhead, fetchBytes } from './downloads';
 import { DataPanel, folded, layOut } from './extract-page';
 import type { PassedOn, PassOn } from './labs';
 import { ADDRESS, fromHash, type Linked, linkOf, toHash, withLink } from './link';
@@ -174,7 +176,10 @@ export class ExtractLab {
   /** The state to return to when an error has been read. */
   #calm: 'loading' | 'paused' | 'done' = 'loading';
   #engineBroken = false;
+  /** The newest, until it is shown. */
   #snapshot: SnapshotEvent | undefined;
+  /** The surface on the screen, in the worker's buffers. */
+  #shown: SurfaceBuffers | undefined;
   #framePending = 0;
   readonly #passOn: PassOn;
 
@@ -204,6 +209,7 @@ export class ExtractLab {
 
   /** Opens what another lab passes on, or what the address says, or else the built-in example, and runs it. */
   async start(passedOn?: PassedOn): Promise<void> {
+    if (!passedOn) fetchLinked();
     try {
       await this.#greet();
     } catch (error) {
@@ -471,6 +477,8 @@ export class ExtractLab {
 
   async #restartEngine(): Promise<void> {
     this.#client.restart({ code: 'internal', message: 'the engine was started again' });
+    // The new one has buffers of its own.
+    this.#shown = undefined;
     await this.#greet();
     this.#engineBroken = false;
   }
@@ -659,6 +667,9 @@ export class ExtractLab {
       case 'snapshot':
         this.#onSnapshot(event);
         break;
+      case 'progress':
+        this.#onReports(event.reports);
+        break;
       case 'sections':
         this.#stage.showSections(event.sections);
         break;
@@ -675,7 +686,7 @@ export class ExtractLab {
 
   /** Shows a snapshot at the next animation frame; only then the worker may send another. */
   #onSnapshot(event: SnapshotEvent): void {
-    if (this.#history.add(event.reports)) this.#transport.showReport(event.reports.at(-1));
+    this.#onReports(event.reports);
     if (this.#snapshot) this.#client.giveBack(this.#snapshot.surface);
     this.#snapshot = event;
     this.#level = event.level;
@@ -691,12 +702,18 @@ export class ExtractLab {
     this.#snapshot = undefined;
     this.#stage.showSurface(snapshot.surface);
     this.#stage.showSections(snapshot.sections);
-    this.#client.giveBack(snapshot.surface);
+    // The one before is not drawn any more.
+    if (this.#shown) this.#client.giveBack(this.#shown);
+    this.#shown = snapshot.surface;
     this.#showHistory();
   }
 
-  #showMeasures({ measures, reports }: SnapshotEvent): void {
-    const last = reports.at(-1);
+  #onReports(reports: StepReport[]): void {
+    if (this.#history.add(reports)) this.#transport.showReport(reports.at(-1));
+  }
+
+  #showMeasures({ measures }: SnapshotEvent): void {
+    const last = this.#history.reports.at(-1);
     if (measures) this.#measures.showMeasures(measures);
     else if (last) this.#measures.showReport(last);
   }
@@ -779,14 +796,15 @@ export class ExtractLab {
   }
 }
 
-function transferable(source: VolumeSource): Transferable[] {
-  return 'files' in source ? source.files.map(({ bytes }) => bytes.buffer as ArrayBuffer) : [];
+/** The volume that the address asks for comes while the engine starts. */
+function fetchLinked(): void {
+  const linked = fromHash(location.hash);
+  const example = linked?.example ? exampleById(linked.example) : EXAMPLES[0];
+  if (example && !linked?.file && 'file' in example.source) fetchAhead(exampleUrl(example.source.file));
 }
 
-async function fetchBytes(url: string): Promise<Uint8Array> {
-  const response = await fetch(url);
-  if (!response.ok) throw new Error(`The server answered ${response.status} for ${url}.`);
-  return new Uint8Array(await response.arrayBuffer());
+function transferable(source: VolumeSource): Transferable[] {
+  return 'files' in source ? source.files.map(({ bytes }) => bytes.buffer as ArrayBuffer) : [];
 }
 
 function describe(state: 'running' | 'paused' | 'done', last: StepReport | undefined): string {

@@ -25,5 +25,8 @@ export interface LabKind {
   id: string;
   name: string;
   tagline: string;
-  open: (root: HTMLElement, help: HTMLElement, passOn: PassOn) => Lab;
+  /** Starts its worker. */
+  spawn: () => Worker;
+  /** Fetches its code. */
+  load: () => Promise<new (root: HTMLElement, help: HTMLElement, passOn: PassOn) => Lab>;
 }

@@ -52,7 +52,7 @@ export class Ahead {
     const [before, after] = [this.#frame?.ellipsoids, this.#hand?.pose];
     // While some vanish, the two are not about the same ellipsoids.
     if (!before || !after || before.length !== after.length) return false;
-    this.#place(({ positions }) => carried(positions, before, after));
+    this.#place(({ positions, vertices }) => carried(positions, before, after, vertices));
     return true;
   }
 

@@ -2,6 +2,7 @@
 import init, { type ImplicitSurface, paramSpecs, type StepReport, version } from 'vesicle';
 import type { Surface } from '../protocol';
 import { Refusal, toFailure } from '../worker/refusal';
+import { noArrays, surfaceIn, transferOf } from '../worker/room';
 import { answer, buffersOf, stop, type Work } from '../worker/serving';
 import { buildModel, cloudFrom, cubicDims, edited, fitOf, levelOf, packed, valuesFor } from './model';
 import type {
@@ -53,7 +54,7 @@ class Session {
 
   readonly handlers: Handlers = {
     hello: async () => {
-      await init();
+      await starting;
       return { version: version(), specs: paramSpecs('implicit') };
     },
     load: (body) => this.#load(body),
@@ -213,7 +214,7 @@ class Session {
     if (!this.#shown) return;
     const mesh = this.#current().preview();
     try {
-      if (mesh.vertexCount > 0) this.#sendSurface({ ...mesh.arrays(), ...countsOf(mesh) }, true);
+      if (mesh.vertexCount > 0) this.#sendSurface(surfaceIn(noArrays(), mesh), true);
     } finally {
       mesh.free();
       this.#previewedAt = performance.now();
@@ -229,14 +230,12 @@ class Session {
     if (version === this.#sent) return;
     this.#sent = version;
     const values = this.#shade && valuesFor(model, this.#pointsInForce(), this.#shade);
-    this.#sendSurface({ ...mesh.arrays(), ...countsOf(mesh), ...(values && { values }) }, false);
+    this.#sendSurface({ ...surfaceIn(noArrays(), mesh), ...(values && { values }) }, false);
   }
 
   #sendSurface(surface: Surface, preview: boolean): void {
     this.#shown = false;
-    const { positions, normals, indices, values, colors } = surface;
-    const arrays = [positions, normals, indices, ...(values ? [values] : []), ...(colors ? [colors] : [])];
-    send({ event: 'surface', surface, preview }, buffersOf(arrays));
+    send({ event: 'surface', surface, preview }, transferOf(surface));
   }
 
   #measure(): void {
@@ -274,9 +273,9 @@ class Session {
   }
 }
 
-function countsOf({ vertexCount: vertices, triangleCount: triangles }: { vertexCount: number; triangleCount: number }) {
-  return { vertices, triangles };
-}
+// At once, and not when it is asked for: the page is still on its way. What goes wrong is told then.
+const starting = init();
+starting.catch(() => undefined);
 
 const session = new Session();
 

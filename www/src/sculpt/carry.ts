@@ -7,12 +7,12 @@ const SOFTNESS = 0.1;
 
 /**
  * Where points (x, y, z of each) go as the ellipsoids go from `before` to `after`: with each by its own map, near ones
- * counting more.
+ * counting more. Only the first `count` points; there is as much room behind them as before.
  */
-export function carried(points: Float32Array, before: Pose, after: Pose): Float32Array {
+export function carried(points: Float32Array, before: Pose, after: Pose, count = points.length / 3): Float32Array {
   const maps = before.map((one, k) => mapBetween(one, after[k] ?? one));
   const out = new Float32Array(points.length);
-  for (let i = 0; i + 2 < points.length; i += 3) carry(points, i, maps, out);
+  for (let i = 0; i < 3 * count; i += 3) carry(points, i, maps, out);
   return out;
 }
 

@@ -1,13 +1,15 @@
 import { Channel } from '../channel';
 import type { Pose, PoseMessage, Requests, ShownMessage, WorkerEvent } from './protocol';
 
+export const spawnSculpt = () =>
+  new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'vesicle sculpt' });
+
 /** The Sculpt lab's worker, from the page. */
 export class SculptClient extends Channel<Requests, WorkerEvent> {
   #turn = 0;
 
   constructor(onEvent: (event: WorkerEvent) => void) {
-    const spawn = () => new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'vesicle sculpt' });
-    super(spawn, onEvent);
+    super(spawnSculpt, onEvent);
   }
 
   /** The frame last sent is on the screen: another may come. */

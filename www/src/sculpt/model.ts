@@ -1,6 +1,8 @@
 /** Meshes and models as the page asks for them. Used by the worker only. */
+
 import { Mesh, MultiresolutionModel, type MultiresParams } from 'vesicle';
 import type { Surface } from '../protocol';
+import { noArrays, surfaceIn, texturedSurface } from '../worker/room';
 import { scaled } from './ellipsoids';
 import { fitted } from './fit';
 import type { Facts, MeshSource, Pose, SceneSource, SculptShade, Setup } from './protocol';
@@ -79,18 +81,16 @@ export function buildModel({ detail, base }: Scene, start: Pose, { params }: Set
 
 /** A mesh as the page draws it, in arrays of its own. */
 export function surfaceOf(mesh: Mesh, values?: Float32Array): Surface {
-  const { positions, normals, indices } = mesh.arrays();
-  const surface = { positions, normals, indices, vertices: positions.length / 3, triangles: indices.length / 3 };
+  const { uvs: _, ...surface } = surfaceIn(noArrays(), mesh);
   // Numbers of other vertices would be nonsense.
-  return values?.length === surface.vertices ? { ...surface, values: values.slice() } : surface;
+  return values && values.length === surface.vertices ? { ...surface, values: values.slice() } : surface;
 }
 
 /** A mesh as the page draws it with a picture on it: vertices on seams of the picture are there more than once. */
 export function texturedSurfaceOf(mesh: Mesh): Surface {
   const split = mesh.splitAtSeams();
   try {
-    const { uvs } = split.arrays();
-    return { ...surfaceOf(split), ...(uvs && { uvs }) };
+    return texturedSurface(split);
   } finally {
     split.free();
   }

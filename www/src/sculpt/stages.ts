@@ -33,8 +33,8 @@ function staged(mesh: Mesh, what: string): Stage {
 const WORST = 0.05;
 
 /** Of each triangle, its area over that of an equilateral one with the same mean square of its edges. */
-function shapesOf({ positions, indices }: Surface): Float32Array {
-  return Float32Array.from({ length: indices.length / 3 }, (_, triangle) => {
+function shapesOf({ positions, indices, triangles }: Surface): Float32Array {
+  return Float32Array.from({ length: triangles }, (_, triangle) => {
     const at = (corner: number) => 3 * (indices[3 * triangle + corner] ?? 0);
     const squared = (one: number, other: number) =>
       [0, 1, 2].reduce((sum, k) => sum + ((positions[one + k] ?? 0) - (positions[other + k] ?? 0)) ** 2, 0);

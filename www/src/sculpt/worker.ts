@@ -1,7 +1,8 @@
 /** The worker of the Sculpt lab: it holds the meshes and one model of them, and does what the page asks. */
 import init, { paramSpecs, type StepReport, version } from 'vesicle';
 import { Refusal, toFailure } from '../worker/refusal';
-import { answer, buffersOf, stop, type Work } from '../worker/serving';
+import { transferOf } from '../worker/room';
+import { answer, stop, type Work } from '../worker/serving';
 import { Course } from './course';
 import {
   buildModel,
@@ -27,7 +28,6 @@ import type {
   SavedPose,
   Setup,
   Shown,
-  Surface,
   ToWorker,
   WorkerEvent,
 } from './protocol';
@@ -65,7 +65,7 @@ class Session {
 
   readonly handlers: Handlers = {
     hello: async () => {
-      await init();
+      await starting;
       return { version: version(), specs: paramSpecs('multires') };
     },
     open: (body) => this.#open(body),
@@ -289,7 +289,7 @@ class Session {
     this.#shown = false;
     send(
       frame,
-      [frame.result, frame.base, frame.link].flatMap((one) => (one ? buffersOfSurface(one) : [])),
+      [frame.result, frame.base, frame.link].flatMap((one) => (one ? transferOf(one) : [])),
     );
   }
 
@@ -338,9 +338,9 @@ class Session {
   }
 }
 
-function buffersOfSurface({ positions, normals, indices, values, uvs }: Surface): Transferable[] {
-  return buffersOf([positions, normals, indices, ...(values ? [values] : []), ...(uvs ? [uvs] : [])]);
-}
+// At once, and not when it is asked for: the page is still on its way. What goes wrong is told then.
+const starting = init();
+starting.catch(() => undefined);
 
 const session = new Session();
 

@@ -1,15 +1,16 @@
 /** What the page is told of a tracked frame. */
-import type { Mesh, SurfaceTracker } from 'vesicle';
+import type { SurfaceTracker } from 'vesicle';
+import { noArrays, surfaceIn } from '../worker/room';
 import { type CineSpec, wallDistances } from './cine';
-import type { Surface, SurfaceError, TrackedFrame } from './protocol';
+import type { SurfaceError, TrackedFrame } from './protocol';
 
 export function trackedFrame(tracker: SurfaceTracker, index: number, spec: CineSpec | undefined): TrackedFrame {
   const mesh = tracker.meshAt(index);
   try {
-    const surface = surfaceOf(mesh);
+    const surface = surfaceIn(noArrays(), mesh);
     const facts = tracker.facts[index];
     if (!facts) throw new Error(`frame ${index} has no facts`);
-    const error = spec && errorOf(spec, index, surface.positions);
+    const error = spec && errorOf(spec, index, surface.positions.subarray(0, 3 * surface.vertices));
     return { surface, facts, measures: { info: mesh.info(), report: mesh.check() }, error };
   } finally {
     mesh.free();
@@ -20,9 +21,4 @@ export function errorOf(spec: CineSpec, frame: number, points: Float32Array): Su
   const distances = wallDistances(spec, frame, points);
   const mean = distances.reduce((sum, distance) => sum + distance, 0) / (distances.length || 1);
   return { mean, most: distances[Math.floor(0.95 * distances.length)] ?? 0 };
-}
-
-function surfaceOf(mesh: Mesh): Surface {
-  const { positions, normals, indices } = mesh.arrays();
-  return { positions, normals, indices, vertices: positions.length / 3, triangles: indices.length / 3 };
 }

@@ -1,7 +1,8 @@
 /** The worker of the Track lab: it holds one 4D image and one tracker, and does what the page asks. */
 import init, { paramSpecs, type StepReport, type SurfaceTracker, type Volume, version } from 'vesicle';
 import { Refusal, toFailure } from '../worker/refusal';
-import { answer, buffersOf, stop, type Work } from '../worker/serving';
+import { transferOf } from '../worker/room';
+import { answer, givingAway, stop, type Work } from '../worker/serving';
 import { viewOf } from '../worker/volumes';
 import { betweenSlices } from './between';
 import { type CineSpec, trueVolume } from './cine';
@@ -60,7 +61,7 @@ class Session {
 
   readonly handlers: Handlers = {
     hello: async () => {
-      await init();
+      await starting;
       return { version: version(), specs: paramSpecs('tracking') };
     },
     open: (body) => this.#open(body),
@@ -96,7 +97,8 @@ class Session {
       this.#forgetFilm();
       this.#film = { name, original, spec, prepared: made, preparation: setup.preparation };
       const truth = spec && Array.from({ length: spec.frames }, (_, frame) => trueVolume(spec, frame));
-      return { ...ready, volume: this.#view(), dims, spacing, truth, prepared: took };
+      const volume = this.#view();
+      return givingAway({ ...ready, volume, dims, spacing, truth, prepared: took }, [volume.voxels]);
     } catch (error) {
       if (made !== original) made.free();
       original.free();
@@ -118,7 +120,8 @@ class Session {
       const ready = this.#adopt(made, setup);
       if (film.prepared !== film.original) film.prepared.free();
       this.#film = { ...film, prepared: made, preparation: setup.preparation };
-      return { ...ready, volume: this.#view() };
+      const volume = this.#view();
+      return givingAway({ ...ready, volume }, [volume.voxels]);
     } catch (error) {
       if (made !== film.original) made.free();
       throw error;
@@ -199,7 +202,7 @@ class Session {
     const index = length > this.#sent ? length - 1 : undefined;
     this.#sent = length;
     const frame = index === undefined ? undefined : trackedFrame(tracker, index, this.#image().spec);
-    const transfer = frame ? buffersOf([frame.surface.positions, frame.surface.normals, frame.surface.indices]) : [];
+    const transfer = frame ? transferOf(frame.surface) : [];
     send({ event: 'step', report, index, frame, closing: tracker.closing }, transfer);
   }
 
@@ -305,6 +308,10 @@ class Session {
 function same(one: unknown, other: unknown): boolean {
   return JSON.stringify(one) === JSON.stringify(other);
 }
+
+// At once, and not when it is asked for: the page is still on its way. What goes wrong is told then.
+const starting = init();
+starting.catch(() => undefined);
 
 const session = new Session();
 

@@ -58,6 +58,7 @@ export class Plots {
   readonly #plots: Plot[];
   readonly #history: History;
   readonly #events = h('p', { class: 'help', 'data-plot-events': '' });
+  readonly #stale = new Set<Plot>();
   #pending = 0;
 
   /** `events`: topology may change, and what happened is told. */
@@ -82,13 +83,21 @@ export class Plots {
     );
   }
 
-  /** Redraws at the next animation frame. */
+  /** Redraws in the next animation frames, one plot in each: all at once, they hold up what else is to be drawn. */
   update(): void {
-    this.#pending ||= requestAnimationFrame(() => {
-      this.#pending = 0;
-      for (const plot of this.#plots) plot.update(this.#history);
-      this.#events.textContent = tellEvents(this.#history);
-    });
+    for (const plot of this.#plots) this.#stale.add(plot);
+    this.#pending ||= requestAnimationFrame(() => this.#redrawOne());
+  }
+
+  #redrawOne(): void {
+    this.#pending = 0;
+    const [plot] = this.#stale;
+    if (!plot) return;
+    // One that becomes stale again waits behind the others.
+    this.#stale.delete(plot);
+    plot.update(this.#history);
+    if (this.#stale.size > 0) this.#pending = requestAnimationFrame(() => this.#redrawOne());
+    else this.#events.textContent = tellEvents(this.#history);
   }
 }
 
@@ -97,6 +106,9 @@ class Plot {
   readonly #kind: PlotKind;
   readonly #plot: uPlot;
   readonly #caption = h('figcaption');
+  /** The iterations, and a list for each curve, of the reports of one run so far. */
+  #columns: (number | null)[][] = [];
+  #run: readonly StepReport[] | undefined;
 
   constructor(kind: PlotKind, history: History) {
     this.#kind = kind;
@@ -111,10 +123,21 @@ class Plot {
 
   update(history: History): void {
     const { reports } = history;
-    const values = (of: Curve['of']) => reports.map((report) => plottable(of(report), this.#kind.log));
-    const data = [reports.map((report) => report.iteration), ...this.#kind.curves.map((curve) => values(curve.of))];
-    this.#plot.setData(reports.length > 0 ? (data as uPlot.AlignedData) : emptyData(this.#kind));
+    this.#extend(reports);
+    this.#plot.setData(this.#columns as uPlot.AlignedData);
     this.#caption.textContent = reports.length > 0 ? this.#kind.tell(history) : 'No step yet.';
+  }
+
+  /** Only what is new is looked at: runs have thousands of steps. */
+  #extend(reports: readonly StepReport[]): void {
+    const { curves, log } = this.#kind;
+    if (reports !== this.#run) this.#columns = [[], ...curves.map(() => [])];
+    this.#run = reports;
+    const [iterations = [], ...values] = this.#columns;
+    for (const report of reports.slice(iterations.length)) {
+      iterations.push(report.iteration);
+      for (const [i, { of }] of curves.entries()) values[i]?.push(plottable(of(report), log));
+    }
   }
 }
 
@@ -250,17 +273,25 @@ function tellEvents({ phases, changes, reports }: History): string {
 /** How many vertices the surface had when it left each level. */
 function tellByLevel({ phases, reports }: History): string {
   const left = phases.slice(1).map(({ iteration }, i) => {
-    const last = reports.filter((report) => report.iteration < iteration).at(-1);
+    const last = lastBefore(reports, iteration);
     return last && `${count(last.vertices)} at the end of ${phases[i]?.phase}`;
   });
   const known = left.filter(Boolean);
   return known.length > 0 ? `${known.join(', ')}.` : '';
 }
 
+function lastBefore(reports: readonly StepReport[], iteration: number): StepReport | undefined {
+  for (let i = reports.length - 1; i >= 0; i--) if ((reports[i]?.iteration ?? iteration) < iteration) return reports[i];
+  return undefined;
+}
+
 function tellChange({ reports }: History, name: string, of: (report: StepReport) => number): string {
-  const [first, last] = [reports[0], reports.at(-1)];
-  if (!first || !last) return '';
-  const values = reports.map(of);
-  const span = `${count(values.reduce((a, b) => Math.min(a, b)))} to ${count(values.reduce((a, b) => Math.max(a, b)))}`;
-  return `${name[0]?.toUpperCase()}${name.slice(1)}: now ${count(of(last))}; between ${span} so far.`;
+  const last = reports.at(-1);
+  if (!last) return '';
+  let [low, high] = [of(last), of(last)];
+  for (const report of reports) {
+    low = Math.min(low, of(report));
+    high = Math.max(high, of(report));
+  }
+  return `${name[0]?.toUpperCase()}${name.slice(1)}: now ${count(of(last))}; between ${count(low)} to ${count(high)} so far.`;
 }

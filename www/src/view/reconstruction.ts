@@ -68,6 +68,9 @@ export class ReconstructionView {
     for (const { object } of [this.#surface, ...this.#clouds, this.#cameras]) this.#viewport.add(object);
     this.#viewport.add(this.#cameras.chosenObject);
     this.#viewport.onClick = (ray) => this.#pick(ray);
+    this.#viewport.onDraw = (_, hurried) => {
+      this.#surface.coarse = hurried;
+    };
     this.#recolor();
     onSchemeChange(() => this.#recolor());
   }

@@ -73,7 +73,10 @@ export class SculptureView {
     this.handles.onHover = (hovered) => canvas.toggleAttribute('data-handle', hovered);
     this.#viewport.add(this.handles.object);
     this.#viewport.onClick = (ray) => this.#pick(ray);
-    this.#viewport.onDraw = () => this.#placeInRow();
+    this.#viewport.onDraw = (_, hurried) => {
+      for (const { surface } of this.#meshes.values()) surface.coarse = hurried;
+      this.#placeInRow();
+    };
     this.#recolor();
     onSchemeChange(() => this.#recolor());
   }
@@ -98,7 +101,7 @@ export class SculptureView {
     this.#frame();
   }
 
-  /** Copies a surface; its arrays may be given away at once. */
+  /** Keeps a surface's arrays until the next one is shown. */
   show(name: MeshName, surface: Surface | undefined): void {
     const mesh = this.#meshes.get(name);
     if (!mesh || !surface) return;

@@ -57,7 +57,10 @@ export class Stage {
     this.#viewport.add(this.#surface.object);
     this.#viewport.add(this.#marks.object);
     this.#viewport.onClick = (ray) => this.#placeOnSurface(ray);
-    this.#viewport.onDraw = (viewer) => this.#placeSlices(viewer);
+    this.#viewport.onDraw = (viewer, hurried) => {
+      this.#surface.coarse = hurried;
+      this.#placeSlices(viewer);
+    };
     this.#recolor();
     onSchemeChange(() => this.#recolor());
   }
@@ -89,7 +92,7 @@ export class Stage {
     this.#moveTo(volume.dims.map((n) => (n - 1) >> 1) as Vec3);
   }
 
-  /** Copies the surface; its arrays may be given away at once. */
+  /** Keeps the surface's arrays until the next one is shown. */
   showSurface(surface: Surface): void {
     this.#surface.show(surface);
     this.#showLegend();

@@ -15,19 +15,24 @@ import {
 } from 'three';
 import type { Surface } from '../protocol';
 import type { ColorMode } from '../ui/view-options';
+import { coarseCorners } from './coarse';
 import { componentColors } from './components';
 import { isShade, linearColors, robustRange, SHADES, shadeColors, type ValueShade } from './shading';
 
-/** Room beyond what is needed now, so that a growing surface gets new GPU buffers only now and then. */
-const SPARE = 1.5;
 const BONE: ColorRepresentation = '#e9dcc3';
 /** Colours from photographs hold their light already: lit once more as they are, white comes out grey. */
 const OWN_GAIN = 1.6;
 
+/** Triangles that a software renderer still turns smoothly; of more, about so many are drawn meanwhile. */
+const SMOOTH = 10_000;
+
 /** What the colour of a surface tells; 'own' are the colours that its vertices came with, 'texture' a picture on it. */
 export type SurfaceColor = ColorMode | ValueShade | 'own' | 'texture';
 
-/** A surface whose vertices and triangles change every frame: over-allocated GPU buffers, drawn as far as they are filled. */
+/**
+ * A surface whose vertices and triangles change every frame. The arrays it is shown are what the GPU's buffers are filled
+ * from, with no copy in between; arrays with as much room as the ones before go into the same buffers.
+ */
 export class SurfaceObject {
   readonly object = new Group();
   readonly #material = new MeshStandardMaterial({
@@ -43,7 +48,10 @@ export class SurfaceObject {
   #lit = true;
   readonly #edgeMaterial = new LineBasicMaterial({ transparent: true, opacity: 0.4 });
   /** With normals from the start: a shader that is made for a surface without them draws flat triangles for ever. */
-  readonly #mesh: Mesh<BufferGeometry, Material> = new Mesh(allocate(1, 1), this.#material);
+  #fine = emptyGeometry();
+  /** Drawn instead of the fine one, while there is one. */
+  #coarse: BufferGeometry | undefined;
+  readonly #mesh: Mesh<BufferGeometry, Material> = new Mesh(this.#fine, this.#material);
   readonly #edges = new LineSegments(new BufferGeometry(), this.#edgeMaterial);
   /** How much of the buffers is in use: vertices, and corners of triangles. */
   #vertices = 0;
@@ -67,26 +75,29 @@ export class SurfaceObject {
     this.object.add(this.#mesh, this.#edges);
   }
 
-  /** Copies the surface; its arrays may be given away as soon as this returns. */
+  /** Keeps the surface's arrays until the next one is shown. */
   show(surface: Surface): void {
+    this.#dropCoarse();
     this.#vertices = surface.vertices;
     this.#corners = 3 * surface.triangles;
-    this.#reserve();
-    const { geometry } = this.#mesh;
-    fill(geometry, 'position', surface.positions, 3 * this.#vertices);
-    fill(geometry, 'normal', surface.normals, 3 * this.#vertices);
-    fillIndex(geometry, surface.indices, this.#corners);
+    this.#takeOver(surface);
+    this.#fine.setDrawRange(0, this.#corners);
     if (this.#edges.visible) this.#fillEdges();
     this.#hasUvs = surface.uvs !== undefined;
-    if (surface.uvs) fill(geometry, 'uv', surface.uvs, 2 * this.#vertices);
     this.#values = surface.values ?? new Float32Array(0);
     this.#colors = surface.colors ?? new Float32Array(0);
     this.#fillColors();
   }
 
-  /** Other places for the vertices that are shown. What light they had they keep: it is for a moment. */
+  /** Other places for the vertices that are shown, in an array of the same length. What light they had they keep: it is for a moment. */
   move(positions: Float32Array): void {
-    fill(this.#mesh.geometry, 'position', positions, 3 * this.#vertices);
+    refill(this.#fine.getAttribute('position') as BufferAttribute, positions, 3 * this.#vertices);
+  }
+
+  /** Fewer triangles, for a moment: where they are drawn in software, a large surface could not be turned. */
+  set coarse(on: boolean) {
+    if (!on) this.#dropCoarse();
+    else if (this.#corners > 3 * SMOOTH && !this.#coarse) this.#makeCoarse();
   }
 
   /** The number that the strongest colours stand for; 0 where colours stand for no number. */
@@ -96,6 +107,7 @@ export class SurfaceObject {
 
   /** What a ray can hit. */
   get target(): Mesh {
+    this.#dropCoarse();
     return this.#mesh;
   }
 
@@ -132,32 +144,72 @@ export class SurfaceObject {
   }
 
   dispose(): void {
-    this.#mesh.geometry.dispose();
+    this.#dropCoarse();
+    this.#fine.dispose();
     this.#edges.geometry.dispose();
     this.#material.dispose();
     this.#plainMaterial.dispose();
     this.#edgeMaterial.dispose();
   }
 
-  #reserve(): void {
-    const { geometry } = this.#mesh;
-    const hasVertices = (geometry.getAttribute('position')?.count ?? 0) >= this.#vertices;
-    const hasTriangles = (geometry.index?.count ?? 0) >= this.#corners;
-    if (hasVertices && hasTriangles && geometry.index) return;
-    // GPU buffers cannot grow: a new geometry replaces the old one.
-    geometry.dispose();
+  /** GPU buffers cannot grow: where the arrays have other lengths than those before, new ones take their place. */
+  #takeOver({ positions, normals, indices, uvs }: Surface): void {
+    const geometry = this.#fine;
+    const parts: Part[] = [
+      { name: 'position', array: positions, size: 3 },
+      { name: 'normal', array: normals, size: 3 },
+      ...(uvs ? [{ name: 'uv', array: uvs, size: 2 }] : []),
+    ];
+    const fits = parts.every(({ name, array }) => geometry.getAttribute(name)?.array.length === array.length);
+    if (!fits || geometry.index?.array.length !== indices.length) {
+      this.#replaceBy(geometryOf(parts, indices));
+      return;
+    }
+    for (const { name, array, size } of parts)
+      refill(geometry.getAttribute(name) as BufferAttribute, array, size * this.#vertices);
+    refill(geometry.index, indices, this.#corners);
+  }
+
+  #makeCoarse(): void {
+    const { attributes, index } = this.#fine;
+    const [positions, normals] = [attributes.position?.array, attributes.normal?.array] as Float32Array[];
+    if (!positions || !normals || !index) return;
+    const indices = index.array as Uint32Array;
+    const [vertices, corners] = [this.#vertices, this.#corners];
+    const list = coarseCorners({ positions, normals, indices, vertices, corners }, SMOOTH);
+    this.#coarse = new BufferGeometry();
+    for (const [name, attribute] of Object.entries(attributes)) this.#coarse.setAttribute(name, attribute);
+    this.#coarse.setIndex(new BufferAttribute(list, 1));
+    this.#coarse.boundingSphere = this.#fine.boundingSphere;
+    this.#mesh.geometry = this.#coarse;
+  }
+
+  #dropCoarse(): void {
+    const coarse = this.#coarse;
+    if (!coarse) return;
+    this.#coarse = undefined;
+    this.#mesh.geometry = this.#fine;
+    // What it shares stays on the GPU.
+    for (const name of Object.keys(coarse.attributes)) coarse.deleteAttribute(name);
+    coarse.dispose();
+  }
+
+  #replaceBy(geometry: BufferGeometry): void {
+    this.#fine.dispose();
     this.#edges.geometry.dispose();
-    const grown = allocate(Math.ceil(SPARE * this.#vertices), Math.ceil((SPARE * this.#corners) / 3));
-    this.#mesh.geometry = grown;
-    this.#edges.geometry = edgeGeometry(grown);
+    this.#fine = geometry;
+    this.#mesh.geometry = geometry;
+    this.#edges.geometry = new BufferGeometry();
   }
 
   #fillEdges(): void {
-    const corners = this.#mesh.geometry.index;
+    const corners = this.#fine.index;
+    if (!corners) return;
+    if (!this.#edges.geometry.index) this.#edges.geometry = edgeGeometry(this.#fine);
     const { geometry } = this.#edges;
-    if (!corners || !geometry.index) return;
-    const count = listEdges(corners.array as Uint32Array, this.#corners, geometry.index.array as Uint32Array);
-    upload(geometry.index, count);
+    const ends = geometry.index as BufferAttribute;
+    const count = listEdges(corners.array as Uint32Array, this.#corners, ends.array as Uint32Array);
+    refill(ends, ends.array as Uint32Array, count);
     geometry.setDrawRange(0, count);
   }
 
@@ -176,27 +228,46 @@ export class SurfaceObject {
     }
     this.#material.color.set(on || map ? '#ffffff' : BONE).multiplyScalar(own ? OWN_GAIN : 1);
     this.#range = shaded ? robustRange(this.#values, SHADES[mode].least) : 0;
-    const { geometry } = this.#mesh;
+    const geometry = this.#fine;
     if (!on || !geometry.index) return;
-    const colors = geometry.getAttribute('color') as BufferAttribute;
+    const colors = colorsOf(geometry);
     const out = colors.array as Float32Array;
     if (shaded) shadeColors(this.#values, this.#range, out);
     else if (own) linearColors(this.#colors, out);
     else componentColors(geometry.index.array as Uint32Array, this.#corners, this.#vertices, out);
-    upload(colors, 3 * this.#vertices);
+    refill(colors, out, 3 * this.#vertices);
   }
 }
 
-function allocate(vertices: number, triangles: number): BufferGeometry {
+/** Numbers at the vertices, so many each. */
+interface Part {
+  name: string;
+  array: Float32Array;
+  size: number;
+}
+
+function emptyGeometry(): BufferGeometry {
+  const parts = ['position', 'normal'].map((name) => ({ name, array: new Float32Array(3), size: 3 }));
+  return geometryOf(parts, new Uint32Array(3));
+}
+
+/** A geometry on these arrays themselves. */
+function geometryOf(parts: Part[], indices: Uint32Array): BufferGeometry {
   const geometry = new BufferGeometry();
-  for (const name of ['position', 'normal', 'color']) {
-    geometry.setAttribute(name, new BufferAttribute(new Float32Array(3 * vertices), 3));
-  }
-  geometry.setAttribute('uv', new BufferAttribute(new Float32Array(2 * vertices), 2));
-  geometry.setIndex(new BufferAttribute(new Uint32Array(3 * triangles), 1));
+  for (const { name, array, size } of parts) geometry.setAttribute(name, new BufferAttribute(array, size));
+  geometry.setIndex(new BufferAttribute(indices, 1));
   geometry.boundingSphere = new Sphere(new Vector3(), Number.POSITIVE_INFINITY);
   geometry.setDrawRange(0, 0);
   return geometry;
+}
+
+/** Made when they are first wanted: most surfaces are plain. */
+function colorsOf(geometry: BufferGeometry): BufferAttribute {
+  const there = geometry.getAttribute('color') as BufferAttribute | undefined;
+  if (there) return there;
+  const colors = new BufferAttribute(new Float32Array(geometry.getAttribute('position').array.length), 3);
+  geometry.setAttribute('color', colors);
+  return colors;
 }
 
 /** The same vertices, drawn as lines. A closed surface has as many edges as half its triangles' corners. */
@@ -223,23 +294,10 @@ function listEdges(indices: Uint32Array, length: number, out: Uint32Array): numb
   return count;
 }
 
-function fill(geometry: BufferGeometry, name: string, values: Float32Array, length: number): void {
-  const attribute = geometry.getAttribute(name) as BufferAttribute;
-  (attribute.array as Float32Array).set(values.subarray(0, length));
-  upload(attribute, length);
-}
-
-function fillIndex(geometry: BufferGeometry, indices: Uint32Array, length: number): void {
-  const { index } = geometry;
-  if (!index) return;
-  (index.array as Uint32Array).set(indices.subarray(0, length));
-  upload(index, length);
-  geometry.setDrawRange(0, length);
-}
-
-/** Only the part in use goes up. */
-function upload(attribute: BufferAttribute, length: number): void {
-  attribute.clearUpdateRanges();
-  attribute.addUpdateRange(0, length);
-  attribute.needsUpdate = true;
+/** Fills a buffer from an array that is as long as the one before. Only the part in use goes up. */
+function refill(buffer: BufferAttribute, array: Float32Array | Uint32Array, length: number): void {
+  buffer.array = array;
+  buffer.clearUpdateRanges();
+  buffer.addUpdateRange(0, length);
+  buffer.needsUpdate = true;
 }

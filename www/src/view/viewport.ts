@@ -40,8 +40,8 @@ export class Viewport {
   readonly #controls: OrbitControls;
   readonly #observer = new ResizeObserver(() => this.#resize());
   readonly #spherical = new Spherical();
-  /** Called before each drawing, with the camera's place. */
-  onDraw: (viewer: Vector3) => void = () => undefined;
+  /** Called before each drawing, with the camera's place. `hurried`: a hand turns the view, and there is no GPU to keep up with it. */
+  onDraw: (viewer: Vector3, hurried: boolean) => void = () => undefined;
   /** Called with the ray through the place that was clicked. */
   onClick: (ray: Raycaster) => void = () => undefined;
   /** Asked about a key first; true where it was meant for something else than the view. */
@@ -51,6 +51,9 @@ export class Viewport {
   #through: PinholeCamera | undefined;
   /** Pointer or wheel is at it: what moves now was meant to. */
   #dragged = false;
+  /** It has moved, and was not only touched. */
+  #turning = false;
+  #inSoftware: boolean | undefined;
   #disposed = false;
   #pending = 0;
   /** To be done before the next drawing. */
@@ -62,6 +65,8 @@ export class Viewport {
   constructor(canvas: HTMLCanvasElement) {
     this.canvas = canvas;
     this.#renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    // Who asks whether a shader has errors waits until it is compiled.
+    this.#renderer.debug.checkShaderErrors = false;
     this.#camera.up.set(0, 0, 1);
     this.#controls = new OrbitControls(this.#camera, canvas);
     this.#controls.addEventListener('change', () => this.#moved());
@@ -207,10 +212,21 @@ export class Viewport {
 
   #setDragged(dragged: boolean): void {
     this.#dragged = dragged;
+    if (dragged || !this.#turning) return;
+    this.#turning = false;
+    // What was drawn in a hurry is drawn as it is.
+    this.invalidate();
+  }
+
+  /** Asked only when it matters: the page has to wait for the answer. */
+  #drawsInSoftware(): boolean {
+    this.#inSoftware ??= isSoftware(this.#renderer.getContext());
+    return this.#inSoftware;
   }
 
   #moved(): void {
     if (this.#dragged) this.lookThrough(undefined);
+    this.#turning = this.#dragged;
     this.invalidate();
   }
 
@@ -228,6 +244,8 @@ export class Viewport {
 
   /** At a place of the view, −1 to 1 each way. */
   #click(x: number, y: number): void {
+    // What was moved since the last drawing, or before the first.
+    this.#scene.updateMatrixWorld();
     const ray = new Raycaster();
     ray.setFromCamera(new Vector2(x, y), this.#viewer());
     this.onClick(ray);
@@ -266,7 +284,7 @@ export class Viewport {
   }
 
   #draw(): void {
-    this.onDraw(this.#camera.position);
+    this.onDraw(this.#camera.position, this.#turning && this.#drawsInSoftware());
     const viewer = this.#viewer();
     // The eye's is up to date; the other's is brought so before its light is placed.
     if (viewer === this.#camera) viewer.updateMatrixWorld();
@@ -323,6 +341,13 @@ export class Viewport {
     this.#controls.update();
     this.invalidate();
   }
+}
+
+/** Whether pictures are made by the processor: SwiftShader in Chromium, llvmpipe in Mesa, WARP in Windows. */
+function isSoftware(context: WebGLRenderingContext | WebGL2RenderingContext): boolean {
+  const info = context.getExtension('WEBGL_debug_renderer_info');
+  const renderer = context.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : context.RENDERER);
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(String(renderer));
 }
 
 function worldBox(grid: Grid): Box3 {

@@ -13,8 +13,17 @@ export async function stop(work: Work | undefined): Promise<undefined> {
   await work?.ended.catch(() => undefined);
 }
 
-export function buffersOf(arrays: (Float32Array | Uint32Array)[]): Transferable[] {
+export function buffersOf(arrays: ArrayBufferView[]): Transferable[] {
   return arrays.map((array) => array.buffer as ArrayBuffer);
+}
+
+/** What goes along with a reply. */
+const along = new WeakMap<object, Transferable[]>();
+
+/** A reply whose large arrays are handed over to the page instead of being copied; nobody here may need them any more. */
+export function givingAway<Reply extends object>(reply: Reply, arrays: ArrayBufferView[]): Reply {
+  along.set(reply, buffersOf(arrays));
+  return reply;
 }
 
 /** Replies with what the handler gives, or with what was wrong. */
@@ -24,7 +33,9 @@ export async function answer(
 ): Promise<void> {
   const handler = handlers[kind] as (body: unknown) => unknown;
   try {
-    self.postMessage({ id, ok: true, body: await handler(body) });
+    const reply = await handler(body);
+    const transfer = reply instanceof Object ? along.get(reply) : undefined;
+    self.postMessage({ id, ok: true, body: reply }, { transfer: transfer ?? [] });
   } catch (error) {
     self.postMessage({ id, ok: false, failure: toFailure(error) });
   }

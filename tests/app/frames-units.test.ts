@@ -1,0 +1,102 @@
+/** What surfaces on their way to the screen are made of, without a browser. */
+import { beforeAll, describe, expect, test } from 'vitest';
+import init, { Mesh } from '../../pkg/index.js';
+import { coarseCorners, type Fine } from '../../www/src/view/coarse';
+import { noArrays, roomFor, surfaceIn } from '../../www/src/worker/room';
+
+beforeAll(() => init());
+
+const ball = (edge: number) => Mesh.icosphere([5, 6, 7], 2, edge);
+
+function fineOf(mesh: Mesh): Fine {
+  const { positions, normals, indices, vertices, triangles } = surfaceIn(noArrays(), mesh);
+  return { positions, normals, indices, vertices, corners: 3 * triangles };
+}
+
+describe('room', () => {
+  test('is enough, not much more, and seldom another', () => {
+    const rooms = Array.from({ length: 20_000 }, (_, count) => roomFor(count));
+    expect(rooms.filter((room, count) => room < count)).toEqual([]);
+    expect(rooms.filter((room, count) => room > Math.max(1, 1.25 * count) + 1)).toEqual([]);
+    expect(new Set(rooms).size).toBeLessThan(50);
+  });
+
+  test('a mesh goes into the arrays it is given where they fit, else into new ones', () => {
+    const mesh = ball(0.5);
+    const first = surfaceIn(noArrays(), mesh);
+    expect(first.vertices).toBe(mesh.vertexCount);
+    expect(first.positions.subarray(0, 3 * first.vertices)).toEqual(mesh.arrays().positions);
+    const second = surfaceIn(first, mesh);
+    expect(second.positions).toBe(first.positions);
+    expect(second.indices).toBe(first.indices);
+    mesh.refine();
+    const third = surfaceIn(second, mesh);
+    expect(third.positions).not.toBe(second.positions);
+    expect(third.indices.subarray(0, 3 * third.triangles)).toEqual(mesh.arrays().indices);
+    mesh.free();
+  });
+});
+
+describe('a coarse surface', () => {
+  test('has about as many triangles as are asked for, on vertices of the fine one', () => {
+    const mesh = ball(0.08);
+    const fine = fineOf(mesh);
+    for (const wanted of [500, 2000]) {
+      const corners = coarseCorners(fine, wanted);
+      expect(corners.length / 3).toBeGreaterThan(wanted / 2.5);
+      expect(corners.length / 3).toBeLessThan(wanted * 2.5);
+      expect(Math.max(...corners)).toBeLessThan(fine.vertices);
+    }
+    mesh.free();
+  });
+
+  test('faces outwards and encloses nearly the same', () => {
+    const mesh = ball(0.08);
+    const fine = fineOf(mesh);
+    const whole = enclosed(fine.positions, fine.indices.subarray(0, fine.corners));
+    expect(enclosed(fine.positions, coarseCorners(fine, 1000)) / whole).toBeGreaterThan(0.93);
+    expect(enclosed(fine.positions, coarseCorners(fine, 1000)) / whole).toBeLessThan(1.01);
+    mesh.free();
+  });
+
+  test('keeps the two sides of a thin sheet apart', () => {
+    const sheet = [0, 0.01].flatMap((z) => gridAt(z, 30));
+    const positions = Float32Array.from(sheet);
+    const normals = positions.map((_, i) => (i % 3 === 2 ? (i < positions.length / 2 ? -1 : 1) : 0));
+    const vertices = positions.length / 3;
+    const [below, above] = [gridCorners(30, 0), gridCorners(30, vertices / 2)];
+    const indices = Uint32Array.from([...below, ...above]);
+    const corners = coarseCorners({ positions, normals, indices, vertices, corners: indices.length }, 200);
+    expect(corners.length).toBeGreaterThan(100);
+    for (let i = 0; i < corners.length; i += 3) {
+      const sides = [0, 1, 2].map((k) => (corners[i + k] ?? 0) < vertices / 2);
+      expect(new Set(sides).size).toBe(1);
+    }
+  });
+});
+
+function gridAt(z: number, side: number): number[] {
+  return Array.from({ length: side * side }, (_, i) => [i % side, Math.floor(i / side), z]).flat();
+}
+
+function gridCorners(side: number, first: number): number[] {
+  const cells = Array.from({ length: (side - 1) ** 2 }, (_, i) => (i % (side - 1)) + side * Math.floor(i / (side - 1)));
+  return cells.flatMap((a) => [a, a + 1, a + side, a + 1, a + side + 1, a + side]).map((corner) => corner + first);
+}
+
+/** Six times the volume that triangles enclose. */
+function enclosed(positions: Float32Array, indices: Uint32Array): number {
+  let sum = 0;
+  for (let i = 0; i < indices.length; i += 3) {
+    const [a, b, c] = [0, 1, 2].map((k) =>
+      positions.subarray(3 * (indices[i + k] ?? 0), 3 * (indices[i + k] ?? 0) + 3),
+    );
+    if (!a || !b || !c) continue;
+    const at = (p: Float32Array, k: number) => p[k] ?? 0;
+    sum +=
+      at(a, 0) * (at(b, 1) * at(c, 2) - at(b, 2) * at(c, 1)) +
+      at(a, 1) * (at(b, 2) * at(c, 0) - at(b, 0) * at(c, 2)) +
+      at(a, 2) * (at(b, 0) * at(c, 1) - at(b, 1) * at(c, 0));
+  }
+  return sum;
+}

@@ -1,0 +1,86 @@
+/** A rougher surface on the same vertices, for while it moves: by vertex clustering (Rossignac and Borrel 1993). */
+
+/** Edges looked at to find how long they are. */
+const SAMPLES = 1000;
+/** Triangles that are left for each area of a cell, so that their number comes near what was asked for. */
+const FILL = 1.5;
+
+export interface Fine {
+  positions: Float32Array;
+  normals: Float32Array;
+  indices: Uint32Array;
+  vertices: number;
+  /** How much of `indices` is in use. */
+  corners: number;
+}
+
+/**
+ * Corners of about so many triangles. The vertices in a cell of a grid become one of them; those of the two sides of a
+ * thin sheet stay apart by where their normals point.
+ */
+export function coarseCorners(fine: Fine, triangles: number): Uint32Array {
+  const { indices, corners } = fine;
+  const cell = meanEdge(fine) * Math.sqrt((FILL * corners) / 3 / triangles);
+  const leaders = leadersOf(fine, cell);
+  const out = new Uint32Array(corners);
+  let length = 0;
+  for (let i = 0; i < corners; i += 3) {
+    const a = leaders[indices[i] ?? 0] ?? 0;
+    const b = leaders[indices[i + 1] ?? 0] ?? 0;
+    const c = leaders[indices[i + 2] ?? 0] ?? 0;
+    if (a === b || b === c || c === a) continue;
+    out[length++] = a;
+    out[length++] = b;
+    out[length++] = c;
+  }
+  return out.slice(0, length);
+}
+
+function meanEdge({ positions, indices, corners }: Fine): number {
+  const stride = 3 * Math.max(1, Math.floor(corners / 3 / SAMPLES));
+  let [sum, count] = [0, 0];
+  for (let i = 0; i + 1 < corners; i += stride) {
+    const [a, b] = [3 * (indices[i] ?? 0), 3 * (indices[i + 1] ?? 0)];
+    const along = (axis: number) => (positions[a + axis] ?? 0) - (positions[b + axis] ?? 0);
+    sum += Math.hypot(along(0), along(1), along(2));
+    count += 1;
+  }
+  return sum / Math.max(1, count) || 1;
+}
+
+/** For each vertex the first one in its cell. */
+function leadersOf({ positions, normals, vertices }: Fine, cell: number): Uint32Array {
+  const [low, wide] = extent(positions, vertices);
+  const side = Math.floor(wide / cell) + 1;
+  const at = (i: number, axis: number) => Math.floor(((positions[i + axis] ?? 0) - (low[axis] ?? 0)) / cell);
+  const first = new Map<number, number>();
+  const leaders = new Uint32Array(vertices);
+  for (let vertex = 0; vertex < vertices; vertex++) {
+    const i = 3 * vertex;
+    const key = 6 * ((at(i, 0) * side + at(i, 1)) * side + at(i, 2)) + facing(normals, i);
+    const leader = first.get(key);
+    if (leader === undefined) first.set(key, vertex);
+    leaders[vertex] = leader ?? vertex;
+  }
+  return leaders;
+}
+
+/** The lowest corner of the box around the points, and its longest side. */
+function extent(positions: Float32Array, vertices: number): [number[], number] {
+  const [low, high] = [Array(3).fill(Number.POSITIVE_INFINITY), Array(3).fill(Number.NEGATIVE_INFINITY)];
+  for (let i = 0; i < 3 * vertices; i++) {
+    const value = positions[i] ?? 0;
+    if (value < low[i % 3]) low[i % 3] = value;
+    if (value > high[i % 3]) high[i % 3] = value;
+  }
+  return [low, Math.max(0, ...low.map((value, axis) => high[axis] - value))];
+}
+
+/** The side of a cube that the normal goes through, 0 to 5. */
+function facing(normals: Float32Array, i: number): number {
+  const [x, y, z] = [normals[i] ?? 0, normals[i + 1] ?? 0, normals[i + 2] ?? 0];
+  const [ax, ay, az] = [Math.abs(x), Math.abs(y), Math.abs(z)];
+  if (ax >= ay && ax >= az) return x < 0 ? 0 : 1;
+  if (ay >= az) return y < 0 ? 2 : 3;
+  return z < 0 ? 4 : 5;
+}
