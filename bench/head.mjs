@@ -2,7 +2,7 @@
 import init, { DeformableModel, Mesh, Volume, version } from '../pkg/index.js';
 
 /** Bone, in the scan's intensities. */
-const ISO = 95;
+export const ISO = 95;
 const LEVELS = 2;
 const PARAMS = { iso: ISO, isoForce: -1, rigidity: 0.2 };
 /** A model that has not come to rest by then is reported as such. */

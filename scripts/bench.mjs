@@ -1,13 +1,15 @@
 // Times points to a surface, remeshing, sculpting, tracking, single steps and the head CT, in Node, in Chromium and, where a
-// program for it is there, natively; prints tables and writes bench.json.
+// program for it is there, natively, and other people's software at the same; prints tables and writes bench.json.
 // `npm run bench -- points` does one of them, and writes nothing.
 import { readFile, writeFile } from 'node:fs/promises';
 import { cpus } from 'node:os';
+import { remeshNatively, stepsNatively } from './bench-native.mjs';
+import { comparePeers, peerRows } from './bench-peers.mjs';
 import { build } from './build.mjs';
 import { launchChromium } from './chromium.mjs';
 import { serve } from './serve.mjs';
 import { setup } from './setup.mjs';
-import { at, must, root, script } from './shell.mjs';
+import { at, root, script } from './shell.mjs';
 
 const SCAN = 'www/public/data/visible-human-head-full.nii.gz';
 const BUST = 'www/public/data/nefertiti.ply';
@@ -20,6 +22,7 @@ const BENCHES = {
     rows: pointRows,
   },
   remesh: {
+    native: remeshNatively,
     inNode: async () => (await import('../bench/remesh.mjs')).measure(REPEATS),
     rows: remeshRows,
   },
@@ -33,7 +36,7 @@ const BENCHES = {
     rows: trackRows,
   },
   steps: {
-    native: 'step_figures',
+    native: stepsNatively,
     inNode: async () => (await import('../bench/steps.mjs')).measure(),
     rows: stepRows,
   },
@@ -41,6 +44,10 @@ const BENCHES = {
     file: SCAN,
     inNode: async () => (await import('../bench/head.mjs')).measure(new Uint8Array(await readFile(at(SCAN))), REPEATS),
     rows: headRows,
+  },
+  peers: {
+    alone: () => comparePeers(SCAN, REPEATS),
+    rows: peerRows,
   },
 };
 
@@ -152,15 +159,15 @@ function print(rows) {
   }
 }
 
-/** What the program for it prints, as one more host. */
-async function natively(example) {
-  const printed = await must('cargo', ['run', '--quiet', '--locked', '--release', '--example', example]);
-  return { host: 'native', rows: JSON.parse(printed) };
+function printed(result, rows) {
+  print(rows(result));
+  return result;
 }
 
 async function run(name) {
-  const { native, inNode, rows } = BENCHES[name];
-  const reference = native && (await natively(native));
+  const { alone, native, inNode, rows } = BENCHES[name];
+  if (alone) return printed(await alone(), rows);
+  const reference = await native?.();
   const results = [{ host: `Node ${process.versions.node}`, ...(await inNode()) }, await inChromium(name)];
   print([...(reference ? rows(reference) : []), ...results.flatMap((result) => rows(result, reference))]);
   return reference ? [reference, ...results] : results;
