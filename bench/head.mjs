@@ -52,6 +52,13 @@ function summary(model, { iteration, done, vertices, triangles, components, eule
   return { ...counts, area, volume, closed, oriented, selfIntersections };
 }
 
+/** Marching cubes alone, as often as it takes to find a moment when nothing else disturbs so short a time. */
+export async function measureCubes(bytes, repeats) {
+  await init();
+  const volume = Volume.parse(bytes);
+  return best(repeats, () => marchingCubes(volume));
+}
+
 /**
  * Measures everything on the bytes of the scan: milliseconds, counts, and the ratio of the model's time to that of
  * marching cubes on the same volume in the same run.

@@ -1,25 +1,32 @@
 // Other people's software on the data of our own bench, in the same run: bench/peers.py times it where it is there. What can be
 // compared and what cannot is said at its head. VESICLE_PYTHON names another Python than python3.
 import { readFile, writeFile } from 'node:fs/promises';
+import { cpus, loadavg } from 'node:os';
 import { join } from 'node:path';
 import { inFolder, remeshNatively } from './bench-native.mjs';
 import { at, run } from './shell.mjs';
+
+/** For what takes a moment only: so many times as many runs, on both sides. */
+const CHEAP = 10;
 
 const PYTHON = process.env.VESICLE_PYTHON ?? 'python3';
 
 /** Rows of ours and theirs for each task and package, or why there is nothing of theirs. */
 export async function comparePeers(scan, repeats) {
+  const [load] = loadavg();
   const all = tasks(await measureOurs(scan, repeats));
   return inFolder(async (folder) => {
     const found = await measureTheirs(await writeJob(folder, scan, repeats));
     const rows = all.flatMap((task) => task.packages.map((name) => compare(task, name, found)));
-    return { bestOf: repeats, rows: await Promise.all(rows) };
+    return { bestOf: repeats, load, cores: cpus().length, rows: await Promise.all(rows) };
   });
 }
 
 async function measureOurs(scan, repeats) {
   const bytes = new Uint8Array(await readFile(at(scan)));
-  const head = await (await import('../bench/head.mjs')).measure(bytes, repeats);
+  const { measure, measureCubes } = await import('../bench/head.mjs');
+  const cubes = await measureCubes(bytes, CHEAP * repeats);
+  const head = { ...(await measure(bytes, repeats)), cubes };
   const points = await (await import('../bench/points.mjs')).measure(repeats);
   return { head, points, remesh: await remeshNatively() };
 }
@@ -47,7 +54,7 @@ function tasks({ head: { cubes, model }, points: { few, many }, remesh }) {
   ];
   const natively = remesh.rows.map((row) => ({
     task: remeshTask(row.name, row.factor),
-    name: `Remeshing, ${row.name}, edges x ${row.factor}`,
+    name: `Remeshing, ${row.name}, edges × ${row.factor}`,
     packages: ['pymeshlab', 'cgal'],
     ours: row,
     host: remesh.host,
@@ -61,7 +68,7 @@ async function writeJob(folder, scan, repeats) {
   const { ISO } = await import('../bench/head.mjs');
   const { FEW, MANY } = await import('../bench/points.mjs');
   const job = {
-    ...{ scan: at(scan), iso: ISO, repeats },
+    ...{ scan: at(scan), iso: ISO, repeats, cheapRepeats: CHEAP * repeats },
     few: await writePoints(folder, FEW),
     many: await writePoints(folder, MANY),
     meshes: await writeMeshes(folder),

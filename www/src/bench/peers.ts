@@ -14,14 +14,15 @@ const NOTES = [
   'MeshLab and CGAL do three rounds and stop there; ours goes on until all edges are in bounds, and keeps the surface from crossing itself.',
 ];
 
-export function peerSection({ rows }: NonNullable<Report['peers']>): Section {
+export function peerSection({ rows, load = 0, cores }: NonNullable<Report['peers']>): Section {
+  const busy = `The machine was busy: its load was ${load.toFixed(1)} on ${cores} cores when this was measured. Ratios waver.`;
   return {
     id: 'peers',
     title: 'Beside other software',
     measured:
       'Other people’s software at comparable work on the same data, in the same run; the bars are our time to theirs.',
     command: 'npm run bench -- peers',
-    notes: NOTES,
+    notes: load > 1 ? [...NOTES, busy] : NOTES,
     charts: [{ title: 'Our time to theirs (less is better)', unit: '×', kind: 'ratio', figures: figuresOf(rows) }],
   };
 }
@@ -35,10 +36,12 @@ function figuresOf(rows: PeerRow[]): Figure[] {
 function barOf(row: PeerRow): Bar {
   const label = row.version ? `${row.package} ${shortVersion(row.version)}` : row.package;
   if (row.ratio === undefined || !row.theirs) return { label, skipped: row.skipped ?? 'skipped' };
-  const ours = `ours ${figureOf(row, row.ours)}${outcomeOf(row.ours)}`;
-  const theirs = `${row.theirs.what} ${figureOf(row, row.theirs)}${outcomeOf(row.theirs)}`;
-  return { label, value: row.ratio, remark: `${ours}; ${theirs}` };
+  const ours = ['ours', figureOf(row, row.ours), ...outcomeOf(row.ours)];
+  const theirs = ['theirs', figureOf(row, row.theirs), row.theirs.what, ...outcomeOf(row.theirs)];
+  return { label, value: row.ratio, remark: [ours, theirs].map(said).join('; ') };
 }
+
+const said = ([whose, figure, ...rest]: string[]) => `${whose} ${figure}${rest.map((one) => `, ${one}`).join('')}`;
 
 /** Without a word for the day it was packed on. */
 export const shortVersion = (version: string) => version.replace(/\.post\d+$/, '');
@@ -49,12 +52,12 @@ function figureOf({ unit }: PeerRow, { figure }: Side): string {
 }
 
 /** What came out, where it tells how far the two can be compared. */
-function outcomeOf({ triangles, vertices, volume, minAngleDegrees, refused }: Side): string {
-  if (refused) return ' (not a closed surface)';
+function outcomeOf({ triangles, vertices, volume, minAngleDegrees, refused }: Side): string[] {
+  if (refused) return ['not a closed surface'];
   const words = [];
   if (triangles) words.push(`${count(triangles)} triangles`);
   else if (vertices) words.push(`${count(vertices)} vertices`);
   if (volume) words.push(`${count(volume / 1000)} cm³`);
   if (minAngleDegrees !== undefined) words.push(`angles from ${count(minAngleDegrees)}°`);
-  return words.length > 0 ? ` (${words.join(', ')})` : '';
+  return words;
 }

@@ -8,7 +8,8 @@ export interface Report {
   track?: (Host & TrackFigures)[];
   steps?: (Host & { rows: StepRow[] })[];
   head?: (Host & HeadFigures)[];
-  peers?: { bestOf: number; rows: PeerRow[] };
+  /** `load` is what the machine was busy with when it began. */
+  peers?: { bestOf: number; load?: number; cores?: number; rows: PeerRow[] };
   page?: Host & PageFigures;
 }
 
