@@ -2,7 +2,7 @@
 import init, { DeformableModel, Mesh, Volume, version } from '../pkg/index.js';
 
 /** Bone, in the scan's intensities. */
-const ISO = 95;
+export const ISO = 95;
 const LEVELS = 2;
 const PARAMS = { iso: ISO, isoForce: -1, rigidity: 0.2 };
 /** A model that has not come to rest by then is reported as such. */
@@ -50,6 +50,13 @@ function summary(model, { iteration, done, vertices, triangles, components, eule
   const { area, volume } = model.mesh.info();
   const counts = { iterations: iteration, converged: done, vertices, triangles, components, euler };
   return { ...counts, area, volume, closed, oriented, selfIntersections };
+}
+
+/** Marching cubes alone, as often as it takes to find a moment when nothing else disturbs so short a time. */
+export async function measureCubes(bytes, repeats) {
+  await init();
+  const volume = Volume.parse(bytes);
+  return best(repeats, () => marchingCubes(volume));
 }
 
 /**

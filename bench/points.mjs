@@ -2,8 +2,8 @@
 import init, { ImplicitSurface, version } from '../pkg/index.js';
 
 /** Points, beside which one for ten is placed outside. */
-const FEW = 3000;
-const MANY = 20_000;
+export const FEW = 3000;
+export const MANY = 20_000;
 /** The torus in a box of side 2, in cells of a 128th of it. */
 const CELL = 2 / 128;
 const [RING, TUBE] = [0.65, 0.35];
@@ -41,6 +41,17 @@ function phases(surface) {
     }
   } while (!report.done);
   return { times, report };
+}
+
+/** The constraints of a surface, and the vertices that come of them: for others to do the same with. */
+export async function example(count) {
+  await init();
+  const surface = new ImplicitSurface({ points: torus(count), params: { cell: CELL } });
+  phases(surface);
+  const { surface: points, exterior } = surface.constraints();
+  const { positions: vertices } = surface.mesh.arrays();
+  surface.free();
+  return { points, exterior, vertices };
 }
 
 /** One surface from its points on, and then with one point more by hand. */

@@ -57,12 +57,19 @@ function timed(mesh, factor, repeats) {
   return { factor, milliseconds, before, triangles, minAngleDegrees, selfIntersections, distance };
 }
 
+/** Lengths that edges are to have, in the mean edge. */
+export const FACTORS = [0.5, 1, 3];
+
+/** What is remeshed, by name. */
+export async function meshes() {
+  await init();
+  return { torus: torus(400, 50), gyroid: gyroid(64) };
+}
+
 /** For each mesh and factor: milliseconds, counts, the smallest angle, and the distance in edges. */
 export async function measure(repeats) {
-  await init();
-  const meshes = { torus: torus(400, 50), gyroid: gyroid(64) };
-  const rows = Object.entries(meshes).flatMap(([name, mesh]) =>
-    [0.5, 1, 3].map((factor) => ({ name, ...timed(mesh, factor, repeats) })),
+  const rows = Object.entries(await meshes()).flatMap(([name, mesh]) =>
+    FACTORS.map((factor) => ({ name, ...timed(mesh, factor, repeats) })),
   );
   return { version: version(), rows };
 }

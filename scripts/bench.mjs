@@ -1,14 +1,16 @@
 // Times points to a surface, remeshing, sculpting, tracking, single steps and the head CT, in Node, in Chromium and, where a
-// program for it is there, natively, and the app in Chromium; prints tables and writes bench.json.
-// `npm run bench -- points` does one of them, and writes nothing.
+// program for it is there, natively, the app in Chromium, and other people's software at the same; prints tables and writes
+// bench.json. `npm run bench -- points` does one of them, and writes nothing.
 import { readFile, writeFile } from 'node:fs/promises';
 import { cpus } from 'node:os';
 import { buildApp } from './app.mjs';
+import { remeshNatively, stepsNatively } from './bench-native.mjs';
+import { comparePeers, peerRows } from './bench-peers.mjs';
 import { build } from './build.mjs';
 import { launchChromium } from './chromium.mjs';
 import { serve } from './serve.mjs';
 import { setup } from './setup.mjs';
-import { at, must, root, script } from './shell.mjs';
+import { at, root, script } from './shell.mjs';
 
 const SCAN = 'www/public/data/visible-human-head-full.nii.gz';
 const BUST = 'www/public/data/nefertiti.ply';
@@ -21,6 +23,7 @@ const BENCHES = {
     rows: pointRows,
   },
   remesh: {
+    native: remeshNatively,
     inNode: async () => (await import('../bench/remesh.mjs')).measure(REPEATS),
     rows: remeshRows,
   },
@@ -34,7 +37,7 @@ const BENCHES = {
     rows: trackRows,
   },
   steps: {
-    native: 'step_figures',
+    native: stepsNatively,
     inNode: async () => (await import('../bench/steps.mjs')).measure(),
     rows: stepRows,
   },
@@ -50,6 +53,10 @@ const BENCHES = {
       return (await import('../bench/page.mjs')).measure(at('dist'), REPEATS);
     },
     rows: pageRows,
+  },
+  peers: {
+    alone: () => comparePeers(SCAN, REPEATS),
+    rows: peerRows,
   },
 };
 
@@ -204,20 +211,15 @@ function print(rows) {
   }
 }
 
-/** What the program for it prints, as one more host. */
-async function natively(example) {
-  const printed = await must('cargo', ['run', '--quiet', '--locked', '--release', '--example', example]);
-  return { host: 'native', rows: JSON.parse(printed) };
+function printed(result, rows) {
+  print(rows(result));
+  return result;
 }
 
 async function run(name) {
   const { alone, native, inNode, rows } = BENCHES[name];
-  if (alone) {
-    const result = await alone();
-    print(rows(result));
-    return [result];
-  }
-  const reference = native && (await natively(native));
+  if (alone) return printed(await alone(), rows);
+  const reference = await native?.();
   const results = [{ host: `Node ${process.versions.node}`, ...(await inNode()) }, await inChromium(name)];
   print([...(reference ? rows(reference) : []), ...results.flatMap((result) => rows(result, reference))]);
   return reference ? [reference, ...results] : results;

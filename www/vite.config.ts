@@ -23,6 +23,7 @@ export default defineConfig({
     outDir: here('../dist'),
     emptyOutDir: true,
     target: 'es2022',
+    rolldownOptions: { input: [here('index.html'), here('bench.html')] },
     // The policy allows no data: script or style; small files stay files.
     assetsInlineLimit: 0,
     chunkSizeWarningLimit: 1000,

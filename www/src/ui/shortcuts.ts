@@ -86,6 +86,7 @@ function shortcutDialog(shortcuts: Shortcut[], opener: HTMLElement, signal: Abor
     { 'aria-labelledby': 'keys-title' },
     h('h2', { id: 'keys-title' }, 'Keyboard'),
     list,
+    h('p', {}, h('a', { href: './bench.html' }, 'Measurements: how fast it is')),
     form,
   );
   opener.addEventListener('click', () => dialog.showModal(), { signal });

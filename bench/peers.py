@@ -1,0 +1,271 @@
+"""Times other people's software on the data of our own bench, and prints what came of it as JSON.
+
+    python3 bench/peers.py <job.json>
+
+`npm run bench -- peers` writes the job, runs this and puts our own figures of the same run beside it. Nothing is installed
+here: a package that is not there is skipped with a word. All of them together:
+
+    pip install vtk scikit-image SimpleITK scipy pymeshlab cgal numpy
+
+How far things can be compared:
+
+- All of these are native code. Ours is WebAssembly, where it is not said to be native.
+- Ours has one thread. So have these here: VTK, ITK, OpenMP and BLAS are told so before they start.
+- Reading files and converting arrays is not timed, on either side.
+- Flying edges and marching cubes take the same voxels and the same value. Those of scikit-image make normals, too.
+- A level set is not a mesh, and may stop farther from the object: it is done when the root mean square of its changes falls
+  below ITK's own default. It is given a start 5 mm around the object, ours finds its way from outside the head. No surface
+  is made of its result in the time that counts, and one run of it has to do.
+- SciPy solves exactly, and with a matrix of all pairs; ours iterates to a residual. With neighbors= it solves nothing as a
+  whole, but a small system for each place asked about, and what comes out has steps: here it is asked about the vertices
+  of our surface only.
+- The two remeshers do three rounds, as in CGAL's example (MeshLab's usual ten take three times as long), then stop, whether
+  the edges are in bounds or not; ours goes on until they are. Neither looks whether the surface crosses itself. Reprojection and
+  flips are on in all of them; MeshLab keeps what it takes for sharp edges.
+"""
+
+import gzip
+import json
+import os
+import struct
+import subprocess
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from time import perf_counter
+
+ONE_THREAD = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "ITK_GLOBAL_DEFAULT_NUMBER_OF_THREADS": "1",
+    "VTK_SMP_BACKEND_IN_USE": "Sequential",
+}
+# Millimetres around the object where the level set starts.
+AROUND = 5
+LEVEL_SET_ITERATIONS = 500
+REMESHING_ROUNDS = 3
+NEIGHBORS = 50
+
+
+def best(repeats, work):
+    """The least milliseconds of several runs, and what the last one gave."""
+    least = float("inf")
+    for _ in range(repeats):
+        started = perf_counter()
+        value = work()
+        least = min(least, 1000 * (perf_counter() - started))
+    return least, value
+
+
+def read_volume(path):
+    """Voxels of a gzipped NIfTI-1 file of bytes as a numpy array, x fastest, and their spacing."""
+    import numpy
+
+    data = gzip.decompress(Path(path).read_bytes())
+    x, y, z = struct.unpack_from("<3h", data, 42)
+    spacing = struct.unpack_from("<3f", data, 80)
+    (start,) = struct.unpack_from("<f", data, 108)
+    if struct.unpack_from("<h", data, 70) != (2,):
+        raise ValueError(f"{path} holds other things than bytes")
+    return numpy.frombuffer(data, numpy.uint8, x * y * z, int(start)).reshape(z, y, x), spacing
+
+
+def vtk(job):
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonDataModel import vtkImageData
+    from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
+
+    voxels, spacing = read_volume(job["scan"])
+    image = vtkImageData()
+    image.SetDimensions(*reversed(voxels.shape))
+    image.SetSpacing(spacing)
+    image.GetPointData().SetScalars(numpy_to_vtk(voxels.ravel()))
+
+    def surface():
+        edges = vtkFlyingEdges3D()
+        edges.SetInputData(image)
+        edges.SetValue(0, job["iso"])
+        edges.ComputeNormalsOff()
+        edges.ComputeGradientsOff()
+        edges.ComputeScalarsOff()
+        edges.Update()
+        return edges.GetOutput()
+
+    milliseconds, found = best(job["cheapRepeats"], surface)
+    counts = {"vertices": found.GetNumberOfPoints(), "triangles": found.GetNumberOfPolys()}
+    yield {"task": "cubes", "what": "flying edges", "milliseconds": milliseconds, **counts}
+
+
+def scikit_image(job):
+    from skimage.measure import marching_cubes
+
+    voxels, spacing = read_volume(job["scan"])
+    work = lambda: marching_cubes(voxels, job["iso"], spacing=spacing[::-1])
+    milliseconds, (vertices, triangles, *_) = best(job["cheapRepeats"], work)
+    counts = {"vertices": len(vertices), "triangles": len(triangles)}
+    yield {"task": "cubes", "what": "marching cubes, with normals", "milliseconds": milliseconds, **counts}
+
+
+def simple_itk(job):
+    import SimpleITK as sitk
+
+    sitk.ProcessObject.SetGlobalDefaultNumberOfThreads(1)
+    scan = sitk.ReadImage(job["scan"])
+    # Above the object's value speed goes on growing, so that the brightest bone is not outside again.
+    level_set = sitk.ThresholdSegmentationLevelSetImageFilter()
+    level_set.SetLowerThreshold(job["iso"])
+    level_set.SetUpperThreshold(job["iso"] + 2 * (255 - job["iso"]))
+    level_set.SetNumberOfIterations(LEVEL_SET_ITERATIONS)
+
+    def segment():
+        bone = sitk.BinaryThreshold(scan, job["iso"], 255)
+        distance = sitk.SignedMaurerDistanceMap(bone, squaredDistance=False, useImageSpacing=True)
+        return level_set.Execute(distance - AROUND, sitk.Cast(scan, sitk.sitkFloat32))
+
+    milliseconds, found = best(1, segment)
+    # As in the distance it started from, what is inside is below zero.
+    inside = sitk.GetArrayViewFromImage(found) < 0
+    x, y, z = scan.GetSpacing()
+    ended = {
+        "iterations": level_set.GetElapsedIterations(),
+        "converged": level_set.GetElapsedIterations() < LEVEL_SET_ITERATIONS,
+        "volume": float(inside.sum() * x * y * z),
+    }
+    yield {"task": "model", "what": "threshold level set", "milliseconds": milliseconds, **ended}
+
+
+def scipy(job):
+    import numpy
+    from scipy.interpolate import RBFInterpolator
+
+    read = lambda name: numpy.fromfile(name, numpy.float32).reshape(-1, 3).astype(float)
+
+    def constraints(of):
+        points, exterior = read(of["points"]), read(of["exterior"])
+        return numpy.concatenate([points, exterior]), numpy.repeat([0.0, -1.0], [len(points), len(exterior)])
+
+    places, values = constraints(job["few"])
+    milliseconds, _ = best(job["repeats"], lambda: RBFInterpolator(places, values, kernel="cubic"))
+    yield {"task": "solve few", "what": "all pairs, r³", "milliseconds": milliseconds}
+
+    places, values = constraints(job["many"])
+    vertices = read(job["many"]["vertices"])
+    matrix = f"its matrix of all pairs takes {8e-9 * len(places) ** 2:.1f} GB, and minutes"
+    yield {"task": "solve many", "absent": f"not tried: {matrix}"}
+
+    local = lambda: RBFInterpolator(places, values, kernel="cubic", neighbors=NEIGHBORS)(vertices)
+    milliseconds, _ = best(job["repeats"], local)
+    what = f"{NEIGHBORS} neighbours, values at the vertices alone"
+    yield {"task": "surface many", "what": what, "milliseconds": milliseconds, "vertices": len(vertices)}
+
+
+def pymeshlab(job):
+    import pymeshlab as meshlab
+
+    for mesh in job["meshes"]:
+        # A new set for each run: the filter changes the mesh it is given.
+        sets = [meshlab.MeshSet() for _ in range(job["repeats"])]
+        for one in sets:
+            one.load_new_mesh(mesh["file"])
+        aim = meshlab.PureValue(mesh["edge"])
+        run = iter(sets)
+
+        def remesh():
+            one = next(run)
+            one.meshing_isotropic_explicit_remeshing(iterations=REMESHING_ROUNDS, targetlen=aim)
+            return one
+
+        milliseconds, found = best(job["repeats"], remesh)
+        surface = found.current_mesh()
+        yield remeshed("pymeshlab", mesh, milliseconds, surface.vertex_matrix(), surface.face_matrix())
+
+
+def cgal(job):
+    from CGAL.CGAL_Polygon_mesh_processing import isotropic_remeshing
+    from CGAL.CGAL_Polyhedron_3 import Polyhedron_3
+
+    for mesh in job["meshes"]:
+        inputs = [Polyhedron_3(mesh["file"]) for _ in range(job["repeats"])]
+        run = iter([(one, list(one.facets())) for one in inputs])
+
+        def remesh():
+            one, facets = next(run)
+            # The rounds have to be given: without them these bindings do next to nothing.
+            isotropic_remeshing(facets, mesh["edge"], one, REMESHING_ROUNDS)
+            return one
+
+        milliseconds, found = best(job["repeats"], remesh)
+        yield remeshed("cgal", mesh, milliseconds, *arrays_of(found))
+
+
+def arrays_of(polyhedron):
+    """Positions and triangles; CGAL's own files have five digits."""
+    positions = []
+    for index, vertex in enumerate(polyhedron.vertices()):
+        vertex.set_id(index)
+        point = vertex.point()
+        positions.append((point.x(), point.y(), point.z()))
+    first = [facet.halfedge() for facet in polyhedron.facets()]
+    triangles = [[at.vertex().id() for at in (one, one.next(), one.next().next())] for one in first]
+    return positions, triangles
+
+
+def remeshed(package, mesh, milliseconds, positions, triangles):
+    """The result, and the files it is looked at in."""
+    import numpy
+
+    name = f"{mesh['file']}.{package}-{mesh['factor']}"
+    files = {"positions": f"{name}.f32", "indices": f"{name}.u32"}
+    numpy.asarray(positions, numpy.float32).tofile(files["positions"])
+    numpy.asarray(triangles, numpy.uint32).tofile(files["indices"])
+    counts = {"vertices": len(positions), "triangles": len(triangles)}
+    what = f"{REMESHING_ROUNDS} rounds"
+    return {"task": mesh["task"], "what": what, "milliseconds": milliseconds, **counts, "files": files}
+
+
+PEERS = {
+    "vtk": vtk,
+    "scikit-image": scikit_image,
+    "SimpleITK": simple_itk,
+    "scipy": scipy,
+    "pymeshlab": pymeshlab,
+    "cgal": cgal,
+}
+
+
+def measure(package, job):
+    """What one package comes to. One that is not there, or fails half-way, says so, and what it had done before stays."""
+    results = []
+    try:
+        about = {"package": package, "version": version(package)}
+        for result in PEERS[package](job):
+            results.append({**about, **result})
+    except PackageNotFoundError:
+        results.append({"package": package, "absent": "not installed"})
+    except Exception as error:
+        results.append({"package": package, "absent": f"failed: {error}"})
+    return results
+
+
+def in_its_own_process(package, job):
+    """So that none finds the memory or the threads of another, and a crash takes only one with it."""
+    command = [sys.executable, __file__, job, package]
+    done = subprocess.run(command, env={**os.environ, **ONE_THREAD}, capture_output=True, text=True)
+    # Some packages print things, too; ours is the last line.
+    printed = done.stdout.strip().splitlines()
+    if done.returncode == 0 and printed:
+        return json.loads(printed[-1])
+    return [{"package": package, "absent": f"crashed, with code {done.returncode}"}]
+
+
+def main(job, package=None):
+    if package:
+        results = measure(package, json.loads(Path(job).read_text()))
+    else:
+        results = [result for name in PEERS for result in in_its_own_process(name, job)]
+    print(json.dumps(results))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

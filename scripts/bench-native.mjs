@@ -1,0 +1,64 @@
+// What the programs in examples/ measure natively, in the form of the benches in Node and Chromium.
+import { mkdtemp, rm, writeFile } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { must } from './shell.mjs';
+
+const example = (name, files = [], env = {}) =>
+  must('cargo', ['run', '--quiet', '--locked', '--release', '--example', name, '--', ...files], { env });
+
+/** A folder for files in passing, gone after `work`. */
+export async function inFolder(work) {
+  const folder = await mkdtemp(join(tmpdir(), 'vesicle-'));
+  try {
+    return await work(folder);
+  } finally {
+    await rm(folder, { recursive: true });
+  }
+}
+
+/** Steps of the deformable model: its program prints the rows as JSON. */
+export async function stepsNatively() {
+  return { host: 'native', rows: JSON.parse(await example('step_figures')) };
+}
+
+/** Remeshing of the same meshes as in bench/remesh.mjs. */
+export async function remeshNatively() {
+  const { meshes } = await import('../bench/remesh.mjs');
+  const printed = await inFolder(async (folder) => {
+    const files = [];
+    for (const [name, mesh] of Object.entries(await meshes())) {
+      files.push(join(folder, `${name}.ply`));
+      await writeFile(files.at(-1), mesh.toBytes('ply'));
+      mesh.free();
+    }
+    // Of these files alone, without the shapes that the program brings along.
+    return example('remesh_figures', files, { ONLY: '.ply' });
+  });
+  return { host: 'native', rows: readTable(printed).map(remeshRow) };
+}
+
+/** Rows of a printed table, by the words of its first line. */
+function readTable(printed) {
+  const [head, ...lines] = printed.trim().split('\n');
+  const names = head.trim().split(/\s+/);
+  const row = (line) => {
+    const values = line.trim().split(/\s+/);
+    return Object.fromEntries(names.map((name, k) => [name, values[k]]));
+  };
+  return lines.filter((line) => line.includes('.ply ')).map(row);
+}
+
+function remeshRow({ mesh, aim, in: before, out, 'us/tri': each, cross, angle, 'haus/a': distance }) {
+  const triangles = Number(out);
+  return {
+    name: mesh.replace('.ply', ''),
+    factor: Number(aim),
+    milliseconds: (Number(each) * triangles) / 1000,
+    before: Number(before),
+    triangles,
+    minAngleDegrees: Number(angle),
+    selfIntersections: Number(cross),
+    distance: Number(distance),
+  };
+}

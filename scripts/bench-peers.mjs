@@ -1,0 +1,198 @@
+// Other people's software on the data of our own bench, in the same run: bench/peers.py times it where it is there. What can be
+// compared and what cannot is said at its head. VESICLE_PYTHON names another Python than python3.
+import { readFile, writeFile } from 'node:fs/promises';
+import { cpus, loadavg } from 'node:os';
+import { join } from 'node:path';
+import { inFolder, remeshNatively } from './bench-native.mjs';
+import { at, run } from './shell.mjs';
+
+/** For what takes a moment only: so many times as many runs, on both sides. */
+const CHEAP = 10;
+
+const PYTHON = process.env.VESICLE_PYTHON ?? 'python3';
+
+/** Rows of ours and theirs for each task and package, or why there is nothing of theirs. */
+export async function comparePeers(scan, repeats) {
+  const [load] = loadavg();
+  const all = tasks(await measureOurs(scan, repeats));
+  return inFolder(async (folder) => {
+    const found = await measureTheirs(await writeJob(folder, scan, repeats));
+    const rows = all.flatMap((task) => task.packages.map((name) => compare(task, name, found)));
+    return { bestOf: repeats, load, cores: cpus().length, rows: await Promise.all(rows) };
+  });
+}
+
+async function measureOurs(scan, repeats) {
+  const bytes = new Uint8Array(await readFile(at(scan)));
+  const { measure, measureCubes } = await import('../bench/head.mjs');
+  const cubes = await measureCubes(bytes, CHEAP * repeats);
+  const head = { ...(await measure(bytes, repeats)), cubes };
+  const points = await (await import('../bench/points.mjs')).measure(repeats);
+  return { head, points, remesh: await remeshNatively() };
+}
+
+const PER_RUN = { unit: 'ms', figure: ({ milliseconds }) => milliseconds };
+const PER_TRIANGLE = {
+  unit: 'µs per triangle',
+  figure: ({ milliseconds, triangles }) => (1000 * milliseconds) / triangles,
+};
+
+const remeshTask = (name, factor) => `remesh ${name} ${factor}`;
+
+/** What is compared, with whom, and what ours came to. */
+function tasks({ head: { cubes, model }, points: { few, many }, remesh }) {
+  const host = `Node ${process.versions.node}`;
+  const solve = ({ solve, residual }) => ({ milliseconds: solve, residual });
+  const size = ({ points, exterior }) => (points + exterior).toLocaleString('en');
+  const surface = { milliseconds: many.solve + many.extract, vertices: many.vertices };
+  const inNode = [
+    { task: 'cubes', name: 'Head CT, marching cubes', packages: ['vtk', 'scikit-image'], ours: cubes },
+    { task: 'model', name: 'Head CT, a surface fitted until it rests', packages: ['SimpleITK'], ours: model },
+    { task: 'solve few', name: `${size(few)} constraints solved`, packages: ['scipy'], ours: solve(few) },
+    { task: 'solve many', name: `${size(many)} constraints solved`, packages: ['scipy'], ours: solve(many) },
+    { task: 'surface many', name: `${size(many)} constraints to a surface`, packages: ['scipy'], ours: surface },
+  ];
+  const natively = remesh.rows.map((row) => ({
+    task: remeshTask(row.name, row.factor),
+    name: `Remeshing, ${row.name}, edges × ${row.factor}`,
+    packages: ['pymeshlab', 'cgal'],
+    ours: row,
+    host: remesh.host,
+    ...PER_TRIANGLE,
+  }));
+  return [...inNode.map((task) => ({ host, ...PER_RUN, ...task })), ...natively];
+}
+
+/** Writes what the others are to work on; gives the file that says so. */
+async function writeJob(folder, scan, repeats) {
+  const { ISO } = await import('../bench/head.mjs');
+  const { FEW, MANY } = await import('../bench/points.mjs');
+  const job = {
+    ...{ scan: at(scan), iso: ISO, repeats, cheapRepeats: CHEAP * repeats },
+    few: await writePoints(folder, FEW),
+    many: await writePoints(folder, MANY),
+    meshes: await writeMeshes(folder),
+  };
+  const file = join(folder, 'job.json');
+  await writeFile(file, JSON.stringify(job));
+  return file;
+}
+
+async function writePoints(folder, count) {
+  const { example } = await import('../bench/points.mjs');
+  const files = {};
+  for (const [name, array] of Object.entries(await example(count))) {
+    files[name] = join(folder, `${name}-${count}.f32`);
+    await writeFile(files[name], array);
+  }
+  return files;
+}
+
+async function writeMeshes(folder) {
+  const { FACTORS, meshes } = await import('../bench/remesh.mjs');
+  const written = [];
+  for (const [name, mesh] of Object.entries(await meshes())) {
+    const file = join(folder, `${name}.off`);
+    await writeFile(file, offOf(mesh.arrays()));
+    const edge = mesh.info().edge.mean;
+    for (const factor of FACTORS) written.push({ task: remeshTask(name, factor), file, factor, edge: factor * edge });
+    mesh.free();
+  }
+  return written;
+}
+
+/** Lines of three numbers each. */
+function lines(array, first = '') {
+  const line = (_, k) => `${first}${array[3 * k]} ${array[3 * k + 1]} ${array[3 * k + 2]}`;
+  return Array.from({ length: array.length / 3 }, line);
+}
+
+/** The one format that both remeshers read: text. */
+function offOf({ positions, indices }) {
+  const counts = `${positions.length / 3} ${indices.length / 3} 0`;
+  return `${['OFF', counts, ...lines(positions), ...lines(indices, '3 ')].join('\n')}\n`;
+}
+
+async function measureTheirs(job) {
+  const { code, output } = await run(PYTHON, [at('bench/peers.py'), job], { echo: false });
+  if (code !== 0) return { absent: `${PYTHON} cannot run bench/peers.py: ${output.trim().split('\n').at(-1)}` };
+  return { results: JSON.parse(output.trim().split('\n').at(-1)) };
+}
+
+/** One row. What a package says without naming a task goes for all of them that it has not done. */
+async function compare({ task, name, unit, figure, host, ours }, wanted, { results = [], absent }) {
+  const from = results.filter(({ package: name }) => name === wanted);
+  const found = from.find((one) => one.task === task) ?? from.find((one) => !one.task);
+  const mine = { host, figure: figure(ours), ...counts(ours) };
+  const row = { task, name, unit, package: wanted, version: found?.version, ours: mine };
+  if (found?.milliseconds === undefined) return { ...row, skipped: found?.absent ?? absent ?? 'nothing came of it' };
+  const theirs = { what: found.what, figure: figure(found), ...counts(found), ...(await looked(found.files)) };
+  return { ...row, theirs, ratio: mine.figure / theirs.figure };
+}
+
+const COUNTED = ['vertices', 'triangles', 'iterations', 'converged', 'volume', 'minAngleDegrees', 'selfIntersections'];
+
+const counts = (of) => Object.fromEntries(COUNTED.filter((name) => name in of).map((name) => [name, of[name]]));
+
+/** The smallest angle and the crossings of a mesh of theirs, measured as ours are. */
+async function looked(files) {
+  if (!files) return {};
+  const { Mesh } = await import('../pkg/index.js');
+  const [positions, indices] = await Promise.all([readFile(files.positions), readFile(files.indices)]);
+  try {
+    const mesh = Mesh.fromArrays(new Float32Array(bufferOf(positions)), new Uint32Array(bufferOf(indices)));
+    const { minAngleDegrees } = mesh.info();
+    const { selfIntersections } = mesh.check();
+    mesh.free();
+    return { minAngleDegrees, selfIntersections };
+  } catch (error) {
+    return { refused: error.message };
+  }
+}
+
+/** What was read, from its own beginning. */
+const bufferOf = ({ buffer, byteOffset, byteLength }) => buffer.slice(byteOffset, byteOffset + byteLength);
+
+/** A line for each row, under a heading for each task. */
+export function peerRows({ rows, bestOf }) {
+  const lines = [['', '', `best of ${bestOf}; the ratio is ours to theirs`]];
+  let task;
+  for (const row of rows) {
+    if (row.task !== task) lines.push(...heading(row));
+    task = row.task;
+    lines.push(row.skipped ? skippedLine(row) : peerLine(row));
+  }
+  return lines;
+}
+
+const heading = (row) => [
+  [row.name, '', ''],
+  [`  ours, ${row.ours.host}`, shown(row, row.ours), `        ${sizes(row.ours)}`],
+];
+
+const skippedLine = (row) => [`  ${row.package}`, '–', `        skipped: ${row.skipped}`];
+
+function peerLine(row) {
+  const { ratio, theirs, version } = row;
+  const remark = [theirs.what, sizes(theirs)].filter(Boolean).join(', ');
+  return [`  ${row.package} ${short(version)}`, shown(row, theirs), `${ratio.toPrecision(2).padEnd(6)}  ${remark}`];
+}
+
+/** Without a word for the day it was packed on. */
+const short = (version) => version.replace(/\.post\d+$/, '');
+
+function shown({ unit }, { figure }) {
+  if (unit !== 'ms') return `${figure.toFixed(1)} µs`;
+  return figure < 1000 ? `${figure.toFixed(0)} ms` : `${(figure / 1000).toFixed(2)} s`;
+}
+
+function sizes({ vertices, triangles, volume, minAngleDegrees, selfIntersections, refused }) {
+  const words = [];
+  if (vertices) words.push(`${vertices} vertices`);
+  if (triangles) words.push(`${triangles} triangles`);
+  if (volume) words.push(`${(volume / 1000).toFixed(0)} cm³`);
+  if (minAngleDegrees !== undefined) words.push(`${minAngleDegrees.toFixed(1)}° at least`);
+  if (selfIntersections !== undefined) words.push(`${selfIntersections} crossings`);
+  if (refused) words.push(`no closed surface: ${refused}`);
+  return words.join(', ');
+}

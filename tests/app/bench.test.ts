@@ -1,0 +1,73 @@
+import { readFile } from 'node:fs/promises';
+import { afterAll, beforeAll, expect, test } from 'vitest';
+import { at } from '../../scripts/shell.mjs';
+import { type App, openApp, overflow } from './browser';
+
+let app: App;
+let report: Record<string, unknown>;
+
+beforeAll(async () => {
+  report = JSON.parse(await readFile(at('bench.json'), 'utf8'));
+  app = await openApp({ width: 1100, height: 900 });
+  // From the list of keys, as a reader comes there.
+  await app.page.click('#help');
+  await app.page.click('dialog a');
+  await app.page.waitForSelector('[data-bench]');
+});
+afterAll(() => app.close());
+
+/** The numbers that are drawn in a part of the page. */
+const drawn = (part: string) =>
+  app.page.locator(`${part} data`).evaluateAll((all) => all.map((one) => Number((one as HTMLDataElement).value)));
+
+/** The names of benches in the report: what is a list, or has rows or a host. */
+const benches = () => Object.keys(report).filter((name) => typeof report[name] === 'object');
+
+test('every bench of the report is drawn, with numbers and tables of them', async () => {
+  const found = await app.page
+    .locator('[data-bench]')
+    .evaluateAll((all) => all.map((one) => one.getAttribute('data-bench') ?? ''));
+  expect(found.toSorted()).toEqual(benches().toSorted());
+  for (const name of found) {
+    const values = await drawn(`[data-bench=${name}]`);
+    const skipped = await app.page.locator(`[data-bench=${name}] .bench-skipped`).count();
+    expect(values.length + skipped, name).toBeGreaterThan(0);
+    expect(values.every(Number.isFinite), name).toBe(true);
+    const rows = await app.page.locator(`[data-bench=${name}] tbody tr`).allTextContents();
+    expect(rows.length, name).toBeGreaterThan(0);
+  }
+});
+
+test('the numbers are those of the report', async () => {
+  const [head] = report.head as { ratio: number; model: { milliseconds: number } }[];
+  expect(await drawn('#head')).toEqual(expect.arrayContaining([head?.ratio, (head?.model.milliseconds ?? 0) / 1000]));
+  const { rows } = report.peers as { rows: { ratio?: number }[] };
+  expect(await drawn('#peers')).toEqual(rows.flatMap(({ ratio }) => ratio ?? []));
+});
+
+test('what does not keep to its bound is said not to', async () => {
+  const count = (outcome: string) => app.page.locator(`#summary tr[data-verdict="${outcome}"]`).count();
+  const all = await app.page.locator('#summary tr[data-verdict]').count();
+  const title = await app.page.textContent('#summary h2');
+  expect(title).toBe(`${await count('met')} of ${all} bounds kept`);
+  const [model] = await app.page.locator('#head .verdict').allTextContents();
+  const slow = (report.head as { model: { milliseconds: number } }[]).some(({ model }) => model.milliseconds > 2000);
+  expect(model).toBe(`asked: ≤ 2 s; ${slow ? 'not met' : 'met'}`);
+});
+
+test.each([
+  [360, 800],
+  [1100, 900],
+])('nothing is wider than a page of %i by %i, tables unfolded', async (width, height) => {
+  await app.page.locator('details').evaluateAll((all) => {
+    for (const one of all) (one as HTMLDetailsElement).open = true;
+  });
+  expect(await overflow(app.page, width, height)).toBeLessThanOrEqual(0);
+});
+
+test('nothing was complained of, under the same policy as the labs', async () => {
+  const policy = await app.page.getAttribute('meta[http-equiv=Content-Security-Policy]', 'content');
+  expect(policy).toContain("default-src 'self'");
+  expect(policy).not.toContain('unsafe-inline');
+  expect(app.complaints).toEqual([]);
+});

@@ -1,0 +1,162 @@
+import { h } from '../ui/dom';
+import { scaleOf } from './scale';
+import type { Chart, Section } from './sections';
+import { askedOf, type Bar, type Figure, meets, type Target, verdict, withUnit } from './targets';
+
+/** One bench: what was measured and how, its charts, and the same numbers as tables. */
+export function drawSection({ id, title, measured, command, notes, charts }: Section): HTMLElement {
+  const list = notes.length > 0 ? [h('ul', { class: 'notes' }, ...notes.map((note) => h('li', {}, note)))] : [];
+  return h(
+    'section',
+    { class: 'panel', id, 'data-bench': id, 'aria-labelledby': `${id}-title` },
+    h('h2', { id: `${id}-title` }, title),
+    h('p', {}, measured),
+    h('p', {}, h('code', {}, command)),
+    ...list,
+    ...charts.map((chart) => drawChart(chart)),
+    h('details', {}, h('summary', {}, 'As tables'), ...charts.map((chart) => tableOf(chart))),
+  );
+}
+
+const WORDS = { linear: '', log: '; logarithmic', ratio: '; logarithmic, bars begin at 1×' };
+
+function drawChart(chart: Chart): HTMLElement {
+  const { title, unit, kind, figures } = chart;
+  const values = figures.flatMap(({ bars, target }) => [...bars.map(({ value }) => value), target?.limit]);
+  const scale = scaleOf(
+    kind,
+    values.filter((value) => value !== undefined),
+  );
+  const drawn: Drawing = { unit, ...scale };
+  return h(
+    'figure',
+    { class: 'bench-chart' },
+    h('figcaption', {}, h('h3', {}, title), ` ${unit === '×' ? 'as a ratio' : `in ${unit}`}${WORDS[kind]}`),
+    ...figures.map((figure) => drawFigure(figure, drawn)),
+    axis(drawn),
+  );
+}
+
+interface Drawing {
+  unit: string;
+  at: (value: number) => number;
+  base: number;
+  ticks: number[];
+}
+
+function drawFigure(figure: Figure, drawn: Drawing): HTMLElement {
+  const { name, target, bars } = figure;
+  const asked = target ? [verdictMark(figure, askedOf(target, drawn.unit))] : [];
+  return h(
+    'div',
+    { class: 'bench-figure' },
+    h('p', { class: 'bench-name' }, h('span', {}, name), ...asked),
+    ...bars.map((bar) => drawBar(figure, bar, drawn)),
+  );
+}
+
+function verdictMark(figure: Figure, asked: string): HTMLElement {
+  const found = verdict(figure);
+  return h('span', { class: 'verdict', 'data-verdict': found }, `asked: ${asked}; `, h('strong', {}, found));
+}
+
+function drawBar(figure: Figure, bar: Bar, drawn: Drawing): HTMLElement {
+  const { label, value, remark, skipped } = bar;
+  const row = h('div', { class: 'bench-bar' }, h('span', { class: 'bench-label' }, label));
+  if (value === undefined) row.append(h('span', { class: 'bench-skipped' }, `skipped: ${skipped}`));
+  else {
+    row.append(track(figure, bar, value, drawn), h('data', { value }, withUnit(value, drawn.unit)));
+    if (remark) row.append(h('span', { class: 'bench-remark' }, remark));
+  }
+  return row;
+}
+
+/** The bar itself and the mark of what was asked; the number beside it says the same. */
+function track(figure: Figure, bar: Bar, value: number, { at, base }: Drawing): HTMLElement {
+  const missed = meets(figure, bar) === false;
+  const [from, to] = [Math.min(at(value), base), Math.max(at(value), base)];
+  const filled = h('div', { class: missed ? 'bench-fill missed' : 'bench-fill' });
+  // By script: the page's policy allows no style in the markup.
+  filled.style.left = percent(from);
+  filled.style.width = percent(to - from);
+  const element = h('div', { class: 'bench-track', 'aria-hidden': true }, filled);
+  const limit = limitFor(figure.target, bar);
+  if (limit !== undefined) element.append(placed('bench-limit', at(limit)));
+  return element;
+}
+
+/** What is asked of one host is not shown on the others. */
+function limitFor(target: Target | undefined, { label }: Bar): number | undefined {
+  return target && (!target.host || label.startsWith(target.host)) ? target.limit : undefined;
+}
+
+const percent = (share: number) => `${(100 * share).toFixed(2)}%`;
+
+function placed(kind: string, share: number, ...children: string[]): HTMLElement {
+  const element = h('div', { class: kind }, ...children);
+  element.style.left = percent(share);
+  return element;
+}
+
+function axis({ ticks, at }: Drawing): HTMLElement {
+  const label = (tick: number) => placed('bench-tick', at(tick), short(tick));
+  return h('div', { class: 'bench-axis', 'aria-hidden': true }, h('div', {}, ...ticks.map(label)));
+}
+
+const short = (value: number) => new Intl.NumberFormat('en', { maximumSignificantDigits: 3 }).format(value);
+
+/** The numbers of a chart: a row for each figure where all have the same hosts, else for each bar. */
+function tableOf(chart: Chart): HTMLElement {
+  const { title, kind } = chart;
+  const [head, rows] = kind === 'ratio' ? listed(chart) : byHost(chart);
+  return scrolling(
+    title,
+    h(
+      'table',
+      { class: 'times bench-table' },
+      h('caption', {}, title),
+      h('thead', {}, h('tr', {}, ...head.map((text) => h('th', { scope: 'col' }, text)))),
+      h('tbody', {}, ...rows.map((row) => rowOf(row))),
+    ),
+  );
+}
+
+/** A table may be wider than a telephone; then it is moved by itself, also by keyboard. */
+export function scrolling(label: string, table: HTMLElement): HTMLElement {
+  return h('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': label }, table);
+}
+
+export function rowOf([first = '', ...rest]: string[]): HTMLElement {
+  return h('tr', {}, h('th', { scope: 'row' }, first), ...rest.map((text) => h('td', {}, text)));
+}
+
+type Table = [head: string[], rows: string[][]];
+
+function byHost({ unit, figures }: Chart): Table {
+  const hosts = [...new Set(figures.flatMap(({ bars }) => bars.map(({ label }) => label)))];
+  const asks = figures.some(({ target }) => target);
+  const row = (figure: Figure) => [figure.name, ...hosts.map((host) => shownAt(figure, host, unit))];
+  const asked = (figure: Figure) => (figure.target ? [askedOf(figure.target, unit), verdict(figure)] : ['–', '–']);
+  return [
+    ['', ...hosts, ...(asks ? ['Asked', 'Outcome'] : [])],
+    figures.map((figure) => [...row(figure), ...(asks ? asked(figure) : [])]),
+  ];
+}
+
+function shownAt({ bars }: Figure, host: string, unit: string): string {
+  const value = bars.find(({ label }) => label === host)?.value;
+  return value === undefined ? '–' : withUnit(value, unit);
+}
+
+function listed({ unit, figures }: Chart): Table {
+  const row = (name: string, { label, value, skipped, remark }: Bar) => [
+    name,
+    label,
+    value === undefined ? 'skipped' : withUnit(value, unit),
+    remark ?? skipped ?? '',
+  ];
+  return [
+    ['', 'Beside', 'Ours to theirs', 'What came of both'],
+    figures.flatMap(({ name, bars }) => bars.map((bar) => row(name, bar))),
+  ];
+}

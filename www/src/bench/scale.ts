@@ -1,0 +1,41 @@
+/** Where numbers lie along a chart, from 0 at its left end to 1 at its right. */
+export interface Scale {
+  at: (value: number) => number;
+  /** Where bars begin. */
+  base: number;
+  ticks: number[];
+}
+
+export type Kind = 'linear' | 'log' | 'ratio';
+
+/** A scale that all values fit on: from 0, by powers of ten, or by powers of ten on both sides of 1. */
+export function scaleOf(kind: Kind, values: number[]): Scale {
+  const good = values.filter((value) => Number.isFinite(value) && (kind === 'linear' || value > 0));
+  if (kind === 'linear') return linear(Math.max(...good, 0));
+  return kind === 'ratio' ? decades([...good, 1], 1) : decades(good.length > 0 ? good : [1]);
+}
+
+function linear(most: number): Scale {
+  const step = niceStep(most || 1);
+  // The longest bar ends a little before the right end.
+  const end = Math.max(most * 1.02, step);
+  const ticks = Array.from({ length: Math.floor(end / step + 1e-9) + 1 }, (_, k) => k * step);
+  return { at: (value) => clamped(value / end), base: 0, ticks };
+}
+
+/** 1, 2 or 5 times a power of ten, about a fourth of the length. */
+function niceStep(length: number): number {
+  const power = 10 ** Math.floor(Math.log10(length / 4));
+  const part = length / 4 / power;
+  return (part > 5 ? 10 : part > 2 ? 5 : part > 1 ? 2 : 1) * power;
+}
+
+function decades(values: number[], base?: number): Scale {
+  const low = Math.floor(Math.log10(Math.min(...values)) + 1e-9);
+  const high = Math.max(Math.ceil(Math.log10(Math.max(...values)) - 1e-9), low + 1);
+  const ticks = Array.from({ length: high - low + 1 }, (_, k) => 10 ** (low + k));
+  const at = (value: number) => clamped((Math.log10(value) - low) / (high - low));
+  return { at, base: at(base ?? 10 ** low), ticks };
+}
+
+const clamped = (share: number) => Math.min(Math.max(share, 0), 1);
