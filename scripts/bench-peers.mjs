@@ -11,9 +11,11 @@ const CHEAP = 10;
 
 const PYTHON = process.env.VESICLE_PYTHON ?? 'python3';
 
+/** What the machine was busy with before anything was measured here. */
+const [load] = loadavg();
+
 /** Rows of ours and theirs for each task and package, or why there is nothing of theirs. */
 export async function comparePeers(scan, repeats) {
-  const [load] = loadavg();
   const all = tasks(await measureOurs(scan, repeats));
   return inFolder(async (folder) => {
     const found = await measureTheirs(await writeJob(folder, scan, repeats));
