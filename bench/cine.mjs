@@ -1,6 +1,7 @@
 // A beating ventricle with papillary muscles as cine MR shows it, of the paper's size: that of the core's tests
 // (`tests/common/cine.rs`), but for the numbers its noise is made of.
 import { Volume } from '../pkg/index.js';
+import { randomNumbers } from './random.mjs';
 
 const DIMS = [156, 192, 25];
 const SPACING = [1.67, 1.67, 5];
@@ -20,17 +21,6 @@ export const BOX = {
 const LAYERS = 5;
 /** Edge of the cubes that the true cavity is counted in, mm. */
 const CUBE = 1;
-
-/** Numbers in (0, 1), the same ones each time (Mulberry32). */
-function randomNumbers() {
-  let state = 17;
-  return () => {
-    state = (state + 0x6d2b79f5) | 0;
-    let mixed = Math.imul(state ^ (state >>> 15), state | 1);
-    mixed ^= mixed + Math.imul(mixed ^ (mixed >>> 7), mixed | 61);
-    return ((mixed ^ (mixed >>> 14)) >>> 0) / 2 ** 32 + 2 ** -33;
-  };
-}
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
@@ -101,7 +91,7 @@ function noisy(value, random) {
 
 /** All frames, with noise. */
 export function cine() {
-  const random = randomNumbers();
+  const random = randomNumbers(17);
   const [nx, ny, nz] = DIMS;
   const data = new Uint8Array(nx * ny * nz * FRAMES);
   for (let at = 0, frame = 0; frame < FRAMES; frame++) {

@@ -1,10 +1,12 @@
-// The measured work: the head CT by marching cubes and by the deformable model. Runs in Node and in a page.
+// The measured work: a head by marching cubes and by the deformable model, a CT and a phantom. Runs in Node and in a page.
 import init, { DeformableModel, Mesh, Volume, version } from '../pkg/index.js';
+import { headPhantom, ISO as PHANTOM_ISO } from './phantom.mjs';
 
 /** Bone, in the scan's intensities. */
 export const ISO = 95;
 const LEVELS = 2;
 const PARAMS = { iso: ISO, isoForce: -1, rigidity: 0.2 };
+const PHANTOM_PARAMS = { iso: PHANTOM_ISO, isoForce: -1, rigidity: 0.4 };
 /** A model that has not come to rest by then is reported as such. */
 const MOST_ITERATIONS = 3000;
 
@@ -21,18 +23,18 @@ function best(repeats, work) {
   return runs.reduce((least, run) => (run.milliseconds < least.milliseconds ? run : least));
 }
 
-function marchingCubes(volume) {
-  const { value: mesh, milliseconds } = timed(() => Mesh.marchingCubes(volume, ISO));
+function marchingCubes(volume, iso) {
+  const { value: mesh, milliseconds } = timed(() => Mesh.marchingCubes(volume, iso));
   const { vertexCount: vertices, triangleCount: triangles } = mesh;
   mesh.free();
   return { milliseconds, vertices, triangles };
 }
 
 /** One whole run of the model, from making it to rest. */
-function wholeRun(volume) {
+function wholeRun(volume, params) {
   const parts = {};
   const started = performance.now();
-  const model = new DeformableModel({ volume, levels: LEVELS, params: PARAMS });
+  const model = new DeformableModel({ volume, levels: LEVELS, params });
   parts.start = performance.now() - started;
   let report;
   do {
@@ -56,18 +58,26 @@ function summary(model, { iteration, done, vertices, triangles, components, eule
 export async function measureCubes(bytes, repeats) {
   await init();
   const volume = Volume.parse(bytes);
-  return best(repeats, () => marchingCubes(volume));
+  return best(repeats, () => marchingCubes(volume, ISO));
 }
 
-/**
- * Measures everything on the bytes of the scan: milliseconds, counts, and the ratio of the model's time to that of
- * marching cubes on the same volume in the same run.
- */
+/** Milliseconds, counts, and the ratio of the model's time to that of marching cubes on the same volume in the same run. */
+function compare(volume, params, repeats) {
+  const cubes = best(repeats, () => marchingCubes(volume, params.iso));
+  const model = best(repeats, () => wholeRun(volume, params));
+  const ratio = model.milliseconds / cubes.milliseconds;
+  return { version: version(), dims: volume.dims, levels: LEVELS, params, cubes, model, ratio };
+}
+
+/** Measures everything on the bytes of the scan. */
 export async function measure(bytes, repeats) {
   await init();
   const { value: volume, milliseconds: parse } = timed(() => Volume.parse(bytes));
-  const cubes = best(repeats, () => marchingCubes(volume));
-  const model = best(repeats, () => wholeRun(volume));
-  const ratio = model.milliseconds / cubes.milliseconds;
-  return { version: version(), dims: volume.dims, levels: LEVELS, params: PARAMS, parse, cubes, model, ratio };
+  return { parse, ...compare(volume, PARAMS, repeats) };
+}
+
+/** The same on a phantom of the size that the paper's tomography has. */
+export async function measurePhantom(repeats) {
+  await init();
+  return compare(headPhantom(), PHANTOM_PARAMS, repeats);
 }

@@ -1,4 +1,4 @@
-// Times points to a surface, remeshing, sculpting, tracking, single steps and the head CT, in Node, in Chromium and, where a
+// Times points to a surface, remeshing, sculpting, tracking, single steps and heads, in Node, in Chromium and, where a
 // program for it is there, natively, the app in Chromium, and other people's software at the same; prints tables and writes
 // bench.json. `npm run bench -- points` does one of them, and writes nothing.
 import { readFile, writeFile } from 'node:fs/promises';
@@ -44,6 +44,10 @@ const BENCHES = {
   head: {
     file: SCAN,
     inNode: async () => (await import('../bench/head.mjs')).measure(new Uint8Array(await readFile(at(SCAN))), REPEATS),
+    rows: headRows,
+  },
+  phantom: {
+    inNode: async () => (await import('../bench/head.mjs')).measurePhantom(REPEATS),
     rows: headRows,
   },
   page: {

@@ -8,6 +8,7 @@ export interface Report {
   track?: (Host & TrackFigures)[];
   steps?: (Host & { rows: StepRow[] })[];
   head?: (Host & HeadFigures)[];
+  phantom?: (Host & HeadFigures)[];
   /** `load` is what the machine was busy with when it began. */
   peers?: { bestOf: number; load?: number; cores?: number; rows: PeerRow[] };
   page?: Host & PageFigures;

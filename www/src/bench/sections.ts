@@ -26,9 +26,10 @@ export interface Section {
 
 /** What can be drawn of a report: parts that it does not have are left out. */
 export function sectionsOf(report: Report): Section[] {
-  const { head, steps, points, skin, track, remesh, page, peers } = report;
+  const { head, phantom, steps, points, skin, track, remesh, page, peers } = report;
   const made = [
-    head && headSection(head),
+    head && headSection(HEAD, head),
+    phantom && headSection(PHANTOM, phantom),
     steps && stepSection(steps),
     points && pointSection(points),
     skin && skinSection(skin),
@@ -65,13 +66,17 @@ const chart = (title: string, unit: string, figures: Figure[], kind: Kind = 'lin
 
 const commandOf = (name: string) => `npm run bench -- ${name}`;
 
-function headSection(hosts: (Host & HeadFigures)[]): Section {
+const HEAD = { id: 'head', title: 'Head CT', of: 'A CT of a head at the intensity of bone' };
+const PHANTOM = {
+  ...{ id: 'phantom', title: 'Head phantom' },
+  of: 'Two nested shells with holes and noise, of the size of the paper’s tomography',
+};
+
+function headSection({ id, title, of }: typeof HEAD, hosts: (Host & HeadFigures)[]): Section {
   const parts = Object.keys(hosts[0]?.model.parts ?? {});
   return {
-    id: 'head',
-    title: 'Head CT',
-    measured: `A CT of a head, ${hosts[0]?.dims.join(' × ')} voxels, at the intensity of bone: marching cubes, and the deformable model from its start around the object until it rests.`,
-    command: commandOf('head'),
+    ...{ id, title, command: commandOf(id) },
+    measured: `${of}, ${hosts[0]?.dims.join(' × ')} voxels: marching cubes, and the deformable model from its start around the object until it rests, coarse to fine on three levels.`,
     notes: hosts.map(outcome),
     charts: [
       chart('Time', 's', [
