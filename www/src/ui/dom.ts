@@ -19,6 +19,14 @@ function setAttribute(element: HTMLElement, name: string, value: unknown): void 
   else if (value !== false && value !== undefined) element.setAttribute(name, String(value));
 }
 
+/**
+ * What draws on a small picture, by the processor. The browser would rather draw it with the graphics card and, after a few
+ * pictures, wait for all that the view in 3D has asked of the card: up to half a second where there is none.
+ */
+export function pen(canvas: HTMLCanvasElement): CanvasRenderingContext2D | null {
+  return canvas.getContext('2d', { willReadFrequently: true });
+}
+
 /** A titled part of a column. */
 export function section(title: string, ...children: (Node | string)[]): HTMLElement {
   return h('section', { class: 'panel' }, h('h2', {}, title), ...children);

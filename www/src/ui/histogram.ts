@@ -1,5 +1,5 @@
 import type { VolumeView } from '../protocol';
-import { h, onSchemeChange, symbol, token, uniqueId } from './dom';
+import { h, onSchemeChange, pen, symbol, token, uniqueId } from './dom';
 import { figure } from './format';
 
 /**
@@ -71,7 +71,7 @@ export class Histogram {
 
   #draw(): void {
     const { clientWidth, clientHeight } = this.#canvas;
-    const context = this.#canvas.getContext('2d');
+    const context = pen(this.#canvas);
     if (!this.#volume || !context || clientWidth === 0) return;
     const ratio = Math.min(devicePixelRatio, 2);
     this.#canvas.width = Math.round(clientWidth * ratio);

@@ -1,4 +1,4 @@
-import { h } from './dom';
+import { h, pen } from './dom';
 import { figure } from './format';
 
 const STEPS = 64;
@@ -45,7 +45,7 @@ export class Legend {
 
   /** The colours from `low` to 1. */
   #draw(low: number): void {
-    const context = this.#bar.getContext('2d');
+    const context = pen(this.#bar);
     for (let i = 0; i < STEPS; i++) {
       if (!context) break;
       context.fillStyle = `rgb(${this.#color(low + ((1 - low) * i) / (STEPS - 1)).join(' ')})`;

@@ -1,5 +1,5 @@
 import type { Photograph } from '../labs/photographs';
-import { h } from './dom';
+import { h, pen } from './dom';
 
 const THUMBNAIL = 72;
 
@@ -101,5 +101,5 @@ export class PhotoStrip {
 function draw(canvas: HTMLCanvasElement, picture: ImageBitmap, width: number): void {
   canvas.width = width;
   canvas.height = Math.round((width * picture.height) / picture.width);
-  canvas.getContext('2d')?.drawImage(picture, 0, 0, canvas.width, canvas.height);
+  pen(canvas)?.drawImage(picture, 0, 0, canvas.width, canvas.height);
 }

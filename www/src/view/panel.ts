@@ -1,5 +1,5 @@
 import type { Attractor, LevelView, Vec3, VolumeView } from '../protocol';
-import { h, token, uniqueId } from '../ui/dom';
+import { h, pen, token, uniqueId } from '../ui/dom';
 import type { SliceFrame } from './anatomy';
 import { discOf, paintLevel, paintSlice, pictureSize, projectSegments } from './slicing';
 
@@ -99,7 +99,7 @@ export class SlicePanel {
   /** Brings everything together on the visible canvas, in its own resolution. */
   draw(): void {
     const { clientWidth, clientHeight } = this.#canvas;
-    const context = this.#canvas.getContext('2d');
+    const context = pen(this.#canvas);
     if (!context || clientWidth === 0) return;
     const ratio = Math.min(devicePixelRatio, 2);
     this.#canvas.width = Math.round(clientWidth * ratio);
@@ -143,7 +143,7 @@ export class SlicePanel {
       paintLevel(this.#volume, this.#level, this.frame, index, this.picture);
     } else {
       paintSlice(this.#volume, this.frame, index, this.#pixels.data);
-      this.picture.getContext('2d')?.putImageData(this.#pixels, 0, 0);
+      pen(this.picture)?.putImageData(this.#pixels, 0, 0);
     }
     this.#slider.valueAsNumber = index;
     this.#output.value = String(index);

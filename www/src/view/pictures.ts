@@ -4,7 +4,7 @@ import { type CannySettings, canny } from '../track/canny';
 import { boundaryPicture, isSplit, twoMeans, windowAt } from '../track/clusters';
 import { crossings } from '../track/cut';
 import type { Between, Votes } from '../track/protocol';
-import { h, token } from '../ui/dom';
+import { h, pen, token } from '../ui/dom';
 import { invert, sliceFrames } from './anatomy';
 import { voxelsOfFrame } from './beating';
 import { greysOf, slicePicture } from './slicing';
@@ -46,7 +46,7 @@ export class Picture {
     const fit = FINE / Math.max(small.width * wide, small.height * high);
     this.canvas.width = Math.round(small.width * wide * fit);
     this.canvas.height = Math.round(small.height * high * fit);
-    const context = this.canvas.getContext('2d');
+    const context = pen(this.canvas);
     if (!context) return;
     context.imageSmoothingEnabled = false;
     context.drawImage(small, 0, 0, this.canvas.width, this.canvas.height);
@@ -86,7 +86,7 @@ export function paintWindow(
   const [left, top] = cornerOf(volume, side, voxel);
   const cut = document.createElement('canvas');
   [cut.width, cut.height] = [Math.min(CUT, width), Math.min(CUT, height)];
-  cut.getContext('2d')?.drawImage(small, -left, -top);
+  pen(cut)?.drawImage(small, -left, -top);
   picture.paint(cut, pixelOfSide(volume, side), (context, scaleX, scaleY) => {
     context.lineWidth = 3;
     for (const bright of [0, 1]) {
@@ -222,6 +222,6 @@ function inGrey(width: number, height: number, grey: (i: number) => number): HTM
     const value = grey(i);
     pixels.data.set([value, value, value, 255], 4 * i);
   }
-  canvas.getContext('2d')?.putImageData(pixels, 0, 0);
+  pen(canvas)?.putImageData(pixels, 0, 0);
   return canvas;
 }

@@ -1,4 +1,5 @@
 import type { Attractor, LevelView, VolumeView } from '../protocol';
+import { pen } from '../ui/dom';
 import type { SliceFrame } from './anatomy';
 
 type Voxels = Pick<VolumeView, 'dims' | 'voxels'>;
@@ -52,7 +53,7 @@ export function paintLevel(
   picture: HTMLCanvasElement,
 ): void {
   const small = slicePicture(level, frame, levelIndex(volume, level, frame, index));
-  const context = picture.getContext('2d');
+  const context = pen(picture);
   if (!context) return;
   context.imageSmoothingEnabled = false;
   context.drawImage(small, 0, 0, picture.width, picture.height);
@@ -66,7 +67,7 @@ export function slicePicture(volume: Voxels, frame: SliceFrame, index: number): 
   canvas.height = height;
   const pixels = new ImageData(width, height);
   paintSlice(volume, frame, index, pixels.data);
-  canvas.getContext('2d')?.putImageData(pixels, 0, 0);
+  pen(canvas)?.putImageData(pixels, 0, 0);
   return canvas;
 }
 
