@@ -118,6 +118,22 @@ test('drawn in software, a large surface is turned with fewer triangles, and res
   expect((await watched()).gpu).toBe(gpu);
 });
 
+test('slices are drawn by the processor, and the view keeps its size when a run begins', async () => {
+  await openAt('#extract?example=linked-rings');
+  await reach(app.page, 'done');
+  const byProcessor = await app.page
+    .locator('.slice canvas')
+    .evaluateAll((all) =>
+      all.map((canvas) => (canvas as HTMLCanvasElement).getContext('2d')?.getContextAttributes().willReadFrequently),
+    );
+  expect(byProcessor).toEqual([true, true, true]);
+  const view = app.page.locator('.view > canvas');
+  const running = await view.boundingBox();
+  await app.page.click('[data-transport=reset]');
+  await expect.poll(() => app.page.textContent('.phase')).toBe('');
+  expect(await view.boundingBox()).toEqual(running);
+});
+
 test('what has a hash in its name is kept for ever, all else is asked for again and not sent twice', async () => {
   const page = await fetch(app.address);
   expect(page.headers.get('cache-control')).toBe('no-cache');
