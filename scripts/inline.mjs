@@ -1,0 +1,35 @@
+// Makes the package once more as a single file with the wasm module inside, for pages that may not fetch anything.
+import { copyFile, readFile } from 'node:fs/promises';
+import { join } from 'node:path';
+import { gzipSync } from 'node:zlib';
+import { build } from 'vite';
+import { at } from './shell.mjs';
+
+/** In place of `module.js`: the module itself, compressed, as text. */
+async function moduleInside() {
+  const bytes = gzipSync(await readFile(at('pkg/vesicle_bg.wasm')), { level: 9 });
+  return `
+const TEXT = '${bytes.toString('base64')}';
+
+export function ownModule() {
+  const bytes = Uint8Array.from(atob(TEXT), (character) => character.charCodeAt(0));
+  const unpacked = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'));
+  return new Response(unpacked).arrayBuffer();
+}
+`;
+}
+
+/** Writes `pkg/inline.js`; needs the rest of the package. */
+export async function makeInline() {
+  const inside = await moduleInside();
+  const outDir = at('target/inline');
+  await build({
+    ...{ configFile: false, logLevel: 'warn', publicDir: false },
+    plugins: [{ name: 'module-inside', load: (id) => (id === at('pkg/module.js') ? inside : undefined) }],
+    build: {
+      ...{ target: 'es2022', outDir, emptyOutDir: true, minify: true },
+      lib: { entry: at('pkg/index.js'), formats: ['es'], fileName: () => 'inline.js' },
+    },
+  });
+  await copyFile(join(outDir, 'inline.js'), at('pkg/inline.js'));
+}
