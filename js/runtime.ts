@@ -57,8 +57,8 @@ async function compile(source: InitInput): Promise<WebAssembly.Module> {
 }
 
 async function readFile(path: URL): Promise<BufferSource> {
-  // Out of the bundlers' sight: a page never gets here.
-  const files = 'node:fs/promises';
+  // Put together out of the bundlers' sight: a page never gets here.
+  const files = ['node', 'fs/promises'].join(':');
   const { readFile } = await import(/* @vite-ignore */ /* webpackIgnore: true */ files);
   return readFile(path);
 }
