@@ -1,4 +1,4 @@
-import { invalid, options, positive, whole } from './check.js';
+import { invalid, knownOnly, positive, whole } from './check.js';
 import type { Mesh } from './mesh.js';
 
 /** What one step, or several together, did. */
@@ -122,7 +122,7 @@ export class Runner {
 }
 
 function checked(given: RunOptions | undefined): RunOptions {
-  const run = options<RunOptions>('options', given, OPTIONS);
+  const run = knownOnly<RunOptions>('options', given, OPTIONS);
   if (run.maxIterations !== undefined)
     whole('maxIterations', run.maxIterations, { min: 1, max: Number.MAX_SAFE_INTEGER });
   if (run.budgetMs !== undefined) positive('budgetMs', run.budgetMs);
