@@ -1,3 +1,4 @@
+import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { defineConfig, type Plugin } from 'vite';
 
@@ -12,12 +13,33 @@ function relaxPolicyWhileDeveloping(): Plugin {
   };
 }
 
+/** Lays the program that reads DICOM beside the page, under the names that its loader asks for. */
+function dicomBeside(): Plugin {
+  const folder = here('../node_modules/@itk-wasm/dicom/dist/pipelines/');
+  const names = ['js', 'wasm.zst'].map((kind) => `read-image-dicom-file-series.${kind}`);
+  return {
+    name: 'dicom-beside',
+    generateBundle() {
+      for (const name of names)
+        this.emitFile({ type: 'asset', fileName: `dicom/${name}`, source: readFileSync(folder + name) });
+    },
+    configureServer({ middlewares }) {
+      middlewares.use('/dicom', (request, response, next) => {
+        const name = names.find((name) => request.url?.split('?')[0] === `/${name}`);
+        if (!name) return next();
+        response.setHeader('Content-Type', name.endsWith('.js') ? 'text/javascript' : 'application/octet-stream');
+        response.end(readFileSync(folder + name));
+      });
+    },
+  };
+}
+
 export default defineConfig({
   root: here('.'),
   // Relative addresses: the built page works from any folder of any server.
   base: './',
   resolve: { alias: { vesicle: here('../pkg') } },
-  plugins: [relaxPolicyWhileDeveloping()],
+  plugins: [relaxPolicyWhileDeveloping(), dicomBeside()],
   worker: { format: 'es' },
   build: {
     outDir: here('../dist'),
