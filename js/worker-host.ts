@@ -34,7 +34,7 @@ import {
 } from './worker-protocol.js';
 import type { ClassName, FunctionName, Library, Own } from './worker-types.js';
 
-type Post = (reply: Reply, transfer: Transferable[]) => void;
+type Post = (reply: Reply, transfer: ArrayBuffer[]) => void;
 type Call = Extract<Task, { type: 'call' }>;
 type Made = { object: Own } | { failed: unknown };
 
@@ -119,9 +119,10 @@ class Host {
   }
 
   /** Into the page's buffers, which came with the request and go back. */
-  #copyTo(call: Call): unknown {
-    const [arrays] = this.#incoming(call.args) as [MeshArrays];
-    return { counts: this.#call({ ...call, args: [arrays] }), arrays };
+  #copyTo({ on, args }: Call): unknown {
+    const { target } = this.#find(on, 'copyTo');
+    const [arrays] = this.#incoming(args) as [MeshArrays];
+    return { counts: (target as unknown as Mesh).copyTo(arrays), arrays };
   }
 
   async #run(id: number, { on, args: [options], reports }: Call): Promise<StepReport> {
@@ -153,7 +154,7 @@ class Host {
   }
 
   /** A result, and the buffers in it: they are fresh, so they can be handed over. */
-  #outgoing(result: unknown): [unknown, Transferable[]] {
+  #outgoing(result: unknown): [unknown, ArrayBuffer[]] {
     const buffers = new Set<ArrayBuffer>();
     const value = swapped('', result, (_, found) => {
       if (ArrayBuffer.isView(found)) buffers.add(found.buffer as ArrayBuffer);
@@ -186,10 +187,12 @@ function start(module: Extract<Task, { type: 'init' }>['module']): Promise<void>
 function failureOf(error: unknown): Failure {
   if (error === ABORTED) return { kind: 'aborted' };
   if (error instanceof VesicleError) return { kind: 'error', code: error.code, message: error.message };
-  if (!(error instanceof VesicleCrash))
-    return { kind: 'other', error: error instanceof Error ? error : new Error(String(error)) };
-  return { kind: 'crash', message: error.message, cause: error.cause instanceof Error ? error.cause : undefined };
+  const other = asError(error);
+  if (!(other instanceof VesicleCrash)) return { kind: 'other', name: other.name, error: other };
+  return { kind: 'crash', message: other.message, cause: other.cause ? asError(other.cause) : undefined };
 }
+
+const asError = (error: unknown) => (error instanceof Error ? error : new Error(String(error)));
 
 async function inNode(): Promise<void> {
   // Out of the bundlers' sight: a page never gets here.

@@ -34,7 +34,8 @@ export type Failure =
   | { kind: 'error'; code: ErrorCode; message: string }
   | { kind: 'crash'; message: string; cause: Error | undefined }
   | { kind: 'aborted' }
-  | { kind: 'other'; error: Error };
+  /** Of other names than JavaScript's own errors, copies of the error have lost theirs. */
+  | { kind: 'other'; name: string; error: Error };
 
 type Kind<T> = T extends (...args: never) => unknown
   ? 'method'

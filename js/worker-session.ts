@@ -5,7 +5,7 @@ import type { Failure, Reply, Request, Task } from './worker-protocol.js';
 
 /** A worker of `node:worker_threads`, as far as it is used. */
 export interface NodeWorker {
-  postMessage(message: unknown, transfer: Transferable[]): void;
+  postMessage(message: unknown, transfer: ArrayBuffer[]): void;
   terminate(): unknown;
   // biome-ignore lint/suspicious/noExplicitAny: each event has a value of its own
   on(event: string, listener: (value: any) => void): unknown;
@@ -23,7 +23,7 @@ interface Waiting {
 
 /** What goes with a task. */
 interface Extra {
-  transfer?: Transferable[];
+  transfer?: ArrayBuffer[];
   asked?: unknown;
   onReport?: ((report: StepReport) => void) | undefined;
 }
@@ -90,7 +90,7 @@ export class Session {
     this.#waiting.clear();
   }
 
-  #send(request: Request, transfer: Transferable[]): void {
+  #send(request: Request, transfer: ArrayBuffer[]): void {
     try {
       this.#worker.postMessage(request, transfer);
     } catch (error) {
@@ -123,7 +123,7 @@ export class Session {
 const notStarted = (what: string) => new Error(`init: the worker could not be started: ${what}`);
 
 function errorOf(failure: Failure): Error {
-  if (failure.kind === 'other') return failure.error;
+  if (failure.kind === 'other') return Object.assign(failure.error, { name: failure.name });
   if (failure.kind === 'aborted') return new VesicleError('aborted', 'the run was called off');
   if (failure.kind === 'error') return new VesicleError(failure.code, failure.message);
   const crash = new VesicleCrash('', { cause: failure.cause });

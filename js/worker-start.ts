@@ -60,16 +60,20 @@ async function begin(given: WorkerInit): Promise<void> {
   turn += 1;
   const mine = turn;
   try {
-    const { module_or_path, worker } = options('options', given, ['module_or_path', 'worker']);
-    const module = await sendable(await module_or_path);
-    const made = new Session(worker ?? (globalThis.Worker ? browserWorker() : await nodeWorker()));
-    if (mine === turn) session = made;
-    else made.end(terminated());
-    await made.ask({ type: 'init', module }).answer;
+    await start(given, mine);
   } catch (error) {
     if (mine === turn) giveUp(error);
     throw error;
   }
+}
+
+async function start(given: WorkerInit, mine: number): Promise<void> {
+  const { module_or_path, worker } = options('options', given, ['module_or_path', 'worker']);
+  const module = await sendable(await module_or_path);
+  const made = new Session(worker ?? (globalThis.Worker ? browserWorker() : await nodeWorker()));
+  if (mine === turn) session = made;
+  else made.end(terminated());
+  await made.ask({ type: 'init', module }).answer;
 }
 
 /** Nothing came of it; a later call tries again. */

@@ -69,9 +69,9 @@ type Arguments<A extends unknown[]> = { [K in keyof A]: There<A[K]> };
 // With the leniency of methods, so that each model is a Stepper here as it is there.
 type Method<A extends unknown[], R> = { method(...args: A): R }['method'];
 
-type Member<T> = T extends Own
+type Member<T> = [T] extends [Own]
   ? There<T>
-  : T extends (...args: infer A) => infer R
+  : [T] extends [(...args: infer A) => infer R]
     ? Method<Arguments<A>, Promise<There<Awaited<R>>>>
     : Promise<There<T>>;
 
