@@ -259,7 +259,9 @@ function fromThis<T>(work: (remote: Remote, args: unknown[]) => T): (this: Remot
 }
 
 function define(target: object, name: string, what: PropertyDescriptor): void {
-  Object.defineProperty(target, name, { configurable: true, enumerable: false, ...what });
+  // Like methods and getters that are written in a class.
+  const writable = 'value' in what ? { writable: true } : {};
+  Object.defineProperty(target, name, { configurable: true, enumerable: false, ...writable, ...what });
 }
 
 /** Nobody may wait for it: the failure shows in whatever is asked of the object. */
