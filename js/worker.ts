@@ -43,8 +43,7 @@
  * **Where the worker comes from.** From `worker-host.js` beside this file, as a module worker; Vite and webpack know the words
  * and bundle it. From another origin it is started by way of a `blob:`, which a content security policy has to allow
  * in `worker-src`. For other bundlers make a worker of `vesicle/worker-host` and give it to {@link init}. In Node it
- * runs on `node:worker_threads`. In Vite's development server, `optimizeDeps: { exclude: ['vesicle'] }` keeps the files beside each
- * other.
+ * runs on `node:worker_threads`.
  *
  * @packageDocumentation
  */

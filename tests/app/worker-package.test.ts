@@ -74,16 +74,17 @@ test('a run is aborted from the page, and buffers are handed over', async () => 
     await init({ module_or_path: 'vesicle_bg.wasm' });
     const data = Uint8Array.from({ length: 8000 }, (_, i) => (i % 20 > 5 && i % 20 < 15 ? 100 : 0));
     const volume = new Volume(library.transfer({ data, dims: [20, 20, 20] }));
-    const model = new DeformableModel({ volume, params: { iso: 50, energyTolerance: 1e-12 } });
+    const params = { iso: 50, isoForce: -1, energyTolerance: 1e-12, maxMove: 0.01, timeStep: 0.01 };
+    const model = new DeformableModel({ volume, start: { seeds: Float32Array.of(9, 9, 9), radius: 2 }, params });
     const abort = new AbortController();
     const onStep = ({ iteration }) => { if (iteration === 3) abort.abort('enough'); };
     const reason = await model.run({ signal: abort.signal, onStep }).catch((why) => why);
-    const { iteration } = await model.step();
+    const { iteration, done } = await model.step();
     const out = await model.mesh.arrays();
     const { vertices } = await model.mesh.copyTo(out);
     const { code, message } = await model.setParams({ bogus: 1 }).catch((error) => error);
-    tell([data.length, reason, iteration > 3, 3 * vertices === out.positions.length, code, message.slice(0, 5)]);`;
-  const expected = [0, 'enough', true, true, 'invalid-argument', 'bogus'];
+    tell([data.length, reason, iteration > 3, done, 3 * vertices === out.positions.length, code, message.slice(0, 5)]);`;
+  const expected = [0, 'enough', true, false, true, 'invalid-argument', 'bogus'];
   expect(await told(`${server.address}package.json`, content)).toEqual(expected);
 });
 

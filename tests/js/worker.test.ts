@@ -25,10 +25,12 @@ function ballOf(size: number, radius: number): Uint8Array {
   });
 }
 
-/** A model that never rests, for runs that are to be ended. */
+/** A model on its way for tens of thousands of steps, for runs that are to be ended. */
 function restless(): worker.DeformableModel {
   const volume = new worker.Volume({ data, dims: DIMS });
-  return new worker.DeformableModel({ volume, params: { ...PARAMS, energyTolerance: 1e-12 } });
+  const start = { seeds: Float32Array.of(12, 12, 12), radius: 2 };
+  const params = { ...PARAMS, energyTolerance: 1e-12, maxMove: 0.01, timeStep: 0.01 };
+  return new worker.DeformableModel({ volume, start, params });
 }
 
 beforeEach(() => init());
@@ -232,7 +234,8 @@ test('an aborted run rejects with the reason, and the model goes on', async () =
   });
   await expect(run).rejects.toBe(reason);
   expect(heard).toEqual([1, 2, 3]);
-  expect((await model.step()).iteration).toBeGreaterThan(3);
+  const { iteration, done } = await model.step();
+  expect([iteration > 3, done]).toEqual([true, false]);
   await expect(model.run({ signal: AbortSignal.abort(reason) })).rejects.toBe(reason);
 });
 
@@ -300,6 +303,20 @@ test('only what an array shows of its buffer is sent', async () => {
   worker.terminate();
 });
 
+test('results are handed over', async () => {
+  // Tells how many buffers went with a message, in place of what was in it.
+  const own = hostOf(`
+    const { parentPort } = await import('node:worker_threads');
+    const post = parentPort.postMessage.bind(parentPort);
+    parentPort.postMessage = (message, buffers) => post({ ...message, value: buffers.length });`);
+  await answerTo(own, { type: 'init' });
+  const mesh = { vesicle: -1, class: 'Mesh' };
+  await answerTo(own, { type: 'call', on: 'Mesh', name: 'icosphere', args: [[0, 0, 0], 1, 1] });
+  expect((await answerTo(own, { type: 'call', on: mesh, name: 'arrays' })).value).toBe(3);
+  expect((await answerTo(own, { type: 'call', on: mesh, name: 'toBytes', args: ['stl'] })).value).toBe(1);
+  await own.terminate();
+});
+
 test('copyTo fills the same memory where there is room', async () => {
   const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 0.5);
   const { positions, normals, indices } = await mesh.arrays();
@@ -311,9 +328,15 @@ test('copyTo fills the same memory where there is room', async () => {
   expect([out.positions.length, out.normals.length, out.indices.length]).toEqual([9999, normals.length, 9999]);
   expect(out.positions.subarray(0, positions.length)).toEqual(positions);
   expect(out.indices.subarray(0, indices.length)).toEqual(indices);
+  // While the buffers are away, others take their place.
+  expect(await Promise.all([mesh.copyTo(out), mesh.copyTo(out)])).toEqual([await counts, await counts]);
+  expect(out.positions.subarray(0, positions.length)).toEqual(positions);
   mesh.free();
+  const { indices: kept } = out;
   expect((await rejection(mesh.copyTo(out))).code).toBe('freed');
-  expect(out.indices.length).toBe(9999);
+  expect((await rejection(mesh.copyTo(wrong({ ...out, colours: kept })))).message).toContain('colours');
+  expect(out.indices).toBe(kept);
+  expect(kept.length).toBeGreaterThan(0);
 });
 
 test('the live mesh is one object that follows the model', async () => {
