@@ -101,14 +101,15 @@ function packed(args: readonly unknown[]): { args: unknown[]; transfer: ArrayBuf
   const buffers = new Set<ArrayBuffer>();
   const pack = (path: string, value: object, moved: boolean): unknown => {
     if (value instanceof Remote) return referenceOf(value);
+    const moves = moved || handedOver.has(value);
     if (ArrayBuffer.isView(value)) {
-      const sent = moved || handedOver.has(value) ? whole(path, value) : copied(path, value);
+      const sent = moves ? whole(path, value) : copied(path, value);
       buffers.add(sent.buffer as ArrayBuffer);
       return sent;
     }
     if (!Array.isArray(value) && !isPlain(value)) throw unsendable(path, value);
-    if (moved || !handedOver.has(value)) return undefined;
-    return swapped(path, value, (at, inner) => pack(at, inner, true));
+    // What is inside is looked at one by one, and goes the same way.
+    return moves && !moved ? swapped(path, value, (at, inner) => pack(at, inner, true)) : undefined;
   };
   const sent = args.map((arg, k) => swapped(`argument ${k + 1}`, arg, (path, value) => pack(path, value, false)));
   return { args: sent, transfer: [...buffers] };
@@ -191,7 +192,7 @@ function tell(onStep: (report: StepReport) => void, report: StepReport, stop: Ab
   }
 }
 
-/** The buffers go there and back. */
+/** The buffers of `out` go there and back. */
 async function copyTo(remote: Remote, out: MeshArrays): Promise<unknown> {
   const { uvs, colors, ...given } = options('out', out, ['positions', 'normals', 'indices', 'uvs', 'colors']);
   const session = sessionOf(remote);

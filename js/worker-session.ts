@@ -7,8 +7,7 @@ import type { Failure, Reply, Request, Task } from './worker-protocol.js';
 export interface NodeWorker {
   postMessage(message: unknown, transfer: ArrayBuffer[]): void;
   terminate(): unknown;
-  // biome-ignore lint/suspicious/noExplicitAny: each event has a value of its own
-  on(event: string, listener: (value: any) => void): unknown;
+  on(event: string, listener: (value: unknown) => void): unknown;
   ref(): void;
   unref(): void;
 }
@@ -34,6 +33,7 @@ interface Asked {
   answer: Promise<unknown>;
 }
 
+/** Asks, and gives each answer to whoever waits for it. */
 export class Session {
   readonly #worker: Worker | NodeWorker;
   readonly #waiting = new Map<number, Waiting>();
@@ -77,6 +77,7 @@ export class Session {
     if (!this.#end) this.#send({ type: 'abort', id }, []);
   }
 
+  /** Gives an object in the worker back. */
   free(object: number): void {
     if (!this.#end) this.#send({ type: 'free', object }, []);
   }
@@ -134,9 +135,9 @@ function errorOf(failure: Failure): Error {
 function listen(worker: Worker | NodeWorker, hear: (reply: Reply) => void, fail: (what: string) => void): void {
   const garbled = () => fail('a message from it could not be read');
   if ('on' in worker) {
-    worker.on('message', hear);
-    worker.on('error', (error: unknown) => fail(error instanceof Error ? error.message : String(error)));
-    worker.on('exit', (code: number) => fail(`it left with code ${code}`));
+    worker.on('message', (reply) => hear(reply as Reply));
+    worker.on('error', (error) => fail(error instanceof Error ? error.message : String(error)));
+    worker.on('exit', (code) => fail(`it left with code ${code}`));
     worker.on('messageerror', garbled);
     return;
   }

@@ -1,5 +1,6 @@
 // The package in a worker of Node: the same results as without, and what is its own.
 import { execFileSync } from 'node:child_process';
+import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { Worker as NodeWorker } from 'node:worker_threads';
 import { afterAll, beforeEach, expect, test } from 'vitest';
@@ -495,6 +496,16 @@ test('anything before init says what to do; a worker at rest keeps no process al
     const mesh = await Mesh.icosphere([0, 0, 0], 1, 1);
     console.log((await mesh.info()).genus);`;
   expect(node(script).split('\n')).toEqual([...Array(4).fill('invalid-argument true'), '0']);
+});
+
+test('the example of the documentation runs', () => {
+  const [, example = ''] = /```js\n([\s\S]*?)```/.exec(readFileSync(`${root}/js/worker.ts`, 'utf8')) ?? [];
+  const script = `
+    import { readFileSync } from 'node:fs';
+    const file = new Blob([readFileSync('www/public/data/visible-human-head.nii.gz')]);
+    ${example.replaceAll(/^ \* ?/gm, '').replace("from 'vesicle/worker'", "from './pkg/worker.js'")}
+    console.log(report.done, positions.length / 3 === report.vertices, indices.length / 3 === report.triangles);`;
+  expect(node(script).split('\n').at(-1)).toBe('true true true');
 });
 
 test('objects that nobody holds are freed in the worker, those in use are not', () => {
