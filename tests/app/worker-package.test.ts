@@ -99,23 +99,40 @@ test('a worker made by hand serves as well; one whose script is not there says s
   expect(genus).toBe(0);
 });
 
-/** The package as a content delivery network has it: on another origin, for everybody. */
-async function deliver(): Promise<{ address: string; close: () => void }> {
-  const types: Record<string, string> = { '.js': 'text/javascript', '.wasm': 'application/wasm' };
+/** The package on an origin of its own, with headers of ours, and a few files more. */
+async function publish(headers: Record<string, string>, files: Record<string, string> = {}) {
+  const types: Record<string, string> = { '.js': 'text/javascript', '.html': 'text/html', '.wasm': 'application/wasm' };
   const answer = async (path: string, response: ServerResponse) => {
-    const head = { 'Content-Type': types[extname(path)] ?? 'text/plain', 'Access-Control-Allow-Origin': '*' };
-    response.writeHead(200, head).end(await readFile(at('pkg', path)));
+    const body = files[path] ?? (await readFile(at('pkg', path)));
+    response.writeHead(200, { 'Content-Type': types[extname(path)] ?? 'text/plain', ...headers }).end(body);
   };
-  const network = createServer((request, response) => {
+  const server = createServer((request, response) => {
     answer(request.url ?? '', response).catch(() => response.writeHead(404).end());
   });
-  await new Promise<void>((done) => network.listen(0, done));
-  const { port } = network.address() as AddressInfo;
-  return { address: `http://localhost:${port}/`, close: () => network.close() };
+  await new Promise<void>((done) => server.listen(0, done));
+  const { port } = server.address() as AddressInfo;
+  return { address: `http://localhost:${port}/`, close: () => server.close() };
 }
 
+test('a strict content security policy is enough', async () => {
+  const headers = {
+    'Content-Security-Policy': `default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'`,
+  };
+  const script = `${LIBRARY} await init(); tell((await (await Mesh.icosphere([0, 0, 0], 1, 1)).info()).genus);`;
+  const page = '<script type="module" src="/page.js"></script>';
+  const strict = await publish(headers, { '/page.html': page, '/page.js': caught(script) });
+  const tab = await browser.newPage();
+  try {
+    await tab.goto(`${strict.address}page.html`);
+    expect(await title(tab)).toBe(0);
+  } finally {
+    await tab.close();
+    strict.close();
+  }
+});
+
 test('from another origin the worker starts by way of this one', async () => {
-  const network = await deliver();
+  const network = await publish({ 'Access-Control-Allow-Origin': '*' });
   try {
     const content = `
       const { default: init, Mesh } = await import('${network.address}worker.js');
