@@ -362,8 +362,9 @@ test('what is freed is refused, here and as an argument', async () => {
   expect((await rejection(volume.range)).message).toContain('this Volume was freed');
   expect((await rejection(worker.Mesh.marchingCubes(volume, 1))).code).toBe('freed');
   expect((await model.step()).iteration).toBe(1);
-  const run = model.run();
-  model.free();
+  const lasting = restless();
+  const run = lasting.run();
+  lasting.free();
   expect((await rejection(run)).code).toBe('freed');
 });
 
@@ -443,9 +444,10 @@ test('a worker that ends by itself rejects everything that waits', async () => {
   worker.terminate();
   await init({ worker: hostOf(FAULTY) });
   const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 1);
-  const run = restless().run();
-  await mesh.check();
-  expect(await crashOf(run)).toContain('no more');
+  // Whether the answer is still heard is up to the system.
+  const check = mesh.check().catch(() => undefined);
+  expect(await crashOf(restless().run())).toContain('no more');
+  await check;
   const own = hostOf();
   await init({ worker: own });
   const waiting = crashOf(restless().run());
