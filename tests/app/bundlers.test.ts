@@ -16,7 +16,7 @@ let project = '';
 const main = (from: string, options = '') => `
   import * as vesicle from '${from}';
   await vesicle.default(${options});
-  document.title = (${spongeBits})(vesicle);`;
+  document.title = await (${spongeBits})(vesicle);`;
 
 const page = (script: string, policy = '') => `<!doctype html>
 <html lang="en">
@@ -142,7 +142,7 @@ test('one file, from the address of a blob, as notebooks do', async () => {
     const address = URL.createObjectURL(new Blob([text], { type: 'text/javascript' }));
     const vesicle = await import(address);
     await vesicle.default();
-    document.title = (${spongeBits})(vesicle);`;
+    document.title = await (${spongeBits})(vesicle);`;
   await write('blob.html', page(`<script type="module">${script}</script>`));
   await titleOf('.', 'blob.html');
 });

@@ -18,7 +18,7 @@ function node(script: string, cwd = root): string {
 const bits = (address: string, options = '') => `
   const vesicle = await import('${address}');
   await vesicle.default(${options});
-  console.log((${spongeBits})(vesicle));`;
+  console.log(await (${spongeBits})(vesicle));`;
 
 test('the file with the module inside gives the same bits, whatever folder it is run in', () => {
   expect(node(bits(`${root}pkg/inline.js`), '/')).toBe(SPONGE_BITS);
