@@ -21,6 +21,9 @@ const PAPERS = [
   'docs/reconstruct.jpg',
 ];
 
+// Between the package and other people's: `vesicle/three` and so on.
+const ADAPTERS = ['three', 'niivue', 'vtk'];
+
 async function compile() {
   await must('cargo', [
     ...['rustc', '--locked', '--release', '--lib', '--crate-type', 'cdylib'],
@@ -66,6 +69,8 @@ async function assemble() {
   await writeFile(at('pkg/package.json'), `${JSON.stringify(await manifest(), null, 2)}\n`);
 }
 
+const adapter = (name) => ({ types: `./adapters/${name}.d.ts`, default: `./adapters/${name}.js` });
+
 async function manifest() {
   const { description, license, version, engines } = JSON.parse(await readFile(at('package.json'), 'utf8'));
   return {
@@ -81,6 +86,7 @@ async function manifest() {
     types: './index.d.ts',
     exports: {
       '.': { types: './index.d.ts', default: './index.js' },
+      ...Object.fromEntries(ADAPTERS.map((name) => [`./${name}`, adapter(name)])),
       './vesicle_bg.wasm': './vesicle_bg.wasm',
       './package.json': './package.json',
     },
