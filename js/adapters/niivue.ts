@@ -169,7 +169,8 @@ function paint({ positions, colors }: MeshArrays, color: ArrayLike<number>): Uin
   const bytes = new Uint8Array((positions.length / 3) * 4);
   const all = Array.from(color, (share) => Math.round(255 * share));
   for (let i = 0, from = 0; i < bytes.length; i += 4, from += 3) {
-    for (let k = 0; k < 3; k++) bytes[i + k] = colors ? 255 * (colors[from + k] as number) : (all[k] as number);
+    for (let k = 0; k < 3; k++)
+      bytes[i + k] = colors ? Math.round(255 * (colors[from + k] as number)) : (all[k] as number);
     bytes[i + 3] = all[3] as number;
   }
   return bytes;
@@ -207,8 +208,11 @@ class InFirst implements Shown {
   show(frame: Frame): void {
     // NiiVue keeps what it is given, for what it does with the mesh later on.
     const [positions, indices] = [frame.positions.slice(), frame.indices.slice()];
-    if (!this.mesh) return this.#add(positions, indices, frame);
-    const { mesh } = this;
+    if (this.mesh) this.#change(this.mesh, positions, indices, frame);
+    else this.#add(positions, indices, frame);
+  }
+
+  #change(mesh: FirstMesh, positions: Float32Array, indices: Uint32Array, frame: Frame): void {
     if (frame.topology) Object.assign(mesh, { tris: indices, layers: [] });
     const { min, max } = bounds(positions);
     Object.assign(mesh, { pts: positions, extentsMin: min, extentsMax: max });

@@ -8,6 +8,7 @@ import { page, shown } from './page';
 await page(async () => {
   const view = document.querySelector('#view') as HTMLElement;
   const renderer = new THREE.WebGLRenderer({ antialias: true });
+  renderer.setClearColor(0x14171a);
   view.append(renderer.domElement);
   const camera = new THREE.PerspectiveCamera(40, 1, 1, 2000);
   camera.position.set(170, -230, 90);
