@@ -20,16 +20,16 @@ await page(async () => {
 
   await init();
   const volume = new Volume(volumeFromItk(image));
-  const model = new DeformableModel({ volume, levels: 1, edge: 1.5, params: { iso: 110, isoForce: -1 } });
+  const model = new DeformableModel({ volume, levels: 1, edge: 1.5, params: { iso: 85, isoForce: -1 } });
   const surface = new VtkSurface({ vtkPolyData, vtkDataArray });
   const mapper = vtkMapper.newInstance();
   mapper.setInputData(surface.polyData);
   const actor = vtkActor.newInstance();
   actor.setMapper(mapper);
   const render = sliceAndSurface(vtkITKHelper.convertItkToVtkImage(image), actor);
-  Object.assign(window, { image, volume, model, surface });
+  Object.assign(window, { image, model, surface, actor, render });
   for (;;) {
-    const report = model.step();
+    const report = model.step(2);
     if (surface.update(model.mesh)) render();
     await shown(report);
     if (report.done) return report;

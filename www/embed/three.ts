@@ -35,7 +35,7 @@ await page(async () => {
   const volume = new Volume(volumeFromThree(tooth, { world: 'slices' }));
   const model = new DeformableModel({ volume, levels: 1, params: { iso: 600, isoForce: -1 } });
   const surface = new ThreeSurface(THREE, object);
-  Object.assign(window, { THREE, tooth, volume, model, surface, object, scene, camera });
+  Object.assign(window, { tooth, model, surface, object, render });
   for (;;) {
     const report = model.step();
     if (surface.update(model.mesh)) render();

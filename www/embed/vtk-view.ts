@@ -20,6 +20,7 @@ export function sliceAndSurface(image: vtkImageData, actor: vtkActor): () => voi
   camera.setPosition(-0.7, -1.5, 0.5);
   camera.setViewUp(0, 0, 1);
   renderer.resetCamera(image.getBounds());
+  camera.zoom(1.5);
   new ResizeObserver(() => generic.resize()).observe(view);
   return () => generic.getRenderWindow().render();
 }

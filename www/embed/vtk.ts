@@ -26,9 +26,9 @@ await page(async () => {
   const actor = vtkActor.newInstance();
   actor.setMapper(mapper);
   const render = sliceAndSurface(image, actor);
-  Object.assign(window, { image, volume, model, surface });
+  Object.assign(window, { image, model, surface, actor, render });
   for (;;) {
-    const report = model.step();
+    const report = model.step(4);
     if (surface.update(model.mesh)) render();
     await shown(report);
     if (report.done) return report;
