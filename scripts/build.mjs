@@ -19,6 +19,7 @@ const PAPERS = [
   'CHANGELOG.md',
   'docs/extract.png',
   'docs/reconstruct.jpg',
+  'docs/hosts.md',
 ];
 
 // Between the package and other people's: `vesicle/three` and so on.

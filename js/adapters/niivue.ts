@@ -255,14 +255,15 @@ class InFirst implements Shown {
 function records({ positions, normals }: Frame, rgba: Uint8Array): ArrayBuffer {
   const vertices = positions.length / 3;
   const buffer = new ArrayBuffer(20 * vertices);
-  const [floats, signed, bytes] = [new Float32Array(buffer), new Int8Array(buffer), new Uint8Array(buffer)];
-  const stride = rgba.length === 4 ? 0 : 4;
+  const [floats, signed, words] = [new Float32Array(buffer), new Int8Array(buffer), new Uint32Array(buffer)];
+  const colors = new Uint32Array(rgba.slice().buffer);
+  const each = colors.length === 1 ? 0 : 1;
   for (let v = 0; v < vertices; v++) {
     for (let k = 0; k < 3; k++) {
       floats[5 * v + k] = positions[3 * v + k] as number;
       signed[20 * v + 12 + k] = 127 * (normals[3 * v + k] as number);
     }
-    for (let k = 0; k < 4; k++) bytes[20 * v + 16 + k] = rgba[stride * v + k] as number;
+    words[5 * v + 4] = colors[each * v] as number;
   }
   return buffer;
 }
@@ -270,8 +271,11 @@ function records({ positions, normals }: Frame, rgba: Uint8Array): ArrayBuffer {
 function furthest(positions: Float32Array): number {
   let most = 0;
   for (let i = 0; i < positions.length; i += 3) {
-    const [x, y, z] = [positions[i] as number, positions[i + 1] as number, positions[i + 2] as number];
-    most = Math.max(most, x * x + y * y + z * z);
+    const x = positions[i] as number;
+    const y = positions[i + 1] as number;
+    const z = positions[i + 2] as number;
+    const squared = x * x + y * y + z * z;
+    if (squared > most) most = squared;
   }
   return Math.sqrt(most);
 }
@@ -289,8 +293,18 @@ interface NextMesh {
   perVertexColors: Uint32Array | null;
 }
 
-/** The view of 1.0, with what it keeps to itself. */
+/** What the view of 1.0 has of a mesh on the graphics card. */
+interface NextBuffers {
+  vao: WebGLVertexArrayObject | null;
+  vertexBuffer: WebGLBuffer | null;
+  indexBuffer: WebGLBuffer | null;
+  indexCount: number;
+}
+
+/** The view of 1.0, with what it keeps to itself; in WebGPU it has less of it. */
 interface View {
+  gl?: WebGL2RenderingContext | null;
+  meshResources?: Map<object, NextBuffers>;
   _rebuildMeshResources?: () => void;
 }
 
@@ -299,6 +313,7 @@ class InNext implements Shown {
   readonly #nv: Niivue;
   readonly #view: View;
   readonly #look: Look;
+  #known: NextBuffers | undefined;
 
   constructor(nv: Niivue, view: View, look: Look) {
     [this.#nv, this.#view, this.#look] = [nv, view, look];
@@ -310,11 +325,46 @@ class InNext implements Shown {
       this.mesh = { ...this.#plain(), ...geometry, layers: [] };
       return this.#nv.addMesh(this.mesh);
     }
+    const buffers = this.#buffers(this.mesh);
     Object.assign(this.mesh, geometry, frame.topology && { layers: [] });
-    // NiiVue has no other way in that leaves its volumes alone.
+    return buffers ? this.#upload(buffers, frame, geometry) : this.#rebuild();
+  }
+
+  // What is asked of NiiVue in the open uploads its volumes again, too.
+  #rebuild(): unknown {
     const { _rebuildMeshResources } = this.#view;
     if (_rebuildMeshResources) return _rebuildMeshResources.call(this.#view);
     return (this.#nv as { updateGLVolume?: () => unknown }).updateGLVolume?.();
+  }
+
+  /** NiiVue's own buffers of the mesh, as it was, where their size says that the records are those that are known. */
+  #buffers(mesh: NextMesh): NextBuffers | undefined {
+    const { gl, meshResources } = this.#view;
+    const buffers = meshResources?.get(mesh);
+    if (!gl || !buffers?.vertexBuffer) return undefined;
+    if (buffers === this.#known) return buffers;
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.vertexBuffer);
+    const size: unknown = gl.getBufferParameter(gl.ARRAY_BUFFER, gl.BUFFER_SIZE);
+    if (size !== (28 * mesh.positions.length) / 3) return undefined;
+    this.#known = buffers;
+    return buffers;
+  }
+
+  #upload(
+    buffers: NextBuffers,
+    frame: Frame,
+    { indices, colors }: { indices: Uint32Array; colors: Uint32Array },
+  ): void {
+    const gl = this.#view.gl as WebGL2RenderingContext;
+    gl.bindVertexArray(buffers.vao);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.vertexBuffer);
+    gl.bufferData(gl.ARRAY_BUFFER, longRecords(frame, colors), gl.DYNAMIC_DRAW);
+    if (frame.topology) {
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.indexBuffer);
+      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.DYNAMIC_DRAW);
+    }
+    gl.bindVertexArray(null);
+    buffers.indexCount = indices.length;
   }
 
   #geometry(frame: Frame) {
@@ -344,4 +394,18 @@ class InNext implements Shown {
     this.mesh = undefined;
     return place < 0 ? undefined : this.#nv.removeMesh(place);
   }
+}
+
+/** 28 bytes a vertex: position, normal, colour. */
+function longRecords({ positions, normals }: Frame, colors: Uint32Array): ArrayBuffer {
+  const buffer = new ArrayBuffer(28 * colors.length);
+  const [floats, words] = [new Float32Array(buffer), new Uint32Array(buffer)];
+  for (let v = 0; v < colors.length; v++) {
+    for (let k = 0; k < 3; k++) {
+      floats[7 * v + k] = positions[3 * v + k] as number;
+      floats[7 * v + 3 + k] = normals[3 * v + k] as number;
+    }
+    words[7 * v + 6] = colors[v] as number;
+  }
+  return buffer;
 }

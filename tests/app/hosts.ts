@@ -137,7 +137,7 @@ const find = ({ positions, indices, size, toIndex, at, iso }: Asked): Found => {
     const side = (way: number) => sample(middle.map((value, k) => value + way * step * (normal[k] ?? 0)));
     if (side(-1) >= iso && side(1) <= iso) passed++;
   }
-  return { vertices: positions.length / 3, volume, bracketed: passed / asked };
+  return { vertices: new Set(Array.from(indices)).size, volume, bracketed: passed / asked };
 };
 
 /** Asks the host of a page. */

@@ -284,7 +284,7 @@ test('vtk.js: disposed, and what is refused', () => {
 
 /** A WebGL context that keeps what is uploaded last to each buffer, as bytes. */
 function recordingGl() {
-  const uploads = new Map<unknown, Uint8Array>();
+  const uploads = new Map<unknown, Uint8Array<ArrayBuffer>>();
   const bound = new Map<unknown, unknown>();
   let made = 0;
   const gl = {
@@ -300,6 +300,7 @@ function recordingGl() {
     ...{ createBuffer: () => ({ id: made++ }), createVertexArray: () => ({ id: made++ }) },
     ...{ bindVertexArray() {}, enableVertexAttribArray() {}, vertexAttribPointer() {} },
     bindBuffer: (target: number, buffer: unknown) => bound.set(target, buffer),
+    getBufferParameter: (target: number) => uploads.get(bound.get(target))?.length,
     bufferData(target: number, data: ArrayBuffer | Uint8Array) {
       const bytes = ArrayBuffer.isView(data)
         ? new Uint8Array(data.buffer, data.byteOffset, data.byteLength)
@@ -452,6 +453,35 @@ test('NiiVue 1.0: its meshes alone are made anew, where it has a way to', async 
   expect([...mesh.indices]).toEqual([...indices]);
   expect(mesh.colors.length).toBe(positions.length / 3);
   expect([...mesh.extentsMin, ...mesh.extentsMax]).toEqual([2, 0, -1, 6, 4, 3].map((at) => expect.closeTo(at, 1)));
+});
+
+test('NiiVue 1.0: its buffers are filled where their records are those that are known', async () => {
+  const { gl, uploads } = recordingGl();
+  const meshResources = new Map();
+  let rebuilt = 0;
+  const { calls, surface } = next({ gl, meshResources, _rebuildMeshResources: () => rebuilt++ });
+  await surface.update(source);
+  const buffers = { vao: {}, vertexBuffer: {}, indexBuffer: {}, indexCount: 0 };
+  meshResources.set(surface.mesh, buffers);
+  const length = (28 * source.arrays().positions.length) / 3;
+  uploads.set(buffers.vertexBuffer, new Uint8Array(length + 28));
+  source.move(1);
+  await surface.update(source);
+  expect(rebuilt).toBe(1);
+  uploads.set(buffers.vertexBuffer, new Uint8Array(length));
+  source.become(sphere(0.6));
+  await surface.update(source);
+  expect([rebuilt, calls]).toEqual([1, []]);
+  const { positions, normals, indices } = source.arrays();
+  const floats = new Float32Array(uploads.get(buffers.vertexBuffer)?.buffer ?? []);
+  expect(floats.length).toBe((7 * positions.length) / 3);
+  for (const v of [0, 7]) {
+    expect([...floats.subarray(7 * v, 7 * v + 3)]).toEqual([...positions.subarray(3 * v, 3 * v + 3)]);
+    expect([...floats.subarray(7 * v + 3, 7 * v + 6)]).toEqual([...normals.subarray(3 * v, 3 * v + 3)]);
+  }
+  expect([...new Uint8Array(floats.buffer).subarray(24, 28)]).toEqual([255, 224, 191, 255]);
+  expect([...new Uint32Array(uploads.get(buffers.indexBuffer)?.buffer ?? [])]).toEqual([...indices]);
+  expect(buffers.indexCount).toBe(indices.length);
 });
 
 test('NiiVue 1.0: taken out', async () => {
