@@ -27,7 +27,11 @@ const PAPERS = [
   'CHANGELOG.md',
   'docs/extract.png',
   'docs/reconstruct.jpg',
+  'docs/hosts.md',
 ];
+
+// Between the package and other people's: `vesicle/three` and so on.
+const ADAPTERS = ['three', 'niivue', 'vtk'];
 
 async function compile({ target, env }) {
   const args = [
@@ -91,6 +95,8 @@ async function assemble() {
   await writeFile(at('pkg/package.json'), `${JSON.stringify(await manifest(), null, 2)}\n`);
 }
 
+const adapter = (name) => ({ types: `./adapters/${name}.d.ts`, default: `./adapters/${name}.js` });
+
 async function manifest() {
   const { description, license, version, engines } = JSON.parse(await readFile(at('package.json'), 'utf8'));
   return {
@@ -109,6 +115,7 @@ async function manifest() {
       './inline': { types: './index.d.ts', default: './inline.js' },
       './worker': { types: './worker.d.ts', default: './worker.js' },
       './worker-host': { types: './worker-host.d.ts', default: './worker-host.js' },
+      ...Object.fromEntries(ADAPTERS.map((name) => [`./${name}`, adapter(name)])),
       './vesicle_bg.wasm': './vesicle_bg.wasm',
       './vesicle_plain_bg.wasm': './vesicle_plain_bg.wasm',
       './package.json': './package.json',

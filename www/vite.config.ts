@@ -2,6 +2,9 @@ import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { defineConfig, type Plugin } from 'vite';
 
+/** A live page for each host that there is an adapter for. */
+const EMBEDS = ['index', 'three', 'niivue', 'niivue-next', 'vtk', 'itk'];
+
 const here = (path: string) => fileURLToPath(new URL(path, import.meta.url));
 
 /** While developing, Vite puts styles inline, which the page's content-security policy forbids; the built page keeps the policy. */
@@ -38,14 +41,25 @@ export default defineConfig({
   root: here('.'),
   // Relative addresses: the built page works from any folder of any server.
   base: './',
+<<<<<<< HEAD
   resolve: { alias: { vesicle: here('../pkg') } },
   plugins: [relaxPolicyWhileDeveloping(), dicomBeside()],
+=======
+  resolve: {
+    alias: [
+      { find: /^vesicle\/(\w+)$/, replacement: `${here('../pkg/adapters')}/$1.js` },
+      { find: 'vesicle', replacement: here('../pkg') },
+    ],
+  },
+  plugins: [relaxPolicyWhileDeveloping()],
+>>>>>>> wt-adapters
   worker: { format: 'es' },
   build: {
     outDir: here('../dist'),
     emptyOutDir: true,
     target: 'es2022',
-    rolldownOptions: { input: [here('index.html'), here('bench.html')] },
+    rolldownOptions: 
+      input: ['index', 'bench', ...EMBEDS.map((name) => `embed/${name}`)].map((name) => here(`${name}.html`)),,
     // The policy allows no data: script or style; small files stay files.
     assetsInlineLimit: 0,
     chunkSizeWarningLimit: 1000,

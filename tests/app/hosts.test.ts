@@ -1,0 +1,59 @@
+// Each live page with the real host in it: from the host's volume to a surface at rest in the host's view.
+import type { Page } from 'playwright-core';
+import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import { type App, openApp, overflow, reach } from './browser';
+import { difference, found, hide, watch } from './hosts';
+
+let app: App;
+let page: Page;
+beforeAll(async () => {
+  app = await openApp({ width: 800, height: 640 });
+  page = app.page;
+  await watch(page);
+});
+afterAll(() => app.close());
+
+describe.each(['three', 'niivue', 'niivue-next', 'vtk', 'itk'])('%s', (name) => {
+  let complaints = 0;
+  beforeAll(async () => {
+    complaints = app.complaints.length;
+    await page.goto(`${app.address}embed/${name}.html`);
+    await reach(page, 'done');
+  });
+
+  test('ten frames and more with another topology went in', async () => {
+    const { times, topologies } = await page.evaluate<{ times: number[]; topologies: number }>(
+      '({ times: window.times, topologies: window.topologies.size })',
+    );
+    expect(topologies).toBeGreaterThan(10);
+    const middle = times.toSorted((a, b) => a - b)[Math.floor(times.length / 2)] ?? 0;
+    console.info(`${name}: ${times.length} frames, ${middle.toFixed(2)} ms for update in the middle`);
+  });
+
+  test('the surface lies where the host has the iso value, its outside outside', async () => {
+    const { vertices, volume, bracketed } = await found(page, name);
+    expect(vertices).toBeGreaterThan(2000);
+    expect(volume).toBeGreaterThan(0);
+    console.info(`${name}: ${(100 * bracketed).toFixed(1)} % of the triangles of ${vertices} vertices`);
+    expect(bracketed).toBeGreaterThan(0.9);
+  });
+
+  test('is drawn: the picture is another without it', async () => {
+    const view = page.locator('#view');
+    const shown = await view.screenshot();
+    await hide(page, name);
+    expect(await difference(page, shown, await view.screenshot())).toBeGreaterThan(0.005);
+  });
+
+  test('fits a phone', async () => {
+    expect(await overflow(page, 360, 780)).toBeLessThanOrEqual(0);
+    await page.setViewportSize({ width: 800, height: 640 });
+  });
+
+  test('nothing was complained of, under a policy without eval and inline styles', async () => {
+    const policy = await page.getAttribute('meta[http-equiv=Content-Security-Policy]', 'content');
+    expect(policy).toMatch(/script-src 'self' 'wasm-unsafe-eval';/);
+    expect(policy).not.toMatch(/unsafe-inline|'unsafe-eval'/);
+    expect(app.complaints.slice(complaints)).toEqual([]);
+  });
+});
