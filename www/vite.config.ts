@@ -41,25 +41,22 @@ export default defineConfig({
   root: here('.'),
   // Relative addresses: the built page works from any folder of any server.
   base: './',
-<<<<<<< HEAD
-  resolve: { alias: { vesicle: here('../pkg') } },
-  plugins: [relaxPolicyWhileDeveloping(), dicomBeside()],
-=======
   resolve: {
     alias: [
-      { find: /^vesicle\/(\w+)$/, replacement: `${here('../pkg/adapters')}/$1.js` },
-      { find: 'vesicle', replacement: here('../pkg') },
+      { find: /^vesicle\/(three|niivue|vtk)$/, replacement: `${here('../pkg/adapters')}/$1.js` },
+      { find: /^vesicle\/(\w+)$/, replacement: `${here('../pkg')}/$1.js` },
+      { find: /^vesicle$/, replacement: here('../pkg') },
     ],
   },
-  plugins: [relaxPolicyWhileDeveloping()],
->>>>>>> wt-adapters
+  plugins: [relaxPolicyWhileDeveloping(), dicomBeside()],
   worker: { format: 'es' },
   build: {
     outDir: here('../dist'),
     emptyOutDir: true,
     target: 'es2022',
-    rolldownOptions: 
-      input: ['index', 'bench', ...EMBEDS.map((name) => `embed/${name}`)].map((name) => here(`${name}.html`)),,
+    rolldownOptions: {
+      input: ['index', 'bench', ...EMBEDS.map((name) => `embed/${name}`)].map((name) => here(`${name}.html`)),
+    },
     // The policy allows no data: script or style; small files stay files.
     assetsInlineLimit: 0,
     chunkSizeWarningLimit: 1000,
