@@ -32,7 +32,7 @@
  * and then new arrays over the same memory where there was room.
  *
  * **Errors.** A {@link VesicleError} has its code. A {@link VesicleCrash}, or a worker that ended by itself (also a
- * `VesicleCrash`), rejects all that waits and all that comes after, until {@link init} starts a fresh worker; objects made
+ * `VesicleCrash`), rejects all that waits and all that comes after, until `init` starts a fresh worker; objects made
  * before are `freed` then. Arguments that cannot be sent are refused with `invalid-argument`, {@link transfer} too where
  * a buffer cannot be handed over.
  *
@@ -42,10 +42,10 @@
  *
  * **Where the worker comes from.** From `worker-host.js` beside this file, as a module worker; Vite and webpack know the words
  * and bundle it. From another origin it is started by way of a `blob:`, which a content security policy has to allow
- * in `worker-src`. For other bundlers make a worker of `vesicle/worker-host` and give it to {@link init}. In Node it
+ * in `worker-src`. For other bundlers make a worker of `vesicle/worker-host` and give it to `init`. In Node it
  * runs on `node:worker_threads`.
  *
- * @packageDocumentation
+ * @module vesicle/worker
  */
 import type * as vesicle from './index.js';
 import { remoteClasses, remoteFunction } from './worker-remote.js';

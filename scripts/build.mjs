@@ -3,6 +3,7 @@
 import { createHash } from 'node:crypto';
 import { existsSync } from 'node:fs';
 import { copyFile, cp, mkdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
+import { makeElement } from './element.mjs';
 import { makeInline } from './inline.mjs';
 import { setup } from './setup.mjs';
 import { at, must, say, script, startedAs, tool } from './shell.mjs';
@@ -91,6 +92,7 @@ async function assemble() {
   for (const { glue, module } of [WITH_VECTORS, PLAIN]) await copyFile(at(glue, 'vesicle_bg.wasm'), at('pkg', module));
   await must(tool('tsc'), ['-p', at('js')]);
   await makeInline();
+  await makeElement();
   for (const file of PAPERS) await cp(at(file), at('pkg', file));
   await writeFile(at('pkg/package.json'), `${JSON.stringify(await manifest(), null, 2)}\n`);
 }
@@ -106,7 +108,7 @@ async function manifest() {
     license,
     keywords: ['mesh', 'surface', 'volume', 'isosurface', 'medical imaging', 'deformable model', 'wasm'],
     type: 'module',
-    sideEffects: ['./worker-host.js'],
+    sideEffects: ['./worker-host.js', './element.js'],
     engines,
     main: './index.js',
     types: './index.d.ts',
@@ -116,6 +118,7 @@ async function manifest() {
       './worker': { types: './worker.d.ts', default: './worker.js' },
       './worker-host': { types: './worker-host.d.ts', default: './worker-host.js' },
       ...Object.fromEntries(ADAPTERS.map((name) => [`./${name}`, adapter(name)])),
+      './element': { types: './element/index.d.ts', default: './element.js' },
       './vesicle_bg.wasm': './vesicle_bg.wasm',
       './vesicle_plain_bg.wasm': './vesicle_plain_bg.wasm',
       './package.json': './package.json',

@@ -3,7 +3,7 @@
  *
  * Nothing of NiiVue is imported: its classes come from the caller.
  *
- * @packageDocumentation
+ * @module vesicle/niivue
  */
 import { invalid } from '../check.js';
 import type { MeshArrays } from '../mesh.js';

@@ -3,7 +3,7 @@
  *
  * Nothing of three.js is imported: its classes come from the caller.
  *
- * @packageDocumentation
+ * @module vesicle/three
  */
 import { choice, invalid } from '../check.js';
 import type { MeshArrays } from '../mesh.js';

@@ -3,7 +3,7 @@
  *
  * Nothing of either is imported: vtk's classes come from the caller.
  *
- * @packageDocumentation
+ * @module vesicle/vtk
  */
 import { choice, invalid } from '../check.js';
 import type { Space, VolumeInit } from '../volume.js';
