@@ -200,6 +200,19 @@ test.each(GRIDS)('NiiVue 0.69: %s, the same at every voxel', async (_, grid) => 
   expect(volume.space).toBe('RAS');
 });
 
+test.each(GRIDS)('NiiVue 0.69: an LPS file, %s, is where the file says, in RAS', async (_, grid) => {
+  const bytes = scan('left-posterior-superior', grid);
+  const image = await wrong(NVImage).new(bytes.slice().buffer, 'scan.nrrd');
+  const file = Volume.parse(bytes);
+  agree(volumeFromNiivue(image), {
+    world: (index) => {
+      const [x, y, z] = place(file.affine, index);
+      return [-x, -y, z];
+    },
+    value: ([i, j, k]) => voxels()[i + SIZE[0] * (j + SIZE[1] * k)] ?? 0,
+  });
+});
+
 /** NiiVue has its matrices in rows. */
 const transposed = (rows: ArrayLike<number>) =>
   Array.from({ length: 16 }, (_, i) => rows[4 * (i % 4) + Math.floor(i / 4)] ?? 0);
