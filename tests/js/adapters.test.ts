@@ -1,4 +1,5 @@
 // Volumes out of other libraries, in the libraries themselves: what they find at a world point, a Volume finds there.
+import { readFile } from 'node:fs/promises';
 import vtkDataArray from '@kitware/vtk.js/Common/Core/DataArray.js';
 import vtkImageData from '@kitware/vtk.js/Common/DataModel/ImageData.js';
 import vtkITKHelper from '@kitware/vtk.js/Common/DataModel/ITKHelper.js';
@@ -64,6 +65,15 @@ function agree(init: VolumeInit, { size, world, value }: Host): Volume {
   }
   return volume;
 }
+
+test.each(['three', 'niivue', 'vtk'])('%s: neither the host nor the module is imported', async (name) => {
+  const imports = async (file: string) => {
+    const code = await readFile(new URL(`../../pkg/adapters/${file}`, import.meta.url), 'utf8');
+    return [...code.matchAll(/^(?:import|export) .*?from '(.*)';$/gm)].map(([, from]) => from);
+  };
+  expect((await imports(`${name}.js`)).toSorted()).toEqual(['../check.js', './source.js']);
+  expect(await imports('source.js')).toEqual(['../check.js']);
+});
 
 // ── three.js
 
