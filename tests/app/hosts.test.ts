@@ -2,7 +2,7 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { type App, openApp, overflow, reach } from './browser';
-import { difference, found, hide, watch } from './hosts';
+import { difference, found, hide, watch, watched } from './hosts';
 
 let app: App;
 let page: Page;
@@ -13,7 +13,19 @@ beforeAll(async () => {
 });
 afterAll(() => app.close());
 
-describe.each(['three', 'niivue', 'niivue-next', 'vtk', 'itk'])('%s', (name) => {
+const HOSTS = ['three', 'niivue', 'niivue-next', 'vtk', 'itk'];
+
+test('the list of hosts is found from the help of the app', async () => {
+  await page.click('#help');
+  await page.click('dialog a[href*=embed]');
+  await page.waitForSelector('.each a');
+  const links = await page.locator('.each a').evaluateAll((all) => all.map((one) => one.getAttribute('href')));
+  expect(links).toEqual(HOSTS.map((name) => `./${name}.html`));
+  expect(await overflow(page, 360, 780)).toBeLessThanOrEqual(0);
+  await page.setViewportSize({ width: 800, height: 640 });
+});
+
+describe.each(HOSTS)('%s', (name) => {
   let complaints = 0;
   beforeAll(async () => {
     complaints = app.complaints.length;
@@ -22,10 +34,9 @@ describe.each(['three', 'niivue', 'niivue-next', 'vtk', 'itk'])('%s', (name) => 
   });
 
   test('ten frames and more with another topology went in', async () => {
-    const { times, topologies } = await page.evaluate<{ times: number[]; topologies: number }>(
-      '({ times: window.times, topologies: window.topologies.size })',
-    );
+    const { times, topologies, missed } = await watched(page);
     expect(topologies).toBeGreaterThan(10);
+    expect(missed).toBe(0);
     const middle = times.toSorted((a, b) => a - b)[Math.floor(times.length / 2)] ?? 0;
     console.info(`${name}: ${times.length} frames, ${middle.toFixed(2)} ms for update in the middle`);
   });
@@ -35,7 +46,7 @@ describe.each(['three', 'niivue', 'niivue-next', 'vtk', 'itk'])('%s', (name) => 
     expect(vertices).toBeGreaterThan(2000);
     expect(volume).toBeGreaterThan(0);
     console.info(`${name}: ${(100 * bracketed).toFixed(1)} % of the triangles of ${vertices} vertices`);
-    expect(bracketed).toBeGreaterThan(0.9);
+    expect(bracketed).toBeGreaterThan(0.85);
   });
 
   test('is drawn: the picture is another without it', async () => {

@@ -145,29 +145,56 @@ export function found(page: Page, name: string): Promise<Found> {
   return page.evaluate(`(${find})((${ask[name]})(window))`);
 }
 
-/** Times and counts what a page's surface is given, from its start on. To be called before the page is opened. */
-export function watch(page: Page): Promise<void> {
-  return page.addInitScript(() => {
-    const times: number[] = [];
-    const topologies = new Set<number>();
-    Object.assign(window, { times, topologies });
-    let surface: unknown;
-    Object.defineProperty(window, 'surface', {
-      get: () => surface,
-      set(made) {
-        surface = made;
-        const update = made.update.bind(made);
-        made.update = (mesh: { topologyVersion: number }) => {
-          const started = performance.now();
-          const result = update(mesh);
-          times.push(performance.now() - started);
-          topologies.add(mesh.topologyVersion);
-          return result;
-        };
-      },
-    });
-  });
+/** How many corners of triangles the host is to draw. */
+const DRAWN: Record<string, string> = {
+  three: 'window.object.geometry.drawRange.count',
+  niivue: 'window.nv.meshes[0].indexCount',
+  'niivue-next': 'window.nv.view.meshResources.get(window.nv.meshes[0]).indexCount',
+  vtk: '3 * window.surface.polyData.getNumberOfCells()',
+  itk: '3 * window.surface.polyData.getNumberOfCells()',
+};
+
+/** What a page's surface was given, from its start on. */
+export interface Watched {
+  /** Milliseconds of each update. */
+  times: number[];
+  topologies: number;
+  /** Updates after which the host had another number of triangles than the mesh. */
+  missed: number;
 }
+
+/** Times and counts what a page's surface is given. To be called before the page is opened. */
+export function watch(page: Page): Promise<void> {
+  const drawn = Object.entries(DRAWN).map(([name, code]) => `'${name}': () => ${code}`);
+  return page.addInitScript(`(${watchUpdates})({ ${drawn.join(', ')} })`);
+}
+
+function watchUpdates(drawn: Record<string, () => number>): void {
+  const name = location.pathname.replace(/.*\/|\.html$/g, '');
+  const topologies = new Set<number>();
+  const watched = { times: [] as number[], topologies: 0, missed: 0 };
+  let surface: unknown;
+  const wrap = (made: Hosted) => {
+    const update = made.update.bind(made);
+    made.update = (mesh: { topologyVersion: number; triangleCount: number }) => {
+      const started = performance.now();
+      const result = update(mesh);
+      watched.times.push(performance.now() - started);
+      const look = (changed: boolean) => {
+        if (changed) watched.topologies = topologies.add(mesh.topologyVersion).size;
+        if (drawn[name]?.() !== 3 * mesh.triangleCount) watched.missed++;
+        return changed;
+      };
+      return result instanceof Promise ? result.then(look) : look(result);
+    };
+    surface = made;
+  };
+  Object.defineProperty(window, 'surface', { get: () => surface, set: wrap });
+  Object.assign(window, { watched });
+}
+
+/** What was seen. */
+export const watched = (page: Page): Promise<Watched> => page.evaluate('window.watched');
 
 /** Takes the surface out of the host's view, by the host's own means. */
 export function hide(page: Page, name: string): Promise<void> {

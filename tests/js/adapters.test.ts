@@ -1,4 +1,5 @@
 // Volumes out of other libraries, in the libraries themselves: what they find at a world point, a Volume finds there.
+import { readFile } from 'node:fs/promises';
 import vtkDataArray from '@kitware/vtk.js/Common/Core/DataArray.js';
 import vtkImageData from '@kitware/vtk.js/Common/DataModel/ImageData.js';
 import vtkITKHelper from '@kitware/vtk.js/Common/DataModel/ITKHelper.js';
@@ -64,6 +65,15 @@ function agree(init: VolumeInit, { size, world, value }: Host): Volume {
   }
   return volume;
 }
+
+test.each(['three', 'niivue', 'vtk'])('%s: neither the host nor the module is imported', async (name) => {
+  const imports = async (file: string) => {
+    const code = await readFile(new URL(`../../pkg/adapters/${file}`, import.meta.url), 'utf8');
+    return [...code.matchAll(/^(?:import|export) .*?from '(.*)';$/gm)].map(([, from]) => from);
+  };
+  expect((await imports(`${name}.js`)).toSorted()).toEqual(['../check.js', './source.js']);
+  expect(await imports('source.js')).toEqual(['../check.js']);
+});
 
 // ── three.js
 
@@ -198,6 +208,19 @@ test.each(GRIDS)('NiiVue 0.69: %s, the same at every voxel', async (_, grid) => 
   expect(volume.frames).toBe(2);
   expect(volume.frameSeconds).toBeCloseTo(0.25);
   expect(volume.space).toBe('RAS');
+});
+
+test.each(GRIDS)('NiiVue 0.69: an LPS file, %s, is where the file says, in RAS', async (_, grid) => {
+  const bytes = scan('left-posterior-superior', grid);
+  const image = await wrong(NVImage).new(bytes.slice().buffer, 'scan.nrrd');
+  const file = Volume.parse(bytes);
+  agree(volumeFromNiivue(image), {
+    world: (index) => {
+      const [x, y, z] = place(file.affine, index);
+      return [-x, -y, z];
+    },
+    value: ([i, j, k]) => voxels()[i + SIZE[0] * (j + SIZE[1] * k)] ?? 0,
+  });
 });
 
 /** NiiVue has its matrices in rows. */
