@@ -3,7 +3,7 @@ import { fileURLToPath } from 'node:url';
 import { defineConfig, type Plugin } from 'vite';
 
 /** A live page for each host that there is an adapter for. */
-const EMBEDS = ['index', 'three', 'niivue', 'niivue-next', 'vtk', 'itk'];
+const EMBEDS = ['index', 'three', 'niivue', 'niivue-next', 'vtk', 'itk', 'element'];
 
 const here = (path: string) => fileURLToPath(new URL(path, import.meta.url));
 

@@ -20,7 +20,15 @@ test('the list of hosts is found from the help of the app', async () => {
   await page.click('dialog a[href*=embed]');
   await page.waitForSelector('.each a');
   const links = await page.locator('.each a').evaluateAll((all) => all.map((one) => one.getAttribute('href')));
-  expect(links).toEqual(HOSTS.map((name) => `./${name}.html`));
+  expect(links).toEqual([...HOSTS, 'element'].map((name) => `./${name}.html`));
+  expect(await overflow(page, 360, 780)).toBeLessThanOrEqual(0);
+  await page.setViewportSize({ width: 800, height: 640 });
+});
+
+test('a plain page, without a script of its own', async () => {
+  await page.goto(`${app.address}embed/element.html`);
+  await page.waitForSelector('vesicle-lab[data-state=done]');
+  expect(await page.locator('vesicle-lab output').textContent()).toMatch(/^Done: [\d,]+ vertices/);
   expect(await overflow(page, 360, 780)).toBeLessThanOrEqual(0);
   await page.setViewportSize({ width: 800, height: 640 });
 });
