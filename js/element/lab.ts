@@ -13,6 +13,10 @@ export type LabMethod = keyof typeof MODELS;
 /** What a lab is doing; its attribute `data-state` says so, too. */
 export type LabState = 'loading' | 'running' | 'paused' | 'done' | 'error';
 
+/** Milliseconds of steps between two pictures, about, and the most steps. */
+const SLICE = 60;
+const MOST_STEPS = 256;
+
 const ATTRIBUTES = ['src', 'method', 'levels', 'params', 'ellipsoids'];
 
 /**
@@ -20,8 +24,8 @@ const ATTRIBUTES = ['src', 'method', 'levels', 'params', 'ellipsoids'];
  *
  * Attributes: `src`, the file; `method`, `deformable` (a volume, the default), `implicit` (points), `tracking` (a volume
  * with frames) or `multires` (a mesh, with `ellipsoids` as JSON); `params` of the method as JSON; `levels` of the pyramid;
- * `paused`, not to begin by itself. A change of one of them, but `paused`, begins anew. Events: `vesicle-step` with a
- * `StepReport` as `detail`, `vesicle-done`, `vesicle-error` with the error. The parts `view`, `controls` and `status` can be
+ * `paused`, not to begin by itself. A change of one of them, but `paused`, begins anew. Events: `vesicle-step` after one
+ * step or a few, with a `StepReport` as `detail`, `vesicle-done`, `vesicle-error` with the error. The parts `view`, `controls` and `status` can be
  * styled.
  */
 export class VesicleLab extends HTMLElement {
@@ -33,10 +37,8 @@ export class VesicleLab extends HTMLElement {
   });
   #view: View | undefined;
   #model: Stepper | undefined;
-  #stop: AbortController | undefined;
   /** Counts openings: what an earlier one brings comes too late. */
   #opening = 0;
-  #drawing = false;
   #from: Vec3 = [0, -1, 0];
   #framed = false;
 
@@ -104,22 +106,27 @@ export class VesicleLab extends HTMLElement {
   async play(): Promise<void> {
     const model = this.#model;
     if (!model || this.state === 'running' || this.state === 'done') return;
-    const stop = new AbortController();
-    this.#stop = stop;
     this.#is('running', 'Running.');
     try {
-      this.#ended(await model.run({ signal: stop.signal, onStep: (report) => this.#stepped(report) }));
-      await this.#show();
+      // Slices that are answered one by one: however fast the steps, the page is never behind.
+      for (let steps = 1; this.#runs(model); ) {
+        const began = performance.now();
+        await this.#go(model, steps);
+        const took = performance.now() - began;
+        steps = took < SLICE / 2 ? Math.min(2 * steps, MOST_STEPS) : took > SLICE ? Math.ceil(steps / 2) : steps;
+      }
     } catch (error) {
-      if (!stop.signal.aborted) this.#fail(error);
+      if (model === this.#model) this.#fail(error);
     }
   }
 
-  /** Stops after the step it is at. */
+  #runs(model: Stepper): boolean {
+    return this.state === 'running' && model === this.#model;
+  }
+
+  /** Stops after the steps it is at. */
   pause(): void {
-    if (this.state !== 'running') return;
-    this.#stop?.abort();
-    this.#is('paused', 'Paused.');
+    if (this.state === 'running') this.#is('paused', 'Paused.');
   }
 
   /** One step of the method. */
@@ -128,24 +135,23 @@ export class VesicleLab extends HTMLElement {
     if (!model || this.state === 'done') return;
     this.pause();
     try {
-      const report = await model.step();
-      this.#stepped(report);
-      if (report.done) this.#ended(report);
-      await this.#show();
+      await this.#go(model, 1);
     } catch (error) {
-      this.#fail(error);
+      if (model === this.#model) this.#fail(error);
     }
   }
 
-  #stepped(report: StepReport): void {
+  /** So many steps, and what came of them on the screen. */
+  async #go(model: Stepper, steps: number): Promise<void> {
+    const report = await model.step(steps);
+    if (model !== this.#model) return;
     this.#parts.figures(report);
     this.dispatchEvent(new CustomEvent('vesicle-step', { detail: report }));
-    // One surface on its way at a time: the worker makes no more than are drawn.
-    if (!this.#drawing) void this.#show().catch(() => undefined);
+    if (report.done) this.#ended(report);
+    await this.#show();
   }
 
-  #ended({ vertices, components, done }: StepReport): void {
-    if (!done) return;
+  #ended({ vertices, components }: StepReport): void {
     const parts = components === 1 ? 'one component' : `${components} components`;
     this.#is('done', `Done: ${vertices.toLocaleString('en')} vertices in ${parts}.`);
     this.dispatchEvent(new CustomEvent('vesicle-done'));
@@ -153,18 +159,12 @@ export class VesicleLab extends HTMLElement {
 
   async #show(): Promise<void> {
     const model = this.#model;
-    if (!model) return;
-    this.#drawing = true;
-    try {
-      const arrays = (await model.mesh.arrays()) as MeshArrays;
-      if (model !== this.#model || arrays.indices.length === 0) return;
-      this.#view?.show(arrays);
-      // What it came to may be much smaller than what it began with.
-      if (!this.#framed || this.state === 'done') this.#view?.frame(this.#from);
-      this.#framed = true;
-    } finally {
-      this.#drawing = false;
-    }
+    const arrays = (await model?.mesh.arrays()) as MeshArrays | undefined;
+    if (model !== this.#model || !arrays?.indices.length) return;
+    this.#view?.show(arrays);
+    // What it came to may be much smaller than what it began with.
+    if (!this.#framed || this.state === 'done') this.#view?.frame(this.#from);
+    this.#framed = true;
   }
 
   #fail(error: unknown): void {
@@ -178,8 +178,6 @@ export class VesicleLab extends HTMLElement {
   }
 
   #close(): void {
-    this.#stop?.abort();
-    this.#stop = undefined;
     this.#model?.free();
     this.#model = undefined;
   }

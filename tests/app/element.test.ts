@@ -102,8 +102,11 @@ test('paused it waits; step, play and reset do what they say, and it tells of ev
   await press('Play');
   await state('done');
   const told = (await page.evaluate('told')) as unknown[];
-  expect(told.at(-1)).toBe('vesicle-done');
-  expect(told.slice(0, 3)).toEqual([1, 2, 3]);
+  expect(told.filter((one) => one === 'vesicle-done')).toEqual([told.at(-1)]);
+  // One after the other, some steps at a time.
+  const steps = told.slice(0, -1).map(Number);
+  expect(steps).toEqual(steps.toSorted((a, b) => a - b));
+  expect(steps.length).toBeGreaterThan(5);
   await press('Reset');
   await state('paused');
   expect(await words()).toBe('Ready.');
