@@ -37,14 +37,11 @@ export function parseFiles(files: NamedBytes[]): Volume {
   return Volume.parse(header.bytes, { data: data.bytes });
 }
 
-/** A volume from files of any format that is read here, one's own or that of others. */
-export async function readFiles(files: NamedBytes[]): Promise<Volume> {
-  const foreign = await readForeign(files);
-  return foreign ? new Volume(foreign) : parseFiles(files);
-}
-
+/** A computed volume, or one from files of any format that is read here, one's own or that of others. */
 export async function volumeFrom(source: VolumeSource): Promise<Volume> {
-  return 'files' in source ? readFiles(source.files) : new Volume(shapeVoxels(source.shape));
+  if (!('files' in source)) return new Volume(shapeVoxels(source.shape));
+  const foreign = await readForeign(source.files);
+  return foreign ? new Volume(foreign) : parseFiles(source.files);
 }
 
 /** The volume reduced to what the page shows: its first frame, or so many of them after each other. */
