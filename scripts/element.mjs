@@ -1,7 +1,5 @@
 // Makes `<vesicle-lab>`: its code with three.js in one file, and its types; the library is the one beside it.
-import { copyFile } from 'node:fs/promises';
-import { join } from 'node:path';
-import { build } from 'vite';
+import { bundle } from './bundle.mjs';
 import { at, must, tool } from './shell.mjs';
 
 /** What the element shares with the package stays where it is. */
@@ -14,15 +12,6 @@ const shared = {
 
 /** Writes `pkg/element.js` and its types; needs the rest of the package. */
 export async function makeElement() {
-  const outDir = at('target/element');
-  await build({
-    ...{ configFile: false, logLevel: 'warn', publicDir: false, plugins: [shared] },
-    build: {
-      ...{ target: 'es2022', outDir, emptyOutDir: true, minify: true },
-      rolldownOptions: { output: { minify: true } },
-      lib: { entry: at('js/element/index.ts'), formats: ['es'], fileName: () => 'element.js' },
-    },
-  });
-  await copyFile(join(outDir, 'element.js'), at('pkg/element.js'));
+  await bundle('element', 'js/element/index.ts', shared, true);
   await must(tool('tsc'), ['-p', at('js/element')]);
 }

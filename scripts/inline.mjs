@@ -1,8 +1,7 @@
 // Makes the package once more as a single file with the wasm module inside, for pages that may not fetch anything.
-import { copyFile, readFile } from 'node:fs/promises';
-import { join } from 'node:path';
+import { readFile } from 'node:fs/promises';
 import { gzipSync } from 'node:zlib';
-import { build } from 'vite';
+import { bundle } from './bundle.mjs';
 import { at } from './shell.mjs';
 
 /** In place of `module.js`: the module itself, compressed, as text. */
@@ -22,15 +21,7 @@ export function ownModule() {
 /** Writes `pkg/inline.js`; needs the rest of the package. */
 export async function makeInline() {
   const inside = await moduleInside();
-  const outDir = at('target/inline');
-  await build({
-    ...{ configFile: false, logLevel: 'warn', publicDir: false },
-    plugins: [{ name: 'module-inside', load: (id) => (id === at('pkg/module.js') ? inside : undefined) }],
-    build: {
-      // Smaller would be hardly smaller, and what is out of bundlers' sight would come into it.
-      ...{ target: 'es2022', outDir, emptyOutDir: true, minify: false },
-      lib: { entry: at('pkg/index.js'), formats: ['es'], fileName: () => 'inline.js' },
-    },
-  });
-  await copyFile(join(outDir, 'inline.js'), at('pkg/inline.js'));
+  const plugin = { name: 'module-inside', load: (id) => (id === at('pkg/module.js') ? inside : undefined) };
+  // Smaller would be hardly smaller, and what is out of bundlers' sight would come into it.
+  await bundle('inline', 'pkg/index.js', plugin, false);
 }
