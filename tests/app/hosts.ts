@@ -164,9 +164,9 @@ export interface Watched {
 }
 
 /** Times and counts what a page's surface is given. To be called before the page is opened. */
-export function watch(page: Page): Promise<void> {
+export async function watch(page: Page): Promise<void> {
   const drawn = Object.entries(DRAWN).map(([name, code]) => `'${name}': () => ${code}`);
-  return page.addInitScript(`(${watchUpdates})({ ${drawn.join(', ')} })`);
+  await page.addInitScript(`(${watchUpdates})({ ${drawn.join(', ')} })`);
 }
 
 function watchUpdates(drawn: Record<string, () => number>): void {

@@ -93,7 +93,7 @@ export function dicomSeries(grid: Grid): Given[] {
 /** Pages of 8 bits as one little-endian TIFF file, its description on the first page. */
 export function tiffStack(pages: Uint8Array[], [wide, high]: [number, number], description: string): Buffer {
   const text = Buffer.from(`${description}\0`, 'utf8');
-  const parts = [Buffer.from([0x49, 0x49, 42, 0, 0, 0, 0, 0]), text];
+  const parts: Uint8Array[] = [Buffer.from([0x49, 0x49, 42, 0, 0, 0, 0, 0]), text];
   let end = 8 + text.length;
   const directories = pages.map((page, k) => {
     parts.push(Buffer.from(page));
