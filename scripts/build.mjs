@@ -28,6 +28,7 @@ const PAPERS = [
   'CHANGELOG.md',
   'docs/extract.png',
   'docs/reconstruct.jpg',
+  'docs/start.md',
   'docs/hosts.md',
 ];
 
