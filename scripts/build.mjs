@@ -5,6 +5,7 @@ import { existsSync } from 'node:fs';
 import { copyFile, cp, mkdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
 import { makeElement } from './element.mjs';
 import { makeInline } from './inline.mjs';
+import { writeNotices } from './licences.mjs';
 import { setup } from './setup.mjs';
 import { at, must, say, script, startedAs, tool } from './shell.mjs';
 
@@ -28,6 +29,9 @@ const PAPERS = [
   'CHANGELOG.md',
   'docs/extract.png',
   'docs/reconstruct.jpg',
+  'docs/track.jpg',
+  'docs/sculpt.jpg',
+  'docs/start.md',
   'docs/hosts.md',
 ];
 
@@ -93,6 +97,7 @@ async function assemble() {
   await must(tool('tsc'), ['-p', at('js')]);
   await makeInline();
   await makeElement();
+  await writeNotices('pkg/licences.txt', 'element');
   for (const file of PAPERS) await cp(at(file), at('pkg', file));
   await writeFile(at('pkg/package.json'), `${JSON.stringify(await manifest(), null, 2)}\n`);
 }

@@ -1,6 +1,7 @@
 import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { defineConfig, type Plugin } from 'vite';
+import { noteBundled } from '../scripts/licences.mjs';
 
 /** A live page for each host that there is an adapter for. */
 const EMBEDS = ['index', 'three', 'niivue', 'niivue-next', 'vtk', 'itk', 'element'];
@@ -37,6 +38,9 @@ function dicomBeside(): Plugin {
   };
 }
 
+/** For the notices beside the page. */
+const noted = noteBundled('app', ['@itk-wasm/dicom']);
+
 export default defineConfig({
   root: here('.'),
   // Relative addresses: the built page works from any folder of any server.
@@ -48,8 +52,8 @@ export default defineConfig({
       { find: /^vesicle$/, replacement: here('../pkg') },
     ],
   },
-  plugins: [relaxPolicyWhileDeveloping(), dicomBeside()],
-  worker: { format: 'es' },
+  plugins: [relaxPolicyWhileDeveloping(), dicomBeside(), noted.page],
+  worker: { format: 'es', plugins: () => [noted.worker] },
   build: {
     outDir: here('../dist'),
     emptyOutDir: true,

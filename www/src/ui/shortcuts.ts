@@ -88,6 +88,7 @@ function shortcutDialog(shortcuts: Shortcut[], opener: HTMLElement, signal: Abor
     list,
     h('p', {}, h('a', { href: './bench.html' }, 'Measurements: how fast it is')),
     h('p', {}, h('a', { href: './embed/index.html' }, 'In other software: three.js, NiiVue, vtk.js, itk-wasm')),
+    h('p', {}, h('a', { href: './licences.txt' }, 'Other people’s work in it, and its licences')),
     form,
   );
   opener.addEventListener('click', () => dialog.showModal(), { signal });
