@@ -2,8 +2,10 @@
 
 use super::bytes::Bytes;
 use super::steppers::shape;
+use vesicle::math::Vec3;
 use vesicle::mesh::{EditError, Mesh, TriangleMesh, count_crossings, curvature, geodesic, measure};
 use vesicle::remesh::{EdgeBounds, Trusting, decimate, remesh, restructure};
+use vesicle::spatial::{cross_section, surface_distance};
 
 /// Vertices beyond which no more edits are made.
 const MOST: usize = 200;
@@ -55,9 +57,10 @@ pub fn remeshing(data: &[u8]) {
     let bytes = &mut Bytes::new(data);
     let given = shape(bytes);
     let Ok(mut mesh) = Mesh::from_triangles(&given) else { return };
+    let edge = mesh.longest_edge();
     let (crossings, euler) = (count_crossings(&given), mesh.euler());
     for _ in 0..1 + bytes.below(3) {
-        pass(&mut mesh, bytes);
+        pass(&mut mesh, edge, bytes);
         assert_eq!(mesh.check(), Ok(()));
         assert_eq!(mesh.euler(), euler);
         let now = mesh.to_triangles();
@@ -66,8 +69,8 @@ pub fn remeshing(data: &[u8]) {
     }
 }
 
-fn pass(mesh: &mut Mesh, bytes: &mut Bytes) {
-    let min = bytes.within(0.1, 1.0) as f32;
+fn pass(mesh: &mut Mesh, edge: f32, bytes: &mut Bytes) {
+    let min = edge * bytes.within(0.2, 1.5) as f32;
     let bounds = EdgeBounds { min, max: min * bytes.within(1.9, 5.0) as f32 };
     match bytes.below(3) {
         0 => _ = decimate(mesh, bytes.below(mesh.triangle_count().min(60_000))),
@@ -82,9 +85,14 @@ fn pass(mesh: &mut Mesh, bytes: &mut Bytes) {
     }
 }
 
-fn measured(mesh: &TriangleMesh) {
+/// What is asked of any mesh gives numbers.
+pub fn measured(mesh: &TriangleMesh) {
     let found = measure(mesh);
     assert!(found.volume.is_finite() && found.area.is_finite());
     assert_eq!(curvature(mesh).mean.len(), mesh.positions.len());
     assert_eq!(geodesic(mesh, 0).map_or(0, |all| all.len()), mesh.positions.len());
+    let at = mesh.positions[0];
+    let section = cross_section(mesh, at, Vec3::new(0.6, -0.5, 0.7));
+    assert!(section.iter().flatten().all(|p| p.is_finite()), "a section at {at}");
+    assert!(surface_distance(mesh, mesh).is_ok_and(|found| found.hausdorff >= 0.0));
 }

@@ -1,8 +1,10 @@
 //! Readers of meshes and points; what was read is written in every format and read again.
 
+use super::edits::measured;
 use std::sync::Arc;
 use vesicle::io::{MeshFormat, parse_mesh, parse_points, parse_textured_mesh, write_animation, write_mesh};
 use vesicle::mesh::{Mesh, Texture, TriangleMesh, count_crossings, measure, report};
+use vesicle::remesh::decimate;
 
 /// Triangles up to which everything is asked of a mesh.
 const FEW: usize = 60;
@@ -91,11 +93,14 @@ fn check(mesh: &TriangleMesh, choice: usize) {
     let found = report(mesh).unwrap();
     let counted = measure(mesh);
     assert_eq!(counted.triangles, mesh.triangles.len());
-    if let Ok(dynamic) = Mesh::from_triangles(mesh) {
+    if let Ok(mut dynamic) = Mesh::from_triangles(mesh) {
+        assert_eq!(dynamic.check(), Ok(()));
+        decimate(&mut dynamic, mesh.triangles.len() / 2);
         assert_eq!(dynamic.check(), Ok(()));
         assert!(found.closed && found.oriented);
     }
     assert_eq!(count_crossings(mesh) > 0, found.self_intersections > 0);
+    measured(mesh);
     write(mesh, choice);
 }
 

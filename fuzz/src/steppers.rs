@@ -159,7 +159,8 @@ fn deformable_params(bytes: &mut Bytes, volume: &Volume) -> DeformableParams {
 pub fn implicit(data: &[u8]) {
     let bytes = &mut Bytes::new(data);
     let cloud = cloud(bytes);
-    let (count, options) = (cloud.points.len(), implicit_options(bytes));
+    let (count, size) = (cloud.points.len(), size(&cloud.points));
+    let options = implicit_options(bytes, size);
     let Ok(mut surface) = ImplicitSurface::new(cloud, options) else { return };
     let mut changes = bytes.below(4);
     for _ in 0..5000 {
@@ -170,7 +171,7 @@ pub fn implicit(data: &[u8]) {
         };
         if done {
             assert_healthy(surface.surface());
-            if changes == 0 || implicit_change(&mut surface, bytes, count).is_err() {
+            if changes == 0 || implicit_change(&mut surface, bytes, count, size).is_err() {
                 return;
             }
             changes -= 1;
@@ -188,9 +189,10 @@ fn implicit_change(
     surface: &mut ImplicitSurface,
     bytes: &mut Bytes,
     count: usize,
+    size: f64,
 ) -> Result<(), MethodError> {
     match bytes.below(3) {
-        0 => surface.set_params(implicit_params(bytes)),
+        0 => surface.set_params(implicit_params(bytes, size)),
         1 => {
             let saved = surface.save();
             surface.restore(&saved).unwrap_or_else(|error| panic!("its own state: {error}"));
@@ -206,9 +208,14 @@ fn implicit_change(
     }
 }
 
+/// How far the points go, about.
+fn size(points: &[Vec3]) -> f64 {
+    points.iter().map(|p| p.as_dvec3().distance(points[0].as_dvec3())).fold(0.0, f64::max)
+}
+
 /// Points on a ball, in a plane, on a line or anywhere; some in one place; large, small or far away.
 fn cloud(bytes: &mut Bytes) -> Cloud {
-    let (count, kind) = (1 + bytes.below(40), bytes.below(5));
+    let (count, kind) = (1 + bytes.below(24), bytes.below(5));
     let (scale, away) = bytes.one_of(&[(1.0, 0.0), (1.0, 0.0), (300.0, 3000.0), (1e-20, 0.0), (1e20, 0.0)]);
     let point = |_| {
         let p = match kind {
@@ -234,18 +241,18 @@ fn camera(bytes: &mut Bytes) -> Option<Camera> {
     Camera::new(rows, 16, 16, image).ok()
 }
 
-fn implicit_options(bytes: &mut Bytes) -> ImplicitOptions {
+fn implicit_options(bytes: &mut Bytes, size: f64) -> ImplicitOptions {
     ImplicitOptions {
         exterior: bytes.chance(4).then(|| (0..bytes.below(8)).map(|_| bytes.place(3.0).as_vec3()).collect()),
         cameras: (0..bytes.one_of(&[0, 0, 0, 1, 2])).filter_map(|_| camera(bytes)).collect(),
         max_points: bytes.one_of(&[20_000, 20_000, 4, 10]),
         keep_components: bytes.chance(4).then(|| 1 + bytes.below(3)),
-        params: implicit_params(bytes),
+        params: implicit_params(bytes, size),
     }
 }
 
 /// Coarse, so that a run takes milliseconds.
-fn implicit_params(bytes: &mut Bytes) -> ImplicitParams {
+fn implicit_params(bytes: &mut Bytes, size: f64) -> ImplicitParams {
     ImplicitParams {
         delta: bytes.one_of(&[0.1, 1.0, 5.0, 20.0, 100.0]),
         tau: bytes.one_of(&[0.001, 0.01, 0.025, 0.1, 1.0]),
@@ -253,7 +260,7 @@ fn implicit_params(bytes: &mut Bytes) -> ImplicitParams {
         lambda_surface: bytes.one_of(&[0.0, 0.001, 0.01, 10.0]),
         lambda_exterior: bytes.one_of(&[0.0, 2.0, 1000.0]),
         tolerance: bytes.one_of(&[1e-2, 1e-5, 1e-8, 1e-12]),
-        cell: 0.0,
+        cell: if bytes.chance(16) { 0.0 } else { size * bytes.within(0.1, 0.4) },
         level: bytes.one_of(&[Level::Zero, Level::Mean]),
         kernel: if bytes.chance(2) {
             bytes.one_of(&[KernelKind::ThinPlate, KernelKind::Biharmonic, KernelKind::Gaussian])
@@ -270,7 +277,7 @@ pub fn multires(data: &[u8]) {
     let ellipsoids = ellipsoids(bytes, 1.0);
     let options = MultiresOptions { detail, base, ellipsoids, params: multires_params(bytes) };
     let Ok(mut model) = MultiresolutionModel::new(options) else { return };
-    for _ in 0..4 {
+    for _ in 0..3 {
         match bytes.below(6) {
             0 => _ = model.set_params(multires_params(bytes)),
             1 => {
@@ -306,7 +313,7 @@ fn ellipsoid(bytes: &mut Bytes, spread: f64) -> ControlEllipsoid {
 }
 
 fn multires_params(bytes: &mut Bytes) -> MultiresParams {
-    let edge = bytes.within(0.25, 0.6);
+    let edge = bytes.within(0.35, 0.8);
     MultiresParams {
         edge_min: 0.65 * edge,
         edge_max: bytes.within(1.4, 2.0) * edge,
@@ -314,7 +321,7 @@ fn multires_params(bytes: &mut Bytes) -> MultiresParams {
         refine_factor: bytes.within(0.3, 0.9),
         smoothing: 1 + bytes.below(6) as u32,
         distribute: bytes.below(5) as u32,
-        supersample: bytes.below(3) as u32,
+        supersample: bytes.below(2) as u32,
         energy: bytes.one_of(&[Energy::Membrane, Energy::ThinPlate]),
         topology: bytes.one_of(&[Topology::Never, Topology::Split, Topology::SplitAndJoin]),
     }
@@ -322,7 +329,7 @@ fn multires_params(bytes: &mut Bytes) -> MultiresParams {
 
 pub fn tracking(data: &[u8]) {
     let bytes = &mut Bytes::new(data);
-    let dims = [3 + bytes.below(8), 3 + bytes.below(8), 1 + bytes.below(6), 2 + bytes.below(3)];
+    let dims = [2 + bytes.below(7), 2 + bytes.below(7), 1 + bytes.below(5), 2 + bytes.below(2)];
     let volume = volume(bytes, dims);
     let last = volume.dims().map(|n| n - 1);
     let bounds = bytes.chance(4).then(|| {
@@ -331,6 +338,7 @@ pub fn tracking(data: &[u8]) {
     });
     let component = if bytes.chance(2) { Component::Nearest(bytes.place(12.0)) } else { Component::Largest };
     let start = bytes.chance(5).then(|| shape(bytes));
+    let parts = start.as_ref().map_or(1, |mesh| measure(mesh).components);
     let options = TrackingOptions { volume, bounds, component, start, params: tracking_params(bytes) };
     let Ok(mut tracker) = SurfaceTracker::new(options) else { return };
     for _ in 0..200 {
@@ -340,7 +348,7 @@ pub fn tracking(data: &[u8]) {
         assert_eq!(tracker.mesh().check(), Ok(()));
         if let Some(mesh) = tracker.meshes().last() {
             let found = measure(mesh);
-            assert_eq!((found.components, count_crossings(mesh)), (1, 0));
+            assert_eq!((found.components, count_crossings(mesh)), (parts, 0));
         }
         if bytes.chance(8) {
             let saved = tracker.save();
@@ -354,7 +362,7 @@ pub fn tracking(data: &[u8]) {
 fn tracking_params(bytes: &mut Bytes) -> TrackingParams {
     let mut or_zero = |low: f64, high: f64| if bytes.chance(2) { bytes.within(low, high) } else { 0.0 };
     let [radius, time_scale] = [or_zero(1.0, 8.0), or_zero(0.1, 10.0)];
-    let edge_min = bytes.within(0.05, 0.5);
+    let edge_min = bytes.within(0.2, 0.5);
     TrackingParams {
         threshold: if bytes.chance(2) { bytes.within(0.01, 0.6) } else { 0.0 },
         window: 1 + bytes.below(4) as u32,
@@ -369,7 +377,8 @@ fn tracking_params(bytes: &mut Bytes) -> TrackingParams {
     }
 }
 
-/// Balls and rings side by side or within each other; bumps may make them cross themselves.
+/// Balls and rings side by side or within each other; bumps may make them cross themselves. Some are as small or large as
+/// numbers are.
 pub fn shape(bytes: &mut Bytes) -> TriangleMesh {
     let mut whole = TriangleMesh::default();
     for _ in 0..bytes.one_of(&[1, 1, 1, 2, 3]) {
@@ -382,6 +391,8 @@ pub fn shape(bytes: &mut Bytes) -> TriangleMesh {
         let size = bytes.within(0.0, 0.4);
         whole.positions.iter_mut().for_each(|p| *p += (bytes.direction() * size).as_vec3());
     }
+    let scale = if bytes.chance(5) { bytes.one_of(&[1e-42, 1e-25, 1e-6, 1e12, 1e20, 1e37]) } else { 1.0 };
+    whole.positions.iter_mut().for_each(|p| *p *= scale);
     whole
 }
 

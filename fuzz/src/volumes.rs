@@ -2,7 +2,7 @@
 
 use vesicle::io::{parse_volume, write_nifti};
 use vesicle::math::DVec3;
-use vesicle::volume::{Volume, marching_cubes_world};
+use vesicle::volume::{Enrichment, Volume, marching_cubes_world};
 
 /// Voxels up to which everything is asked of a volume.
 const FEW: usize = 4096;
@@ -103,6 +103,9 @@ fn derive(volume: &Volume) {
     let levels = volume.max_pyramid_levels(2.0).unwrap_or(0);
     let _ = volume.pyramid(levels.min(3), 2.0);
     let _ = volume.binned([2, 1, 3]);
+    for method in [Enrichment::Flow, Enrichment::Linear] {
+        let _ = volume.enrich_slices(Some(2), method);
+    }
 }
 
 /// What is written is read again, and written the same.
