@@ -10,7 +10,7 @@ const SECONDS = 60;
 const LONGEST = 4096;
 
 // The core has no unsafe code for a sanitizer to look into, and is twice as fast without; memory is counted by the targets.
-const BUILD = ['--sanitizer', 'none'];
+const BUILD = ['--sanitizer', 'none', '--codegen-units', '16'];
 
 async function checkTools() {
   const nightly = await run('cargo', [NIGHTLY, '--version'], { echo: false });
@@ -58,7 +58,7 @@ async function fuzz(target, seconds) {
   const before = await finds(target);
   const corpus = at('fuzz', 'corpus', target);
   await mkdir(corpus, { recursive: true });
-  const limits = [`-max_total_time=${seconds}`, `-max_len=${LONGEST}`, '-timeout=10', '-rss_limit_mb=2048'];
+  const limits = [`-max_total_time=${seconds}`, `-max_len=${LONGEST}`, '-timeout=30', '-rss_limit_mb=2048'];
   const folders = [corpus, at('fuzz', 'seeds', target)];
   const args = [NIGHTLY, 'fuzz', 'run', ...BUILD, target, ...folders, '--', ...limits, '-print_final_stats=1'];
   const { code, output } = await run('cargo', args, { echo: false });

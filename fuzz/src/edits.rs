@@ -43,7 +43,10 @@ fn edit(mesh: &mut Mesh, bytes: &mut Bytes) -> Result<(), EditError> {
         6..11 => mesh.collapse(u, w, middle),
         11 => mesh.join(u, live[bytes.below(live.len())], 0.5 + 0.4 * bytes.unit() as f32).map(drop),
         12 => mesh.remove_tetrahedron(u),
-        13 => Ok(mesh.set_position(u, bytes.place(2.0).as_vec3())),
+        13 => {
+            mesh.set_position(u, bytes.place(2.0).as_vec3());
+            Ok(())
+        }
         _ => {
             let common = mesh.common_neighbours(u, w);
             let o = *common.get(bytes.below(common.len().max(1))).ok_or(EditError::IsTriangle)?;

@@ -76,7 +76,7 @@ fn use_mesh(data: &[u8]) {
         Ok(mesh) => check(&mesh, data.len()),
         Err(error) => is_short(&error.to_string()),
     }
-    if data.len() % 4 != 0 {
+    if !data.len().is_multiple_of(4) {
         return;
     }
     let picture = Texture::new(b"\x89PNG\r\n\x1a\n".to_vec()).map(Arc::new);

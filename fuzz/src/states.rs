@@ -74,7 +74,7 @@ scene!(small_deformable, DeformableModel, steppers::small_deformable());
 target!(deformable, deformable_seed, small_deformable, |model: &DeformableModel| [model.mesh().clone()]);
 
 scene!(small_implicit, ImplicitSurface, steppers::small_implicit());
-target!(implicit, implicit_seed, small_implicit, |_: &ImplicitSurface| [Mesh::default(); 0]);
+target!(implicit, implicit_seed, small_implicit, |_: &ImplicitSurface| Vec::<Mesh>::new());
 
 scene!(small_multires, MultiresolutionModel, steppers::small_multires());
 target!(multires, multires_seed, small_multires, |model: &MultiresolutionModel| [

@@ -26,7 +26,10 @@ pub fn of(target: &str) -> Vec<Seed> {
             "extension.nii.gz",
             "usec_4d.nii.gz",
             "rgb24.nii.gz",
-        ]),
+        ])
+        .into_iter()
+        .chain([far_away("two_big_i2_4d.nii")])
+        .collect(),
         "nrrd" => made(&[
             "ascii.nrrd",
             "u1_little.nrrd",
@@ -40,7 +43,10 @@ pub fn of(target: &str) -> Vec<Seed> {
         .into_iter()
         .chain([hex()])
         .collect(),
-        "metaimage" => made(&["u1.mha", "f4.mha", "frames.mha", "compressed.mha"]),
+        "metaimage" => made(&["u1.mha", "f4.mha", "frames.mha", "compressed.mha"])
+            .into_iter()
+            .chain([far_away("u1.mha")])
+            .collect(),
         "volume_pair" => pairs(),
         "gzip" => (0..3).map(|kind| (format!("deflated-{kind}"), deflated(kind))).collect(),
         "ply" => [mesh(MeshFormat::Ply), text_ply()].concat(),
@@ -82,6 +88,19 @@ fn hex() -> Seed {
         "hex.nrrd".into(),
         format!("{header}space: LAS\nspace directions: (1,0,0) (0,2,0)\n\n0001 00ff 7fff 8000\n").into(),
     )
+}
+
+/// A file whose voxels lie where no position in `f32` can be.
+fn far_away(file: &str) -> Seed {
+    let mut bytes = data(file);
+    if file.ends_with(".nii") {
+        // The last number of the first row of a big-endian NIfTI-2.
+        bytes[424..432].copy_from_slice(&1e300_f64.to_be_bytes());
+    } else {
+        let text = String::from_utf8_lossy(&bytes).replacen("Offset = 10", "Offset = 1e300", 1);
+        bytes = text.into_bytes();
+    }
+    (format!("found-far-away-{file}"), bytes)
 }
 
 fn pairs() -> Vec<Seed> {
