@@ -9,7 +9,7 @@ const SECONDS = 60;
 /** Longer inputs are slower and find no more. */
 const LONGEST = 4096;
 
-// The core has no unsafe code for a sanitizer to look into, and is twice as fast without; memory is counted by the targets.
+// The core has no unsafe code of its own for a sanitizer to look into; memory is counted by the targets.
 const BUILD = ['--sanitizer', 'none', '--codegen-units', '16'];
 
 async function checkTools() {
