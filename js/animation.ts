@@ -19,8 +19,9 @@ import { RawAnimation } from './vesicle.js';
 export function animationGlb(frames: readonly Mesh[], options: { frameSeconds?: number } = {}): Uint8Array {
   const { frameSeconds = 0.1 } = knownOnly('options', options, ['frameSeconds']);
   number('frameSeconds', frameSeconds, { min: 0.001, max: 1000 });
-  if (list('frames', frames).length === 0) throw invalid('frames', 'there are none; at least one Mesh is needed');
-  const handles = frames.map((frame, at) => meshHandle(`frames[${at}]`, frame));
+  const meshes = list('frames', frames);
+  if (meshes.length === 0) throw invalid('frames', 'there are none; at least one Mesh is needed');
+  const handles = meshes.map((frame, at) => meshHandle(`frames[${at}]`, frame));
   const animation = call(() => new RawAnimation());
   try {
     for (const handle of handles) handle.use((mesh) => animation.add(mesh));

@@ -114,9 +114,9 @@ export function knownOnly<T extends object>(
   return value;
 }
 
-/** An array of things. */
+/** An array of things, holes among them as `undefined`, which `map` would leave out. */
 export function list<T>(parameter: string, value: readonly T[]): readonly T[] {
-  if (Array.isArray(value)) return value;
+  if (Array.isArray(value)) return Array.from(value);
   throw invalid(parameter, `${shown(value)}; an array is needed`);
 }
 

@@ -48,6 +48,7 @@ const HOSTILE: [string, unknown][] = [
   ['half a letter', '\ud800'],
   ['an empty list', []],
   ['a list of holes', new Array(3)],
+  ['a list of nothing', [undefined, null]],
   ['a list of numbers', [0, 0, 0]],
   ['a list of NaN', [Number.NaN, Number.NaN, Number.NaN]],
   ['a list of lists', [[[[]]]]],
@@ -213,8 +214,15 @@ describeEach('%s: freed, it says so', async (make) => {
   object.free();
 });
 
-test('no argument of a constructor or a static method breaks anything', async () => {
+test('no argument of a constructor, a static method or a function breaks anything', async () => {
   const bad: string[] = [];
+  const functions = { animationGlb: vesicle.animationGlb, paramSpecs: vesicle.paramSpecs, version: vesicle.version };
+  for (const [name, work] of Object.entries(functions)) {
+    for (const [what, value] of HOSTILE) {
+      const came = await outcome(() => loose(work)(value, value));
+      if (!isForeseen(came)) bad.push(`${name}(${what}): ${came}`);
+    }
+  }
   for (const type of Object.keys(MAKERS)) {
     const made = loose(vesicle)[type];
     const statics = Object.getOwnPropertyNames(made).filter((name) => typeof made[name] === 'function');
