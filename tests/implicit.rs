@@ -348,7 +348,7 @@ fn a_restored_run_goes_on_bit_for_bit() {
             break;
         }
     }
-    // At its end a state once counted a slice that its own copy did not.
+    // At its end, and while solving, a state once counted slices that its own copy did not.
     let mut resumed = begun();
     resumed.restore(&running.save()).unwrap();
     assert!(resumed.save() == running.save());

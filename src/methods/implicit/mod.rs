@@ -267,8 +267,9 @@ impl ImplicitSurface {
             Stage::Color(painting) => self.color(*painting),
             Stage::Done => Stage::Done,
         };
-        let goes_on = self.stage.phase() == before && !matches!(self.stage, Stage::Done);
-        self.slices = if goes_on { slices + 1 } else { 0 };
+        // The solver knows how far it is, and at the end nothing goes on.
+        let counts = self.stage.phase() == before && !matches!(self.stage, Stage::Solve(_) | Stage::Done);
+        self.slices = if counts { slices + 1 } else { 0 };
         Ok(())
     }
 
