@@ -6,15 +6,12 @@ use super::schedule::Rest;
 use super::{Attractor, DeformableModel, DeformableParams, delta_at};
 use crate::mesh::{Mesh, VertexId};
 use crate::methods::MethodError;
-use crate::methods::saved::{Hash, Mark, opened, sealed};
+use crate::methods::saved::{Hash, MOST_NEIGHBOURS, Mark, can_be_checked, opened, sealed};
 use crate::remesh::{Resolver, Waiting};
 use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
 
 const MARK: Mark = *b"VSCLDEF\x02";
-
-/// More neighbours than any edit leaves a vertex, and few enough to check.
-const MOST_NEIGHBOURS: usize = 4096;
 
 /// Everything a run has beside its volume.
 #[derive(Serialize, Deserialize)]
@@ -68,7 +65,7 @@ impl DeformableModel {
     fn check_state(&self, state: &State) -> Result<(), MethodError> {
         let bad = |field, problem: String| Err(MethodError::BadState { field, problem });
         state.params.validate()?;
-        if state.mesh.rings().iter().any(|ring| ring.valence() > MOST_NEIGHBOURS) {
+        if !can_be_checked(&state.mesh) {
             return bad("mesh", format!("a vertex has more than {MOST_NEIGHBOURS} neighbours"));
         }
         if let Err(flaw) = state.mesh.check() {

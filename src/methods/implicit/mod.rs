@@ -121,7 +121,7 @@ pub struct ImplicitSurface {
     /// In force, of samples, exterior and edits.
     constraints: Constraints,
     stage: Stage,
-    /// Slices of work that the stage has had.
+    /// Slices of work that the stage has had, where it does not know by itself.
     slices: u32,
     solved: Option<Solved>,
     /// The edits at the last solve from the start: later ones revise its system.

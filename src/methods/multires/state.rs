@@ -7,7 +7,7 @@ use super::{MultiresParams, MultiresolutionModel};
 use crate::math::Vec3;
 use crate::mesh::Mesh;
 use crate::methods::MethodError;
-use crate::methods::saved::{Hash, Mark, opened, sealed};
+use crate::methods::saved::{Hash, Mark, can_be_checked, opened, sealed};
 use serde::{Deserialize, Serialize};
 
 const MARK: Mark = *b"VSCLMRS\x02";
@@ -59,7 +59,9 @@ impl MultiresolutionModel {
         if state.params.validate().is_err() || !state.movers.are_sound() {
             return bad("parameters", "they are out of range");
         }
-        if state.surface.check().is_err() || state.link.len() != state.surface.slots() {
+        let is_sound = can_be_checked(&state.surface) && state.surface.check().is_ok();
+        let is_like_this = state.surface.attribute_counts() == self.surface.attribute_counts();
+        if !is_sound || !is_like_this || state.link.len() != state.surface.slots() {
             return bad("surface", "its parts do not fit each other");
         }
         let Some(link) = self.linked(&state.link) else { return bad("link", "it leads nowhere") };

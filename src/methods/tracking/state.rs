@@ -7,11 +7,8 @@ use super::{Component, SurfaceTracker, TrackingParams};
 use crate::math::Vec3;
 use crate::mesh::{Mesh, TriangleMesh};
 use crate::methods::MethodError;
-use crate::methods::saved::{Hash, Mark, opened, sealed};
+use crate::methods::saved::{Hash, Mark, can_be_checked, opened, sealed};
 use serde::{Deserialize, Serialize};
-
-/// Checking a mesh takes the square of this for a vertex; the surfaces of real runs stay far below.
-const MOST_NEIGHBOURS: usize = 4096;
 
 const MARK: Mark = *b"VSCLTRK\x01";
 
@@ -82,7 +79,7 @@ impl SurfaceTracker {
         if !frames_fit || !boundary_fits || state.edge.is_some() == meshes.is_empty() {
             return bad("frames", "their parts do not fit each other");
         }
-        if state.mesh.rings().iter().any(|ring| ring.valence() > MOST_NEIGHBOURS)
+        if !can_be_checked(&state.mesh)
             || state.mesh.attribute_counts() != self.start.attribute_counts()
             || state.mesh.check().is_err()
             || meshes.iter().any(|mesh| mesh.validate().is_err())
