@@ -81,8 +81,9 @@ export class ExtractLab {
   readonly #banner = new ErrorBanner(() => this.#dismiss());
   readonly #canvas = h('canvas', {
     tabindex: 0,
-    role: 'img',
-    'aria-label': '3D view of the surface and the slices. Arrow keys turn it, plus and minus zoom.',
+    role: 'application',
+    'aria-label':
+      '3D view of the surface and the slices. Arrow keys turn it, plus and minus zoom; while attractors are placed, Enter is a click in its middle.',
   });
   readonly #slices = h('div', { class: 'slices' });
   readonly #drop = h('div', { class: 'drop', hidden: true }, 'Drop a volume to open it');
