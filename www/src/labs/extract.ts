@@ -26,7 +26,7 @@ import { FigurePanel } from '../ui/figure';
 import { acceptDrops, fileChooser, readFiles } from '../ui/files';
 import { count, plural } from '../ui/format';
 import { Histogram } from '../ui/histogram';
-import { History } from '../ui/history';
+import { History, underWay } from '../ui/history';
 import { EventLog } from '../ui/log';
 import { MeasurePanel } from '../ui/measures';
 import { ParamControls } from '../ui/params';
@@ -710,7 +710,9 @@ export class ExtractLab {
   }
 
   #onReports(reports: StepReport[]): void {
-    if (this.#history.add(reports)) this.#transport.showReport(reports.at(-1));
+    if (!this.#history.add(reports)) return;
+    this.#transport.showReport(reports.at(-1));
+    if (this.#state.value === 'running') this.#status.report(() => underWay(this.#history));
   }
 
   #showMeasures({ measures }: SnapshotEvent): void {

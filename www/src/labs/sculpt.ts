@@ -5,6 +5,7 @@ import { lastFrame } from '../sculpt/film';
 import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
 import type { FrameEvent, Opened, ParamValues, SculptShade, Shown, WorkerEvent } from '../sculpt/protocol';
 import type { LabState } from '../state';
+import { wantsStillness } from '../ui/dom';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { SculptViewOptions } from '../view/sculpture';
@@ -169,7 +170,8 @@ export class SculptLab implements Lab {
     if (preset?.stages) this.#results.showStages(preset.stages);
     await this.#settings.setFilm(film, 0);
     await this.#client.request('show', this.#shown);
-    await this.#client.request(film && !linked?.pose ? 'play' : 'settle', undefined);
+    const endless = film?.loop === true && wantsStillness();
+    await this.#client.request(film && !linked?.pose && !endless ? 'play' : 'settle', undefined);
   }
 
   #openVariant(preset: SculptPreset, { name, params, pose }: SculptVariant): void {
