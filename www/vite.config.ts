@@ -12,12 +12,24 @@ function relaxPolicyWhileDeveloping(): Plugin {
   };
 }
 
+/** Names every built file, for the service worker to keep. */
+function listFiles(): Plugin {
+  return {
+    name: 'list-files',
+    apply: 'build',
+    generateBundle(_, bundle) {
+      const names = Object.keys(bundle).filter((name) => name.startsWith('assets/'));
+      this.emitFile({ type: 'asset', fileName: 'files.json', source: `${JSON.stringify(names.sort(), null, 1)}\n` });
+    },
+  };
+}
+
 export default defineConfig({
   root: here('.'),
   // Relative addresses: the built page works from any folder of any server.
   base: './',
   resolve: { alias: { vesicle: here('../pkg') } },
-  plugins: [relaxPolicyWhileDeveloping()],
+  plugins: [relaxPolicyWhileDeveloping(), listFiles()],
   worker: { format: 'es' },
   build: {
     outDir: here('../dist'),

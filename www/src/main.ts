@@ -2,6 +2,7 @@ import './style.css';
 import { spawnAhead } from './channel';
 import { spawnExtract } from './client';
 import type { Lab, LabKind, PassedOn } from './labs/labs';
+import { workOffline } from './offline';
 import { spawnReconstruct } from './reconstruct/client';
 import { spawnSculpt } from './sculpt/client';
 import { spawnTrack } from './track/client';
@@ -85,7 +86,7 @@ class Labs {
       void this.#lab.start(passedOn);
     } catch (error) {
       this.#root.dataset.state = 'error';
-      this.#root.textContent = `This page needs WebGL 2 and Web Workers, and could not use them here: ${error instanceof Error ? error.message : error}`;
+      this.#root.textContent = `This page needs WebAssembly and Web Workers, and could not use them here; another or a newer browser may. It said: ${error instanceof Error ? error.message : error}`;
     }
   }
 
@@ -122,3 +123,4 @@ const lab = document.getElementById('lab');
 const help = document.getElementById('help');
 const nav = document.getElementById('labs');
 if (lab && help && nav) new Labs(lab, help, nav);
+workOffline();

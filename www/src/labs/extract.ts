@@ -398,7 +398,7 @@ export class ExtractLab {
   /** Starts the model over, with the parameters as they are. */
   async #reset(): Promise<void> {
     if (!this.#volume || this.#state.value === 'loading') return;
-    if (this.#engineBroken && this.#source) return this.#open(this.#source);
+    if (this.#engineBroken && this.#source) return this.#recover(this.#source);
     const forget = this.#rewinder.remember('Reset');
     this.#enterLoading('Starting over.');
     try {
@@ -482,6 +482,35 @@ export class ExtractLab {
     this.#shown = undefined;
     await this.#greet();
     this.#engineBroken = false;
+    await this.#client.request('shade', this.#shade);
+  }
+
+  /** Another engine, with the volume and the settings as they were, in the last state that was kept. */
+  async #recover(source: Source): Promise<void> {
+    const turn = ++this.#turn;
+    this.#enterLoading('Starting the engine again.');
+    try {
+      await this.#restartEngine();
+      const volume = await source.volume();
+      if (turn !== this.#turn) return;
+      const setup = this.#setup(this.#start.inForce, this.#params);
+      const ready = await this.#client.request(
+        'load',
+        { name: source.name, source: volume, setup },
+        transferable(volume),
+      );
+      // The new engine does not know the slices yet.
+      this.#stage.goTo(this.#stage.crosshair);
+      const { last } = this.#rewinder;
+      if (last) await this.#client.request('restore', last.saved);
+      if (last) this.#adoptMoment(last);
+      else this.#adoptModel(ready);
+      this.#status.say(
+        `Started again ${last ? `from iteration ${count(last.saved.iteration)}` : 'from the beginning'}.`,
+      );
+    } catch (error) {
+      if (turn === this.#turn) this.#fail('The engine could not be started again.', error);
+    }
   }
 
   // ── running ───────────────────────────────────────────────────────────────────────────────────
@@ -520,7 +549,7 @@ export class ExtractLab {
   }
 
   #setPlanes(planes: Plane[]): void {
-    this.#ask(this.#client.request('planes', planes));
+    if (!this.#engineBroken) this.#ask(this.#client.request('planes', planes));
   }
 
   async #setParam(name: string, value: unknown): Promise<void> {

@@ -1,0 +1,255 @@
+import { gzipSync } from 'node:zlib';
+import type { Page } from 'playwright-core';
+import { afterEach, describe, expect, test } from 'vitest';
+import { type App, drop, iteration, measures, openApp, reach, recordStates } from './browser';
+import { ball } from './volumes';
+
+const LABS = ['extract', 'reconstruct', 'track', 'sculpt'];
+
+let app: App;
+let page: Page;
+
+afterEach(async () => {
+  const complaints = app.complaints.splice(0);
+  await app.close();
+  expect(complaints).toEqual([]);
+});
+
+/** A lab in a page of which `prepare` was true before its own scripts ran. */
+async function openLab(lab: string, prepare: () => void = () => undefined): Promise<void> {
+  app = await openApp();
+  page = app.page;
+  await page.addInitScript(prepare);
+  await page.goto('about:blank');
+  await page.goto(`${app.address}#${lab}`);
+}
+
+const banner = () => page.locator('.banner');
+
+async function view(): Promise<string> {
+  return (await page.locator('.lab canvas[tabindex]').screenshot()).toString('base64');
+}
+
+/** How many colours the view shows. */
+async function colors(): Promise<number> {
+  return page.evaluate(
+    async (base64) => {
+      const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
+      const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+      const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+      context?.drawImage(image, 0, 0);
+      return new Set(new Uint32Array(context?.getImageData(0, 0, image.width, image.height).data.buffer ?? [])).size;
+    },
+    await view(),
+  );
+}
+
+describe.each(LABS)('the %s lab', (lab) => {
+  test('draws its view again when the graphics card gives it back', async () => {
+    await openLab(lab);
+    await page.emulateMedia({ reducedMotion: 'reduce' });
+    await page.reload();
+    await reach(page, 'done');
+    await page.locator('canvas[tabindex]').first().press('Home');
+    const before = await view();
+    const extension = await page.evaluateHandle(() => {
+      const canvas = document.querySelector<HTMLCanvasElement>('.lab canvas[tabindex]');
+      return canvas?.getContext('webgl2')?.getExtension('WEBGL_lose_context');
+    });
+    await extension.evaluate((one) => one?.loseContext());
+    await expect
+      .poll(() => page.locator('.view-note').allTextContents())
+      .toEqual([expect.stringContaining('comes back')]);
+    await extension.evaluate((one) => one?.restoreContext());
+    await expect.poll(() => page.locator('.view-note').count()).toBe(0);
+    await expect.poll(view).toBe(before);
+    expect(await colors()).toBeGreaterThan(500);
+  });
+
+  test('runs without WebGL 2, and says what is missing', async () => {
+    await openLab(lab, () => {
+      const { getContext } = HTMLCanvasElement.prototype as { getContext: (...given: unknown[]) => unknown };
+      Object.assign(HTMLCanvasElement.prototype, {
+        getContext(this: HTMLCanvasElement, kind: string, ...more: unknown[]) {
+          return kind.startsWith('webgl') ? null : getContext.call(this, kind, ...more);
+        },
+      });
+    });
+    await reach(page, 'done');
+    expect(await page.textContent('.view-note')).toContain('no WebGL 2');
+    expect(await measures(page)).toMatchObject({ closed: true });
+    await page.locator('canvas[tabindex]').first().press('ArrowLeft');
+  });
+
+  test('keeps the last surface when its worker breaks in the middle of a run, and starts again', async () => {
+    await openLab(lab, () => {
+      const { Worker } = window;
+      const all: Worker[] = [];
+      class Watched extends Worker {
+        constructor(...given: ConstructorParameters<typeof Worker>) {
+          super(...given);
+          all.push(this);
+        }
+      }
+      Object.assign(window, { Worker: Watched, all });
+    });
+    await reach(page, 'running');
+    await expect.poll(() => page.textContent('[data-measure=vertices]')).toMatch(/[1-9]/);
+    await page.evaluate(() => {
+      const { all } = window as unknown as { all: Worker[] };
+      all.at(-1)?.dispatchEvent(new ErrorEvent('error', { message: 'out of memory', cancelable: true }));
+    });
+    await page.waitForSelector('[data-state=error]');
+    expect(await banner().textContent()).toMatch(/Reset starts the engine again.*out of memory/);
+    expect(await colors()).toBeGreaterThan(100);
+    await page.click('text=Reset');
+    await reach(page, 'paused', 'running', 'done');
+    expect(await banner().isVisible()).toBe(false);
+    if (await page.isEnabled('.play')) await page.click('.play');
+    await reach(page, 'done');
+    expect(await measures(page)).toMatchObject({ closed: true });
+  });
+
+  test('goes on, or waits, in a tab that nobody sees, and shows all when it is looked at', async () => {
+    await openLab(lab, () => {
+      // As in the background: no animation frame comes.
+      const request = window.requestAnimationFrame.bind(window);
+      const held: FrameRequestCallback[] = [];
+      const state = { seen: true, messages: 0 };
+      window.requestAnimationFrame = (callback) => (state.seen ? request(callback) : held.push(callback));
+      const { Worker } = window;
+      class Counted extends Worker {
+        constructor(...given: ConstructorParameters<typeof Worker>) {
+          super(...given);
+          this.addEventListener('message', () => {
+            state.messages += 1;
+          });
+        }
+      }
+      const show = () => {
+        state.seen = true;
+        for (const callback of held.splice(0)) request(callback);
+      };
+      Object.assign(window, { Worker: Counted, tab: state, show });
+    });
+    await reach(page, 'running');
+    const hide = () =>
+      page.evaluate(() => Object.assign((window as unknown as { tab: object }).tab, { seen: false, messages: 0 }));
+    await hide();
+    // Until nothing more comes: a whole run, or what it goes on with before it waits for the page.
+    const messages = () => page.evaluate(() => (window as unknown as { tab: { messages: number } }).tab.messages);
+    let count = -1;
+    await expect
+      .poll(
+        async () => {
+          const before = count;
+          count = await messages();
+          return count === before;
+        },
+        { interval: 1500 },
+      )
+      .toBe(true);
+    expect(count).toBeLessThan(60);
+    await page.evaluate(() => (window as unknown as { show: () => void }).show());
+    await reach(page, 'done');
+    expect(await measures(page)).toMatchObject({ closed: true });
+    expect(await colors()).toBeGreaterThan(500);
+  });
+
+  test('bears whatever is pressed in whatever order', async () => {
+    await openLab(lab);
+    await reach(page, 'running', 'done');
+    const keys = [' ', 's', 'd', 'r', 'Control+z', 'Control+y', 'Escape', ' ', 'ArrowLeft'];
+    const examples = await page.locator('.data select option:not([hidden])').count();
+    let seed = 20261123;
+    const random = (below: number) => {
+      seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0;
+      return Math.floor((seed / 2 ** 32) * below);
+    };
+    await page.locator('canvas[tabindex]').first().focus();
+    for (let i = 0; i < 60; i++) {
+      if (i % 20 === 19) await page.selectOption('.data select', { index: 1 + random(Math.min(3, examples - 1)) });
+      await page
+        .locator('canvas[tabindex]')
+        .first()
+        .press(keys[random(keys.length)] ?? ' ');
+    }
+    await page.selectOption('.data select', { index: 1 });
+    await reach(page, 'done', 'paused', 'running');
+    expect(await banner().isVisible()).toBe(false);
+    await page.keyboard.press('r');
+    await reach(page, 'paused');
+    expect(await iteration(page)).toBe(0);
+  });
+
+  test('needs no storage', async () => {
+    await openLab(lab, () => {
+      const refuse = {
+        get(): never {
+          throw new DOMException('The operation is insecure.', 'SecurityError');
+        },
+      };
+      for (const name of ['localStorage', 'sessionStorage', 'caches', 'indexedDB'])
+        Object.defineProperty(window, name, refuse);
+      Object.assign(ServiceWorkerContainer.prototype, {
+        register: () => Promise.reject(new DOMException('The operation is insecure.', 'SecurityError')),
+      });
+    });
+    await reach(page, 'done');
+    expect(await measures(page)).toMatchObject({ closed: true });
+  });
+
+  test.each(hostile(lab).map((file) => [file.name, file] as const))(
+    'refuses %s and keeps what was there',
+    async (_, file) => {
+      await openLab(lab);
+      await reach(page, 'done');
+      const before = await measures(page);
+      const states = await recordStates(page);
+      await drop(page, [file]);
+      await page.waitForSelector('[data-state=error]');
+      expect(await banner().textContent()).toContain(`${file.name} could not be opened`);
+      expect((await page.textContent('[data-error]'))?.length).toBeGreaterThan(20);
+      expect(await measures(page)).toEqual(before);
+      await page.click('.banner button');
+      await reach(page, 'done');
+      expect(await states()).not.toContain('running');
+    },
+  );
+});
+
+/** Files that promise what they do not hold. */
+function hostile(lab: string): { name: string; bytes: Uint8Array }[] {
+  const text = (words: string) => new TextEncoder().encode(words);
+  if (lab === 'reconstruct' || lab === 'sculpt')
+    return [
+      {
+        name: 'endless.ply',
+        bytes: text(
+          `ply\nformat binary_little_endian 1.0\nelement vertex 4294967295\nproperty float x\nproperty float y\nproperty float z\nend_header\nabc`,
+        ),
+      },
+      { name: 'nothing.obj', bytes: new Uint8Array(0) },
+    ];
+  const whole = gzipSync(nifti([32, 32, 32, 1], ball()));
+  return [
+    { name: 'cut.nii.gz', bytes: whole.subarray(0, whole.length / 2) },
+    { name: 'huge.nii', bytes: nifti([32767, 32767, 32767, 32767], new Uint8Array(8)) },
+    { name: 'bomb.nii.gz', bytes: gzipSync(nifti([32, 32, 32, 1], new Uint8Array(3e8))) },
+  ];
+}
+
+/** The 352 bytes before the voxels of a NIfTI-1 file of bytes, and these. */
+function nifti(dims: number[], data: Uint8Array): Uint8Array {
+  const bytes = new Uint8Array(352 + data.length);
+  const header = new DataView(bytes.buffer);
+  header.setInt32(0, 348, true);
+  for (const [i, n] of [4, ...dims].entries()) header.setInt16(40 + 2 * i, n, true);
+  header.setInt16(70, 2, true);
+  header.setInt16(72, 8, true);
+  for (let i = 0; i < 8; i++) header.setFloat32(76 + 4 * i, 1, true);
+  header.setFloat32(108, 352, true);
+  bytes.set(new TextEncoder().encode('n+1'), 344);
+  bytes.set(data, 352);
+  return bytes;
+}
