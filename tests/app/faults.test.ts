@@ -102,10 +102,11 @@ describe.each(LABS)('the %s lab', (lab) => {
     await page.waitForSelector('[data-state=error]');
     expect(await banner().textContent()).toMatch(/Reset starts the engine again.*out of memory/);
     expect(await colors()).toBeGreaterThan(100);
-    await page.click('text=Reset');
+    await page.getByRole('button', { name: 'Reset', exact: true }).click();
+    await expect.poll(() => banner().isVisible()).toBe(false);
     await reach(page, 'paused', 'running', 'done');
-    expect(await banner().isVisible()).toBe(false);
-    if (await page.isEnabled('.play')) await page.click('.play');
+    // The others play what they open again.
+    if (lab === 'extract') await page.click('.play');
     await reach(page, 'done');
     expect(await measures(page)).toMatchObject({ closed: true });
   });
@@ -174,12 +175,14 @@ describe.each(LABS)('the %s lab', (lab) => {
         .first()
         .press(keys[random(keys.length)] ?? ' ');
     }
-    await page.selectOption('.data select', { index: 1 });
-    await reach(page, 'done', 'paused', 'running');
+    const states = await recordStates(page);
+    const other = page.locator('.data select option:not([hidden]):not(:checked)').first();
+    await page.selectOption('.data select', (await other.getAttribute('value')) ?? '');
+    await expect.poll(states).toContain('done');
     expect(await banner().isVisible()).toBe(false);
-    await page.keyboard.press('r');
+    await page.locator('canvas[tabindex]').first().press('r');
+    await expect.poll(() => iteration(page)).toBe(0);
     await reach(page, 'paused');
-    expect(await iteration(page)).toBe(0);
   });
 
   test('needs no storage', async () => {
@@ -191,21 +194,22 @@ describe.each(LABS)('the %s lab', (lab) => {
       };
       for (const name of ['localStorage', 'sessionStorage', 'caches', 'indexedDB'])
         Object.defineProperty(window, name, refuse);
-      Object.assign(ServiceWorkerContainer.prototype, {
-        register: () => Promise.reject(new DOMException('The operation is insecure.', 'SecurityError')),
-      });
+      // Not on the empty page before.
+      if ('serviceWorker' in navigator)
+        Object.assign(ServiceWorkerContainer.prototype, {
+          register: () => Promise.reject(new DOMException('The operation is insecure.', 'SecurityError')),
+        });
     });
     await reach(page, 'done');
     expect(await measures(page)).toMatchObject({ closed: true });
   });
 
-  test.each(hostile(lab).map((file) => [file.name, file] as const))(
-    'refuses %s and keeps what was there',
-    async (_, file) => {
-      await openLab(lab);
-      await reach(page, 'done');
-      const before = await measures(page);
-      const states = await recordStates(page);
+  test('refuses files that promise what they do not hold, and keeps what was there', async () => {
+    await openLab(lab);
+    await reach(page, 'done');
+    const before = await measures(page);
+    const states = await recordStates(page);
+    for (const file of hostile(lab)) {
       await drop(page, [file]);
       await page.waitForSelector('[data-state=error]');
       expect(await banner().textContent()).toContain(`${file.name} could not be opened`);
@@ -213,9 +217,9 @@ describe.each(LABS)('the %s lab', (lab) => {
       expect(await measures(page)).toEqual(before);
       await page.click('.banner button');
       await reach(page, 'done');
-      expect(await states()).not.toContain('running');
-    },
-  );
+    }
+    expect(await states()).not.toContain('running');
+  });
 });
 
 /** Files that promise what they do not hold. */
