@@ -168,8 +168,8 @@ describe.each(LABS)('the %s lab', (lab) => {
       return Math.floor((seed / 2 ** 32) * below);
     };
     await page.locator('canvas[tabindex]').first().focus();
-    for (let i = 0; i < 60; i++) {
-      if (i % 20 === 19) await page.selectOption('.data select', { index: 1 + random(Math.min(3, examples - 1)) });
+    for (let i = 0; i < 40; i++) {
+      if (i % 20 === 15) await page.selectOption('.data select', { index: 1 + random(Math.min(3, examples - 1)) });
       await page
         .locator('canvas[tabindex]')
         .first()

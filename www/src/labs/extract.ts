@@ -626,7 +626,9 @@ export class ExtractLab {
 
   /** One after the other, however fast they are asked for. */
   #travel(way: 'undo' | 'redo'): Promise<void> {
-    this.#travels = this.#travels.then(() => this.#travelOnce(way));
+    const turn = this.#turn;
+    // What was asked on the volume before is not done to this one.
+    this.#travels = this.#travels.then(() => (turn === this.#turn ? this.#travelOnce(way) : undefined));
     return this.#travels;
   }
 
