@@ -19,6 +19,8 @@ afterEach(async () => {
 async function openLab(lab: string, prepare: () => void = () => undefined): Promise<void> {
   app = await openApp();
   page = app.page;
+  // The frames of Track stand still.
+  await page.emulateMedia({ reducedMotion: 'reduce' });
   await page.addInitScript(prepare);
   await page.goto('about:blank');
   await page.goto(`${app.address}#${lab}`);
@@ -47,8 +49,6 @@ async function colors(): Promise<number> {
 describe.each(LABS)('the %s lab', (lab) => {
   test('draws its view again when the graphics card gives it back', async () => {
     await openLab(lab);
-    await page.emulateMedia({ reducedMotion: 'reduce' });
-    await page.reload();
     await reach(page, 'done');
     await page.locator('canvas[tabindex]').first().press('Home');
     const before = await view();
