@@ -1,4 +1,4 @@
-import { invalid, list, number, options } from './check.js';
+import { invalid, knownOnly, list, number } from './check.js';
 import { type Mesh, meshHandle } from './mesh.js';
 import { call } from './runtime.js';
 import { RawAnimation } from './vesicle.js';
@@ -16,8 +16,8 @@ import { RawAnimation } from './vesicle.js';
  * @throws {@link VesicleError} `invalid-argument`: no frames, one that is no mesh or has no triangles, a time out of
  *   range; `too-large`: more than there is memory for, or than a glb can hold, 4 GiB; `freed`.
  */
-export function animationGlb(frames: readonly Mesh[], options_: { frameSeconds?: number } = {}): Uint8Array {
-  const { frameSeconds = 0.1 } = options('options', options_, ['frameSeconds']);
+export function animationGlb(frames: readonly Mesh[], options: { frameSeconds?: number } = {}): Uint8Array {
+  const { frameSeconds = 0.1 } = knownOnly('options', options, ['frameSeconds']);
   number('frameSeconds', frameSeconds, { min: 0.001, max: 1000 });
   if (list('frames', frames).length === 0) throw invalid('frames', 'there are none; at least one Mesh is needed');
   const handles = frames.map((frame, at) => meshHandle(`frames[${at}]`, frame));

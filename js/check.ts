@@ -88,7 +88,7 @@ export function finite(parameter: string, value: unknown, stride: number): Float
 }
 
 /** An object that has no other properties than those named; `{}` where it is left out. */
-export function options<T extends object>(
+export function knownOnly<T extends object>(
   parameter: string,
   value: T | undefined,
   names: readonly string[],

@@ -1,4 +1,4 @@
-import { finite, invalid, list, number, options, plain, positive, typed, vec3, whole } from './check.js';
+import { finite, invalid, knownOnly, list, number, plain, positive, typed, vec3, whole } from './check.js';
 import { Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
@@ -223,7 +223,7 @@ export class DeformableModel implements Stepper {
 }
 
 function checked(given: DeformableOptions): Partial<DeformableOptions> {
-  const known = options('options', given, OPTIONS);
+  const known = knownOnly('options', given, OPTIONS);
   const { frame, levels, edge } = known;
   if (frame !== undefined) whole('frame', frame);
   if (levels !== undefined) whole('levels', levels);
@@ -237,15 +237,15 @@ function rawStart(start: DeformableStart): RawStart {
   if (start instanceof Mesh) return meshHandle('start', start).use((raw) => RawStart.mesh(raw));
   if (start === null || typeof start !== 'object') throw unknownStart();
   if ('bubbles' in start) {
-    const { bubbles } = options('start', start, ['bubbles']);
+    const { bubbles } = knownOnly('start', start, ['bubbles']);
     return RawStart.bubbles(whole('bubbles', bubbles, { min: 1 }));
   }
   if ('marchingCubes' in start) {
-    const { marchingCubes } = options('start', start, ['marchingCubes']);
+    const { marchingCubes } = knownOnly('start', start, ['marchingCubes']);
     return RawStart.marchingCubes(number('marchingCubes', marchingCubes));
   }
   if ('seeds' in start) {
-    const { seeds, radius } = options('start', start, ['seeds', 'radius']);
+    const { seeds, radius } = knownOnly('start', start, ['seeds', 'radius']);
     return RawStart.seeds(finite('seeds', seeds, 3), positive('radius', radius));
   }
   throw unknownStart();
@@ -256,7 +256,7 @@ function unknownStart(): Error {
 }
 
 function numbersOf(attractor: Attractor, index: number): number[] {
-  const { point, strength, radius } = options(`attractors[${index}]`, attractor, ['point', 'strength', 'radius']);
+  const { point, strength, radius } = knownOnly(`attractors[${index}]`, attractor, ['point', 'strength', 'radius']);
   return [
     ...vec3(`attractors[${index}].point`, point),
     number(`attractors[${index}].strength`, strength),

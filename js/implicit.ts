@@ -1,4 +1,4 @@
-import { finite, list, numbers, options, plain, typed, whole } from './check.js';
+import { finite, knownOnly, list, numbers, plain, typed, whole } from './check.js';
 import { type Mesh, wrapMesh } from './mesh.js';
 import { call, Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
@@ -242,7 +242,7 @@ export class ImplicitSurface implements Stepper {
    *   size, no such index, too few points left, on the surface and outside at once; nothing has changed then.
    */
   setEdits(edits: PointEdits): void {
-    const known = options('edits', edits, ['added', 'removed', 'outside']) as PointEdits;
+    const known = knownOnly('edits', edits, ['added', 'removed', 'outside']) as PointEdits;
     const { added = new Float32Array(), removed = new Uint32Array(), outside = new Float32Array() } = known;
     finite('added', added, 3);
     finite('outside', outside, 3);
@@ -339,7 +339,7 @@ export class ImplicitSurface implements Stepper {
 }
 
 function checked(given: ImplicitOptions): ImplicitOptions {
-  const known = options('options', given, OPTIONS) as ImplicitOptions;
+  const known = knownOnly('options', given, OPTIONS) as ImplicitOptions;
   finite('points', known.points, 3);
   if (known.normals !== undefined) finite('normals', known.normals, 3);
   if (known.confidence !== undefined) finite('confidence', known.confidence, 1);
@@ -353,7 +353,7 @@ function checked(given: ImplicitOptions): ImplicitOptions {
 function checkedCameras(cameras: readonly Camera[]): Camera[] {
   return list('cameras', cameras).map((camera, index) => {
     const at = `cameras[${index}]`;
-    const { projection, width, height, image } = options(at, camera, ['projection', 'width', 'height', 'image']);
+    const { projection, width, height, image } = knownOnly(at, camera, ['projection', 'width', 'height', 'image']);
     if (image !== undefined) typed(`${at}.image`, image, Uint8ClampedArray);
     return {
       projection: numbers(`${at}.projection`, projection, 12),

@@ -4,7 +4,7 @@
  * Points are packed xyz in a `Float32Array`, triangles packed abc in a `Uint32Array`, counter-clockwise seen from
  * outside. "World" is the volume's world space, in mm where the file says mm.
  *
- * @packageDocumentation
+ * @module vesicle
  */
 import { call } from './runtime.js';
 import { version as rawVersion } from './vesicle.js';

@@ -1,4 +1,4 @@
-import { choice, finite, invalid, list, number, options, plain, positive, typed, vec3, whole } from './check.js';
+import { choice, finite, invalid, knownOnly, list, number, plain, positive, typed, vec3, whole } from './check.js';
 import { call, Handle } from './runtime.js';
 import { type RawArrays, RawMesh, RawTexture } from './vesicle.js';
 import { type Vec3, type Volume, volumeHandle } from './volume.js';
@@ -178,7 +178,7 @@ export class Mesh {
     indices: Uint32Array,
     extra: { uvs?: Float32Array; texture?: MeshTexture } = {},
   ): Mesh {
-    const { uvs, texture } = options('extra', extra, ['uvs', 'texture']);
+    const { uvs, texture } = knownOnly('extra', extra, ['uvs', 'texture']);
     const vertices = finite('positions', positions, 3).length / 3;
     checkIndices(typed('indices', indices, Uint32Array, 3), vertices);
     if (uvs !== undefined && finite('uvs', uvs, 2).length !== 2 * vertices) {
@@ -200,9 +200,9 @@ export class Mesh {
    * @throws {@link VesicleError} `bad-file` naming the format and the field, also for a texture where the file has no
    *   texture coordinates; `too-large`; `invalid-argument`.
    */
-  static parse(bytes: Uint8Array, options_: { texture?: MeshTexture } = {}): Mesh {
+  static parse(bytes: Uint8Array, options: { texture?: MeshTexture } = {}): Mesh {
     typed('bytes', bytes, Uint8Array);
-    const { texture } = options('options', options_, ['texture']);
+    const { texture } = knownOnly('options', options, ['texture']);
     checkTexture(texture);
     return made(() => RawMesh.parse(bytes, rawTexture(texture)));
   }
@@ -214,8 +214,8 @@ export class Mesh {
    * @param options - `frame`: which one of a 4D volume; default 0.
    * @throws {@link VesicleError} `invalid-argument`: no such frame; `too-large`.
    */
-  static marchingCubes(volume: Volume, iso: number, options_: { frame?: number } = {}): Mesh {
-    const { frame = 0 } = options('options', options_, ['frame']);
+  static marchingCubes(volume: Volume, iso: number, options: { frame?: number } = {}): Mesh {
+    const { frame = 0 } = knownOnly('options', options, ['frame']);
     number('iso', iso);
     whole('frame', frame);
     const handle = volumeHandle('volume', volume);
@@ -269,7 +269,7 @@ export class Mesh {
    * @throws {@link VesicleError} `invalid-argument` where `out` is no such object.
    */
   copyTo(out: MeshArrays): { vertices: number; triangles: number } {
-    options('out', out, ['positions', 'normals', 'indices', 'uvs', 'colors']);
+    knownOnly('out', out, ['positions', 'normals', 'indices', 'uvs', 'colors']);
     const arrays = this.#handle.use((raw) => raw.arrays());
     try {
       return call(() => copyArrays(arrays, out));
@@ -464,7 +464,7 @@ export class Mesh {
 }
 
 function edgeBounds(edge: { min: number; max: number }): [number, number] {
-  const { min, max } = options('edge', plain('edge', edge), ['min', 'max']);
+  const { min, max } = knownOnly('edge', plain('edge', edge), ['min', 'max']);
   positive('edge.min', min);
   if (number('edge.max', max) > 2 * (min as number)) return [min as number, max as number];
   throw invalid('edge.max', `${max}; more than twice edge.min, ${min}, is needed`);
@@ -482,7 +482,7 @@ function checkIndices(indices: Uint32Array, vertices: number): void {
 
 function checkTexture(texture: MeshTexture | undefined): void {
   if (texture === undefined) return;
-  const { type, bytes } = options('texture', texture, ['type', 'bytes']);
+  const { type, bytes } = knownOnly('texture', texture, ['type', 'bytes']);
   choice('texture.type', type, TEXTURES);
   typed('texture.bytes', bytes, Uint8Array);
 }

@@ -1,4 +1,4 @@
-import { invalid, list, options, plain, typed, vec3, whole } from './check.js';
+import { invalid, knownOnly, list, plain, typed, vec3, whole } from './check.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
@@ -81,7 +81,7 @@ export class MultiresolutionModel implements Stepper {
    *   `too-large` for edges so short that the surface would have more than 200,000 vertices.
    */
   constructor(given: MultiresOptions) {
-    const known = options('options', given, OPTIONS) as MultiresOptions;
+    const known = knownOnly('options', given, OPTIONS) as MultiresOptions;
     const packed = packedEllipsoids(known.ellipsoids);
     const params = plain('params', known.params ?? {});
     this.#handle = new Handle('MultiresolutionModel', () => {
@@ -245,7 +245,7 @@ function triangles(parameter: string, mesh: Mesh | undefined): TrianglesOf | und
 function packedEllipsoids(ellipsoids: readonly ControlEllipsoid[]): Float64Array<ArrayBuffer> {
   const numbers = list('ellipsoids', ellipsoids).flatMap((ellipsoid, index) => {
     const at = `ellipsoids[${index}]`;
-    const { center, axes } = options(at, ellipsoid, ['center', 'axes']);
+    const { center, axes } = knownOnly(at, ellipsoid, ['center', 'axes']);
     const vectors = [center, ...list(`${at}.axes`, axes ?? [])];
     if (vectors.length !== 4) throw invalid(`${at}.axes`, `${vectors.length - 1} given; three are needed`);
     return vectors.flatMap((vector, k) => [...vec3(k === 0 ? `${at}.center` : `${at}.axes[${k - 1}]`, vector)]);

@@ -1,5 +1,6 @@
 // The WebAssembly instance: how it starts, how calls into it fail, how objects of it are held.
 import { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
+import { ownModule } from './module.js';
 import load, { initSync as loadSync, __wbg_reset_state as reset } from './vesicle.js';
 
 /** Whatever the module can be made from. */
@@ -16,7 +17,7 @@ let generation = 0;
  * {@link VesicleCrash} it starts a fresh instance.
  *
  * @param options - `module_or_path`: the module, its bytes or its address. Left out, the `.wasm` beside this file
- *   is fetched (in a browser) or read (in Node).
+ *   is fetched (in a browser) or read (in Node); in `vesicle/inline` it is in the file itself.
  * @throws Whatever fetching or compiling threw; a later call tries again.
  */
 export function init(options: { module_or_path?: InitInput | Promise<InitInput> } = {}): Promise<unknown> {
@@ -39,7 +40,7 @@ export function initSync(options: { module: BufferSource | WebAssembly.Module })
 }
 
 async function begin(source: InitInput | Promise<InitInput> | undefined): Promise<unknown> {
-  const module = await compile((await source) ?? new URL('./vesicle_bg.wasm', import.meta.url));
+  const module = await compile((await source) ?? (await ownModule()));
   instance ??= await load({ module_or_path: module });
   return instance;
 }
@@ -56,8 +57,8 @@ async function compile(source: InitInput): Promise<WebAssembly.Module> {
 }
 
 async function readFile(path: URL): Promise<BufferSource> {
-  // Out of the bundlers' sight: a page never gets here.
-  const files = 'node:fs/promises';
+  // Put together out of the bundlers' sight: a page never gets here.
+  const files = ['node', 'fs/promises'].join(':');
   const { readFile } = await import(/* @vite-ignore */ /* webpackIgnore: true */ files);
   return readFile(path);
 }

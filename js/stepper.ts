@@ -1,4 +1,4 @@
-import { invalid, options, positive, whole } from './check.js';
+import { invalid, knownOnly, positive, whole } from './check.js';
 import type { Mesh } from './mesh.js';
 
 /** What one step, or several together, did. */
@@ -95,7 +95,7 @@ export class Runner {
 
   /** Steps until done, aborted, or `maxIterations`. See {@link RunOptions}. */
   async run(step: () => StepReport, given: RunOptions | undefined): Promise<StepReport> {
-    const { signal, maxIterations = Number.MAX_SAFE_INTEGER, budgetMs = 12, onStep } = checked(given);
+    const { signal, maxIterations = Number.MAX_SAFE_INTEGER, budgetMs = 12, onStep } = checkedRun(given);
     signal?.throwIfAborted();
     this.refuseWhileRunning('run');
     this.#running = true;
@@ -121,8 +121,9 @@ export class Runner {
   }
 }
 
-function checked(given: RunOptions | undefined): RunOptions {
-  const run = options<RunOptions>('options', given, OPTIONS);
+/** The options of a run, or `invalid-argument`. */
+export function checkedRun(given: RunOptions | undefined): RunOptions {
+  const run = knownOnly<RunOptions>('options', given, OPTIONS);
   if (run.maxIterations !== undefined)
     whole('maxIterations', run.maxIterations, { min: 1, max: Number.MAX_SAFE_INTEGER });
   if (run.budgetMs !== undefined) positive('budgetMs', run.budgetMs);

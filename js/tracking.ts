@@ -1,4 +1,4 @@
-import { invalid, options, plain, typed, vec3, whole } from './check.js';
+import { invalid, knownOnly, plain, typed, vec3, whole } from './check.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
@@ -105,7 +105,7 @@ export class SurfaceTracker implements Stepper {
    *   that is.
    */
   constructor(given: TrackingOptions) {
-    const known = options('options', given, OPTIONS) as TrackingOptions;
+    const known = knownOnly('options', given, OPTIONS) as TrackingOptions;
     const image = volumeHandle('volume', known.volume);
     const [box, voxels, nearest] = [corners(known.box), ends(known.voxels), point(known.component)];
     if (box && voxels) throw invalid('voxels', 'box cannot be given together with it: it says the same');
@@ -277,13 +277,13 @@ export class SurfaceTracker implements Stepper {
 
 function corners(box: TrackingOptions['box']): Float64Array | undefined {
   if (box === undefined) return undefined;
-  const { min, max } = options('box', box, ['min', 'max']);
+  const { min, max } = knownOnly('box', box, ['min', 'max']);
   return Float64Array.of(...vec3('box.min', min), ...vec3('box.max', max));
 }
 
 function ends(voxels: TrackingOptions['voxels']): Uint32Array | undefined {
   if (voxels === undefined) return undefined;
-  const { min, max } = options('voxels', voxels, ['min', 'max']);
+  const { min, max } = knownOnly('voxels', voxels, ['min', 'max']);
   const indices = [...vec3('voxels.min', min), ...vec3('voxels.max', max)];
   return Uint32Array.from(indices, (index) => whole('voxels', index));
 }

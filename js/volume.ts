@@ -1,4 +1,4 @@
-import { choice, invalid, list, number, numbers, options, positive, typed, vec3, whole } from './check.js';
+import { choice, invalid, knownOnly, list, number, numbers, positive, typed, vec3, whole } from './check.js';
 import { Handle } from './runtime.js';
 import { RawFrames, RawVolume } from './vesicle.js';
 
@@ -86,8 +86,8 @@ export class Volume {
    * @param options - `data`: the payload that belongs to a detached header.
    * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`.
    */
-  static parse(bytes: Uint8Array, options_: { data?: Uint8Array } = {}): Volume {
-    const { data } = options('options', options_, ['data']);
+  static parse(bytes: Uint8Array, options: { data?: Uint8Array } = {}): Volume {
+    const { data } = knownOnly('options', options, ['data']);
     typed('bytes', bytes, Uint8Array);
     if (data !== undefined) typed('data', data, Uint8Array);
     return wrap(() => RawVolume.parse(bytes, data));
@@ -99,8 +99,8 @@ export class Volume {
    * @param options - `frameSeconds`: from one frame to the next; default that of the first volume.
    * @throws {@link VesicleError} `invalid-argument` where the grids differ, or there is none.
    */
-  static fromFrames(frames: Volume[], options_: { frameSeconds?: number } = {}): Volume {
-    const { frameSeconds } = options('options', options_, ['frameSeconds']);
+  static fromFrames(frames: Volume[], options: { frameSeconds?: number } = {}): Volume {
+    const { frameSeconds } = knownOnly('options', options, ['frameSeconds']);
     if (frameSeconds !== undefined) positive('frameSeconds', frameSeconds);
     const handles = list('frames', frames).map((frame, index) => volumeHandle(`frames[${index}]`, frame));
     return wrap(() => {
@@ -202,8 +202,8 @@ export class Volume {
    * @param options - `factor`: above 1, at most 2; default the square root of 3.
    * @throws {@link VesicleError} `invalid-argument`: factor out of range, or more levels than the size allows.
    */
-  pyramid(levels: number, options_: { factor?: number } = {}): Volume[] {
-    const { factor = Math.sqrt(3) } = options('options', options_, ['factor']);
+  pyramid(levels: number, options: { factor?: number } = {}): Volume[] {
+    const { factor = Math.sqrt(3) } = knownOnly('options', options, ['factor']);
     whole('levels', levels, { min: 1 });
     number('factor', factor);
     return this.#handle.use((raw) => raw.pyramid(levels, factor)).map((level) => wrap(() => level));
@@ -229,8 +229,8 @@ export class Volume {
    *   cubes, 1 changes nothing. `method`: `'linear'` takes weighted means instead.
    * @throws {@link VesicleError} `invalid-argument`: factor out of range, or a single slice; `too-large`.
    */
-  enrichSlices(options_: { factor?: number; method?: 'flow' | 'linear' } = {}): Volume {
-    const { factor, method = 'flow' } = options('options', options_, ['factor', 'method']);
+  enrichSlices(options: { factor?: number; method?: 'flow' | 'linear' } = {}): Volume {
+    const { factor, method = 'flow' } = knownOnly('options', options, ['factor', 'method']);
     if (factor !== undefined) whole('factor', factor, { min: 1 });
     choice('method', method, ['flow', 'linear']);
     return wrap(() => this.#handle.use((raw) => raw.enrichSlices(factor, method === 'flow')));
@@ -253,7 +253,7 @@ function wrap(make: () => RawVolume): Volume {
 }
 
 function fromInit(init: VolumeInit): RawVolume {
-  const given = options('init', init, INIT);
+  const given = knownOnly('init', init, INIT);
   const { data, slope = 1, intercept = 0, frameSeconds, space = 'RAS' } = given;
   if (!ELEMENTS.some((kind) => data instanceof kind)) {
     throw invalid('data', `a typed array is needed: ${ELEMENTS.map((kind) => kind.name).join(', ')}`);

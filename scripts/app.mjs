@@ -1,9 +1,10 @@
-// Builds the web app from www/ into dist/; needs pkg/.
+// Builds the web app from www/ into dist/, and the documentation beside it; needs pkg/.
 import { at, must, say, tool } from './shell.mjs';
 
-/** The app as static files, ready for any server. */
+/** The app and its documentation as static files, ready for any server. */
 export async function buildApp() {
   const started = performance.now();
   await must(tool('vite'), ['build', '--logLevel', 'warn', '--config', at('www/vite.config.ts')]);
+  await must(tool('typedoc'), ['--options', at('typedoc.json'), '--logLevel', 'Warn']);
   say('dist', `${((performance.now() - started) / 1000).toFixed(1)} s`);
 }

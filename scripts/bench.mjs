@@ -1,6 +1,6 @@
 // Times points to a surface, remeshing, sculpting, tracking, single steps and heads, in Node, in Chromium and, where a
 // program for it is there, natively, the app in Chromium, and other people's software at the same; prints tables and writes
-// bench.json. `npm run bench -- points` does one of them, and writes nothing.
+// bench.json. `npm run bench -- points` does one of them, and writes nothing; so does `hosts`, which is done when asked for.
 import { readFile, writeFile } from 'node:fs/promises';
 import { cpus } from 'node:os';
 import { buildApp } from './app.mjs';
@@ -57,6 +57,15 @@ const BENCHES = {
       return (await import('../bench/page.mjs')).measure(at('dist'), REPEATS);
     },
     rows: pageRows,
+  },
+  hosts: {
+    // For docs/hosts.md, and not in the report.
+    apart: true,
+    alone: async () => {
+      await buildApp();
+      return (await import('../bench/hosts.mjs')).measure(at('dist'));
+    },
+    rows: hostRows,
   },
   peers: {
     alone: () => comparePeers(SCAN, REPEATS),
@@ -209,6 +218,15 @@ function pageRows({ host, viewport, cold, warm, runs, motion, memory }) {
   ];
 }
 
+function hostRows({ host, rows }) {
+  const row = ({ name, vertices, update, draw }) => [
+    `  ${name}`,
+    `${update.toFixed(1)} ms`,
+    `to take over ${vertices} vertices with other triangles; ${draw.toFixed(1)} ms until the page goes on after drawing`,
+  ];
+  return [[host, '', 'the middle of 30 frames'], ...rows.map(row)];
+}
+
 function print(rows) {
   for (const [what, figure, remark] of rows) {
     process.stdout.write(`${what.padEnd(28)}${figure.padStart(10)}  ${remark}\n`);
@@ -236,7 +254,8 @@ await script(async () => {
   await setup();
   await build();
   const all = {};
-  for (const name of asked.length > 0 ? asked : Object.keys(BENCHES)) all[name] = await run(name);
+  const names = Object.keys(BENCHES).filter((name) => !BENCHES[name].apart);
+  for (const name of asked.length > 0 ? asked : names) all[name] = await run(name);
   if (asked.length > 0) return;
   const report = { scan: SCAN, bestOf: REPEATS, processor: cpus()[0]?.model, ...all };
   await writeFile(at('bench.json'), `${JSON.stringify(report, null, 2)}\n`);

@@ -85,6 +85,7 @@ const STAGES = [
   ['package', vitest('tests/js')],
   ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')])],
   ['app build', works(buildApp)],
+  ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')])],
   ['app', vitest('tests/app')],
 ];
 

@@ -555,3 +555,20 @@ fn a_volume_too_long_for_memory_is_refused_at_once() {
     let refusal = DeformableModel::new(&volume, DeformableOptions::default()).unwrap_err();
     assert!(matches!(refusal, MethodError::TooManyVertices { .. }), "{refusal}");
 }
+
+/// On a coarse level, some vertices of this tooth lie where the image is so steep that they swung to and fro for ever under the
+/// force that coarse levels have.
+#[cfg(not(target_arch = "wasm32"))]
+#[test]
+fn a_swing_on_a_coarse_level_comes_to_rest() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/www/public/data/tooth.nrrd");
+    let volume = vesicle::io::parse_volume(&std::fs::read(path).unwrap(), None).unwrap();
+    let mut model =
+        DeformableModel::new(&volume, DeformableOptions { levels: 2, ..Default::default() }).unwrap();
+    let mut report = model.step().unwrap();
+    while !report.done {
+        assert!(report.iteration < 2000, "{} on level {}", report.iteration, model.level());
+        report = model.step().unwrap();
+    }
+    assert!(report.iteration > 600, "nothing swings any more: {} iterations", report.iteration);
+}

@@ -1,5 +1,9 @@
+import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
-import { defineConfig, type Plugin } from 'vite';
+import { defineConfig, type Plugin, type Rolldown } from 'vite';
+
+/** A live page for each host that there is an adapter for. */
+const EMBEDS = ['index', 'three', 'niivue', 'niivue-next', 'vtk', 'itk', 'element'];
 
 const here = (path: string) => fileURLToPath(new URL(path, import.meta.url));
 
@@ -12,14 +16,58 @@ function relaxPolicyWhileDeveloping(): Plugin {
   };
 }
 
-/** Names every built file, for the service worker to keep. */
+/** Lays the program that reads DICOM beside the page, under the names that its loader asks for. */
+function dicomBeside(): Plugin {
+  const folder = here('../node_modules/@itk-wasm/dicom/dist/pipelines/');
+  const names = ['js', 'wasm.zst'].map((kind) => `read-image-dicom-file-series.${kind}`);
+  return {
+    name: 'dicom-beside',
+    generateBundle() {
+      for (const name of names)
+        this.emitFile({ type: 'asset', fileName: `dicom/${name}`, source: readFileSync(folder + name) });
+    },
+    configureServer({ middlewares }) {
+      middlewares.use('/dicom', (request, response, next) => {
+        const name = names.find((name) => request.url?.split('?')[0] === `/${name}`);
+        if (!name) return next();
+        response.setHeader('Content-Type', name.endsWith('.js') ? 'text/javascript' : 'application/octet-stream');
+        response.end(readFileSync(folder + name));
+      });
+    },
+  };
+}
+
+/** Chunks that one of `entries` leads to, these included. */
+function reached(bundle: Rolldown.OutputBundle, entries: Rolldown.OutputChunk[]): Set<string> {
+  const found = new Set(entries.map(({ fileName }) => fileName));
+  for (const name of found) {
+    const chunk = bundle[name];
+    if (chunk?.type === 'chunk') for (const next of [...chunk.imports, ...chunk.dynamicImports]) found.add(next);
+  }
+  return found;
+}
+
+/** Names the built files of the app, for the service worker to keep: without other people's libraries in the live pages, and one module of the two. */
 function listFiles(): Plugin {
+  const isEmbed = ({ facadeModuleId }: Rolldown.OutputChunk) => facadeModuleId?.includes('/embed/') === true;
   return {
     name: 'list-files',
     apply: 'build',
+    // Late: Vite takes out scripts that only stood for styles.
+    enforce: 'post',
     generateBundle(_, bundle) {
-      const names = Object.keys(bundle).filter((name) => name.startsWith('assets/'));
-      this.emitFile({ type: 'asset', fileName: 'files.json', source: `${JSON.stringify(names.sort(), null, 1)}\n` });
+      const entries = Object.values(bundle)
+        .filter((one) => one.type === 'chunk')
+        .filter(({ isEntry }) => isEntry);
+      const own = reached(
+        bundle,
+        entries.filter((one) => !isEmbed(one)),
+      );
+      const theirs = reached(bundle, entries.filter(isEmbed));
+      const wanted = (name: string) =>
+        name.startsWith('assets/') && (own.has(name) || !theirs.has(name)) && !name.includes('_plain_');
+      const listed = Object.keys(bundle).filter(wanted).sort();
+      this.emitFile({ type: 'asset', fileName: 'files.json', source: `${JSON.stringify(listed, null, 1)}\n` });
     },
   };
 }
@@ -28,14 +76,22 @@ export default defineConfig({
   root: here('.'),
   // Relative addresses: the built page works from any folder of any server.
   base: './',
-  resolve: { alias: { vesicle: here('../pkg') } },
-  plugins: [relaxPolicyWhileDeveloping(), listFiles()],
+  resolve: {
+    alias: [
+      { find: /^vesicle\/(three|niivue|vtk)$/, replacement: `${here('../pkg/adapters')}/$1.js` },
+      { find: /^vesicle\/(\w+)$/, replacement: `${here('../pkg')}/$1.js` },
+      { find: /^vesicle$/, replacement: here('../pkg') },
+    ],
+  },
+  plugins: [relaxPolicyWhileDeveloping(), dicomBeside(), listFiles()],
   worker: { format: 'es' },
   build: {
     outDir: here('../dist'),
     emptyOutDir: true,
     target: 'es2022',
-    rolldownOptions: { input: [here('index.html'), here('bench.html')] },
+    rolldownOptions: {
+      input: ['index', 'bench', ...EMBEDS.map((name) => `embed/${name}`)].map((name) => here(`${name}.html`)),
+    },
     // The policy allows no data: script or style; small files stay files.
     assetsInlineLimit: 0,
     chunkSizeWarningLimit: 1000,

@@ -110,9 +110,9 @@ describe.each(LABS)('the %s lab', (lab) => {
     const home = await picture();
     for (const key of ['ArrowLeft', 'ArrowUp', '+']) {
       await view.press(key);
-      await expect.poll(picture, key).not.toBe(home);
+      await expect.poll(picture, { message: key }).not.toBe(home);
       await view.press('Home');
-      await expect.poll(picture, `Home after ${key}`).toBe(home);
+      await expect.poll(picture, { message: `Home after ${key}` }).toBe(home);
     }
   });
 

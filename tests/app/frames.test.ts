@@ -129,7 +129,7 @@ test('slices are drawn by the processor, and the view keeps its size when a run 
   expect(byProcessor).toEqual([true, true, true]);
   const view = app.page.locator('.view > canvas');
   const running = await view.boundingBox();
-  await app.page.click('[data-transport=reset]');
+  await app.page.getByRole('button', { name: 'Reset', exact: true }).click();
   await expect.poll(() => app.page.textContent('.phase')).toBe('');
   expect(await view.boundingBox()).toEqual(running);
 });

@@ -14,7 +14,7 @@ test('two hundred steps end in the bits that the core gives natively', async () 
     const content = `
       import * as vesicle from '/index.js';
       await vesicle.default();
-      document.title = (${spongeBits})(vesicle);`;
+      document.title = await (${spongeBits})(vesicle);`;
     await page.addScriptTag({ type: 'module', content });
     await expect.poll(() => page.title()).toBe(SPONGE_BITS);
   } finally {

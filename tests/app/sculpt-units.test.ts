@@ -208,7 +208,7 @@ describe('a surface ahead of its model', () => {
     expect(one.follow([ball(2, 0, 0, 1)], 2)).toBe(true);
     one.shown(frame(0.5, 1, 1));
     one.shown(frame(1, 2, 2));
-    expect(drawn.map(Math.fround)).toEqual([2, 3, 3, 3]);
+    expect(drawn.map((x) => Math.fround(x ?? Number.NaN))).toEqual([2, 3, 3, 3]);
     one.shown(frame(2, 2, 2));
     one.shown(frame(2.5, 3, 2));
     expect(drawn).toHaveLength(4);

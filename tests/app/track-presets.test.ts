@@ -83,15 +83,15 @@ test('figure 3: in this heart it makes little difference, in thick slices projec
   for (const [i, volume] of tracker.volumes().entries())
     expect(Math.abs(volume / (predicted[i] ?? 1) - 1)).toBeLessThan(0.05);
   tracker.restore(present);
-  expect(stepsIn(true)).toBeLessThan(0.95 * stepsIn(false));
+  expect(await stepsIn(true)).toBeLessThan(0.95 * (await stepsIn(false)));
 });
 
 /** Of the projections in the computed ventricle in thick slices, in the mean of its first frames. */
-function stepsIn(prediction: boolean): number {
+async function stepsIn(prediction: boolean): Promise<number> {
   const example = filmById('thick-slices');
   if (!example || !('cine' in example.source)) throw new Error('there is no computed ventricle');
   const setup = setupOf(example);
-  const film = filmFrom(example.source);
+  const film = await filmFrom(example.source);
   const image = prepared(film, setup.preparation, () => undefined);
   const { tracker } = buildTracker(image, { ...setup, params: { ...setup.params, prediction } });
   tracker.step(tracker.frames + 5);

@@ -259,7 +259,7 @@ describe('images', () => {
     expect(names(['voxels.raw', 'image.nhdr'])).toEqual([['image.nhdr', 'voxels.raw']]);
   });
 
-  test('are put together from their frames', () => {
+  test('are put together from their frames', async () => {
     const frame = (value: number) => {
       const volume = new Volume({ data: new Uint8Array(64).fill(value), dims: [4, 4, 4] });
       const bytes = volume.toNifti();
@@ -267,7 +267,7 @@ describe('images', () => {
       return bytes;
     };
     const files = [9, 7, 8].map((value) => ({ name: `frame-${value}.nii`, bytes: frame(value) }));
-    const film = filmFrom({ files });
+    const film = await filmFrom({ files });
     expect(film.frames).toBe(3);
     expect([0, 1, 2].map((index) => film.sample([1, 1, 1], index))).toEqual([7, 8, 9]);
     film.free();

@@ -49,9 +49,8 @@ test('slices lie as in a reading room, whatever the order of the voxel axes', ()
 });
 
 test('a picture shows each voxel where its labels say', () => {
-  const { dims, ...rest } = grid(STRAIGHT);
   const voxels = Uint8Array.from({ length: 4 * 5 * 6 }, (_, i) => i);
-  const volume = { ...rest, dims, voxels } as Parameters<typeof paintSlice>[0];
+  const volume = { ...grid(STRAIGHT), voxels };
   const axial = sliceFrames(volume)[2];
   if (!axial) throw new Error('no axial slice');
   const out = new Uint8ClampedArray(4 * 4 * 5);
@@ -79,12 +78,11 @@ test('the plane of a slice holds its voxels', () => {
 });
 
 test('an outline lies over the voxels it goes through', () => {
-  const { dims, ...rest } = grid(STRAIGHT);
-  const volume = { ...rest, dims } as Parameters<typeof projectSegments>[2];
+  const volume = grid(STRAIGHT);
   const axial = sliceFrames(volume)[2];
   if (!axial) throw new Error('no axial slice');
-  const segment = new Float32Array([...toWorld(rest.affine, [3, 4, 0]), ...toWorld(rest.affine, [0, 0, 0])]);
-  const [x1, y1, x2, y2] = projectSegments(segment, invert(rest.affine), volume, axial);
+  const segment = new Float32Array([...toWorld(volume.affine, [3, 4, 0]), ...toWorld(volume.affine, [0, 0, 0])]);
+  const [x1, y1, x2, y2] = projectSegments(segment, invert(volume.affine), volume, axial);
   expect([x1, y1]).toEqual([0.5, 0.5]);
   expect([x2, y2]).toEqual([3.5, 4.5]);
 });

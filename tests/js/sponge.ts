@@ -1,11 +1,13 @@
 // The Menger sponge of depth two after 200 steps, as a number over the bits of its positions. The function names nothing
-// outside itself, so that it can be sent into a browser.
+// outside itself, so that it can be sent into a browser, and waits where the package in a worker makes it.
 import type * as Package from '../../pkg/index.js';
+import type * as Worker from '../../pkg/worker.js';
 
 /** FNV-1a over all positions: what the core gives natively. */
 export const SPONGE_BITS = 'b9c3798824176882';
 
-export function spongeBits({ Volume, DeformableModel }: typeof Package): string {
+export async function spongeBits(library: typeof Package | typeof Worker): Promise<string> {
+  const { Volume, DeformableModel } = library as typeof Worker;
   const middle = (n: number, cell: number) => Math.floor(n / cell) % 3 === 1;
   const isSolid = (p: number[]) => [27, 9].every((cell) => p.filter((n) => middle(n, cell)).length < 2);
   const data = Uint8Array.from({ length: 81 ** 3 }, (_, i) =>
@@ -13,8 +15,8 @@ export function spongeBits({ Volume, DeformableModel }: typeof Package): string 
   );
   const volume = new Volume({ data, dims: [81, 81, 81] });
   const model = new DeformableModel({ volume, levels: 3, params: { iso: 0.4, rigidity: 0.05, stiffness: 0.001 } });
-  model.step(200);
-  const { positions } = model.mesh.arrays();
+  await model.step(200);
+  const { positions } = await model.mesh.arrays();
   let hash = 0xcbf29ce484222325n;
   for (const byte of new Uint8Array(positions.buffer, positions.byteOffset, positions.byteLength)) {
     hash = ((hash ^ BigInt(byte)) * 0x100000001b3n) & 0xffffffffffffffffn;

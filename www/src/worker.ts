@@ -91,7 +91,7 @@ class Session {
 
   async #load(name: string, source: VolumeSource, setup: Setup): Promise<Loaded> {
     await this.#pause();
-    const volume = volumeFrom(source);
+    const volume = await volumeFrom(source);
     try {
       const view = viewOf(volume, name);
       // The page plays it at once: what a check would find, it would not show.

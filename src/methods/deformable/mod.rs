@@ -253,10 +253,11 @@ impl DeformableModel {
         let normals = (self.clock)();
         let delta = self.model_delta();
         let pulls = self.pulls();
+        let gain = coarse::left_of(self.gain, self.iteration.saturating_sub(self.rest.began));
         let world = World {
             field: Field {
                 image: &self.pyramid.levels[self.level],
-                scale: ForceScale::new(&self.params, [self.level_iso, self.gain], self.voxel, delta),
+                scale: ForceScale::new(&self.params, [self.level_iso, gain], self.voxel, delta),
                 pulls: &pulls,
             },
             domain: self.domain,

@@ -24,7 +24,7 @@ pub(super) struct Rest {
     woken: bool,
     done: bool,
     /// The iteration at whose end this level began.
-    began: u32,
+    pub(super) began: u32,
 }
 
 impl DeformableModel {

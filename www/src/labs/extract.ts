@@ -23,7 +23,7 @@ import { h } from '../ui/dom';
 import { EXTRACT_EXERCISES, exercises } from '../ui/exercises';
 import { ExportButtons } from '../ui/exports';
 import { FigurePanel } from '../ui/figure';
-import { acceptDrops, fileChooser, readFiles } from '../ui/files';
+import { acceptDrops, fileChooser, nameOf, readFiles } from '../ui/files';
 import { count, plural } from '../ui/format';
 import { Histogram } from '../ui/histogram';
 import { History, underWay } from '../ui/history';
@@ -281,7 +281,7 @@ export class ExtractLab {
   }
 
   #openFiles(files: File[]): Promise<void> {
-    const name = files.map((file) => file.name).join(' + ');
+    const name = nameOf(files);
     const linked = this.#awaiting;
     return this.#open({ name, volume: async () => ({ files: await readFiles(files) }), ...(linked && { linked }) });
   }

@@ -1,5 +1,6 @@
 /** 4D images as the worker opens and prepares them. */
 import { SurfaceTracker, Volume } from 'vesicle';
+import { readForeign } from '../foreign';
 import { invert } from '../view/anatomy';
 import { Refusal } from '../worker/refusal';
 import { parseFiles } from '../worker/volumes';
@@ -10,7 +11,7 @@ import type { FilmSource, NamedBytes, Preparation, Setup } from './protocol';
 /** Seconds from one computed frame to the next. */
 const CINE_SECONDS = 0.04;
 
-export function filmFrom(source: FilmSource): Volume {
+export async function filmFrom(source: FilmSource): Promise<Volume> {
   if ('cine' in source) {
     const { dims, spacing, frames } = source.cine;
     return new Volume({
@@ -20,7 +21,8 @@ export function filmFrom(source: FilmSource): Volume {
       frameSeconds: CINE_SECONDS,
     });
   }
-  return fromParts(framesOf(source.files));
+  const foreign = await readForeign(source.files);
+  return foreign ? new Volume(foreign) : fromParts(framesOf(source.files));
 }
 
 /** The files of each frame, in the order of their names: a header together with its data. */

@@ -86,7 +86,7 @@ class Session {
     await this.#pause();
     const tell = (what: string) => send({ event: 'preparing', what });
     const began = performance.now();
-    const original = filmFrom(source);
+    const original = await filmFrom(source);
     const spec = 'cine' in source ? source.cine : undefined;
     let made: Volume = original;
     try {

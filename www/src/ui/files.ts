@@ -1,7 +1,7 @@
 import type { NamedBytes } from '../protocol';
 import { h, uniqueId } from './dom';
 
-const ACCEPT = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw';
+const ACCEPT = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw,.dcm,.tif,.tiff';
 
 /** A file chooser: one file, or several that belong together. */
 export function fileChooser(onFiles: (files: File[]) => void, accept = ACCEPT): HTMLElement {
@@ -45,6 +45,13 @@ export function acceptDrops(overlay: HTMLElement, onFiles: (files: File[]) => vo
     },
     { signal },
   );
+}
+
+/** What files that belong together are called. */
+export function nameOf(files: File[]): string {
+  const [first, second] = files.map(({ name }) => name);
+  if (files.length === 2) return `${first} + ${second}`;
+  return files.length > 1 ? `${first} + ${files.length - 1}` : (first ?? '');
 }
 
 export async function readFiles(files: File[]): Promise<NamedBytes[]> {

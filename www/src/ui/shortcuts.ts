@@ -87,6 +87,7 @@ function shortcutDialog(shortcuts: Shortcut[], opener: HTMLElement, signal: Abor
     h('h2', { id: 'keys-title' }, 'Keyboard'),
     list,
     h('p', {}, h('a', { href: './bench.html' }, 'Measurements: how fast it is')),
+    h('p', {}, h('a', { href: './embed/index.html' }, 'In other software: three.js, NiiVue, vtk.js, itk-wasm')),
     form,
   );
   opener.addEventListener('click', () => dialog.showModal(), { signal });

@@ -1,5 +1,6 @@
 /** Volumes as the worker opens them, and as the page sees them. */
 import { VesicleError, Volume } from 'vesicle';
+import { readForeign } from '../foreign';
 import type { LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
 import { quantize } from '../quantize';
 import { shapeVoxels } from '../shapes';
@@ -27,12 +28,20 @@ export function parseFiles(files: NamedBytes[]): Volume {
   const [first, second] = files;
   if (!first) throw new Refusal('bad-file', 'no file was given');
   if (!second) return parseFile(first);
+  if (files.length > 2)
+    throw new Refusal(
+      'bad-file',
+      `${files.length} files are neither a series of DICOM or TIFF files, nor a header and its data`,
+    );
   const [header, data] = isHeader(second) && !isHeader(first) ? [second, first] : [first, second];
   return Volume.parse(header.bytes, { data: data.bytes });
 }
 
-export function volumeFrom(source: VolumeSource): Volume {
-  return 'files' in source ? parseFiles(source.files) : new Volume(shapeVoxels(source.shape));
+/** A computed volume, or one from files of any format that is read here, one's own or that of others. */
+export async function volumeFrom(source: VolumeSource): Promise<Volume> {
+  if (!('files' in source)) return new Volume(shapeVoxels(source.shape));
+  const foreign = await readForeign(source.files);
+  return foreign ? new Volume(foreign) : parseFiles(source.files);
 }
 
 /** The volume reduced to what the page shows: its first frame, or so many of them after each other. */

@@ -1,0 +1,411 @@
+/**
+ * Between Vesicle and NiiVue, 0.69 and 1.0-rc: its volumes, and a mesh in its view that follows a surface.
+ *
+ * Nothing of NiiVue is imported: its classes come from the caller.
+ *
+ * @module vesicle/niivue
+ */
+import { invalid } from '../check.js';
+import type { MeshArrays } from '../mesh.js';
+import type { Space, VolumeInit } from '../volume.js';
+import { affineOf, bounds, type Frame, type MeshSource, Reader, voxels } from './source.js';
+
+export type { MeshSource } from './source.js';
+
+/** What is read of a volume of NiiVue, `nv.volumes[i]`. */
+export interface NiivueVolume {
+  /** Voxels in the order of the file. */
+  img?: unknown;
+  hdr: {
+    dims: number[];
+    pixDims: number[];
+    datatypeCode: number;
+    xyzt_units: number;
+    scl_slope: number;
+    scl_inter: number;
+    /** Index to world, rows. */
+    affine: number[][];
+  } | null;
+}
+
+/** NIfTI's codes of colours and complex numbers. */
+const SEVERAL_NUMBERS: Record<number, string> = { 32: 'complex64', 128: 'RGB', 1792: 'complex128', 2304: 'RGBA' };
+
+/** NIfTI's codes of time units, in seconds; of none, too. */
+const SECONDS: Record<number, number> = { 0: 1, 8: 1, 16: 1e-3, 24: 1e-6 };
+
+/**
+ * What a `Volume` is made of, from a volume of NiiVue: `new Volume(volumeFromNiivue(nv.volumes[0]))`. Its world is NiiVue's:
+ * RAS, whatever the file says. All frames that NiiVue has loaded come along.
+ *
+ * @throws `VesicleError` `invalid-argument`: a volume that is not loaded, or several numbers a voxel.
+ */
+export function volumeFromNiivue(volume: NiivueVolume | undefined): VolumeInit {
+  const { hdr, img } = Object(volume) as NiivueVolume;
+  if (!hdr?.affine || !img) throw invalid('volume', 'a loaded volume of NiiVue is needed, as nv.volumes[0]');
+  const several = SEVERAL_NUMBERS[hdr.datatypeCode];
+  if (several) throw invalid('volume', `${several}; one number a voxel is needed`);
+  const grid = voxels(
+    img,
+    hdr.dims.slice(1, 4).map((count) => Math.max(1, count)),
+  );
+  const columns = [0, 1, 2, 3].map((column) => [0, 1, 2].map((row) => Number(hdr.affine[row]?.[column])));
+  return {
+    ...grid,
+    affine: affineOf(columns, columns[3] ?? []),
+    // NIfTI: a slope of 0 is none.
+    slope: hdr.scl_slope || 1,
+    intercept: hdr.scl_inter || 0,
+    space: 'RAS',
+    ...secondsBetween(hdr, grid.dims[3] ?? 1),
+  };
+}
+
+function secondsBetween(hdr: { pixDims: number[]; xyzt_units: number }, frames: number): { frameSeconds?: number } {
+  const seconds = Number(hdr.pixDims[4]) * (SECONDS[hdr.xyzt_units & 0x38] ?? 0);
+  return frames > 1 && seconds > 0 && Number.isFinite(seconds) ? { frameSeconds: seconds } : {};
+}
+
+/** What is used of a `Niivue`, or `NiiVueGPU` as it is called in 1.0. */
+export interface Niivue {
+  addMesh(mesh: object): unknown;
+  /** The mesh in 0.69, its place in the list in 1.0. */
+  removeMesh(mesh: object | number): unknown;
+  readonly meshes: readonly object[];
+}
+
+/** NiiVue's `NVMesh`, of 0.69. */
+export type NVMeshClass = new (
+  pts: Float32Array<ArrayBuffer>,
+  tris: Uint32Array<ArrayBuffer>,
+  name: string,
+  rgba255: Uint8Array<ArrayBuffer>,
+  opacity: number,
+  visible: boolean,
+  gl: WebGL2RenderingContext,
+) => object;
+
+/** How a {@link NiivueSurface} is made. */
+export interface NiivueSurfaceOptions {
+  /** NiiVue's class of this name; 0.69 needs it, 1.0 does not. */
+  NVMesh?: NVMeshClass;
+  /** In NiiVue's list of meshes; default 'vesicle'. */
+  name?: string;
+  /** rgba, 0..1; default a warm white. Where the mesh has colours of its own, those are shown. */
+  color?: readonly [number, number, number, number];
+  /** Of the mesh, as its volume says it; default RAS, as NiiVue. */
+  space?: Space;
+}
+
+/**
+ * A mesh in NiiVue that follows another, whatever becomes of its connectivity.
+ *
+ * ```js
+ * const surface = new NiivueSurface(nv, { NVMesh }); // 1.0: without NVMesh
+ * if (await surface.update(model.mesh)) nv.drawScene(); // after every step
+ * ```
+ */
+export class NiivueSurface {
+  readonly #reader: Reader;
+  readonly #shown: Shown;
+
+  /**
+   * @param nv - Attached to its canvas.
+   * @throws `VesicleError` `invalid-argument`: no NiiVue, one that has no canvas yet, or 0.69 without `NVMesh`.
+   */
+  constructor(nv: Niivue, options: NiivueSurfaceOptions = {}) {
+    const { NVMesh, name = 'vesicle', color = [1, 0.88, 0.75, 1], space = 'RAS' } = options;
+    if (typeof Object(nv).addMesh !== 'function') throw invalid('nv', 'a Niivue is needed');
+    const { gl, view } = nv as { gl?: WebGL2RenderingContext; view?: View };
+    if (!gl && !view) throw invalid('nv', 'has no canvas yet: attach it first');
+    this.#reader = new Reader(space, 'RAS');
+    const look = { name, color };
+    if (view) this.#shown = new InNext(nv, view, look);
+    else if (NVMesh && gl) this.#shown = new InFirst(nv, gl, NVMesh, look);
+    else throw invalid('NVMesh', "NiiVue 0.69 needs its class: import { Niivue, NVMesh } from '@niivue/niivue'");
+  }
+
+  /** The mesh in NiiVue's list, `nv.meshes`; nothing before the first update. */
+  get mesh(): object | undefined {
+    return this.#shown.mesh;
+  }
+
+  /**
+   * Takes over what changed since the last time; to see it, draw. False where nothing did.
+   *
+   * All is done when this returns, and the promise is kept at once, but for the first time in 1.0: then NiiVue adds a mesh
+   * and uploads its volumes again.
+   *
+   * @throws `VesicleError` `invalid-argument`: no mesh.
+   */
+  async update(mesh: MeshSource): Promise<boolean> {
+    const frame = this.#reader.read(mesh);
+    if (!frame) return false;
+    await this.#shown.show(frame);
+    return true;
+  }
+
+  /** Takes the mesh out of NiiVue. */
+  async dispose(): Promise<void> {
+    this.#reader.clear();
+    await this.#shown.remove();
+  }
+}
+
+interface Look {
+  name: string;
+  color: readonly [number, number, number, number];
+}
+
+/** A mesh as one of the two generations of NiiVue has it. */
+interface Shown {
+  readonly mesh: object | undefined;
+  show(frame: Frame): unknown;
+  remove(): unknown;
+}
+
+/** Four bytes a vertex: its own colour where the mesh has them, else the same for all. */
+function paint({ positions, colors }: MeshArrays, color: ArrayLike<number>): Uint8Array<ArrayBuffer> {
+  const bytes = new Uint8Array((positions.length / 3) * 4);
+  const all = Array.from(color, (share) => Math.round(255 * share));
+  for (let i = 0, from = 0; i < bytes.length; i += 4, from += 3) {
+    for (let k = 0; k < 3; k++)
+      bytes[i + k] = colors ? Math.round(255 * (colors[from + k] as number)) : (all[k] as number);
+    bytes[i + 3] = all[3] as number;
+  }
+  return bytes;
+}
+
+/** What is used of an `NVMesh` of 0.69. */
+interface FirstMesh {
+  pts: Float32Array;
+  tris: Uint32Array;
+  rgba255: Uint8Array;
+  layers: unknown[];
+  extentsMin: unknown;
+  extentsMax: unknown;
+  furthestVertexFromOrigin: number;
+  f32PerVertex: number;
+  vertexCount: number;
+  indexCount: number;
+  vao: WebGLVertexArrayObject;
+  vertexBuffer: WebGLBuffer;
+  indexBuffer: WebGLBuffer;
+  updateMesh(gl: WebGL2RenderingContext): void;
+}
+
+class InFirst implements Shown {
+  mesh: FirstMesh | undefined;
+  readonly #nv: Niivue;
+  readonly #gl: WebGL2RenderingContext;
+  readonly #NVMesh: NVMeshClass;
+  readonly #look: Look;
+
+  constructor(nv: Niivue, gl: WebGL2RenderingContext, NVMesh: NVMeshClass, look: Look) {
+    [this.#nv, this.#gl, this.#NVMesh, this.#look] = [nv, gl, NVMesh, look];
+  }
+
+  show(frame: Frame): void {
+    // NiiVue keeps what it is given, for what it does with the mesh later on.
+    const [positions, indices] = [frame.positions.slice(), frame.indices.slice()];
+    if (this.mesh) this.#change(this.mesh, positions, indices, frame);
+    else this.#add(positions, indices, frame);
+  }
+
+  #change(mesh: FirstMesh, positions: Float32Array, indices: Uint32Array, frame: Frame): void {
+    if (frame.topology) Object.assign(mesh, { tris: indices, layers: [] });
+    const { min, max } = bounds(positions);
+    Object.assign(mesh, { pts: positions, extentsMin: min, extentsMax: max });
+    mesh.furthestVertexFromOrigin = furthest(positions);
+    if (frame.colors) mesh.rgba255 = paint(frame, this.#look.color);
+    // Packed by hand it takes a fifth of the time. One day the records may be others.
+    if (mesh.f32PerVertex === 5 && mesh.layers.length === 0) this.#upload(mesh, frame);
+    else mesh.updateMesh(this.#gl);
+  }
+
+  #add(positions: Float32Array<ArrayBuffer>, indices: Uint32Array<ArrayBuffer>, frame: Frame): void {
+    const { name, color } = this.#look;
+    const rgba = frame.colors ? paint(frame, color) : Uint8Array.from(color, (share) => Math.round(255 * share));
+    const mesh = new this.#NVMesh(positions, indices, name, rgba, 1, true, this.#gl);
+    this.mesh = mesh as FirstMesh;
+    this.#nv.addMesh(mesh);
+  }
+
+  #upload(mesh: FirstMesh, frame: Frame): void {
+    const gl = this.#gl;
+    gl.bindVertexArray(mesh.vao);
+    gl.bindBuffer(gl.ARRAY_BUFFER, mesh.vertexBuffer);
+    gl.bufferData(gl.ARRAY_BUFFER, records(frame, mesh.rgba255), gl.DYNAMIC_DRAW);
+    if (frame.topology) {
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, mesh.indexBuffer);
+      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.tris, gl.DYNAMIC_DRAW);
+    }
+    gl.bindVertexArray(null);
+    // As updateMesh has them: indices, and numbers of positions.
+    [mesh.indexCount, mesh.vertexCount] = [mesh.tris.length, mesh.pts.length];
+  }
+
+  remove(): void {
+    if (this.mesh) this.#nv.removeMesh(this.mesh);
+    this.mesh = undefined;
+  }
+}
+
+/** 20 bytes a vertex: position, normal in signed bytes, colour. */
+function records({ positions, normals }: Frame, rgba: Uint8Array): ArrayBuffer {
+  const vertices = positions.length / 3;
+  const buffer = new ArrayBuffer(20 * vertices);
+  const [floats, signed, words] = [new Float32Array(buffer), new Int8Array(buffer), new Uint32Array(buffer)];
+  const colors = new Uint32Array(rgba.slice().buffer);
+  const each = colors.length === 1 ? 0 : 1;
+  for (let v = 0; v < vertices; v++) {
+    for (let k = 0; k < 3; k++) {
+      floats[5 * v + k] = positions[3 * v + k] as number;
+      signed[20 * v + 12 + k] = 127 * (normals[3 * v + k] as number);
+    }
+    words[5 * v + 4] = colors[each * v] as number;
+  }
+  return buffer;
+}
+
+function furthest(positions: Float32Array): number {
+  let most = 0;
+  for (let i = 0; i < positions.length; i += 3) {
+    const x = positions[i] as number;
+    const y = positions[i + 1] as number;
+    const z = positions[i + 2] as number;
+    const squared = x * x + y * y + z * z;
+    if (squared > most) most = squared;
+  }
+  return Math.sqrt(most);
+}
+
+/** What is used of a mesh of 1.0. */
+interface NextMesh {
+  positions: Float32Array;
+  indices: Uint32Array;
+  colors: Uint32Array;
+  color: [number, number, number, number];
+  extentsMin: ArrayLike<number>;
+  extentsMax: ArrayLike<number>;
+  mz3: { positions: Float32Array; indices: Uint32Array };
+  layers: unknown[];
+  perVertexColors: Uint32Array | null;
+}
+
+/** What the view of 1.0 has of a mesh on the graphics card. */
+interface NextBuffers {
+  vao: WebGLVertexArrayObject | null;
+  vertexBuffer: WebGLBuffer | null;
+  indexBuffer: WebGLBuffer | null;
+  indexCount: number;
+}
+
+/** The view of 1.0, with what it keeps to itself; in WebGPU it has less of it. */
+interface View {
+  gl?: WebGL2RenderingContext | null;
+  meshResources?: Map<object, NextBuffers>;
+  _rebuildMeshResources?: () => void;
+}
+
+class InNext implements Shown {
+  mesh: NextMesh | undefined;
+  readonly #nv: Niivue;
+  readonly #view: View;
+  readonly #look: Look;
+  #known: NextBuffers | undefined;
+
+  constructor(nv: Niivue, view: View, look: Look) {
+    [this.#nv, this.#view, this.#look] = [nv, view, look];
+  }
+
+  show(frame: Frame): unknown {
+    const geometry = this.#geometry(frame);
+    if (!this.mesh) {
+      this.mesh = { ...this.#plain(), ...geometry, layers: [] };
+      return this.#nv.addMesh(this.mesh);
+    }
+    const buffers = this.#buffers(this.mesh);
+    Object.assign(this.mesh, geometry, frame.topology && { layers: [] });
+    return buffers ? this.#upload(buffers, frame, geometry) : this.#rebuild();
+  }
+
+  // What is asked of NiiVue in the open uploads its volumes again, too.
+  #rebuild(): unknown {
+    const { _rebuildMeshResources } = this.#view;
+    if (_rebuildMeshResources) return _rebuildMeshResources.call(this.#view);
+    return (this.#nv as { updateGLVolume?: () => unknown }).updateGLVolume?.();
+  }
+
+  /** NiiVue's own buffers of the mesh, as it was, where their size says that the records are those that are known. */
+  #buffers(mesh: NextMesh): NextBuffers | undefined {
+    const { gl, meshResources } = this.#view;
+    const buffers = meshResources?.get(mesh);
+    if (!gl || !buffers?.vertexBuffer) return undefined;
+    if (buffers === this.#known) return buffers;
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.vertexBuffer);
+    const size: unknown = gl.getBufferParameter(gl.ARRAY_BUFFER, gl.BUFFER_SIZE);
+    if (size !== (28 * mesh.positions.length) / 3) return undefined;
+    this.#known = buffers;
+    return buffers;
+  }
+
+  #upload(
+    buffers: NextBuffers,
+    frame: Frame,
+    { indices, colors }: { indices: Uint32Array; colors: Uint32Array },
+  ): void {
+    const gl = this.#view.gl as WebGL2RenderingContext;
+    gl.bindVertexArray(buffers.vao);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.vertexBuffer);
+    gl.bufferData(gl.ARRAY_BUFFER, longRecords(frame, colors), gl.DYNAMIC_DRAW);
+    if (frame.topology) {
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.indexBuffer);
+      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.DYNAMIC_DRAW);
+    }
+    gl.bindVertexArray(null);
+    buffers.indexCount = indices.length;
+  }
+
+  #geometry(frame: Frame) {
+    const [positions, indices] = [frame.positions.slice(), frame.indices.slice()];
+    const colors = new Uint32Array(paint(frame, this.mesh?.color ?? this.#look.color).buffer);
+    const { min, max } = bounds(positions);
+    const own = frame.colors ? colors : null;
+    return {
+      ...{ positions, indices, colors, mz3: { positions, indices }, perVertexColors: own },
+      ...{ extentsMin: Float32Array.from(min), extentsMax: Float32Array.from(max) },
+    };
+  }
+
+  /** What a mesh of 1.0 has besides. */
+  #plain() {
+    const { name, color } = this.#look;
+    const [r, g, b, a] = color;
+    return {
+      ...{ kind: 'mesh', name, color: [r, g, b, a] as [number, number, number, number], opacity: 1 },
+      ...{ shaderType: 'phong', clipPlane: new Float32Array(4), isColorbarVisible: false },
+      ...{ trx: null, jcon: null, tractOptions: null, connectomeOptions: null },
+    };
+  }
+
+  remove(): unknown {
+    const place = this.mesh ? this.#nv.meshes.indexOf(this.mesh) : -1;
+    this.mesh = undefined;
+    return place < 0 ? undefined : this.#nv.removeMesh(place);
+  }
+}
+
+/** 28 bytes a vertex: position, normal, colour. */
+function longRecords({ positions, normals }: Frame, colors: Uint32Array): ArrayBuffer {
+  const buffer = new ArrayBuffer(28 * colors.length);
+  const [floats, words] = [new Float32Array(buffer), new Uint32Array(buffer)];
+  for (let v = 0; v < colors.length; v++) {
+    for (let k = 0; k < 3; k++) {
+      floats[7 * v + k] = positions[3 * v + k] as number;
+      floats[7 * v + 3 + k] = normals[3 * v + k] as number;
+    }
+    words[7 * v + 6] = colors[v] as number;
+  }
+  return buffer;
+}

@@ -1,0 +1,260 @@
+/**
+ * Between Vesicle and three.js: the volumes of its `NRRDLoader`, and a surface in its scene that follows a mesh.
+ *
+ * Nothing of three.js is imported: its classes come from the caller.
+ *
+ * @module vesicle/three
+ */
+import { choice, invalid } from '../check.js';
+import type { MeshArrays } from '../mesh.js';
+import type { Space, VolumeInit } from '../volume.js';
+import { affineOf, bounds, type Frame, type MeshSource, Reader, voxels } from './source.js';
+
+export type { MeshSource } from './source.js';
+
+/** What is read of a volume of three's `NRRDLoader`. */
+export interface ThreeVolume {
+  data: ArrayLike<number>;
+  xLength: number;
+  yLength: number;
+  zLength: number;
+  /** Index to world without the place of the first voxel; 3 x 3 where the volume was made by hand. */
+  matrix: { elements: ArrayLike<number> };
+}
+
+/** The fields of the file's header that are needed, as `NRRDLoader` leaves them. */
+interface Header {
+  space?: string;
+  vectors?: number[][];
+  space_origin?: string[];
+  sizes?: number[];
+  kinds?: string;
+  endian?: string;
+  encoding?: string;
+}
+
+/**
+ * What a `Volume` is made of, from a volume of three's `NRRDLoader`: `new Volume(volumeFromThree(volume))`.
+ *
+ * @param options - `world`: `'file'`, the default, is the world of the file, with its origin, and RAS or LPS as it says.
+ *   `'slices'` is where `volume.extractSlice()` draws: the middle of the volume at the origin, RAS.
+ * @throws `VesicleError` `invalid-argument`: not such a volume, several numbers a voxel, or an order of bytes that the
+ *   loader does not read.
+ */
+export function volumeFromThree(volume: ThreeVolume, options: { world?: 'file' | 'slices' } = {}): VolumeInit {
+  const { data, xLength, yLength, zLength, matrix } = checkVolume(volume);
+  const header = (volume as { header?: Header }).header ?? {};
+  checkHeader(header, data);
+  const grid = voxels(data, [xLength, yLength, zLength]);
+  const columns = columnsOf(matrix.elements);
+  if (choice('world', options.world ?? 'file', ['file', 'slices']) === 'slices') {
+    return { ...grid, affine: affineOf(columns, centred(columns, grid.dims)), space: 'RAS' };
+  }
+  // The loader's matrix leaves the origin out, and turns the index instead of the world where the file is LPS.
+  const { vectors = columns, space_origin = [0, 0, 0] } = header;
+  return { ...grid, ...inSpace(header.space ?? '', vectors, space_origin.map(Number)) };
+}
+
+function checkVolume(volume: ThreeVolume): ThreeVolume {
+  const { data, xLength, yLength, zLength, matrix } = Object(volume) as ThreeVolume;
+  if (data && matrix?.elements && xLength > 0 && yLength > 0 && zLength > 0) return volume;
+  throw invalid('volume', 'a loaded volume of NRRDLoader is needed: data, xLength, yLength, zLength and matrix');
+}
+
+function checkHeader({ sizes = [], kinds = '', endian, encoding }: Header, data: unknown): void {
+  if (sizes.length > 3 && !/(list|time)$/.test(kinds.trim())) {
+    throw invalid('volume', `${sizes.length} axes, kinds '${kinds}'; one number a voxel is needed, frames last`);
+  }
+  const bytes = (data as { BYTES_PER_ELEMENT?: number }).BYTES_PER_ELEMENT ?? 1;
+  const written = /^(ascii|te?xt|hex)$/.test(encoding ?? '');
+  if (endian !== 'big' || bytes === 1 || written) return;
+  throw invalid('volume', 'big-endian, which NRRDLoader reads as little-endian; give the file to Volume.parse instead');
+}
+
+/** Columns of a matrix of 4 x 4 or 3 x 3, column-major. */
+function columnsOf(elements: ArrayLike<number>): number[][] {
+  const rows = elements.length === 9 ? 3 : 4;
+  return [0, 1, 2].map((column) => [0, 1, 2].map((row) => Number(elements[rows * column + row])));
+}
+
+/** Where the first voxel lies when the middle of the grid is at the origin. */
+function centred(columns: number[][], dims: readonly number[]): number[] {
+  const half = dims.slice(0, 3).map((count) => (count - 1) / 2);
+  return [0, 1, 2].map((row) => -columns.reduce((sum, column, k) => sum + (column[row] ?? 0) * (half[k] ?? 0), 0));
+}
+
+function inSpace(name: string, vectors: number[][], origin: number[]): { affine: Float64Array; space: Space } {
+  const plain = name.toLowerCase().replace(/-time$/, '');
+  const space = plain === 'left-posterior-superior' || plain === 'lps' ? 'LPS' : 'RAS';
+  // The third of the named spaces, LAS, is a mirrored RAS.
+  const mirrored = plain === 'left-anterior-superior' || plain === 'las';
+  const world = ([x = 0, y = 0, z = 0]: number[]) => [mirrored ? -x : x, y, z];
+  return { affine: affineOf(vectors.map(world), world(origin)), space };
+}
+
+/** What is used of a three.js `BufferAttribute`. */
+interface Attribute {
+  needsUpdate: boolean;
+  clearUpdateRanges(): void;
+  addUpdateRange(start: number, count: number): void;
+}
+
+/** What is used of a three.js `BufferGeometry`. */
+interface Geometry {
+  boundingSphere: object | null;
+  boundingBox: object | null;
+  setAttribute(name: string, attribute: object): unknown;
+  setIndex(attribute: object | null): unknown;
+  setDrawRange(start: number, count: number): void;
+  dispose(): void;
+}
+
+interface Vector {
+  set(x: number, y: number, z: number): unknown;
+}
+
+/** The classes of three.js that are needed; the whole of it, `THREE`, will do. */
+export interface ThreeClasses {
+  BufferGeometry: new () => Geometry;
+  BufferAttribute: new (array: Float32Array | Uint32Array, itemSize: number) => Attribute;
+  Sphere: new () => { center: Vector; radius: number };
+  Box3: new () => { min: Vector; max: Vector };
+}
+
+/** What has a geometry: a `Mesh` of three.js, mostly. */
+export interface ThreeObject {
+  geometry: Geometry;
+}
+
+/** An array of the mesh, the name three.js has for it, and how many numbers a vertex has. */
+const ATTRIBUTES = [
+  ['positions', 'position', 3],
+  ['normals', 'normal', 3],
+  ['uvs', 'uv', 2],
+  ['colors', 'color', 3],
+] as const;
+
+/** Buffers are so many times as large as what is in them, so that they are seldom made anew. */
+const ROOM = 1.5;
+
+/**
+ * A surface in a three.js scene that follows a mesh, whatever becomes of its connectivity.
+ *
+ * ```js
+ * const object = new THREE.Mesh(undefined, new THREE.MeshStandardMaterial());
+ * const surface = new ThreeSurface(THREE, object);
+ * surface.update(model.mesh); // after every step
+ * ```
+ *
+ * The object's `geometry` is another one whenever the buffers have to grow; material and place in the scene are the
+ * caller's. Positions are those of the mesh, in its volume's world.
+ */
+export class ThreeSurface {
+  readonly #three: ThreeClasses;
+  readonly #object: ThreeObject;
+  readonly #reader: Reader;
+  #buffers: Buffers | undefined;
+
+  /**
+   * @param three - The classes of three.js.
+   * @param object - Gets the geometry; what it had is not disposed of.
+   * @param options - `space` of the mesh and `worldSpace` of the scene: where both are given and differ, x and y change
+   *   their signs.
+   * @throws `VesicleError` `invalid-argument`: classes that are missing, no such object.
+   */
+  constructor(three: ThreeClasses, object: ThreeObject, options: { space?: Space; worldSpace?: Space } = {}) {
+    for (const name of ['BufferGeometry', 'BufferAttribute', 'Sphere', 'Box3'] as const) {
+      if (typeof Object(three)[name] !== 'function') throw invalid('three', `has no ${name}; THREE is needed`);
+    }
+    if (!Object(object).geometry) throw invalid('object', 'an object with a geometry is needed, as a THREE.Mesh');
+    this.#three = three;
+    this.#object = object;
+    this.#reader = new Reader(options.space, options.worldSpace);
+  }
+
+  /**
+   * Takes over what changed since the last time; the next rendering uploads it. False where nothing did.
+   *
+   * @throws `VesicleError` `invalid-argument`: no mesh.
+   */
+  update(mesh: MeshSource): boolean {
+    const frame = this.#reader.read(mesh);
+    if (!frame) return false;
+    if (!this.#buffers?.fit(frame)) this.#grow(frame);
+    this.#buffers?.write(frame);
+    return true;
+  }
+
+  #grow(frame: Frame): void {
+    this.#buffers?.geometry.dispose();
+    this.#buffers = new Buffers(this.#three, frame);
+    this.#object.geometry = this.#buffers.geometry;
+  }
+
+  /** Frees the buffers. The object stays in the scene, as the caller's; `update` would make new ones. */
+  dispose(): void {
+    this.#buffers?.geometry.dispose();
+    this.#buffers = undefined;
+    this.#reader.clear();
+  }
+}
+
+/** A geometry with room for more than is in it. */
+class Buffers {
+  readonly geometry: Geometry;
+  readonly #parts = new Map<keyof MeshArrays, { array: Float32Array | Uint32Array; attribute: Attribute }>();
+  readonly #sphere: { center: Vector; radius: number };
+  readonly #box: { min: Vector; max: Vector };
+  #filled = false;
+
+  constructor({ BufferGeometry, BufferAttribute, Sphere, Box3 }: ThreeClasses, frame: MeshArrays) {
+    this.geometry = new BufferGeometry();
+    // Of what is in the buffers; three would take in what is left over in them.
+    this.geometry.boundingSphere = this.#sphere = new Sphere();
+    this.geometry.boundingBox = this.#box = new Box3();
+    for (const [name, called, size] of ATTRIBUTES) {
+      const values = frame[name];
+      if (!values) continue;
+      const array = new Float32Array(size * room(values.length / size));
+      const attribute = new BufferAttribute(array, size);
+      this.geometry.setAttribute(called, attribute);
+      this.#parts.set(name, { array, attribute });
+    }
+    const array = new Uint32Array(3 * room(frame.indices.length / 3));
+    const attribute = new BufferAttribute(array, 1);
+    this.geometry.setIndex(attribute);
+    this.#parts.set('indices', { array, attribute });
+  }
+
+  /** Whether everything of this surface, and nothing else, has its place. */
+  fit(frame: MeshArrays): boolean {
+    return (['indices', ...ATTRIBUTES.map(([name]) => name)] as const).every((name) => {
+      const [room, needed] = [this.#parts.get(name)?.array.length, frame[name]?.length];
+      return room === undefined || needed === undefined ? room === needed : needed <= room;
+    });
+  }
+
+  write(frame: Frame): void {
+    for (const [name] of ATTRIBUTES) this.#fill(name, frame[name]);
+    if (frame.topology || !this.#filled) this.#fill('indices', frame.indices);
+    this.#filled = true;
+    this.geometry.setDrawRange(0, frame.indices.length);
+    const { min, max } = bounds(frame.positions);
+    this.#box.min.set(...min);
+    this.#box.max.set(...max);
+    this.#sphere.center.set((min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2);
+    this.#sphere.radius = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) / 2;
+  }
+
+  #fill(name: keyof MeshArrays, values: Float32Array | Uint32Array | undefined): void {
+    const part = this.#parts.get(name);
+    if (!part || !values) return;
+    const { array, attribute } = part;
+    array.set(values);
+    attribute.clearUpdateRanges();
+    attribute.addUpdateRange(0, values.length);
+    attribute.needsUpdate = true;
+  }
+}
+
+const room = (count: number): number => Math.ceil(ROOM * count);

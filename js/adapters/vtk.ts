@@ -1,0 +1,173 @@
+/**
+ * Between Vesicle and vtk.js and itk-wasm: their images, and a vtk.js surface that follows a mesh.
+ *
+ * Nothing of either is imported: vtk's classes come from the caller.
+ *
+ * @module vesicle/vtk
+ */
+import { choice, invalid } from '../check.js';
+import type { Space, VolumeInit } from '../volume.js';
+import { affineOf, type Frame, type MeshSource, Reader, voxels } from './source.js';
+
+export type { MeshSource } from './source.js';
+
+/** What is read of a `vtkImageData`. */
+export interface VtkImage {
+  getDimensions(): number[];
+  getExtent(): number[];
+  getIndexToWorld(): ArrayLike<number>;
+  getPointData(): { getScalars(): { getData(): ArrayLike<number>; getNumberOfComponents(): number } | null };
+}
+
+/** What is read of an itk-wasm `Image`. */
+export interface ItkImage {
+  imageType: { dimension: number; components: number; pixelType: string };
+  size: ArrayLike<number>;
+  spacing: ArrayLike<number>;
+  origin: ArrayLike<number>;
+  /** Row-major. */
+  direction: ArrayLike<number | bigint>;
+  data: unknown;
+}
+
+/**
+ * What a `Volume` is made of, from a `vtkImageData` of vtk.js: `new Volume(volumeFromVtk(image))`.
+ *
+ * @param options - `space`: which way the world axes of the image point, which vtk.js does not know; default LPS, as in what
+ *   itk and DICOM readers give.
+ * @throws `VesicleError` `invalid-argument`: no such image, no scalars, or several numbers a voxel.
+ */
+export function volumeFromVtk(image: VtkImage, options: { space?: Space } = {}): VolumeInit {
+  const scalars = scalarsOf(image);
+  const matrix = image.getIndexToWorld();
+  const [x = 0, , y = 0, , z = 0] = image.getExtent();
+  const columns = [0, 4, 8].map((first) => [0, 1, 2].map((row) => Number(matrix[first + row])));
+  // The first voxel is where the extent begins, and that need not be at 0.
+  const first = [0, 1, 2].map((row) => Number(matrix[12 + row]) + dot([x, y, z], columns, row));
+  return {
+    ...voxels(scalars.getData(), image.getDimensions()),
+    affine: affineOf(columns, first),
+    space: choice('space', options.space ?? 'LPS', ['RAS', 'LPS']),
+  };
+}
+
+const dot = (index: number[], columns: number[][], row: number): number =>
+  index.reduce((sum, value, k) => sum + value * (columns[k]?.[row] ?? 0), 0);
+
+function scalarsOf(image: VtkImage) {
+  const { getIndexToWorld, getPointData } = Object(image) as Partial<VtkImage>;
+  if (!getIndexToWorld || !getPointData) throw invalid('image', 'a vtkImageData is needed');
+  const scalars = getPointData().getScalars();
+  if (!scalars) throw invalid('image', 'has no scalars; a vtkImageData with one number a voxel is needed');
+  const components = scalars.getNumberOfComponents();
+  if (components === 1) return scalars;
+  throw invalid('image', `${components} numbers a voxel; one is needed`);
+}
+
+/**
+ * What a `Volume` is made of, from an `Image` of itk-wasm, in 3D, or 4D with frames last: `new Volume(volumeFromItk(image))`.
+ * Its world is LPS. Seconds between frames are the caller's to add, since not all files say them.
+ *
+ * @throws `VesicleError` `invalid-argument`: no such image, another dimension, or several numbers a voxel.
+ */
+export function volumeFromItk(image: ItkImage): VolumeInit {
+  const { imageType, size, spacing, origin, direction, data } = Object(image) as ItkImage;
+  if (!imageType || !size || !direction) throw invalid('image', 'an Image of itk-wasm is needed');
+  const { dimension, components, pixelType } = imageType;
+  if (dimension !== 3 && dimension !== 4) throw invalid('image', `${dimension}D; a 3D or 4D image is needed`);
+  if (components !== 1) throw invalid('image', `${components} numbers a voxel, ${pixelType}; one is needed`);
+  const cosine = (row: number, column: number) => Number(direction[column + row * dimension]);
+  const columns = [0, 1, 2].map((column) => [0, 1, 2].map((row) => cosine(row, column) * Number(spacing[column])));
+  return { ...voxels(data, Array.from(size)), affine: affineOf(columns, origin), space: 'LPS' };
+}
+
+interface DataArray {
+  setData(values: Float32Array | Uint32Array, components?: number): void;
+}
+
+/** What is used of a `vtkPolyData`. */
+export interface VtkPolyData {
+  getPoints(): DataArray;
+  getPolys(): DataArray;
+  getPointData(): { setNormals(array: DataArray): unknown };
+  modified(): void;
+  delete(): void;
+}
+
+/** The classes of vtk.js that are needed: `{ vtkPolyData, vtkDataArray }`. */
+export interface VtkClasses<P extends VtkPolyData> {
+  vtkPolyData: { newInstance(): P };
+  vtkDataArray: { newInstance(values: { name: string; numberOfComponents: number; values: Float32Array }): DataArray };
+}
+
+/**
+ * A `vtkPolyData` that follows a mesh, whatever becomes of its connectivity.
+ *
+ * ```js
+ * const surface = new VtkSurface({ vtkPolyData, vtkDataArray });
+ * mapper.setInputData(surface.polyData);
+ * surface.update(model.mesh); // after every step, then render
+ * ```
+ *
+ * Points are those of the mesh, in its volume's world; they have normals, outwards.
+ */
+export class VtkSurface<P extends VtkPolyData> {
+  /** For a `vtkMapper`; the same from start to end. */
+  readonly polyData: P;
+  readonly #normals: DataArray;
+  readonly #reader: Reader;
+
+  /**
+   * @param vtk - The classes of vtk.js.
+   * @param options - `space` of the mesh and `worldSpace` of the view: where both are given and differ, x and y change
+   *   their signs.
+   * @throws `VesicleError` `invalid-argument`: classes that are missing.
+   */
+  constructor(vtk: VtkClasses<P>, options: { space?: Space; worldSpace?: Space } = {}) {
+    for (const name of ['vtkPolyData', 'vtkDataArray'] as const) {
+      if (typeof Object(vtk)[name]?.newInstance !== 'function') throw invalid('vtk', `has no ${name} of vtk.js`);
+    }
+    this.#reader = new Reader(options.space, options.worldSpace);
+    this.polyData = vtk.vtkPolyData.newInstance();
+    this.#normals = vtk.vtkDataArray.newInstance({
+      name: 'Normals',
+      numberOfComponents: 3,
+      values: new Float32Array(),
+    });
+    this.polyData.getPointData().setNormals(this.#normals);
+  }
+
+  /**
+   * Takes over what changed since the last time; the next rendering uploads it. False where nothing did.
+   *
+   * @throws `VesicleError` `invalid-argument`: no mesh.
+   */
+  update(mesh: MeshSource): boolean {
+    const frame = this.#reader.read(mesh);
+    if (!frame) return false;
+    // vtk.js keeps what it is given.
+    this.polyData.getPoints().setData(frame.positions.slice(), 3);
+    this.#normals.setData(frame.normals.slice(), 3);
+    if (frame.topology) this.polyData.getPolys().setData(polygons(frame));
+    this.polyData.modified();
+    return true;
+  }
+
+  /** Deletes the poly data; take its actor out of the view before. */
+  dispose(): void {
+    this.#reader.clear();
+    this.polyData.delete();
+  }
+}
+
+/** Triangles as vtk has polygons: each with the number of its corners before it. */
+function polygons({ indices }: Frame): Uint32Array {
+  const cells = new Uint32Array((indices.length / 3) * 4);
+  for (let from = 0, to = 0; from < indices.length; from += 3, to += 4) {
+    cells[to] = 3;
+    cells[to + 1] = indices[from] as number;
+    cells[to + 2] = indices[from + 1] as number;
+    cells[to + 3] = indices[from + 2] as number;
+  }
+  return cells;
+}

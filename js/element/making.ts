@@ -1,0 +1,82 @@
+// A model of each method out of what the attributes of the element say.
+import { invalid } from '../check.js';
+import { VesicleError } from '../error.js';
+import {
+  type ControlEllipsoid,
+  DeformableModel,
+  ImplicitSurface,
+  Mesh,
+  MultiresolutionModel,
+  parsePoints,
+  type Stepper,
+  SurfaceTracker,
+  type Vec3,
+  Volume,
+} from '../worker.js';
+
+/** What the element is told. */
+export interface Told {
+  bytes: Uint8Array;
+  levels: number;
+  params: Record<string, unknown>;
+  ellipsoids: ControlEllipsoid[];
+}
+
+/** A model, and the direction from which its surface is seen at first. */
+export interface Made {
+  model: Stepper;
+  from: Vec3;
+}
+
+/** Along +y, where things made by hand have their front. */
+const FRONT: Vec3 = [-0.5, -1, 0.35];
+
+/** From one method to its model; whatever else was made on the way is freed. */
+export const MODELS = {
+  deformable: ({ bytes, levels, params }: Told): Promise<Made> =>
+    ofVolume(bytes, (volume) => DeformableModel.create({ volume, levels, params })),
+  implicit: async ({ bytes, params }: Told): Promise<Made> => {
+    const { points, normals } = await parsePoints(bytes);
+    return { model: await ImplicitSurface.create({ points, ...(normals && { normals }), params }), from: FRONT };
+  },
+  tracking: ({ bytes, params }: Told): Promise<Made> =>
+    ofVolume(bytes, (volume) => SurfaceTracker.create({ volume, params })),
+  multires: async ({ bytes, ellipsoids, params }: Told): Promise<Made> => {
+    const make = (detail: Mesh) => MultiresolutionModel.create({ detail, ellipsoids, params });
+    return { model: await using(await Mesh.parse(bytes), make), from: FRONT };
+  },
+};
+
+/** Of a person: from before, a little from their left. */
+function ofVolume(bytes: Uint8Array, make: (volume: Volume) => Promise<Stepper>): Promise<Made> {
+  const made = async (volume: Volume): Promise<Made> => {
+    const [model, space] = await Promise.all([make(volume), volume.space]);
+    return { model, from: space === 'RAS' ? [-0.6, 1, 0.35] : [0.6, -1, 0.35] };
+  };
+  return Volume.parse(bytes).then((volume) => using(volume, made));
+}
+
+async function using<T extends { free(): void }, Made>(thing: T, make: (thing: T) => Promise<Made>): Promise<Made> {
+  try {
+    return await make(thing);
+  } finally {
+    thing.free();
+  }
+}
+
+/** The file at an address. */
+export async function fetched(address: string): Promise<Uint8Array> {
+  const response = await fetch(address);
+  if (!response.ok) throw new VesicleError('bad-file', `src: ${address}: ${response.status} ${response.statusText}`);
+  return new Uint8Array(await response.arrayBuffer());
+}
+
+/** JSON out of an attribute; what it is when it is left out. */
+export function json<T>(name: string, text: string | null, otherwise: T): T {
+  if (text === null || text.trim() === '') return otherwise;
+  try {
+    return JSON.parse(text) as T;
+  } catch {
+    throw invalid(name, `'${text}' is not JSON, such as '{ "iso": 95 }'`);
+  }
+}

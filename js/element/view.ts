@@ -1,0 +1,132 @@
+// The surface in three dimensions.
+import * as THREE from 'three';
+import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import { type MeshSource, ThreeSurface } from '../adapters/three.js';
+import type { MeshArrays } from '../mesh.js';
+import type { Vec3 } from '../volume.js';
+
+const FIELD_OF_VIEW = 40;
+/** Pixels drawn for one of the page at most. */
+const FINEST = 2;
+
+/** Draws a surface when it has changed or the view has. */
+export class View {
+  readonly #renderer: THREE.WebGLRenderer;
+  readonly #scene = new THREE.Scene();
+  readonly #camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW);
+  readonly #controls: OrbitControls;
+  readonly #object = new THREE.Mesh(
+    new THREE.BufferGeometry(),
+    new THREE.MeshStandardMaterial({ color: '#d8c3a5', roughness: 0.55 }),
+  );
+  readonly #surface = new ThreeSurface(THREE, this.#object);
+  readonly #observer = new ResizeObserver(() => this.#resize());
+  /** Nobody has turned it yet: it may still be put right. */
+  #untouched = true;
+  #version = 0;
+  #asked = 0;
+
+  /** Throws where the browser gives no WebGL. */
+  constructor(readonly canvas: HTMLCanvasElement) {
+    this.#renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    const light = new THREE.DirectionalLight('#ffffff', 2.4);
+    light.position.set(0.4, 0.6, 1);
+    this.#camera.up.set(0, 0, 1);
+    this.#camera.add(light);
+    this.#scene.add(this.#camera, this.#object, new THREE.HemisphereLight('#ffffff', '#8d8377', 1.2));
+    this.#controls = new OrbitControls(this.#camera, canvas);
+    this.#controls.addEventListener('change', () => this.#ask());
+    this.#controls.addEventListener('start', () => {
+      this.#untouched = false;
+    });
+    canvas.addEventListener('keydown', (event) => this.#turnByKey(event));
+    this.#observer.observe(canvas);
+  }
+
+  /** Shows a surface. */
+  show(arrays: MeshArrays): void {
+    this.#version += 1;
+    const source: MeshSource = { topologyVersion: this.#version, geometryVersion: this.#version, arrays: () => arrays };
+    this.#surface.update(source);
+    this.#ask();
+  }
+
+  /** Begins with another surface, which nobody has turned. */
+  begin(): void {
+    this.#untouched = true;
+  }
+
+  /** Puts the whole surface in sight, from a direction, unless it was turned by hand. */
+  frame(from: Vec3): void {
+    if (!this.#untouched) return;
+    const { center, radius } = this.#object.geometry.boundingSphere ?? new THREE.Sphere();
+    const away = (0.85 * radius) / Math.sin((FIELD_OF_VIEW * Math.PI) / 360);
+    this.#camera.position
+      .set(...from)
+      .normalize()
+      .multiplyScalar(away)
+      .add(center);
+    this.#camera.near = away / 100;
+    this.#camera.far = away * 10;
+    this.#camera.updateProjectionMatrix();
+    this.#controls.target.copy(center);
+    this.#controls.update();
+  }
+
+  #turnByKey(event: KeyboardEvent): void {
+    const [right, up, closer] = KEYS[event.key] ?? [0, 0, 0];
+    if (right === 0 && up === 0 && closer === 0) return;
+    event.preventDefault();
+    this.#untouched = false;
+    const away = this.#camera.position.clone().sub(this.#controls.target);
+    // About the axis that is up in the world, and about the one to the right on the screen.
+    away.applyAxisAngle(this.#camera.up, 0.12 * right);
+    const level = Math.acos(away.z / away.length()) - 0.12 * up;
+    if (level > 0.05 && level < Math.PI - 0.05) {
+      const across = new THREE.Vector3().crossVectors(this.#camera.up, away).normalize();
+      away.applyAxisAngle(across, -0.12 * up);
+    }
+    this.#camera.position.copy(this.#controls.target).addScaledVector(away, 1 - 0.1 * closer);
+    this.#controls.update();
+  }
+
+  #resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (width === 0 || height === 0) return;
+    this.#renderer.setPixelRatio(Math.min(devicePixelRatio, FINEST));
+    this.#renderer.setSize(width, height, false);
+    this.#camera.aspect = width / height;
+    this.#camera.updateProjectionMatrix();
+    // A new size clears the canvas: drawn at once, or it flashes.
+    this.#draw();
+  }
+
+  #ask(): void {
+    if (this.#asked === 0) this.#asked = requestAnimationFrame(() => this.#draw());
+  }
+
+  #draw(): void {
+    cancelAnimationFrame(this.#asked);
+    this.#asked = 0;
+    this.#renderer.render(this.#scene, this.#camera);
+  }
+
+  dispose(): void {
+    cancelAnimationFrame(this.#asked);
+    this.#observer.disconnect();
+    this.#controls.dispose();
+    this.#surface.dispose();
+    this.#object.material.dispose();
+    this.#renderer.dispose();
+  }
+}
+
+/** To the right, up, and closer. */
+const KEYS: Record<string, [number, number, number]> = {
+  ArrowLeft: [-1, 0, 0],
+  ArrowRight: [1, 0, 0],
+  ArrowUp: [0, 1, 0],
+  ArrowDown: [0, -1, 0],
+  '+': [0, 0, 1],
+  '-': [0, 0, -1],
+};

@@ -1,0 +1,212 @@
+/**
+ * What runs in the worker of `vesicle/worker`: the library itself, and a table of the objects that were made. It exports
+ * nothing; a bundler that does not find it by itself takes it as the entry of a worker.
+ *
+ * @packageDocumentation
+ */
+import { VesicleCrash, VesicleError } from './error.js';
+import init, {
+  animationGlb,
+  DeformableModel,
+  ImplicitSurface,
+  Mesh,
+  MultiresolutionModel,
+  paramSpecs,
+  parsePoints,
+  SurfaceTracker,
+  Volume,
+  version,
+} from './index.js';
+import type { MeshArrays } from './mesh.js';
+import type { RunOptions, Stepper, StepReport } from './stepper.js';
+import {
+  type Failure,
+  FUNCTIONS,
+  isReference,
+  lookUp,
+  MEMBERS,
+  type Reference,
+  type Reply,
+  type Request,
+  STATICS,
+  swapped,
+  type Task,
+} from './worker-protocol.js';
+import type { ClassName, FunctionName, Library, Own } from './worker-types.js';
+
+type Post = (reply: Reply, transfer: ArrayBuffer[]) => void;
+type Call = Extract<Task, { type: 'call' }>;
+type Made = { object: Own } | { failed: unknown };
+
+const LIBRARY: Pick<Library, ClassName | FunctionName> = {
+  ...{ Volume, Mesh, DeformableModel, ImplicitSurface, SurfaceTracker, MultiresolutionModel },
+  ...{ version, paramSpecs, parsePoints, animationGlb },
+};
+
+const CLASSES = Object.keys(MEMBERS) as ClassName[];
+
+/** Why a run was called off from the page, which knows the reason. */
+const ABORTED = new VesicleError('aborted', 'the run was called off');
+
+/** Does what the page asks for, one request after the other; runs go on between them. */
+class Host {
+  readonly #post: Post;
+  readonly #made = new Map<number, Made>();
+  readonly #runs = new Map<number, AbortController>();
+  #last = 0;
+
+  constructor(post: Post) {
+    this.#post = post;
+  }
+
+  receive(request: Request): void {
+    if (request.type === 'abort') this.#runs.get(request.id)?.abort(ABORTED);
+    else if (request.type === 'free') this.#free(request.object);
+    else void this.#answer(request.id, request);
+  }
+
+  async #answer(id: number, task: Task): Promise<void> {
+    try {
+      const [value, transfer] = this.#outgoing(await this.#perform(id, task));
+      this.#post({ type: 'value', id, value }, transfer);
+    } catch (error) {
+      this.#post({ type: 'error', id, failure: failureOf(error) }, []);
+    }
+  }
+
+  #perform(id: number, task: Task): unknown {
+    if (task.type === 'init') return start(task.module);
+    if (task.type === 'make') return this.#make(task.as, task.args);
+    if (task.name === 'run') return this.#run(id, task);
+    return task.name === 'copyTo' ? this.#copyTo(task) : this.#call(task);
+  }
+
+  #make({ vesicle: at, class: name }: Reference, args: unknown[]): void {
+    lookUp(MEMBERS, name);
+    try {
+      const Class = LIBRARY[name] as unknown as new (...args: unknown[]) => Own;
+      this.#made.set(at, { object: new Class(...this.#incoming(args)) });
+    } catch (failed) {
+      // Everything asked of it meets the same failure.
+      this.#made.set(at, { failed });
+      throw failed;
+    }
+  }
+
+  #call({ on, name, args }: Call): unknown {
+    const { target, kind } = this.#find(on, name);
+    const member = target[name];
+    return kind === 'value' ? member : (member as (...args: unknown[]) => unknown).apply(target, this.#incoming(args));
+  }
+
+  /** Where a name is, and what it is; only names in the tables are found. */
+  #find(on: Call['on'], name: string): { target: Record<string, unknown>; kind: string } {
+    if (on === undefined) return { target: LIBRARY, kind: lookUp(FUNCTIONS, name) };
+    if (typeof on === 'string') {
+      return { kind: lookUp<string>(lookUp(STATICS, on), name), target: record(LIBRARY[on]) };
+    }
+    const object = this.#object(on);
+    return { kind: lookUp<string>(MEMBERS[classOf(object)], name), target: record(object) };
+  }
+
+  #object({ vesicle: at, part }: Reference): Own {
+    const made = this.#made.get(at);
+    if (!made) throw new VesicleError('freed', 'this object was freed and cannot be used any more');
+    if ('failed' in made) throw made.failed;
+    if (part === undefined) return made.object;
+    if (lookUp<string>(MEMBERS[classOf(made.object)], part) === 'live') return record(made.object)[part] as Own;
+    throw new VesicleError('invalid-argument', `${part}: this is no object`);
+  }
+
+  /** Into the page's buffers, which came with the request and go back. */
+  #copyTo({ on, args }: Call): unknown {
+    const { target } = this.#find(on, 'copyTo');
+    const [arrays] = this.#incoming(args) as [MeshArrays];
+    return { counts: (target as unknown as Mesh).copyTo(arrays), arrays };
+  }
+
+  async #run(id: number, { on, args: [options], reports }: Call): Promise<StepReport> {
+    const { target } = this.#find(on, 'run');
+    const abort = new AbortController();
+    this.#runs.set(id, abort);
+    const onStep = (report: StepReport) => this.#post({ type: 'report', id, report }, []);
+    try {
+      const given = { ...(options as RunOptions), signal: abort.signal, ...(reports && { onStep }) };
+      return await (target as unknown as Stepper).run(given);
+    } finally {
+      this.#runs.delete(id);
+    }
+  }
+
+  #free(at: number): void {
+    const made = this.#made.get(at);
+    this.#made.delete(at);
+    if (made && 'object' in made) made.object.free();
+  }
+
+  #incoming(args: unknown[]): unknown[] {
+    return args.map((arg) =>
+      swapped('', arg, (_, value) => {
+        if (isReference(value)) return this.#object(value);
+        return isBinary(value) ? value : undefined;
+      }),
+    );
+  }
+
+  /** A result, and the buffers in it: they are fresh, so they can be handed over. */
+  #outgoing(result: unknown): [unknown, ArrayBuffer[]] {
+    const buffers = new Set<ArrayBuffer>();
+    const value = swapped('', result, (_, found) => {
+      if (ArrayBuffer.isView(found)) buffers.add(found.buffer as ArrayBuffer);
+      if (isBinary(found)) return found;
+      return CLASSES.some((name) => found instanceof LIBRARY[name]) ? this.#keep(found as Own) : undefined;
+    });
+    return [value, [...buffers]];
+  }
+
+  #keep(object: Own): Reference {
+    this.#last -= 1;
+    this.#made.set(this.#last, { object });
+    return { vesicle: this.#last, class: classOf(object) };
+  }
+}
+
+const isBinary = (value: object): boolean => ArrayBuffer.isView(value) || value instanceof ArrayBuffer;
+
+const record = (value: object) => value as Record<string, unknown>;
+
+function classOf(object: Own): ClassName {
+  return CLASSES.find((name) => object instanceof LIBRARY[name]) as ClassName;
+}
+
+function start(module: Extract<Task, { type: 'init' }>['module']): Promise<void> {
+  const source = typeof module === 'string' ? new URL(module) : module;
+  return init(source && { module_or_path: source }).then(() => undefined);
+}
+
+function failureOf(error: unknown): Failure {
+  if (error === ABORTED) return { kind: 'aborted' };
+  if (error instanceof VesicleError) return { kind: 'error', code: error.code, message: error.message };
+  const other = asError(error);
+  if (!(other instanceof VesicleCrash)) return { kind: 'other', name: other.name, error: other };
+  return { kind: 'crash', message: other.message, cause: other.cause ? asError(other.cause) : undefined };
+}
+
+const asError = (error: unknown) => (error instanceof Error ? error : new Error(String(error)));
+
+async function inNode(): Promise<void> {
+  // Out of the bundlers' sight: a page never gets here.
+  const threads = 'node:worker_threads';
+  const { parentPort } = await import(/* @vite-ignore */ /* webpackIgnore: true */ threads);
+  const host = new Host((reply, transfer) => parentPort.postMessage(reply, transfer));
+  parentPort.on('message', (request: Request) => host.receive(request));
+}
+
+function inBrowser(): void {
+  const port = globalThis as unknown as { postMessage: Post };
+  const host = new Host((reply, transfer) => port.postMessage(reply, transfer));
+  addEventListener('message', ({ data }: MessageEvent<Request>) => host.receive(data));
+}
+
+if ('postMessage' in globalThis) inBrowser();
+else void inNode();

@@ -1,0 +1,17 @@
+// Makes `<vesicle-lab>`: its code with three.js in one file, and its types; the library is the one beside it.
+import { bundle } from './bundle.mjs';
+import { at, must, tool } from './shell.mjs';
+
+/** What the element shares with the package stays where it is. */
+const shared = {
+  name: 'shared',
+  enforce: 'pre',
+  resolveId: (id) =>
+    id.startsWith('../') && id.endsWith('.js') ? { id: `./${id.slice(3)}`, external: true } : undefined,
+};
+
+/** Writes `pkg/element.js` and its types; needs the rest of the package. */
+export async function makeElement() {
+  await bundle('element', 'js/element/index.ts', shared, true);
+  await must(tool('tsc'), ['-p', at('js/element')]);
+}

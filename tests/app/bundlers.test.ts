@@ -1,0 +1,174 @@
+// The package as it would be published, taken up by bundlers and by plain pages.
+import { mkdir, mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import type { Browser } from 'playwright-core';
+import { afterAll, beforeAll, expect, test } from 'vitest';
+import { launchChromium } from '../../scripts/chromium.mjs';
+import { serve } from '../../scripts/serve.mjs';
+import { at, must } from '../../scripts/shell.mjs';
+import { SPONGE_BITS, spongeBits } from '../js/sponge';
+
+let browser: Browser;
+/** A project with the packed package installed in it, and nothing else. */
+let project = '';
+
+const main = (from: string, options = '') => `
+  import * as vesicle from '${from}';
+  await vesicle.default(${options});
+  document.title = await (${spongeBits})(vesicle);`;
+
+const page = (script: string, policy = '') => `<!doctype html>
+<html lang="en">
+  <head>
+    <meta charset="utf-8">${policy && `<meta http-equiv="Content-Security-Policy" content="${policy}">`}
+    <link rel="icon" href="data:,">
+  </head>
+  <body>${script}</body>
+</html>`;
+
+const write = (path: string, text: string) => writeFile(join(project, path), text);
+
+beforeAll(async () => {
+  project = await mkdtemp(join(tmpdir(), 'vesicle-bundled-'));
+  browser = await launchChromium();
+  const packed = await must('npm', ['pack', '--silent', '--pack-destination', project, at('pkg')]);
+  await write('package.json', '{ "name": "a-page", "private": true, "type": "module" }');
+  const install = [
+    'install',
+    '--offline',
+    '--no-audit',
+    '--no-fund',
+    join(project, packed.trim().split('\n').at(-1) ?? ''),
+  ];
+  await must('npm', install, { cwd: project });
+  await mkdir(join(project, 'dist'));
+});
+afterAll(async () => {
+  await browser.close();
+  await rm(project, { recursive: true, force: true });
+});
+
+/** What the page in `folder` of the project, at `address`, comes to; complaints in the console fail. */
+async function titleOf(folder: string, address = ''): Promise<void> {
+  const server = await serve(join(project, folder), 0);
+  const opened = await browser.newPage();
+  const complaints: string[] = [];
+  opened.on('console', (message) => message.type() === 'error' && complaints.push(message.text()));
+  opened.on('pageerror', (error) => complaints.push(error.message));
+  try {
+    await opened.goto(server.address + address);
+    await expect.poll(async () => complaints[0] ?? (await opened.title())).toBe(SPONGE_BITS);
+    expect(complaints).toEqual([]);
+  } finally {
+    await opened.close();
+    await server.close();
+  }
+}
+
+test('Vite', async () => {
+  await write('index.html', page('<script type="module" src="./main.js"></script>'));
+  await write('main.js', main('vesicle'));
+  const { build } = await import('vite');
+  const target = { target: 'es2022', outDir: join(project, 'dist/vite') };
+  await build({ root: project, configFile: false, logLevel: 'error', build: target });
+  await titleOf('dist/vite');
+});
+
+test('webpack', async () => {
+  await write('main.js', main('vesicle'));
+  const { default: webpack } = await import('webpack');
+  const output = { path: join(project, 'dist/webpack'), publicPath: '', filename: 'main.js' };
+  const compiler = webpack({
+    ...{
+      context: project,
+      entry: './main.js',
+      mode: 'production',
+      target: 'web',
+      output,
+      performance: { hints: false },
+    },
+  });
+  const stats = await new Promise<{ compilation: { errors: Error[]; warnings: Error[] } }>((resolve, reject) =>
+    compiler?.run((error, stats) => (stats ? resolve(stats) : reject(error))),
+  );
+  expect(stats.compilation.errors).toEqual([]);
+  expect(stats.compilation.warnings).toEqual([]);
+  await write('dist/webpack/index.html', page('<script type="module" src="./main.js"></script>'));
+  await titleOf('dist/webpack');
+});
+
+test('esbuild, which is given the address of the module', async () => {
+  await write('main.js', main('vesicle', `{ module_or_path: new URL('./vesicle_bg.wasm', import.meta.url) }`));
+  const { build } = await import('esbuild');
+  const outdir = join(project, 'dist/esbuild');
+  const built = await build({
+    ...{ absWorkingDir: project, entryPoints: ['main.js'], bundle: true, format: 'esm', outdir, logLevel: 'silent' },
+  });
+  expect(built.errors).toEqual([]);
+  await writeFile(
+    join(outdir, 'vesicle_bg.wasm'),
+    await readFile(join(project, 'node_modules/vesicle/vesicle_bg.wasm')),
+  );
+  await write('dist/esbuild/index.html', page('<script type="module" src="./main.js"></script>'));
+  await titleOf('dist/esbuild');
+});
+
+test('esbuild with the module inside, which is given nothing', async () => {
+  await write('main.js', main('vesicle/inline'));
+  const { build } = await import('esbuild');
+  const outdir = join(project, 'dist/esbuild-inline');
+  const entry = { absWorkingDir: project, entryPoints: ['main.js'], outdir };
+  await build({ ...entry, bundle: true, format: 'esm', logLevel: 'silent' });
+  await write('dist/esbuild-inline/index.html', page('<script type="module" src="./main.js"></script>'));
+  await titleOf('dist/esbuild-inline');
+});
+
+test('a plain page without a bundler', async () => {
+  await write('plain.html', page(`<script type="module">${main('./node_modules/vesicle/index.js')}</script>`));
+  await titleOf('.', 'plain.html');
+});
+
+test('one file, under a policy that forbids to fetch anything', async () => {
+  const policy = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'none'; img-src data:";
+  await write('strict.js', main('./node_modules/vesicle/inline.js'));
+  await write('strict.html', page('<script type="module" src="./strict.js"></script>', policy));
+  await titleOf('.', 'strict.html');
+});
+
+test('one file, from the address of a blob, as notebooks do', async () => {
+  const script = `
+    const text = await (await fetch('./node_modules/vesicle/inline.js')).text();
+    const address = URL.createObjectURL(new Blob([text], { type: 'text/javascript' }));
+    const vesicle = await import(address);
+    await vesicle.default();
+    document.title = await (${spongeBits})(vesicle);`;
+  await write('blob.html', page(`<script type="module">${script}</script>`));
+  await titleOf('.', 'blob.html');
+});
+
+test.each(['bundler', 'node16', 'nodenext'])(
+  'types, as TypeScript with moduleResolution %s finds them',
+  async (resolution) => {
+    const entries = ['vesicle', 'vesicle/inline'];
+    const lines = entries.map((entry, k) => `import init${k}, { Mesh as Mesh${k} } from '${entry}';`);
+    const uses = entries.map(
+      (_, k) => `await init${k}(); const n${k}: number = Mesh${k}.icosphere([0, 0, 0], 1, 0.5).vertexCount;`,
+    );
+    await write('main.ts', [...lines, ...uses, `console.log(${entries.map((_, k) => `n${k}`)});`].join('\n'));
+    const module = resolution === 'bundler' ? 'esnext' : resolution;
+    const lib = 'ES2023,ESNext.Disposable,DOM';
+    const options = [
+      '--module',
+      module,
+      '--moduleResolution',
+      resolution,
+      '--target',
+      'es2022',
+      '--lib',
+      lib,
+      '--strict',
+    ];
+    await must(at('node_modules/.bin/tsc'), ['--noEmit', ...options, 'main.ts'], { cwd: project });
+  },
+);

@@ -1,0 +1,212 @@
+// `<vesicle-lab>` on pages of others: the package's own files, and nothing of the app.
+import { cp, mkdtemp, rm, writeFile } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import type { Browser, Page } from 'playwright-core';
+import init, { Mesh } from 'vesicle';
+import type {} from 'vesicle/element';
+import { afterAll, afterEach, beforeAll, expect, test } from 'vitest';
+import { launchChromium } from '../../scripts/chromium.mjs';
+import { serve } from '../../scripts/serve.mjs';
+import { at } from '../../scripts/shell.mjs';
+import { beating } from '../js/beating';
+import { metaImageHeader, ring } from './volumes';
+
+const POLICY =
+  "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; connect-src 'self'; img-src data:";
+
+let browser: Browser;
+let folder = '';
+let server: { address: string; close: () => unknown };
+let page: Page;
+const complaints: string[] = [];
+
+beforeAll(async () => {
+  folder = await mkdtemp(join(tmpdir(), 'vesicle-element-'));
+  await cp(at('pkg'), join(folder, 'vesicle'), { recursive: true });
+  const header = Buffer.from(metaImageHeader('LOCAL'));
+  await writeFile(join(folder, 'ring.mha'), Buffer.concat([header, ring()]));
+  await cp(at('www/public/data/nefertiti-base.ply'), join(folder, 'bust.ply'));
+  server = await serve(folder, 0);
+  browser = await launchChromium();
+});
+afterAll(async () => {
+  await browser.close();
+  await server.close();
+  await rm(folder, { recursive: true, force: true });
+});
+afterEach(async () => {
+  await page.close();
+  expect(complaints.splice(0)).toEqual([]);
+});
+
+/** A page with the element in it, and what happens to the element written down. */
+async function open(body: string, before = ''): Promise<void> {
+  page = await browser.newPage();
+  page.setDefaultTimeout(120_000);
+  page.on('console', (message) => message.type() === 'error' && complaints.push(message.text()));
+  page.on('pageerror', (error) => complaints.push(error.message));
+  const policy = `<meta http-equiv="Content-Security-Policy" content="${POLICY}">`;
+  const script = '<script type="module" src="./vesicle/element.js"></script>';
+  const head = `<meta charset="utf-8">${policy}<link rel="icon" href="data:,">${before}${script}`;
+  await writeFile(
+    join(folder, 'index.html'),
+    `<!doctype html><html lang="en"><head>${head}</head><body>${body}</body></html>`,
+  );
+  await page.goto(server.address);
+}
+
+const state = (wanted: string) => page.waitForSelector(`vesicle-lab[data-state=${wanted}]`);
+const words = () => page.locator('vesicle-lab output').textContent();
+const press = (name: string) => page.getByRole('button', { name, exact: true }).click();
+
+/** Of the pixels of the view, those that are not the ground: more than a few, or nothing is seen. */
+async function drawnPixels(): Promise<number> {
+  const picture = await page.locator('vesicle-lab canvas').screenshot();
+  return page.evaluate(async (base64) => {
+    const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
+    const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+    context?.drawImage(bitmap, 0, 0);
+    const { data } = context?.getImageData(0, 0, bitmap.width, bitmap.height) ?? { data: [] };
+    let others = 0;
+    for (let i = 0; i < data.length; i += 4) if (Math.abs((data[i] ?? 0) - (data[0] ?? 0)) > 12) others += 1;
+    return others;
+  }, picture.toString('base64'));
+}
+
+test('it grows the surface of its volume by itself, under a strict policy', async () => {
+  await open('<vesicle-lab src="ring.mha" params=\'{ "iso": 128 }\'></vesicle-lab>');
+  await state('done');
+  expect(await words()).toMatch(/^Done: [\d,]+ vertices in one component\.$/);
+  await expect.poll(drawnPixels).toBeGreaterThan(2000);
+  const { genus, closed } = await page.evaluate(async () => {
+    const mesh = document.querySelector('vesicle-lab')?.model?.mesh;
+    return { genus: (await mesh?.info())?.genus, closed: (await mesh?.check())?.closed };
+  });
+  expect({ genus, closed }).toEqual({ genus: 1, closed: true });
+});
+
+test('paused it waits; step, play and reset do what they say, and it tells of every step', async () => {
+  await open('<vesicle-lab src="ring.mha" paused></vesicle-lab>');
+  await state('paused');
+  await page.evaluate(() => {
+    const lab = document.querySelector('vesicle-lab');
+    const told: unknown[] = [];
+    for (const name of ['vesicle-step', 'vesicle-done'])
+      lab?.addEventListener(name, (event) => told.push((event as CustomEvent).detail?.iteration ?? event.type));
+    Object.assign(window, { told });
+  });
+  await press('Step');
+  await expect.poll(() => page.evaluate('told')).toEqual([1]);
+  expect(await page.locator('vesicle-lab .figures').textContent()).toMatch(/^Step 1, level 0: [\d,]+ vertices$/);
+  await press('Play');
+  await state('done');
+  const told = (await page.evaluate('told')) as unknown[];
+  expect(told.filter((one) => one === 'vesicle-done')).toEqual([told.at(-1)]);
+  // One after the other, some steps at a time.
+  const steps = told.slice(0, -1).map(Number);
+  expect(steps).toEqual(steps.toSorted((a, b) => a - b));
+  expect(steps.length).toBeGreaterThan(5);
+  await press('Reset');
+  await state('paused');
+  expect(await words()).toBe('Ready.');
+});
+
+test('other attributes begin anew', async () => {
+  await open('<vesicle-lab src="ring.mha" paused></vesicle-lab>');
+  await state('paused');
+  const rigidity = () =>
+    page.evaluate(async () => (await document.querySelector('vesicle-lab')?.model?.params)?.rigidity);
+  expect(await rigidity()).not.toBe(0.05);
+  await page.evaluate(() => document.querySelector('vesicle-lab')?.setAttribute('params', '{ "rigidity": 0.05 }'));
+  await expect.poll(rigidity).toBe(0.05);
+});
+
+test('the view turns by keys, and has words for those who do not see it', async () => {
+  await open('<vesicle-lab src="ring.mha"></vesicle-lab>');
+  await state('done');
+  const view = page.getByRole('img', { name: /^The surface\. Arrow keys turn it/ });
+  await expect.poll(drawnPixels).toBeGreaterThan(2000);
+  const before = await view.screenshot();
+  await view.press('ArrowUp');
+  await expect.poll(async () => (await view.screenshot()).equals(before)).toBe(false);
+});
+
+test.each([
+  ['<vesicle-lab></vesicle-lab>', 'src: the address of a file is needed'],
+  [
+    '<vesicle-lab src="ring.mha" method="magic"></vesicle-lab>',
+    /^method: 'magic'; there are deformable, implicit, tracking, multires$/,
+  ],
+  ['<vesicle-lab src="ring.mha" params="iso 3"></vesicle-lab>', /^params: 'iso 3' is not JSON/],
+  ['<vesicle-lab src="ring.mha" params=\'{ "isoo": 3 }\'></vesicle-lab>', /isoo/],
+  ['<vesicle-lab src="bust.ply"></vesicle-lab>', /NIfTI/],
+  ['<vesicle-lab src="bust.ply" method="multires"></vesicle-lab>', /ellipsoids/],
+])('%s says what is wrong', async (body, message) => {
+  await open(body);
+  await state('error');
+  expect(await words()).toMatch(message);
+});
+
+test('a file that is not there', async () => {
+  await open('<vesicle-lab src="gone.nii"></vesicle-lab>');
+  await state('error');
+  expect(await words()).toMatch(/gone\.nii: 404/);
+  // The browser tells it, too.
+  expect(complaints.splice(0)).toHaveLength(1);
+});
+
+test('points', async () => {
+  const points = Array.from({ length: 600 }, (_, k) => {
+    const z = 1 - (2 * (k + 0.5)) / 600;
+    const [radius, turn] = [Math.sqrt(1 - z * z), k * 2.399963];
+    return `${radius * Math.cos(turn)} ${radius * Math.sin(turn)} ${z}`;
+  });
+  await writeFile(join(folder, 'ball.xyz'), points.join('\n'));
+  await open('<vesicle-lab src="ball.xyz" method="implicit"></vesicle-lab>');
+  await state('done');
+  await expect.poll(drawnPixels).toBeGreaterThan(2000);
+});
+
+test('a mesh under ellipsoids, which goes on without an end', async () => {
+  await init();
+  await writeFile(join(folder, 'ball.ply'), Mesh.icosphere([0, 0, 0], 1, 0.3).toBytes('ply'));
+  const axes = [0, 1, 2].map((axis) => [0, 1, 2].map((other) => (axis === other ? 0.9 : 0)));
+  const ellipsoids = JSON.stringify([{ center: [0, 0, 0], axes }]);
+  await open(`<vesicle-lab src="ball.ply" method="multires" ellipsoids='${ellipsoids}' paused></vesicle-lab>`);
+  await state('paused');
+  await press('Step');
+  await expect.poll(() => page.locator('vesicle-lab .figures').textContent()).toMatch(/^Step 1/);
+  await expect.poll(drawnPixels).toBeGreaterThan(2000);
+});
+
+test('a volume with frames', async () => {
+  await init();
+  await writeFile(join(folder, 'beating.nii'), beating().toNifti());
+  await open('<vesicle-lab src="beating.nii" method="tracking" params=\'{ "threshold": 60 }\'></vesicle-lab>');
+  await state('done');
+  await expect.poll(drawnPixels).toBeGreaterThan(2000);
+});
+
+test('taken out of the page it ends, and put in again it begins anew', async () => {
+  await open('<vesicle-lab src="ring.mha"></vesicle-lab>');
+  await state('done');
+  await page.evaluate(() => {
+    const lab = document.querySelector('vesicle-lab');
+    lab?.remove();
+    if (lab) document.body.append(lab);
+  });
+  await state('running');
+  await state('done');
+  await expect.poll(drawnPixels).toBeGreaterThan(2000);
+});
+
+test('without WebGL there are numbers, and words in place of the picture', async () => {
+  await writeFile(join(folder, 'blind.js'), 'HTMLCanvasElement.prototype.getContext = () => null;');
+  await open('<vesicle-lab src="ring.mha"></vesicle-lab>', '<script src="./blind.js"></script>');
+  await state('done');
+  expect(await page.locator('vesicle-lab p').textContent()).toMatch(/no WebGL/);
+  // three.js says so itself.
+  expect(complaints.splice(0).every((complaint) => /WebGL/.test(complaint))).toBe(true);
+});

@@ -1,0 +1,160 @@
+/** Files in the formats of scanners and microscopes, opened in the app. */
+import { readFile } from 'node:fs/promises';
+import init, { Mesh } from 'vesicle';
+import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
+import { describedIn } from '../../www/src/foreign/tiff-description';
+import { type App, measures, openApp, reach } from './browser';
+import { dicomSeries, type Given, tiffStack } from './pictures';
+
+const [WIDE, HIGH, DEEP] = [24, 20, 16];
+/** Of the half axes of an ellipsoid in voxels. */
+const AXES = [9, 7, 5];
+
+/** Bright inside the ellipsoid in the middle, 128 at its surface. */
+function ellipsoid(): number[] {
+  return Array.from({ length: WIDE * HIGH * DEEP }, (_, i) => {
+    const place = [i % WIDE, Math.floor(i / WIDE) % HIGH, Math.floor(i / (WIDE * HIGH))];
+    const middle = [WIDE, HIGH, DEEP].map((n) => (n - 1) / 2);
+    const level = Math.hypot(...place.map((n, k) => (n - (middle[k] ?? 0)) / (AXES[k] ?? 1)));
+    return Math.round(Math.min(Math.max(128 + 1500 * (1 - level), 0), 255));
+  });
+}
+
+/** In voxels. */
+const VOLUME = (4 / 3) * Math.PI * AXES.reduce((product, axis) => product * axis, 1);
+
+const pages = () => {
+  const values = Uint8Array.from(ellipsoid());
+  return Array.from({ length: DEEP }, (_, z) => values.slice(z * WIDE * HIGH, (z + 1) * WIDE * HIGH));
+};
+
+const OME =
+  '<?xml version="1.0"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06"><Image ID="Image:0"><Pixels ID="Pixels:0" ' +
+  `DimensionOrder="XYCZT" Type="uint8" SizeX="${WIDE}" SizeY="${HIGH}" SizeZ="${DEEP}" SizeC="2" SizeT="1" ` +
+  'PhysicalSizeX="0.5" PhysicalSizeY="0.5" PhysicalSizeZ="1.25"/></Image></OME>';
+
+let app: App;
+
+beforeAll(async () => {
+  app = await openApp();
+});
+afterAll(() => app.close());
+afterEach(() => {
+  expect(app.complaints.splice(0)).toEqual([]);
+});
+
+async function open(files: Given[], name: string): Promise<void> {
+  await app.page.setInputFiles('input[type=file]', files);
+  await app.page.waitForFunction((name) => document.querySelector('.facts')?.textContent?.includes(name), name);
+  await reach(app.page, 'done');
+}
+
+const fact = (name: string) =>
+  app.page
+    .locator('.facts dt', { hasText: new RegExp(`^${name}$`) })
+    .locator('+ dd')
+    .textContent();
+
+async function hasVolume(voxel: number): Promise<void> {
+  const { volume, components, closed } = await measures(app.page);
+  expect({ components, closed }).toEqual({ components: 1, closed: true });
+  expect(Number(volume) / (voxel * VOLUME)).toBeCloseTo(1, 1);
+}
+
+describe('DICOM', () => {
+  test('a series in any order, oblique, with its intensities rescaled', async () => {
+    const data = Uint16Array.from(ellipsoid(), (value) => value + 1000);
+    const along: [number, number, number, number, number, number] = [0.8, 0.6, 0, -0.6, 0.8, 0];
+    const grid = { data, dims: [WIDE, HIGH, DEEP] as [number, number, number], along };
+    await open(dicomSeries({ ...grid, spacing: [0.5, 0.75, 2], origin: [10, -20, 30] }), 'IM0');
+    expect(await fact('Voxels')).toBe('24 × 20 × 16');
+    expect(await fact('Voxel size')).toBe('0.5 × 0.75 × 2 mm');
+    expect(await fact('Intensities')).toBe('0 to 255');
+    await hasVolume(0.5 * 0.75 * 2);
+    const click = app.page.click('[data-export=ply]');
+    const [download] = await Promise.all([app.page.waitForEvent('download'), click]);
+    await init();
+    const { centroid } = Mesh.parse(await readFile(await download.path())).info();
+    // The middle of the voxels by their directions, steps and place.
+    for (const [axis, expected] of [10.325, -10.85, 45].entries()) expect(centroid[axis]).toBeCloseTo(expected, 1);
+  });
+
+  test('what only looks like it is refused with what was wrong', async () => {
+    const broken = Buffer.concat([Buffer.alloc(128), Buffer.from('DICM'), Buffer.from('nothing of that kind')]);
+    await app.page.setInputFiles('input[type=file]', [
+      { name: 'x.dcm', mimeType: 'application/dicom', buffer: broken },
+    ]);
+    await expect.poll(() => app.page.textContent('.banner')).toMatch(/DICOM: this file could not be read/);
+    // ITK tells the console, too.
+    expect(app.complaints.splice(0).filter((complaint) => !/stderr|Debug mode/.test(complaint))).toEqual([]);
+  });
+});
+
+describe('TIFF', () => {
+  test('OME, of two channels the first', async () => {
+    const second = new Uint8Array(WIDE * HIGH).fill(255);
+    const file = tiffStack(
+      pages().flatMap((page) => [page, second]),
+      [WIDE, HIGH],
+      OME,
+    );
+    await open([{ name: 'cell.ome.tif', mimeType: 'image/tiff', buffer: file }], 'cell.ome.tif');
+    expect(await fact('Voxels')).toBe('24 × 20 × 16');
+    expect(await fact('Voxel size')).toBe('0.5 × 0.5 × 1.25 mm');
+    await hasVolume(0.5 * 0.5 * 1.25);
+  });
+
+  test('one file a slice, in the order of the numbers in their names', async () => {
+    const files = pages().map((page, z) => ({
+      ...{ name: `slice${z}.tif`, mimeType: 'image/tiff' },
+      buffer: tiffStack([page], [WIDE, HIGH], ''),
+    }));
+    await open(files.reverse(), 'slice');
+    expect(await fact('Voxels')).toBe('24 × 20 × 16');
+    await hasVolume(1);
+  });
+
+  test('pages of different sizes are refused', async () => {
+    const files = [WIDE, WIDE - 1].map((wide, z) => ({
+      ...{ name: `slice${z}.tif`, mimeType: 'image/tiff' },
+      buffer: tiffStack([new Uint8Array(wide * HIGH)], [wide, HIGH], ''),
+    }));
+    await app.page.setInputFiles('input[type=file]', files);
+    await expect
+      .poll(() => app.page.textContent('.banner'))
+      .toMatch(/TIFF: page 2 is of another size than the first, 24 by 20/);
+  });
+
+  test('a single slice', async () => {
+    const file = { name: 'slice.tif', mimeType: 'image/tiff', buffer: tiffStack([new Uint8Array(4)], [2, 2], '') };
+    await app.page.setInputFiles('input[type=file]', [file]);
+    await expect.poll(() => app.page.textContent('.banner')).toMatch(/TIFF: a single slice; choose or drop all files/);
+  });
+
+  test('more files than a header and its data', async () => {
+    const files = ['a', 'b', 'c'].map((name) => ({ name, mimeType: '', buffer: Buffer.from(name) }));
+    await app.page.setInputFiles('input[type=file]', files);
+    await expect.poll(() => app.page.textContent('.banner')).toMatch(/3 files are neither a series/);
+  });
+});
+
+describe('what a TIFF file says of its stack', () => {
+  test('ImageJ: slices before frames, channels before both', () => {
+    const { pages, frames, spacing } = describedIn(
+      'ImageJ=1.53\nimages=12\nchannels=2\nslices=3\nframes=2\nspacing=0.7\n',
+      12,
+    );
+    expect({ pages, frames, z: spacing[2] }).toEqual({ pages: [0, 2, 4, 6, 8, 10], frames: 2, z: 0.7 });
+  });
+
+  test('OME: time before depth', () => {
+    const text = '<OME><Pixels DimensionOrder="XYTZC" SizeZ="2" SizeT="3" SizeC="1"/></OME>';
+    expect(describedIn(text, 6)).toMatchObject({ pages: [0, 3, 1, 4, 2, 5], frames: 3 });
+  });
+
+  test('words that do not fit the pages, or none: all are slices', () => {
+    const text = '<OME><Pixels DimensionOrder="XYZCT" SizeZ="9" SizeT="3"/></OME>';
+    expect(describedIn(text, 4)).toMatchObject({ pages: [0, 1, 2, 3], frames: 1 });
+    expect(describedIn('', 2)).toMatchObject({ pages: [0, 1], frames: 1 });
+  });
+});

@@ -1,0 +1,539 @@
+// The package in a worker of Node: the same results as without, and what is its own.
+import { execFileSync } from 'node:child_process';
+import { readFileSync } from 'node:fs';
+import { fileURLToPath } from 'node:url';
+import { Worker as NodeWorker } from 'node:worker_threads';
+import { afterAll, beforeEach, expect, test } from 'vitest';
+import * as vesicle from '../../pkg/index.js';
+import init, * as worker from '../../pkg/worker.js';
+import { rejection, wrong } from './helpers.js';
+import { SPONGE_BITS, spongeBits } from './sponge.js';
+
+const root = fileURLToPath(new URL('../../', import.meta.url));
+const pkg = new URL('../../pkg/', import.meta.url);
+const data = ballOf(24, 7);
+const DIMS: vesicle.Vec3 = [24, 24, 24];
+const PARAMS: vesicle.DeformableParams = { iso: 100, isoForce: -1, rigidity: 0.2 };
+
+/** Awaiting what is no promise does no harm: what is written for the worker runs without, too. */
+type Library = typeof worker;
+
+function ballOf(size: number, radius: number): Uint8Array {
+  const middle = (size - 1) / 2;
+  return Uint8Array.from({ length: size ** 3 }, (_, i) => {
+    const place = [i % size, Math.floor(i / size) % size, Math.floor(i / size ** 2)];
+    return 200 * Math.min(1, Math.max(0, radius + 0.5 - Math.hypot(...place.map((x) => x - middle))));
+  });
+}
+
+/** A model on its way for tens of thousands of steps, for runs that are to be ended. */
+function restless(): worker.DeformableModel {
+  const volume = new worker.Volume({ data, dims: DIMS });
+  const start = { seeds: Float32Array.of(12, 12, 12), radius: 2 };
+  const params = { ...PARAMS, energyTolerance: 1e-12, maxMove: 0.01, timeStep: 0.01 };
+  return new worker.DeformableModel({ volume, start, params });
+}
+
+beforeEach(() => init());
+afterAll(() => worker.terminate());
+
+/** What each class does, from one end to the other. */
+const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
+  functions: async ({ version, paramSpecs, parsePoints, animationGlb, Mesh }) => [
+    await version(),
+    await paramSpecs('tracking'),
+    await parsePoints(new TextEncoder().encode('0 0 0 1 0 0\n1 0 0 0 1 0\n')),
+    await animationGlb([await Mesh.icosphere([0, 0, 0], 1, 1)], { frameSeconds: 1 }),
+  ],
+  volume: async ({ Volume }) => {
+    const made = new Volume({ data, dims: DIMS, spacing: [1, 1, 2], slope: 2, space: 'LPS' });
+    const volume = await Volume.parse(await made.toNifti());
+    const several = await Volume.fromFrames([made, made], { frameSeconds: 0.5 });
+    const { dims, frames, frameSeconds, spacing, affine, space, range } = several;
+    return [
+      await Promise.all([dims, frames, frameSeconds, spacing, affine, space, range]),
+      await Promise.all([several.histogram(4, 1), several.sample([1, 2, 3]), several.slice(2, 12)]),
+      await several.intensities(1),
+      await made.toNifti(),
+      await Promise.all((await volume.pyramid(3)).map((level) => level.intensities())),
+      await (await volume.binned([2, 2, 1])).intensities(),
+      await (await volume.enrichSlices({ factor: 2 })).intensities(),
+    ];
+  },
+  mesh: async ({ Mesh, Volume }) => {
+    const ball = await Mesh.icosphere([0, 0, 0], 1, 0.4);
+    const { positions, indices } = await ball.arrays();
+    const uvs = Float32Array.from({ length: (2 * positions.length) / 3 }, (_, i) => (i % 7) / 7);
+    const textured = await Mesh.fromArrays(positions, indices, { uvs });
+    const parsed = await Mesh.parse(await textured.toBytes('ply'));
+    const found = await Mesh.marchingCubes(new Volume({ data, dims: DIMS }), 100);
+    await found.remesh({ min: 0.5, max: 1.5 });
+    await found.decimate(300);
+    const copy = await found.clone();
+    await copy.refine();
+    const moved = await copy.restructure({ min: 0.6, max: 2 }, ['flip']);
+    return [
+      await parsed.arrays(),
+      await (await textured.splitAtSeams()).arrays(),
+      await Promise.all((await found.components()).map((part) => part.info())),
+      [moved, await copy.check(), await copy.curvature('mean'), await copy.geodesic(0)],
+      await Promise.all([found.vertexCount, found.triangleCount, found.topologyVersion, found.geometryVersion]),
+      await Promise.all([ball.texture, ball.pick([3, 0.1, 0], [-1, 0, 0]), ball.pick([3, 0, 0], [1, 0, 0])]),
+      await Promise.all([ball.distanceTo(parsed), ball.crossSection([0, 0, 0.1], [0, 0, 1])]),
+    ];
+  },
+  deformable: async ({ DeformableModel, Mesh, Volume }) => {
+    const start = await Mesh.icosphere([12, 12, 12], 3, 2);
+    const model = new DeformableModel({ volume: new Volume({ data, dims: DIMS }), start, levels: 1, params: PARAMS });
+    const heard: number[] = [];
+    const report = await model.run({
+      maxIterations: 12,
+      budgetMs: 1,
+      onStep: ({ iteration }) => heard.push(iteration),
+    });
+    await model.setAttractors([{ point: [20, 12, 12], strength: 1, radius: 6 }]);
+    await model.setParams({ rigidity: 0.3 });
+    const state = await model.save();
+    const { iteration } = await model.step(4);
+    await model.restore(state);
+    await model.step(4);
+    return [
+      [heard, iteration, report.events, report.phase, state],
+      await Promise.all([model.level, model.delta, model.params, model.speeds(), model.mesh.arrays()]),
+    ];
+  },
+  implicit: async ({ DeformableModel, ImplicitSurface }) => {
+    // On a ball, in a spiral.
+    const points = Float32Array.from({ length: 360 }, (_, at) => {
+      const z = 1 - (2 * Math.floor(at / 3) + 1) / 120;
+      const turned = 2.4 * Math.floor(at / 3) + (at % 3 === 1 ? Math.PI / 2 : 0);
+      return at % 3 === 2 ? z : Math.sqrt(1 - z * z) * Math.cos(turned);
+    });
+    const surface = new ImplicitSurface({ points, params: { cell: 0.2 } });
+    const { residual } = await surface.run();
+    await surface.setEdits({ added: Float32Array.of(0, 0, 1.2) });
+    await surface.run();
+    const volume = await surface.toVolume([12, 12, 12]);
+    const next = new DeformableModel({ volume, params: { iso: 0, isoForce: -1 } });
+    await next.step(3);
+    return [
+      [
+        residual,
+        await surface.mesh.arrays(),
+        await surface.edits,
+        await surface.constraints(),
+        await surface.fitness(),
+      ],
+      await Promise.all([surface.cell, surface.spacing, surface.duplicates, surface.strays, surface.warning]),
+      await Promise.all([surface.evaluate(points), surface.gradient(points), surface.params]),
+      [await (await surface.preview()).vertexCount, await next.mesh.arrays()],
+    ];
+  },
+  tracker: async ({ SurfaceTracker, Volume }) => {
+    const frames = [7, 6.5, 6].map((radius) => new Volume({ data: ballOf(24, radius), dims: DIMS }));
+    const tracker = new SurfaceTracker({ volume: await Volume.fromFrames(frames), params: { window: 1 } });
+    const { phase } = await tracker.run();
+    return [
+      await Promise.all([phase, tracker.frame, tracker.frames, tracker.noise, tracker.closing, tracker.facts]),
+      await Promise.all([tracker.boundary(1), tracker.volumes(), tracker.toGlb(), tracker.params]),
+      await (await tracker.meshAt(1)).arrays(),
+    ];
+  },
+  multires: async ({ MultiresolutionModel }) => {
+    const ball = (x: number): vesicle.ControlEllipsoid => ({
+      center: [x, 0, 0],
+      axes: [
+        [1, 0, 0],
+        [0, 1, 0],
+        [0, 0, 1],
+      ],
+    });
+    const model = new MultiresolutionModel({ ellipsoids: [ball(0)], params: { edgeMin: 0.2, edgeMax: 0.45 } });
+    await model.step(2);
+    await model.setEllipsoids([ball(0.5)]);
+    await model.step(2);
+    return [
+      await Promise.all([model.mesh, model.baseMesh, model.linkMesh].map((mesh) => mesh.arrays())),
+      await Promise.all((await model.levelMeshes()).map((level) => level.vertexCount)),
+      await Promise.all([model.ellipsoids, model.goals, model.bands, model.folded, model.missed, model.held]),
+      await model.distortion(),
+    ];
+  },
+};
+
+test.each(Object.entries(SCENES))('%s: the same as without a worker', async (_, scene) => {
+  await vesicle.default();
+  const here = await scene(vesicle as unknown as Library);
+  expect(await scene(worker)).toEqual(here);
+});
+
+test('two hundred steps end in the bits that the core gives natively', async () => {
+  expect(await spongeBits(worker)).toBe(SPONGE_BITS);
+});
+
+test('everything of the package is here, and nothing of an object but what the package has', async () => {
+  const names = Object.keys(vesicle).filter((name) => name !== 'initSync');
+  expect(Object.keys(worker).sort()).toEqual([...names, 'terminate', 'transfer'].sort());
+  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 1);
+  expect(mesh).toBeInstanceOf(worker.Mesh);
+  expect(mesh.constructor.name).toBe('Mesh');
+  expect(wrong(mesh).then).toBeUndefined();
+  expect(wrong(mesh).anything).toBeUndefined();
+});
+
+test('errors come as VesicleErrors with code and message', async () => {
+  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 1);
+  const refused = await rejection(mesh.decimate(-1));
+  expect([refused.code, refused.message.slice(0, 15), refused.name]).toEqual([
+    'invalid-argument',
+    'targetTriangles',
+    'VesicleError',
+  ]);
+  expect((await rejection(worker.Mesh.parse(new Uint8Array(9)))).code).toBe('bad-file');
+  expect((await rejection(worker.paramSpecs(wrong('magic')))).message).toContain('magic');
+});
+
+test('an object that cannot be made rejects in all that is asked of it; create rejects itself', async () => {
+  const volume = new worker.Volume({ data, dims: [1, 1, 1] });
+  expect((await rejection(volume.range)).message).toContain('dims');
+  const model = new worker.DeformableModel({ volume, params: PARAMS });
+  for (const asked of [model.step(), model.mesh.arrays()]) expect((await rejection(asked)).message).toContain('dims');
+  expect((await rejection(worker.Volume.create({ data, dims: [1, 1, 1] }))).message).toContain('dims');
+  const made = await worker.Volume.create({ data, dims: DIMS });
+  expect(await made.dims).toEqual(DIMS);
+  expect((await rejection(wrong(new (wrong(worker.Mesh))()).info())).message).toContain('icosphere');
+});
+
+test('arguments that cannot be sent are refused by name', async () => {
+  const volume = new worker.Volume({ data, dims: DIMS });
+  const loop: Record<string, unknown> = {};
+  loop.again = loop;
+  const cases: [unknown, string][] = [
+    [new vesicle.VesicleError('aborted', ''), 'volume: a VesicleError cannot be sent'],
+    [() => 1, 'volume: a function cannot be sent'],
+    [loop, 'too many objects inside each other'],
+  ];
+  for (const [value, message] of cases) {
+    const model = new worker.DeformableModel({ volume: wrong(value) });
+    expect((await rejection(model.step())).message).toContain(message);
+  }
+  const misspelled = new worker.DeformableModel({ volume, ...wrong({ level: 2 }) });
+  expect((await rejection(misspelled.step())).message).toContain('level');
+});
+
+test('an aborted run rejects with the reason, and the model goes on', async () => {
+  const model = restless();
+  const abort = new AbortController();
+  const reason = new Error('enough');
+  const heard: number[] = [];
+  const run = model.run({
+    signal: abort.signal,
+    onStep: ({ iteration }) => {
+      heard.push(iteration);
+      if (iteration === 3) abort.abort(reason);
+    },
+  });
+  await expect(run).rejects.toBe(reason);
+  expect(heard).toEqual([1, 2, 3]);
+  const { iteration, done } = await model.step();
+  expect([iteration > 3, done]).toEqual([true, false]);
+  await expect(model.run({ signal: AbortSignal.abort(reason) })).rejects.toBe(reason);
+});
+
+test('what onStep throws ends the run', async () => {
+  const model = restless();
+  const thrown = new Error('mine');
+  const run = model.run({
+    onStep: () => {
+      throw thrown;
+    },
+  });
+  await expect(run).rejects.toBe(thrown);
+  expect((await model.step()).done).toBe(false);
+});
+
+test('while a run is under way, parameters change and the rest is refused', async () => {
+  const model = restless();
+  const abort = new AbortController();
+  const run = model.run({ signal: abort.signal, budgetMs: 1 });
+  await model.setParams({ rigidity: 0.4 });
+  expect((await model.params).rigidity).toBe(0.4);
+  expect((await rejection(model.run())).message).toContain('under way');
+  expect((await rejection(model.step())).message).toContain('under way');
+  expect((await rejection(model.run({ signal: wrong('now') }))).message).toContain('AbortSignal');
+  abort.abort('done');
+  await expect(run).rejects.toBe('done');
+});
+
+test('arrays are copied, and handed over when that is asked for', async () => {
+  const [kept, given, inside] = [data.slice(), data.slice(), data.slice()];
+  const all = new Uint8Array(2 * data.length);
+  all.set(data, data.length);
+  const volumes = [
+    new worker.Volume({ data: kept, dims: DIMS }),
+    new worker.Volume({ data: all.subarray(data.length), dims: DIMS }),
+    new worker.Volume({ data: worker.transfer(given), dims: DIMS }),
+    new worker.Volume(worker.transfer({ data: inside, dims: DIMS })),
+  ];
+  for (const volume of volumes) expect(await volume.intensities()).toEqual(Float32Array.from(data));
+  expect([kept, all, given, inside].map(({ length }) => length)).toEqual([data.length, 2 * data.length, 0, 0]);
+  const again = new worker.Volume({ data: given, dims: DIMS });
+  expect((await rejection(again.dims)).message).toContain('handed over before');
+  const shared = new Uint8Array(new SharedArrayBuffer(data.length));
+  expect((await rejection(worker.Volume.create({ data: worker.transfer(shared), dims: DIMS }))).message).toContain(
+    'shared',
+  );
+});
+
+test('only what an array shows of its buffer is sent', async () => {
+  const sent: Uint8Array[] = [];
+  const own = hostOf();
+  const post = own.postMessage.bind(own);
+  own.postMessage = (message, transfer) => {
+    if (message.name === 'parse') sent.push(message.args[0]);
+    post(message, transfer);
+  };
+  worker.terminate();
+  await init({ worker: own });
+  const large = new Uint8Array(1 << 20);
+  await rejection(worker.Volume.parse(large.subarray(5, 9)));
+  await rejection(worker.Volume.parse(Buffer.from('abc')));
+  // Handed over, so empty by now: it was not the caller's own.
+  expect(sent.map(({ length }) => length)).toEqual([0, 0]);
+  expect(large.length).toBe(1 << 20);
+  worker.terminate();
+});
+
+test('results are handed over', async () => {
+  // Tells how many buffers went with a message, in place of what was in it.
+  const own = hostOf(`
+    const { parentPort } = await import('node:worker_threads');
+    const post = parentPort.postMessage.bind(parentPort);
+    parentPort.postMessage = (message, buffers) => post({ ...message, value: buffers.length });`);
+  await answerTo(own, { type: 'init' });
+  const mesh = { vesicle: -1, class: 'Mesh' };
+  await answerTo(own, { type: 'call', on: 'Mesh', name: 'icosphere', args: [[0, 0, 0], 1, 1] });
+  expect((await answerTo(own, { type: 'call', on: mesh, name: 'arrays' })).value).toBe(3);
+  expect((await answerTo(own, { type: 'call', on: mesh, name: 'toBytes', args: ['stl'] })).value).toBe(1);
+  await own.terminate();
+});
+
+test('copyTo fills the same memory where there is room', async () => {
+  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 0.5);
+  const { positions, normals, indices } = await mesh.arrays();
+  const out = { positions: new Float32Array(9999), normals: new Float32Array(), indices: new Uint32Array(9999) };
+  const before = out.positions;
+  const counts = mesh.copyTo(out);
+  expect([out.positions.length, before.length]).toEqual([0, 0]);
+  expect(await counts).toEqual({ vertices: positions.length / 3, triangles: indices.length / 3 });
+  expect([out.positions.length, out.normals.length, out.indices.length]).toEqual([9999, normals.length, 9999]);
+  expect(out.positions.subarray(0, positions.length)).toEqual(positions);
+  expect(out.indices.subarray(0, indices.length)).toEqual(indices);
+  // While the buffers are away, others take their place.
+  expect(await Promise.all([mesh.copyTo(out), mesh.copyTo(out)])).toEqual([await counts, await counts]);
+  expect(out.positions.subarray(0, positions.length)).toEqual(positions);
+  mesh.free();
+  const { indices: kept } = out;
+  expect((await rejection(mesh.copyTo(out))).code).toBe('freed');
+  expect((await rejection(mesh.copyTo(wrong({ ...out, colours: kept })))).message).toContain('colours');
+  expect(out.indices).toBe(kept);
+  expect(kept.length).toBeGreaterThan(0);
+});
+
+test('the live mesh is one object that follows the model', async () => {
+  const model = restless();
+  const { mesh } = model;
+  const before = await mesh.geometryVersion;
+  await model.step(3);
+  expect(model.mesh).toBe(mesh);
+  expect(await mesh.geometryVersion).toBeGreaterThan(before);
+  mesh.free();
+  expect((await mesh.info()).components).toBe(1);
+  expect((await mesh.distanceTo(await mesh.clone())).hausdorff).toBe(0);
+  model.free();
+  expect((await rejection(mesh.info())).code).toBe('freed');
+});
+
+test('what is freed is refused, here and as an argument', async () => {
+  const volume = await worker.Volume.create({ data, dims: DIMS });
+  const model = new worker.DeformableModel({ volume, params: PARAMS });
+  volume.free();
+  volume[Symbol.dispose]();
+  expect((await rejection(volume.range)).message).toContain('this Volume was freed');
+  expect((await rejection(worker.Mesh.marchingCubes(volume, 1))).code).toBe('freed');
+  expect((await model.step()).iteration).toBe(1);
+  const lasting = restless();
+  const run = lasting.run();
+  lasting.free();
+  expect((await rejection(run)).code).toBe('freed');
+});
+
+/** The host as a worker made by hand; `before` runs in it first. */
+function hostOf(before = ''): NodeWorker {
+  const script = `${before}; import(${JSON.stringify(new URL('worker-host.js', pkg).href)});`;
+  return new NodeWorker(`(async () => { ${script} })()`, { eval: true });
+}
+
+/** Sends what no page of ours would, and gives the answer. */
+async function answerTo(own: NodeWorker, request: object): Promise<{ failure?: { message: string }; value?: unknown }> {
+  const answer = new Promise<object>((resolve) => own.once('message', resolve));
+  own.postMessage({ id: 1, args: [], ...request });
+  return answer;
+}
+
+test('names that are not in the tables are refused', async () => {
+  const own = hostOf();
+  await answerTo(own, { type: 'init' });
+  const mesh = { vesicle: 7, class: 'Volume' };
+  await answerTo(own, { type: 'make', as: mesh, args: [{ data, dims: DIMS }] });
+  const calls = [
+    { on: mesh, name: 'constructor' },
+    { on: mesh, name: '__proto__' },
+    { on: mesh, name: 'toString' },
+    { on: mesh, name: 'free' },
+    { on: { ...mesh, part: 'constructor' }, name: 'info' },
+    { on: { ...mesh, part: 'dims' }, name: 'info' },
+    { on: 'Volume', name: 'constructor' },
+    { on: 'Volume', name: 'prototype' },
+    { on: 'constructor', name: 'assign' },
+    { on: 'VesicleError', name: 'captureStackTrace' },
+    { name: 'default' },
+    { name: 'hasOwnProperty' },
+  ];
+  for (const call of calls) {
+    const { failure } = await answerTo(own, { type: 'call', ...call });
+    expect(failure?.message, JSON.stringify(call)).toMatch(/there is no such thing|this is no object/);
+  }
+  const { failure } = await answerTo(own, { type: 'make', as: { vesicle: 8, class: 'constructor' } });
+  expect(failure?.message).toContain('there is no such thing');
+  const polluting = JSON.parse('[{ "__proto__": { "levels": 3 } }]');
+  expect((await answerTo(own, { type: 'call', on: 'Volume', name: 'parse', args: polluting })).failure).toBeDefined();
+  expect((await answerTo(own, { type: 'call', on: mesh, name: 'dims' })).value).toEqual(DIMS);
+  await own.terminate();
+});
+
+/** Meshes whose `info` fails as a fault inside the module does, and whose `check` fails where nobody catches it. */
+const FAULTY = `
+  const { RawMesh } = await import(${JSON.stringify(new URL('vesicle.js', pkg).href)});
+  RawMesh.prototype.info = () => { throw new WebAssembly.RuntimeError('unreachable'); };
+  RawMesh.prototype.check = () => { setImmediate(() => { throw new Error('no more'); }); return {}; };`;
+
+async function crashOf(promise: Promise<unknown>): Promise<string> {
+  const error = await promise.catch((reason) => reason);
+  expect(error).toBeInstanceOf(worker.VesicleCrash);
+  return (error as Error).message;
+}
+
+test('a crash of the module rejects everything, until init starts a fresh worker', async () => {
+  worker.terminate();
+  await init({ worker: hostOf(FAULTY) });
+  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 1);
+  const run = restless().run();
+  const [crash, waiting] = await Promise.all([crashOf(mesh.info()), crashOf(run)]);
+  expect(crash).toMatch(/^unreachable\. This is a fault in vesicle/);
+  expect(waiting).toBe(crash);
+  expect(await crashOf(mesh.arrays())).toBe(crash);
+  expect(await crashOf(worker.version())).toBe(crash);
+  await init();
+  expect((await rejection(mesh.info())).message).toContain('was lost');
+  mesh.free();
+  expect((await (await worker.Mesh.icosphere([0, 0, 0], 1, 1)).info()).genus).toBe(0);
+});
+
+test('a worker that ends by itself rejects everything that waits', async () => {
+  worker.terminate();
+  await init({ worker: hostOf(FAULTY) });
+  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 1);
+  // Whether the answer is still heard is up to the system.
+  const check = mesh.check().catch(() => undefined);
+  expect(await crashOf(restless().run())).toContain('no more');
+  await check;
+  const own = hostOf();
+  await init({ worker: own });
+  const waiting = crashOf(restless().run());
+  await own.terminate();
+  expect(await waiting).toContain('it left with code');
+  await init();
+  expect(await worker.version()).toBeTruthy();
+});
+
+test('terminate rejects what waits, and init starts again', async () => {
+  const model = restless();
+  const run = rejection(model.run());
+  worker.terminate();
+  expect((await run).code).toBe('aborted');
+  expect((await rejection(model.step())).code).toBe('aborted');
+  const called = [rejection(init()), worker.terminate()];
+  expect((await (called[0] as Promise<vesicle.VesicleError>)).code).toBe('aborted');
+  const first = init();
+  expect(init()).toBe(first);
+  await first;
+  expect((await rejection(model.step())).message).toContain('was lost');
+  expect(await worker.version()).toBeTruthy();
+});
+
+test('a start that fails says why, and the next one works', async () => {
+  worker.terminate();
+  await expect(init({ module_or_path: new Uint8Array(8) })).rejects.toMatchObject({ name: 'CompileError' });
+  await expect(init({ module_or_path: new Response('', { status: 404 }) })).rejects.toThrow('404');
+  const missing = new NodeWorker(new URL('nowhere.js', pkg));
+  await expect(init({ worker: missing })).rejects.toThrow(/could not be started: .*nowhere\.js/);
+  await expect(init(wrong({ wasm: 1 }))).rejects.toThrow('wasm');
+  await init({ module_or_path: new URL('vesicle_bg.wasm', pkg) });
+  expect(await worker.version()).toBeTruthy();
+});
+
+/** What a module script prints, run in a new Node from the project's folder. */
+function node(script: string, ...flags: string[]): string {
+  const args = [...flags, '--input-type=module', '--eval', script];
+  return execFileSync(process.execPath, args, { cwd: root, encoding: 'utf8', timeout: 120_000 }).trim();
+}
+
+test('anything before init says what to do; a worker at rest keeps no process alive', () => {
+  const script = `
+    import init, { Mesh, Volume, version } from './pkg/worker.js';
+    for (const early of [version(), Mesh.icosphere([0, 0, 0], 1, 1), new Volume({}).dims, new Volume({}).dims])
+      await early.catch(({ code, message }) => console.log(code, message.includes('await init()')));
+    await init();
+    const mesh = await Mesh.icosphere([0, 0, 0], 1, 1);
+    console.log((await mesh.info()).genus);`;
+  expect(node(script).split('\n')).toEqual([...Array(4).fill('invalid-argument true'), '0']);
+});
+
+test('the example of the documentation runs', () => {
+  const [, example = ''] = /```js\n([\s\S]*?)```/.exec(readFileSync(`${root}/js/worker.ts`, 'utf8')) ?? [];
+  const script = `
+    import { readFileSync } from 'node:fs';
+    const file = new Blob([readFileSync('www/public/data/visible-human-head.nii.gz')]);
+    ${example.replaceAll(/^ \* ?/gm, '').replace("from 'vesicle/worker'", "from './pkg/worker.js'")}
+    console.log(report.done, positions.length / 3 === report.vertices, indices.length / 3 === report.triangles);`;
+  expect(node(script).split('\n').at(-1)).toBe('true true true');
+});
+
+test('objects that nobody holds are freed in the worker, those in use are not', () => {
+  const script = `
+    import { Worker } from 'node:worker_threads';
+    import init, { DeformableModel, Mesh, Volume } from './pkg/worker.js';
+    const worker = new Worker(new URL('./pkg/worker-host.js', 'file://' + process.cwd() + '/'), { execArgv: [] });
+    const freed = new Set();
+    const post = worker.postMessage.bind(worker);
+    worker.postMessage = (message, transfer) => {
+      if (message.type === 'free') freed.add(message.object);
+      post(message, transfer);
+    };
+    await init({ worker });
+    const data = Uint8Array.from({ length: 4096 }, (_, i) => (i % 16 > 4 && i % 16 < 12 ? 100 : 0));
+    const held = await Mesh.icosphere([0, 0, 0], 1, 1);
+    const { mesh } = new DeformableModel({ volume: new Volume({ data, dims: [16, 16, 16] }), params: { iso: 50 } });
+    const steps = (model) => model.run({ maxIterations: 50 });
+    const run = steps(new DeformableModel({ volume: new Volume({ data, dims: [16, 16, 16] }), params: { iso: 50 } }));
+    await (async () => { for (let i = 0; i < 20; i++) await Mesh.icosphere([0, 0, 0], 1, 1); })();
+    // The two volumes and twenty meshes; how soon is the engine's to choose.
+    while (freed.size < 22) { gc(); await new Promise((resolve) => setTimeout(resolve)); }
+    const { iteration } = await run;
+    console.log(iteration > 0, (await mesh.info()).components > 0, (await held.info()).genus);
+    // The model that ran, too.
+    while (freed.size < 23) { gc(); await new Promise((resolve) => setTimeout(resolve)); }
+    console.log(freed.size, (await mesh.info()).components > 0);`;
+  expect(node(script, '--expose-gc').split('\n')).toEqual(['true true 0', '23 true']);
+});

@@ -1,0 +1,22 @@
+import NiiVue from 'niivue-next/webgl2';
+import init, { DeformableModel, Volume } from 'vesicle';
+import { NiivueSurface, volumeFromNiivue } from 'vesicle/niivue';
+import { page, shown } from './page';
+
+await page(async () => {
+  const nv = new NiiVue({ backgroundColor: [0.08, 0.09, 0.1, 1], showRender: 1, meshThicknessOn2D: 8, meshXRay: 0.6 });
+  await nv.attachToCanvas(document.querySelector('canvas') as HTMLCanvasElement);
+  await nv.loadVolumes([{ url: '../data/visible-human-head.nii.gz' }]);
+
+  await init();
+  const volume = new Volume(volumeFromNiivue(nv.volumes[0]));
+  const model = new DeformableModel({ volume, levels: 2, params: { iso: 35, isoForce: -1 } });
+  const surface = new NiivueSurface(nv);
+  Object.assign(window, { nv, model, surface });
+  for (;;) {
+    const report = model.step(2);
+    if (await surface.update(model.mesh)) nv.drawScene();
+    await shown(report);
+    if (report.done) return report;
+  }
+});

@@ -1,0 +1,39 @@
+// A view of vtk.js as any page with it has one: a slice of an image and an actor.
+import '@kitware/vtk.js/Rendering/Profiles/Volume';
+import type vtkImageData from '@kitware/vtk.js/Common/DataModel/ImageData';
+import type vtkActor from '@kitware/vtk.js/Rendering/Core/Actor';
+import vtkImageMapper from '@kitware/vtk.js/Rendering/Core/ImageMapper';
+import { SlicingMode } from '@kitware/vtk.js/Rendering/Core/ImageMapper/Constants';
+import vtkImageSlice from '@kitware/vtk.js/Rendering/Core/ImageSlice';
+import vtkGenericRenderWindow from '@kitware/vtk.js/Rendering/Misc/GenericRenderWindow';
+
+/** Shows both from the front, feet down; gives what draws them. */
+export function sliceAndSurface(image: vtkImageData, actor: vtkActor): () => void {
+  const view = document.querySelector('#view') as HTMLElement;
+  const generic = vtkGenericRenderWindow.newInstance({ background: [0.08, 0.09, 0.1], listenWindowResize: false });
+  generic.setContainer(view);
+  const renderer = generic.getRenderer();
+  renderer.addViewProp(middleSlice(image));
+  actor.getProperty().setColor(0.95, 0.86, 0.75);
+  renderer.addActor(actor);
+  const camera = renderer.getActiveCamera();
+  camera.setPosition(-0.7, -1.5, 0.5);
+  camera.setViewUp(0, 0, 1);
+  renderer.resetCamera(image.getBounds());
+  camera.zoom(1.5);
+  new ResizeObserver(() => generic.resize()).observe(view);
+  return () => generic.getRenderWindow().render();
+}
+
+function middleSlice(image: vtkImageData) {
+  const mapper = vtkImageMapper.newInstance();
+  mapper.setInputData(image);
+  mapper.setSlicingMode(SlicingMode.K);
+  mapper.setSlice(Math.floor((image.getDimensions()[2] ?? 1) / 2));
+  const slice = vtkImageSlice.newInstance();
+  slice.setMapper(mapper);
+  const [low, high] = image.getPointData().getScalars().getRange();
+  slice.getProperty().setColorWindow(high - low);
+  slice.getProperty().setColorLevel((low + high) / 2);
+  return slice;
+}
