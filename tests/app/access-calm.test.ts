@@ -1,25 +1,17 @@
 import type { Browser } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
-import { type App, openApp, overflow, reach, recordNews } from './browser';
-
-const LABS = ['extract', 'reconstruct', 'track', 'sculpt'];
+import { type App, LABS, open, openApp, overflow, QUICK, reach, recordNews, unfold } from './browser';
 
 let app: App;
 
 beforeAll(async () => {
-  app = await openApp();
+  app = await openApp(undefined, 'bench.html');
+  await app.page.emulateMedia({ reducedMotion: 'reduce' });
 });
 afterAll(() => app.close());
-afterEach(async () => {
-  await app.page.emulateMedia({ reducedMotion: null, forcedColors: null, colorScheme: null });
+afterEach(() => {
   expect(app.complaints.splice(0)).toEqual([]);
 });
-
-async function openLab(address: string, ...states: string[]): Promise<void> {
-  await app.page.goto('about:blank');
-  await app.page.goto(`${app.address}#${address}`);
-  await reach(app.page, ...states);
-}
 
 /** Counts what the page draws, of its canvases, within some animation frames. */
 function drawings(frames: number): Promise<number> {
@@ -37,10 +29,35 @@ function drawings(frames: number): Promise<number> {
   }, frames);
 }
 
-describe('who asks for little motion', () => {
-  test.each(LABS)('sees %s stand still when its example is done', async (lab) => {
-    await app.page.emulateMedia({ reducedMotion: 'reduce' });
-    await openLab(lab, 'done');
+/** Every text that is seen, but numbers, which may go on changing. */
+function words(): Promise<string[]> {
+  return app.page.evaluate(() => {
+    const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    const found: string[] = [];
+    while (walker.nextNode()) {
+      const text = walker.currentNode.textContent?.trim() ?? '';
+      const seen = walker.currentNode.parentElement?.checkVisibility() === true;
+      if (/[a-z]{3}/i.test(text) && !/\d/.test(text) && text !== 'Vesicle' && seen) found.push(text);
+    }
+    return found;
+  });
+}
+
+/** What sticks out of its box and is hidden there. */
+function cut(): Promise<string[]> {
+  return app.page.evaluate(() => {
+    const hides = (one: Element) => /hidden|clip/.test(getComputedStyle(one).overflowX);
+    return [...document.querySelectorAll('main *, header *')]
+      .filter((one) => one.checkVisibility() && one.clientWidth > 1 && hides(one))
+      .filter((one) => one.scrollWidth > one.clientWidth + 1 && !one.matches('select, input, .plot, .plot *'))
+      .map((one) => one.outerHTML.slice(0, 120));
+  });
+}
+
+describe.each(LABS)('the %s lab', (lab) => {
+  test('stands still for who asks for little motion, when its example is done', async () => {
+    await open(app, QUICK[lab]);
+    await reach(app.page, 'done');
     // What was still to be drawn is drawn.
     await expect.poll(() => drawings(5)).toBe(0);
     expect(await drawings(60)).toBe(0);
@@ -48,31 +65,8 @@ describe('who asks for little motion', () => {
     expect(animations).toBe(0);
   });
 
-  test('sees Track beat when that is asked for, and others see it without', async () => {
-    await app.page.emulateMedia({ reducedMotion: 'reduce' });
-    await openLab('track', 'done');
-    expect(await app.page.textContent('[data-frame=beat]')).toBe('Beat');
-    await app.page.locator('canvas[tabindex]').first().press('b');
-    expect(await app.page.textContent('[data-frame=beat]')).toBe('Hold');
-    await expect.poll(() => drawings(5)).toBeGreaterThan(0);
-    await app.page.emulateMedia({ reducedMotion: 'no-preference' });
-    await openLab('track', 'done');
-    await expect.poll(() => app.page.textContent('[data-frame=beat]')).toBe('Hold');
-  });
-
-  test('sees a film without end in Sculpt only when it is played', async () => {
-    await app.page.emulateMedia({ reducedMotion: 'reduce' });
-    await openLab('sculpt?loop=true', 'done', 'paused');
-    await expect.poll(() => drawings(5)).toBe(0);
-    await app.page.locator('canvas[tabindex]').first().press(' ');
-    await reach(app.page, 'running');
-  });
-});
-
-describe('who uses colours of the own', () => {
-  test.each(LABS)('sees in %s what is pressed, where the page is, and what colours mean', async (lab) => {
+  test('shows in colours of the own what is pressed, where the page is, and what colours mean', async () => {
     await app.page.emulateMedia({ forcedColors: 'active' });
-    await openLab(lab, 'done');
     const styles = await app.page.evaluate(() => {
       const all = (selector: string) =>
         [...document.querySelectorAll<HTMLElement>(selector)].filter((one) => one.checkVisibility());
@@ -87,60 +81,72 @@ describe('who uses colours of the own', () => {
         swatches: new Set(all('.swatch').map(color)).size,
       };
     });
+    await app.page.emulateMedia({ forcedColors: null });
     expect(styles.forced).toBe(true);
     expect(styles.current).toEqual([true, true, true, true]);
     expect(styles.pressed.every(Boolean)).toBe(true);
     expect(styles.swatches).toBe(['extract', 'track'].includes(lab) ? 3 : 0);
   });
-});
 
-describe('who zooms', () => {
-  test.each(LABS)('loses nothing of %s, at twice the size and at four times', async (lab) => {
-    await app.page.setViewportSize({ width: 1280, height: 800 });
-    await openLab(lab, 'done');
-    await app.page.locator('details').evaluateAll((all) => {
-      for (const one of all) (one as HTMLDetailsElement).open = true;
+  test('tells all that its pictures show', async () => {
+    await unfold(app.page);
+    const untold = await app.page.evaluate(() => {
+      const shown = [...document.querySelectorAll('canvas')].filter((one) => one.checkVisibility());
+      const named = (one: Element) => (one.getAttribute('aria-label') ?? '').length > 10;
+      const caption = (one: Element) => one.closest('figure')?.querySelector('figcaption')?.textContent ?? '';
+      // A picture on a button is told by the button.
+      const button = (one: Element) => (one.closest('button')?.getAttribute('aria-label') ?? '').length > 10;
+      return shown.filter((one) => !named(one) && !button(one) && caption(one).length < 20).map((one) => one.outerHTML);
     });
-    const wide = await words();
-    for (const [width, height] of [
-      [640, 400],
-      [320, 256],
-    ] as const) {
-      expect(await overflow(app.page, width, height), `${width}`).toBeLessThanOrEqual(0);
-      const narrow = await words();
-      expect(
-        wide.filter((word) => !narrow.includes(word)),
-        `${width}`,
-      ).toEqual([]);
-      expect(await cut(), `${width}`).toEqual([]);
-    }
-    await app.page.setViewportSize({ width: 1280, height: 800 });
+    expect(untold).toEqual([]);
   });
 
-  /** Every text that is seen, but numbers, which may go on changing. */
-  function words(): Promise<string[]> {
-    return app.page.evaluate(() => {
-      const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
-      const found: string[] = [];
-      while (walker.nextNode()) {
-        const text = walker.currentNode.textContent?.trim() ?? '';
-        const seen = walker.currentNode.parentElement?.checkVisibility() === true;
-        if (/[a-z]{3}/i.test(text) && !/\d/.test(text) && text !== 'Vesicle' && seen) found.push(text);
-      }
-      return found;
-    });
-  }
+  test.runIf(lab !== 'track')('has the numbers of its plots in a table', async () => {
+    const table = app.page.locator('[data-plot-table]');
+    const last = table.locator('tbody tr:not([hidden])').last();
+    await expect.poll(() => last.locator('th').textContent()).toMatch(/^\d/);
+    const iteration = (await app.page.textContent('.iteration'))?.replace('Iteration ', '');
+    await expect.poll(() => last.locator('th').textContent()).toBe(iteration);
+    const heads = await table.locator('thead th').count();
+    expect(await last.locator('td').count()).toBe(heads - 1);
+  });
 
-  /** What sticks out of its box and is hidden there. */
-  function cut(): Promise<string[]> {
-    return app.page.evaluate(() => {
-      const hides = (one: Element) => /hidden|clip/.test(getComputedStyle(one).overflowX);
-      return [...document.querySelectorAll('main *, header *')]
-        .filter((one) => one.checkVisibility() && one.clientWidth > 1 && hides(one))
-        .filter((one) => one.scrollWidth > one.clientWidth + 1 && !one.matches('select, input, .plot, .plot *'))
-        .map((one) => one.outerHTML.slice(0, 120));
-    });
-  }
+  test.each([
+    [640, 400],
+    [320, 256],
+  ])('loses nothing at %i by %i, as when it is zoomed', async (width, height) => {
+    await app.page.setViewportSize({ width: 1280, height: 800 });
+    const wide = await words();
+    expect(wide).toContain('How it works');
+    expect(await overflow(app.page, width, height)).toBeLessThanOrEqual(0);
+    const narrow = await words();
+    expect(wide.filter((word) => !narrow.includes(word))).toEqual([]);
+    expect(await cut()).toEqual([]);
+  });
+});
+
+describe('who asks for little motion', () => {
+  test('sees Track beat when that is asked for, and others see it without', async () => {
+    const beat = () => app.page.textContent('[data-frame=beat]');
+    await open(app, QUICK.track);
+    await reach(app.page, 'done');
+    expect(await beat()).toBe('Beat');
+    await app.page.locator('canvas[tabindex]').first().press('b');
+    expect(await beat()).toBe('Hold');
+    await expect.poll(() => drawings(5)).toBeGreaterThan(0);
+    await app.page.emulateMedia({ reducedMotion: 'no-preference' });
+    await open(app, QUICK.track);
+    await expect.poll(beat).toBe('Hold');
+    await app.page.emulateMedia({ reducedMotion: 'reduce' });
+  });
+
+  test('sees a film without end in Sculpt only when it is played', async () => {
+    await open(app, 'sculpt?loop=true');
+    await reach(app.page, 'done', 'paused');
+    await expect.poll(() => drawings(5)).toBe(0);
+    await app.page.locator('canvas[tabindex]').first().press(' ');
+    await reach(app.page, 'running');
+  });
 });
 
 describe('who listens', () => {
@@ -172,32 +178,4 @@ describe('who listens', () => {
       await page.close();
     },
   );
-
-  test.each(LABS)('is told by %s all that its pictures show', async (lab) => {
-    await openLab(lab, 'done');
-    await app.page.locator('details').evaluateAll((all) => {
-      for (const one of all) (one as HTMLDetailsElement).open = true;
-    });
-    const untold = await app.page.evaluate(() => {
-      const shown = [...document.querySelectorAll('canvas')].filter((one) => one.checkVisibility());
-      const named = (one: Element) => (one.getAttribute('aria-label') ?? '').length > 10;
-      const caption = (one: Element) => one.closest('figure')?.querySelector('figcaption')?.textContent ?? '';
-      // A picture on a button is told by the button.
-      const button = (one: Element) => (one.closest('button')?.getAttribute('aria-label') ?? '').length > 10;
-      return shown.filter((one) => !named(one) && !button(one) && caption(one).length < 20).map((one) => one.outerHTML);
-    });
-    expect(untold).toEqual([]);
-  });
-
-  test.each(['extract', 'reconstruct', 'sculpt'])('finds the numbers of the plots of %s in a table', async (lab) => {
-    await openLab(lab, 'done');
-    const table = app.page.locator('[data-plot-table]');
-    await app.page.locator('details', { has: table }).last().locator('summary').last().press('Enter');
-    const last = table.locator('tbody tr:not([hidden])').last();
-    await expect.poll(() => last.locator('th').textContent()).toMatch(/^\d/);
-    const iteration = (await app.page.textContent('.iteration'))?.replace('Iteration ', '');
-    await expect.poll(() => last.locator('th').textContent()).toBe(iteration);
-    const heads = await table.locator('thead th').count();
-    expect(await last.locator('td').count()).toBe(heads - 1);
-  });
 });

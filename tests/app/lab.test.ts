@@ -49,7 +49,7 @@ describe('a figure of the paper', () => {
     );
     expect(levels.map(({ width }) => width)).toEqual([20, 36, 64, 112]);
     expect(levels.map(({ inUse }) => inUse)).toEqual([false, false, false, true]);
-    expect(levels[0]?.label).toBe('Level 3, 20 × 20 × 20 voxels');
+    expect(levels[0]?.label).toBe('I₃: level 3, 20 × 20 × 20 voxels');
     expect(levels[3]?.label).toContain('the model is here');
   });
 

@@ -7,7 +7,7 @@ import { afterAll, beforeAll, expect, test } from 'vitest';
 import { launchChromium } from '../../scripts/chromium.mjs';
 import { serve } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
-import { measures, openApp, reach } from './browser';
+import { measures, open, openApp, reach } from './browser';
 
 let folder: string;
 let browser: Browser;
@@ -17,7 +17,7 @@ const uncaught: string[] = [];
 
 beforeAll(async () => {
   // Builds the app where that has not been done.
-  await (await openApp()).close();
+  await (await openApp(undefined, 'bench.html')).close();
   folder = await mkdtemp(join(tmpdir(), 'vesicle-'));
   await cp(at('dist'), folder, { recursive: true });
   server = await serve(folder, 0);
@@ -45,43 +45,37 @@ async function kept(): Promise<string[]> {
 const listed = async (): Promise<string[]> => JSON.parse(await readFile(join(folder, 'files.json'), 'utf8'));
 
 test('a first visit keeps the page, all its code, and the data it had opened', async () => {
-  await page.goto(`${server.address}#extract`);
+  await page.goto(`${server.address}#extract?example=tooth`);
   await reach(page, 'done');
-  const wanted = [...(await listed()), '', 'icon.svg', 'data/visible-human-head.nii.gz'];
+  const wanted = [...(await listed()), '', 'icon.svg', 'data/tooth.nrrd'];
   await expect.poll(kept).toEqual(expect.arrayContaining(wanted));
-  expect(await kept()).not.toContain('data/heart.nii.gz');
+  expect(await kept()).not.toContain('data/angel.ply');
 });
 
 test('what is opened later is kept, too', async () => {
-  await page.goto(`${server.address}#track`);
-  await reach(page, 'done');
-  await expect.poll(kept).toContain('data/heart.nii.gz');
+  await page.goto(`${server.address}#reconstruct?example=angel`);
+  await reach(page, 'running', 'done');
+  await expect.poll(kept).toContain('data/angel.ply');
 });
 
 test('without a server the examples run as before, with all of their addresses', async () => {
-  await page.goto(`${server.address}#extract`);
+  await page.goto(`${server.address}#extract?example=tooth`);
   await reach(page, 'done');
   const before = await measures(page);
   await server.close();
-  for (const address of ['#extract', '?from=somewhere#extract']) {
-    await page.goto('about:blank');
-    await page.goto(server.address + address);
-    await reach(page, 'done');
-    expect(await measures(page)).toEqual(before);
-  }
-  await page.click('[data-lab=track]');
-  await expect.poll(() => page.title()).toBe('Vesicle: Track');
+  await page.goto('about:blank');
+  await page.goto(`${server.address}?from=somewhere#reconstruct?example=angel`);
+  await reach(page, 'running', 'done');
+  await open({ page, address: server.address }, 'extract?example=tooth');
   await reach(page, 'done');
+  expect(await measures(page)).toEqual(before);
   expect(uncaught).toEqual([]);
 });
 
 test('what was never opened says that it needs the network, and the lab stays usable', async () => {
-  await page.goto('about:blank');
-  await page.goto(`${server.address}#extract`);
-  await reach(page, 'done');
-  await page.selectOption('.data select', 'tooth');
+  await page.selectOption('.data select', 'ovule');
   await reach(page, 'error');
-  expect(await page.textContent('.banner')).toMatch(/tooth.* could not be opened.*network/s);
+  expect(await page.textContent('.banner')).toMatch(/ovule.* could not be opened.*network/s);
   await page.click('.banner button');
   await reach(page, 'done');
   expect(uncaught).toEqual([]);
@@ -98,8 +92,7 @@ test('a new deployment is there at the next visit, and the files of the old one 
   });
   const fresh = await listed();
   server = await serve(folder, Number(new URL(server.address).port));
-  await page.goto('about:blank');
-  await page.goto(`${server.address}#sculpt`);
+  await open({ page, address: server.address }, 'sculpt?example=globe');
   await reach(page, 'done');
   expect(await page.getAttribute('html', 'data-deployment')).toBe('second');
   const gone = old.filter((name) => !fresh.includes(name));

@@ -1,6 +1,7 @@
 import './style.css';
 import { spawnAhead } from './channel';
 import { spawnExtract } from './client';
+import { GUIDES } from './guides';
 import type { Lab, LabKind, PassedOn } from './labs/labs';
 import { workOffline } from './offline';
 import { spawnReconstruct } from './reconstruct/client';
@@ -14,6 +15,7 @@ const LABS: [LabKind, ...LabKind[]] = [
     id: 'extract',
     name: 'Extract',
     tagline: 'A closed surface that splits and merges as it grows onto your data. Nothing leaves this machine.',
+    guide: GUIDES.extract,
     spawn: spawnExtract,
     load: async () => (await import('./labs/extract')).ExtractLab,
   },
@@ -21,6 +23,7 @@ const LABS: [LabKind, ...LabKind[]] = [
     id: 'reconstruct',
     name: 'Reconstruct',
     tagline: 'A smooth closed surface through sparse and noisy points. Nothing leaves this machine.',
+    guide: GUIDES.reconstruct,
     spawn: spawnReconstruct,
     load: async () => (await import('./labs/reconstruct')).ReconstructLab,
   },
@@ -28,6 +31,7 @@ const LABS: [LabKind, ...LabKind[]] = [
     id: 'track',
     name: 'Track',
     tagline: 'A closed surface that follows what moves in a 4D image. Nothing leaves this machine.',
+    guide: GUIDES.track,
     spawn: spawnTrack,
     load: async () => (await import('./labs/track')).TrackLab,
   },
@@ -35,6 +39,7 @@ const LABS: [LabKind, ...LabKind[]] = [
     id: 'sculpt',
     name: 'Sculpt',
     tagline: 'A detailed surface that follows ellipsoids, as far as you like. Nothing leaves this machine.',
+    guide: GUIDES.sculpt,
     spawn: spawnSculpt,
     load: async () => (await import('./labs/sculpt')).SculptLab,
   },
@@ -103,7 +108,7 @@ class Labs {
     if (link && location.hash.startsWith(`#${this.#kind?.id}`)) link.setAttribute('href', location.hash);
   }
 
-  #present({ id, name, tagline }: LabKind): void {
+  #present({ id, name, tagline, guide }: LabKind): void {
     document.title = `Vesicle: ${name}`;
     for (const [one, link] of this.#links) {
       if (one === id) {
@@ -114,8 +119,9 @@ class Labs {
     }
     const title = document.getElementById('lab-name');
     if (title) title.textContent = name;
-    const text = document.querySelector('.tagline');
+    const text = document.getElementById('tagline');
     if (text) text.textContent = tagline;
+    document.getElementById('guide')?.setAttribute('href', guide);
   }
 }
 

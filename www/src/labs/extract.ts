@@ -1,5 +1,6 @@
 import { Client, RequestError, toFailure } from '../client';
 import { EXAMPLES, type Example, exampleUrl, type Unit } from '../examples';
+import { GUIDES } from '../guides';
 import { exampleById, isPreset, PRESETS, type Preset, startOf, type Variant, variantOf } from '../presets';
 import type {
   MeshFormat,
@@ -194,7 +195,7 @@ export class ExtractLab {
     this.#state.follow((state) => this.#showState(state));
     const { signal } = this.#closing;
     acceptDrops(this.#drop, (files) => void this.#openFiles(files), signal);
-    offerShortcuts(this.#shortcuts, help, signal);
+    offerShortcuts(this.#shortcuts, help, GUIDES.extract, signal);
   }
 
   /** Gives everything back: the lab is not used again. */

@@ -1,4 +1,5 @@
 import { RequestError } from '../channel';
+import { GUIDES } from '../guides';
 import { SculptClient } from '../sculpt/client';
 import { SCENES } from '../sculpt/examples';
 import { lastFrame } from '../sculpt/film';
@@ -55,7 +56,7 @@ export class SculptLab implements Lab {
     this.#filming = new Filming(client, ui, states, this.#settings);
     this.#opening = new Opening(client, ui, states, (opened, source) => this.#adopt(opened, source));
     states.follow((state) => this.#showState(state));
-    offerShortcuts(this.#shortcuts(), help, signal);
+    offerShortcuts(this.#shortcuts(), help, GUIDES.sculpt, signal);
   }
 
   /** Opens what the address says, or else the built-in example, and runs it. */

@@ -1,4 +1,5 @@
 import { RequestError, toFailure } from '../channel';
+import { GUIDES } from '../guides';
 import type { LabState } from '../state';
 import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
 import { TrackClient } from '../track/client';
@@ -64,7 +65,7 @@ export class TrackLab implements Lab {
     );
     this.#sharing = new TrackSharing(this.#client, ui, states, this.#results, this.#settings, this.#opening);
     states.follow((state) => this.#showState(state));
-    offerShortcuts(this.#shortcuts(), help, signal);
+    offerShortcuts(this.#shortcuts(), help, GUIDES.track, signal);
   }
 
   /** Opens what the address says, or else the built-in example, and runs it. */
