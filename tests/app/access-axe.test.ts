@@ -20,6 +20,8 @@ beforeAll(async () => {
   app = await openApp(WIDE, 'bench.html');
   // Before the page's own scripts: its policy lets in none that comes later.
   await app.page.addInitScript({ content: axe.source });
+  // The frames of Track stand still.
+  await app.page.emulateMedia({ reducedMotion: 'reduce' });
 });
 afterAll(() => app.close());
 afterEach(() => {
