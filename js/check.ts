@@ -75,8 +75,20 @@ export function typed<T extends { readonly length: number }>(
   stride = 1,
 ): T {
   if (!(value instanceof kind)) throw invalid(parameter, `${shown(value)}; a ${kind.name} is needed`);
+  if (isGone(value))
+    throw invalid(parameter, 'its memory was transferred or has shrunk; an array that can be read is needed');
   if (value.length % stride === 0) return value;
   throw invalid(parameter, `length ${value.length} is not a multiple of ${stride}`);
+}
+
+/** Whether a typed array's memory is elsewhere: its length is 0 then, like that of one that is only empty. */
+function isGone(array: { readonly length: number }): boolean {
+  try {
+    if (array.length === 0 && ArrayBuffer.isView(array)) (array as unknown as Uint8Array).at(0);
+    return false;
+  } catch {
+    return true;
+  }
 }
 
 /** Packed numbers, all finite, their count a multiple of `stride`. */

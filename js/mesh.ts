@@ -269,6 +269,7 @@ export class Mesh {
    * @throws {@link VesicleError} `invalid-argument` where `out` is no such object.
    */
   copyTo(out: MeshArrays): { vertices: number; triangles: number } {
+    if (out === undefined) throw invalid('out', 'undefined; an object with positions, normals and indices is needed');
     knownOnly('out', out, ['positions', 'normals', 'indices', 'uvs', 'colors']);
     const arrays = this.#handle.use((raw) => raw.arrays());
     try {

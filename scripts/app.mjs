@@ -1,10 +1,12 @@
 // Builds the web app from www/ into dist/, and the documentation beside it; needs pkg/.
+import { writeNotices } from './licences.mjs';
 import { at, must, say, tool } from './shell.mjs';
 
 /** The app and its documentation as static files, ready for any server. */
 export async function buildApp() {
   const started = performance.now();
   await must(tool('vite'), ['build', '--logLevel', 'warn', '--config', at('www/vite.config.ts')]);
+  await writeNotices('dist/licences.txt', 'element', 'app');
   await must(tool('typedoc'), ['--options', at('typedoc.json'), '--logLevel', 'Warn']);
   say('dist', `${((performance.now() - started) / 1000).toFixed(1)} s`);
 }

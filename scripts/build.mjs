@@ -5,6 +5,7 @@ import { existsSync } from 'node:fs';
 import { copyFile, cp, mkdir, readFile, rm, stat, writeFile } from 'node:fs/promises';
 import { makeElement } from './element.mjs';
 import { makeInline } from './inline.mjs';
+import { writeNotices } from './licences.mjs';
 import { setup } from './setup.mjs';
 import { at, must, say, script, startedAs, tool } from './shell.mjs';
 
@@ -14,7 +15,7 @@ const WITH_VECTORS = { target: 'target', glue: 'target/glue', module: 'vesicle_b
 const PLAIN = {
   ...{ target: 'target/plain', glue: 'target/plain-glue', module: 'vesicle_plain_bg.wasm' },
   // In place of what .cargo/config.toml says of the target.
-  env: { RUSTFLAGS: '-Ctarget-feature=-simd128' },
+  env: { RUSTFLAGS: '-Ctarget-feature=-simd128 -Cllvm-args=-inline-threshold=40' },
 };
 
 const compiled = ({ target }) => at(target, 'wasm32-unknown-unknown/release/vesicle.wasm');
@@ -28,6 +29,9 @@ const PAPERS = [
   'CHANGELOG.md',
   'docs/extract.png',
   'docs/reconstruct.jpg',
+  'docs/track.jpg',
+  'docs/sculpt.jpg',
+  'docs/start.md',
   'docs/hosts.md',
 ];
 
@@ -93,6 +97,7 @@ async function assemble() {
   await must(tool('tsc'), ['-p', at('js')]);
   await makeInline();
   await makeElement();
+  await writeNotices('pkg/licences.txt', 'element');
   for (const file of PAPERS) await cp(at(file), at('pkg', file));
   await writeFile(at('pkg/package.json'), `${JSON.stringify(await manifest(), null, 2)}\n`);
 }

@@ -1,5 +1,6 @@
 // Makes `<vesicle-lab>`: its code with three.js in one file, and its types; the library is the one beside it.
 import { bundle } from './bundle.mjs';
+import { noteBundled } from './licences.mjs';
 import { at, must, tool } from './shell.mjs';
 
 /** What the element shares with the package stays where it is. */
@@ -12,6 +13,6 @@ const shared = {
 
 /** Writes `pkg/element.js` and its types; needs the rest of the package. */
 export async function makeElement() {
-  await bundle('element', 'js/element/index.ts', shared, true);
+  await bundle('element', 'js/element/index.ts', [shared, noteBundled('element').page], true);
   await must(tool('tsc'), ['-p', at('js/element')]);
 }

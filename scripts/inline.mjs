@@ -23,5 +23,5 @@ export async function makeInline() {
   const inside = await moduleInside();
   const plugin = { name: 'module-inside', load: (id) => (id === at('pkg/module.js') ? inside : undefined) };
   // Smaller would be hardly smaller, and what is out of bundlers' sight would come into it.
-  await bundle('inline', 'pkg/index.js', plugin, false);
+  await bundle('inline', 'pkg/index.js', [plugin], false);
 }

@@ -138,6 +138,21 @@ fn joining_parts_takes_two_from_chi() {
     }
 }
 
+/// Squares of such places do not fit `f32`: no tube was the shortest, and both discs stayed open.
+#[test]
+fn parts_far_out_are_joined_like_others() {
+    let scaled = |scale: f32| {
+        let mut mesh = sphere();
+        let other = VertexId::from_index(mesh.slots());
+        mesh.append(&Mesh::icosphere(Vec3::X * 3.0, 1.0, 0.6).unwrap()).unwrap();
+        mesh.positions_mut().iter_mut().for_each(|p| *p *= scale);
+        mesh.join(v(0), other, 0.7).unwrap();
+        assert_eq!((mesh.check(), mesh.euler()), (Ok(()), 2), "{scale}");
+        mesh.triangles().collect::<Vec<_>>()
+    };
+    assert_eq!(scaled(1.0), scaled((1u128 << 120) as f32));
+}
+
 #[test]
 fn joining_vertices_with_common_neighbours_stays_simplicial() {
     // Both ends of a double pyramid share every neighbour.

@@ -1,6 +1,7 @@
 import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { defineConfig, type Plugin, type Rolldown } from 'vite';
+import { noteBundled } from '../scripts/licences.mjs';
 
 /** A live page for each host that there is an adapter for. */
 const EMBEDS = ['index', 'three', 'niivue', 'niivue-next', 'vtk', 'itk', 'element'];
@@ -72,6 +73,9 @@ function listFiles(): Plugin {
   };
 }
 
+/** For the notices beside the page. */
+const noted = noteBundled('app', ['@itk-wasm/dicom']);
+
 export default defineConfig({
   root: here('.'),
   // Relative addresses: the built page works from any folder of any server.
@@ -83,8 +87,8 @@ export default defineConfig({
       { find: /^vesicle$/, replacement: here('../pkg') },
     ],
   },
-  plugins: [relaxPolicyWhileDeveloping(), dicomBeside(), listFiles()],
-  worker: { format: 'es' },
+  plugins: [relaxPolicyWhileDeveloping(), dicomBeside(), listFiles(), noted.page],
+  worker: { format: 'es', plugins: () => [noted.worker] },
   build: {
     outDir: here('../dist'),
     emptyOutDir: true,

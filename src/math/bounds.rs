@@ -1,5 +1,6 @@
 //! Axis-aligned boxes, and a tree of them for finding the few that matter.
 
+use super::order::{by_both, rank};
 use super::{DVec3, Vec3};
 use smallvec::SmallVec;
 
@@ -304,9 +305,11 @@ fn build(nodes: &mut Vec<Node>, items: &mut [(Bounds, u32)], first: usize) {
     }
     nodes.push(Node { bounds, link: 0, count: 0 });
     let (axis, middle) = (bounds.widest_axis(), items.len() / 2);
-    items.select_nth_unstable_by(middle, |(a, i), (b, j)| {
-        (a.min[axis] + a.max[axis]).total_cmp(&(b.min[axis] + b.max[axis])).then(i.cmp(j))
-    });
+    let mut ranked: Vec<(u64, u32)> =
+        items.iter().map(|(b, i)| by_both(rank(b.min[axis] + b.max[axis]), *i)).zip(0..).collect();
+    ranked.select_nth_unstable(middle);
+    let before = items.to_vec();
+    items.iter_mut().zip(ranked).for_each(|(item, (_, i))| *item = before[i as usize]);
     let (left, right) = items.split_at_mut(middle);
     build(nodes, left, first);
     nodes[at].link = nodes.len() as u32;

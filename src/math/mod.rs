@@ -1,6 +1,7 @@
 //! Small geometry: the vector types every layer shares, quadric errors, and exact predicates on triangles.
 
 mod bounds;
+pub mod order;
 pub mod predicates;
 mod quadric;
 mod random;

@@ -1,5 +1,7 @@
 //! Every use of every edge by a triangle, sorted: what the measures and the report read.
 
+use crate::math::order::sort_by_rank;
+
 /// One side of one triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct EdgeUse {
@@ -30,7 +32,7 @@ pub(super) fn edge_uses(triangles: &[[u32; 3]]) -> Vec<EdgeUse> {
             forward: from < to,
         }));
     }
-    uses.sort_unstable_by_key(|u| (u.key, u.triangle));
+    sort_by_rank(&mut uses, |u| u.key);
     uses
 }
 

@@ -4,6 +4,7 @@ use super::crossing::count_crossings;
 use super::edge_table::{EdgeUse, by_edge, edge_uses};
 use super::groups::Groups;
 use super::{MeshError, TriangleMesh};
+use crate::math::order::{by_both, sort_by_rank};
 use crate::math::predicates::collinear;
 
 /// What an independent look at a mesh finds; a healthy one is closed, oriented and has all counts at zero.
@@ -80,7 +81,7 @@ fn non_manifold_vertices(mesh: &TriangleMesh) -> usize {
 }
 
 /// An edge of the link of a vertex: the side opposite to it in one of its triangles.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy)]
 struct LinkEdge {
     vertex: u32,
     from: u32,
@@ -95,20 +96,21 @@ fn links(mesh: &TriangleMesh) -> Vec<LinkEdge> {
             [(a, b, c), (b, c, a), (c, a, b)].map(|(vertex, from, to)| LinkEdge { vertex, from, to })
         })
         .collect();
-    links.sort_unstable();
+    sort_by_rank(&mut links, |link| by_both(link.from, link.to));
+    sort_by_rank(&mut links, |link| link.vertex.into());
     links
 }
 
 /// Whether the link is connected, with at most two edges at each of its vertices.
 fn is_path_or_cycle(link: &[LinkEdge]) -> bool {
-    let mut ends: Vec<(u32, usize)> =
-        link.iter().enumerate().flat_map(|(i, edge)| [(edge.from, i), (edge.to, i)]).collect();
+    let mut ends: Vec<(u64, u32)> =
+        link.iter().zip(0..).flat_map(|(edge, i)| [(edge.from.into(), i), (edge.to.into(), i)]).collect();
     ends.sort_unstable();
     let mut groups = Groups::new(link.len());
     let mut valence_ok = true;
     for at_vertex in ends.chunk_by(|a, b| a.0 == b.0) {
         valence_ok &= at_vertex.len() <= 2;
-        at_vertex.windows(2).for_each(|pair| groups.join(pair[0].1, pair[1].1));
+        at_vertex.windows(2).for_each(|pair| groups.join(pair[0].1 as usize, pair[1].1 as usize));
     }
     valence_ok && groups.count() == 1
 }

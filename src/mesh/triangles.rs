@@ -176,18 +176,19 @@ impl TriangleMesh {
     /// `uvs` stands in for `corner_uvs`. A mesh without `corner_uvs` is given back as it is.
     pub fn split_at_seams(&self) -> Self {
         let Some(corner_uvs) = &self.corner_uvs else { return self.clone() };
-        let mut corners: Vec<(u32, [u32; 2], usize)> = Vec::with_capacity(3 * corner_uvs.len());
-        for (at, (&v, uv)) in self.triangles.as_flattened().iter().zip(corner_uvs.as_flattened()).enumerate()
-        {
-            corners.push((v, uv.to_array().map(f32::to_bits), at));
+        let mut corners: Vec<([u32; 3], u32)> = Vec::with_capacity(3 * corner_uvs.len());
+        for ((&v, uv), at) in self.triangles.as_flattened().iter().zip(corner_uvs.as_flattened()).zip(0..) {
+            corners.push(([v, uv.x.to_bits(), uv.y.to_bits()], at));
         }
         corners.sort_unstable();
         let (mut vertices, mut uvs) = (Vec::new(), Vec::new());
         let mut triangles = vec![[0; 3]; self.triangles.len()];
-        for same in corners.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-            same.iter().for_each(|&(_, _, at)| triangles[at / 3][at % 3] = vertices.len() as u32);
-            vertices.push(same[0].0 as usize);
-            uvs.push(Vec2::from_array(same[0].1.map(f32::from_bits)));
+        for same in corners.chunk_by(|a, b| a.0 == b.0) {
+            let [v, x, y] = same[0].0;
+            let corners = same.iter().map(|&(_, at)| at as usize);
+            corners.for_each(|at| triangles[at / 3][at % 3] = vertices.len() as u32);
+            vertices.push(v as usize);
+            uvs.push(Vec2::new(f32::from_bits(x), f32::from_bits(y)));
         }
         Self { triangles, uvs: Some(uvs), ..self.gathered(&vertices) }
     }

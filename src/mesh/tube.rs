@@ -36,10 +36,20 @@ impl Tube {
 /// at one corner, and the edge at the beginning of that round is there twice.
 const TURNS: usize = 4;
 
+/// Squares of coordinates beyond this, and sums of them, may not fit `f32`; there places are made smaller, by a power of
+/// two, which rounds nothing.
+const FAR: f32 = (1u64 << 55) as f32;
+/// See [`FAR`].
+const SHRINK: f32 = 1.0 / (1u128 << 80) as f32;
+
 /// The walk with the least sum of squared edge lengths, over every offset between the polygons.
 ///
 /// Dynamic programming over (i, j, polygon of the last step, turns so far); each polygon has at least three corners.
 pub(super) fn shortest_tube(first: &[Vec3], second: &[Vec3]) -> Tube {
+    if first.iter().chain(second).any(|p| p.abs().max_element() > FAR) {
+        let nearer = |rim: &[Vec3]| rim.iter().map(|&p| p * SHRINK).collect::<Vec<_>>();
+        return shortest_tube(&nearer(first), &nearer(second));
+    }
     let cost = |i: usize, j: usize| {
         first[i % first.len()].distance_squared(second[(second.len() - j % second.len()) % second.len()])
     };

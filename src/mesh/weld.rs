@@ -33,11 +33,11 @@ impl TriangleMesh {
     /// For each vertex the first at its position.
     fn representatives(&self) -> Vec<usize> {
         let key = |p: &Vec3| (*p + Vec3::ZERO).to_array().map(f32::to_bits);
-        let mut order: Vec<([u32; 3], usize)> = self.positions.iter().map(key).zip(0..).collect();
+        let mut order: Vec<([u32; 3], u32)> = self.positions.iter().map(key).zip(0..).collect();
         order.sort_unstable();
         let mut representatives = vec![0; self.positions.len()];
         for same in order.chunk_by(|a, b| a.0 == b.0) {
-            same.iter().for_each(|&(_, v)| representatives[v] = same[0].1);
+            same.iter().for_each(|&(_, v)| representatives[v as usize] = same[0].1 as usize);
         }
         representatives
     }

@@ -1,6 +1,7 @@
 //! Vertices in contact that are no neighbours: equation (3) and the axial change of figures 3 and 4.
 
 use super::{Resolver, Sampling};
+use crate::math::order::{by_both, rank, sort_by_rank};
 use crate::mesh::{Mesh, VertexId};
 
 /// Where the intermediary points of a joint lie on the spokes, from the centre. Nearer to the centre the tube is thin
@@ -9,6 +10,7 @@ use crate::mesh::{Mesh, VertexId};
 const JOINT_REACHES: [f32; 4] = [0.7, 0.5, 0.35, 0.85];
 
 /// Two vertices in contact, the lower one first.
+#[derive(Clone, Copy)]
 struct Contact {
     square: f32,
     u: VertexId,
@@ -66,7 +68,8 @@ impl Resolver {
                 }
             });
         }
-        contacts.sort_by(|a, b| a.square.total_cmp(&b.square).then(a.u.cmp(&b.u)).then(a.v.cmp(&b.v)));
+        sort_by_rank(&mut contacts, |contact| by_both(contact.u.0, contact.v.0));
+        sort_by_rank(&mut contacts, |contact| rank(contact.square).into());
         contacts
     }
 

@@ -2,6 +2,7 @@
 
 use super::{Resolver, Sampling};
 use crate::math::Vec3;
+use crate::math::order::{rank, sort_by_rank};
 use crate::mesh::{Cut, EditError, Mesh, Opposite, VertexId};
 
 /// How far the two sides of a cut neck are moved apart, in δ: the first that makes nothing cross. With less they are soon
@@ -134,7 +135,7 @@ impl Resolver {
         };
         let mut thirds = mesh.common_neighbours(u, v);
         thirds.retain(|&mut o| o != opposite.left && o != opposite.right);
-        thirds.sort_by(|a, b| around(a).total_cmp(&around(b)));
+        sort_by_rank(&mut thirds, |o| rank(around(o)).into());
         if thirds.is_empty() {
             return Ok(false);
         }
@@ -178,7 +179,7 @@ impl Resolver {
 fn collapse_places(mesh: &Mesh, u: VertexId, v: VertexId) -> [Vec3; 3] {
     let (p, q) = (mesh.position(u), mesh.position(v));
     let mut places = [(p + q) * 0.5, p, q];
-    places.sort_by_cached_key(|&at| turns_over(mesh, u, v, at) || turns_over(mesh, v, u, at));
+    sort_by_rank(&mut places, |&at| u64::from(turns_over(mesh, u, v, at) || turns_over(mesh, v, u, at)));
     places
 }
 

@@ -186,16 +186,16 @@ fn along_a_curve(mesh: &Mesh) -> Vec<VertexId> {
         .fold(Bounds::EMPTY, |all, v| all.joined(&Bounds { min: mesh.position(v), max: mesh.position(v) }));
     // In f64, where no size of finite coordinates overflows.
     let (low, size) = (bounds.min.as_dvec3(), (bounds.max.as_dvec3() - bounds.min.as_dvec3()).max_element());
-    let mut keyed: Vec<(u64, VertexId)> = mesh
+    let mut keyed: Vec<(u64, u32)> = mesh
         .vertices()
         .map(|v| {
             let cell = (mesh.position(v).as_dvec3() - low) / size * f64::from((1_u32 << CURVE_BITS) - 1);
             // A size of 0 gives NaN, and NaN the cell 0.
-            (spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2, v)
+            (spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2, v.0)
         })
         .collect();
     keyed.sort_unstable();
-    keyed.into_iter().map(|(_, v)| v).collect()
+    keyed.into_iter().map(|(_, v)| VertexId(v)).collect()
 }
 
 /// Cells of the curve along an axis are 2 to this power: more than enough to part the vertices of a mesh.

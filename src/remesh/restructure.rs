@@ -6,6 +6,7 @@
 //! guaranteed: that all edges come into bounds, nor, with [`Trusting`] edits, that nothing crosses.
 
 use super::{Changes, Embedding};
+use crate::math::order::{by_both, rank, sort_by_rank};
 use crate::math::{Vec3, triangle};
 use crate::mesh::{EditError, Mesh, MeshError, Opposite, VertexId};
 
@@ -226,7 +227,8 @@ pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut 
         let square = |(u, v): (VertexId, VertexId)| mesh.position(u).distance_squared(mesh.position(v));
         let all = mesh.edges().map(|edge| (square(edge), edge));
         let mut long: Vec<_> = all.filter(|&(square, _)| square > longest).collect();
-        long.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        sort_by_rank(&mut long, |&(_, (u, v))| by_both(u.0, v.0));
+        sort_by_rank(&mut long, |&(square, _)| (!rank(square)).into());
         for (_, (u, v)) in long {
             if mesh.vertex_count() >= most {
                 return changes;

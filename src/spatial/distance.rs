@@ -1,6 +1,7 @@
 //! How far two surfaces are from each other.
 
 use super::TriangleTree;
+use crate::math::order::{rank_f64, sort_by_rank};
 use crate::math::triangle;
 use crate::mesh::{MeshError, TriangleMesh};
 
@@ -70,7 +71,8 @@ impl Summary {
     fn of(mesh: &TriangleMesh, distances: &[f64]) -> Self {
         let mut weighted: Vec<(f64, f64)> =
             distances.iter().copied().zip(weights(mesh)).filter_map(|(d, w)| Some((d, w?))).collect();
-        weighted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        sort_by_rank(&mut weighted, |&(_, w)| rank_f64(w));
+        sort_by_rank(&mut weighted, |&(d, _)| rank_f64(d));
         let total: f64 = weighted.iter().map(|(_, w)| w).sum();
         let mean_of = |value: fn(f64) -> f64| weighted.iter().map(|&(d, w)| value(d) * (w / total)).sum();
         let largest = weighted.last().map_or(0.0, |&(d, _)| d);

@@ -1,6 +1,7 @@
 //! Points near a place, in a grid of cells that points are added to one by one.
 
 use crate::math::Vec3;
+use crate::math::order::by_both;
 
 /// No point.
 const NONE: u32 = u32::MAX;
@@ -99,13 +100,14 @@ impl PointGrid {
             }
             reach *= 1.5;
         }
-        let order = |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-        if found.len() > count {
-            found.select_nth_unstable_by(count, order);
-            found.truncate(count);
+        let mut ranked: Vec<u64> = found.iter().map(|&(squared, i)| by_both(squared.to_bits(), i)).collect();
+        if ranked.len() > count {
+            ranked.select_nth_unstable(count);
+            ranked.truncate(count);
         }
-        found.sort_unstable_by(order);
-        found
+        ranked.sort_unstable();
+        // Squares are not below 0: their bits are in their order.
+        ranked.into_iter().map(|rank| (f32::from_bits((rank >> 32) as u32), rank as u32)).collect()
     }
 
     fn visit_cell(

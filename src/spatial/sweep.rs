@@ -6,6 +6,7 @@
 //! the few that are at its height. All of it lies in flat arrays, and each pair is met once.
 
 use super::stars::{Nearness, Star};
+use crate::math::order::{by_both, rank, sort_by_rank};
 
 /// The largest stars of the first class, in the star in the middle. With less, the few long edges of an ordinary mesh need
 /// a class of their own; with more, all of its columns are wide because of them.
@@ -111,7 +112,10 @@ fn in_order_of_columns(places: &[[i32; 2]]) -> Vec<u32> {
     let ([x, wide], [y, deep]) = (extent(0).into(), extent(1).into());
     if wide * deep > 64 + (MOST_EMPTY * places.len()) as i64 {
         let mut order: Vec<u32> = (0..places.len() as u32).collect();
-        order.sort_unstable_by_key(|&i| places[i as usize]);
+        let from_least = |x: i32| x as u32 ^ 1 << 31;
+        sort_by_rank(&mut order, |&i| {
+            by_both(from_least(places[i as usize][0]), from_least(places[i as usize][1]))
+        });
         return order;
     }
     let number = |place: &[i32; 2]| ((i64::from(place[0]) - x) * deep + i64::from(place[1]) - y) as usize;
@@ -143,8 +147,12 @@ impl Columns {
         let stars: Vec<&Star> = stars.collect();
         let places: Vec<[i32; 2]> = stars.iter().map(|star| width.column(star)).collect();
         let mut order = in_order_of_columns(&places);
+        let mut by_height = Vec::new();
         for column in order.chunk_by_mut(|&a, &b| places[a as usize] == places[b as usize]) {
-            column.sort_unstable_by_key(|&i| (height(stars[i as usize].position.z), i));
+            by_height.clear();
+            by_height.extend(column.iter().map(|&i| by_both(rank(stars[i as usize].position.z), i)));
+            by_height.sort_unstable();
+            column.iter_mut().zip(&by_height).for_each(|(i, &ranked)| *i = ranked as u32);
         }
         let mut columns: Vec<([i32; 2], usize)> = Vec::new();
         let mut before = None;
@@ -232,13 +240,6 @@ fn meet(stars: &[Star], others: &[Star], reach: f32, test: &mut impl FnMut(&Star
         }
         others[low..].iter().take_while(|b| b.position.z <= top).for_each(|b| test(a, b));
     }
-}
-
-/// An integer of the order of the number.
-#[inline]
-fn height(z: f32) -> i32 {
-    let bits = z.to_bits() as i32;
-    bits ^ ((bits >> 31) as u32 >> 1) as i32
 }
 
 /// Tells most columns that are not beside any of some.

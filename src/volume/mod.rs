@@ -115,13 +115,14 @@ impl Volume {
     ///
     /// # Errors
     /// [`VolumeError::InvalidArgument`] naming the field when a dimension is 0, the number of voxels is not the
-    /// product of the dimensions, the affine is not finite or not invertible, the slope is 0 or not finite, the
+    /// product of the dimensions, the affine is not finite or not invertible or leads beyond what `f32` holds, the slope is 0 or not finite, the
     /// frame time is negative, no voxel is a finite number, or an intensity exceeds what `f32` holds.
     pub fn new(init: VolumeInit) -> Result<Volume, VolumeError> {
         check_dims(init.dims, init.voxels.len())?;
         check_scale(init.slope, init.intercept)?;
         check_frame_seconds(init.frame_seconds)?;
         let inverse = invert(init.affine)?;
+        check_corners(init.affine, init.dims)?;
         let range = intensity_range(&init.voxels, init.slope, init.intercept)?;
         Ok(Volume {
             voxels: Arc::new(init.voxels),
@@ -367,6 +368,18 @@ fn invert(affine: DAffine3) -> Result<DAffine3, VolumeError> {
     if inverse.is_finite() { Ok(inverse) } else { error("is not invertible") }
 }
 
+/// Surfaces hold their positions in `f32`.
+fn check_corners(affine: DAffine3, dims: [usize; 4]) -> Result<(), VolumeError> {
+    let far = DVec3::new(dims[0] as f64, dims[1] as f64, dims[2] as f64);
+    let corners = (0..8).map(|i| far * DVec3::from([0, 1, 2].map(|axis| f64::from(i >> axis & 1))));
+    let furthest = corners.map(|p| affine.transform_point3(p).abs().max_element()).fold(0.0, f64::max);
+    if furthest <= f64::from(f32::MAX) {
+        return Ok(());
+    }
+    let problem = format!("puts a corner of the volume at {furthest:e}; at most 3.4e38 (f32) is accepted");
+    Err(VolumeError::invalid("affine", problem))
+}
+
 /// Spacings outside these ends come from broken headers only; products of three stay far from overflow.
 const MIN_SPACING: f64 = 1e-12;
 /// See [`MIN_SPACING`].
@@ -474,6 +487,9 @@ mod tests {
             refused(VolumeInit { affine: affine([1., 0., 0., 0., f64::NAN, 0., 0., 0., 1.]), ..good() }),
             "affine"
         );
+        let far_away =
+            affine([1., 0., 0., 0., 1., 0., 0., 0., 1.]) * DAffine3::from_translation(DVec3::Y * 4e38);
+        assert_eq!(refused(VolumeInit { affine: far_away, ..good() }), "affine");
         assert_eq!(refused(VolumeInit { voxels: Voxels::F64(vec![f64::NAN; 8]), ..good() }), "data");
         assert_eq!(refused(VolumeInit { voxels: Voxels::F64(vec![1e300; 8]), ..good() }), "data");
     }

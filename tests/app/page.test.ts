@@ -31,6 +31,8 @@ test('the help lists the keys and closes again', async () => {
 
 test.each(LABS)('%s leads to the page on its method, and from its list of keys to all other help', async (lab) => {
   await app.page.click(`[data-lab=${lab}]`);
+  // The list of keys of the lab before is gone by then.
+  await expect.poll(async () => (await app.page.title()).toLowerCase()).toBe(`vesicle: ${lab}`);
   await app.page.waitForSelector('dialog', { state: 'attached' });
   const hrefs = await app.page
     .locator('dialog a')
@@ -38,6 +40,7 @@ test.each(LABS)('%s leads to the page on its method, and from its list of keys t
   expect(hrefs[0]).toBe(await app.page.locator('#guide').evaluate((one) => (one as HTMLAnchorElement).href));
   const pages = await Promise.all(hrefs.map(async (href) => (await app.page.request.get(href)).text()));
   expect(pages[0]).toContain(`index.html#${lab}"`);
+  expect(pages.pop()).toContain('three');
   expect(pages.map((page) => /<title>(.*)<\/title>/.exec(page)?.[1])).toEqual([
     expect.stringMatching(/^A surface .* Vesicle documentation$/),
     'Vesicle documentation',

@@ -1,5 +1,6 @@
 //! The points in the box: scaled, without duplicates, without outliers (paper, section VI-D).
 
+use crate::math::order::sort_by_rank;
 use crate::math::{Bounds, DAffine3, DMat3, DVec3, Vec3, symmetric};
 use crate::methods::MethodError;
 
@@ -77,9 +78,9 @@ impl Cloud {
     /// The first of each set of equal points, in order.
     pub fn distinct(&self) -> Self {
         let bits = |i: u32| self.points[i as usize].to_array().map(|x| (x + 0.0).to_bits());
-        let mut order: Vec<u32> = (0..self.len() as u32).collect();
-        order.sort_unstable_by_key(|&i| (bits(i), i));
-        let mut first: Vec<u32> = order.chunk_by(|&a, &b| bits(a) == bits(b)).map(|same| same[0]).collect();
+        let mut order: Vec<([u32; 3], u32)> = (0..self.len() as u32).map(|i| (bits(i), i)).collect();
+        order.sort_unstable();
+        let mut first: Vec<u32> = order.chunk_by(|a, b| a.0 == b.0).map(|same| same[0].1).collect();
         first.sort_unstable();
         if first.len() == self.len() { self.clone() } else { self.gathered(&first) }
     }
@@ -250,43 +251,46 @@ const SPACING_SAMPLE: usize = 4000;
 
 /// The points of the `keep` largest clusters, in order; `cell` is the edge of the cells whose 26 neighbours join them.
 pub fn largest_clusters(points: &[Vec3], cell: f32, keep: usize) -> Vec<u32> {
-    let mut clusters = clusters(points, cell);
-    clusters.sort_by_key(|cluster| std::cmp::Reverse(cluster.len()));
-    clusters.truncate(keep);
-    let mut kept = clusters.concat();
+    let clusters = clusters(points, cell);
+    let mut largest: Vec<&[u32]> = clusters.iter().map(Vec::as_slice).collect();
+    sort_by_rank(&mut largest, |cluster| (points.len() - cluster.len()) as u64);
+    let mut kept = largest[..keep.min(largest.len())].concat();
     kept.sort_unstable();
     kept
 }
 
 /// Points whose cells touch, even at a corner, by the lowest index of each cluster.
 fn clusters(points: &[Vec3], cell: f32) -> Vec<Vec<u32>> {
-    let cell_of = |p: Vec3| (p / cell).floor().to_array().map(|x| x as i32);
-    let mut by_cell: Vec<([i32; 3], u32)> = points.iter().map(|&p| cell_of(p)).zip(0..).collect();
+    let cell_of = |p: &Vec3| (*p / cell).floor().to_array().map(|x| x as i32 as u32);
+    let mut by_cell: Vec<([u32; 3], u32)> = points.iter().map(cell_of).zip(0..).collect();
     by_cell.sort_unstable();
-    let occupied: Vec<&[([i32; 3], u32)]> = by_cell.chunk_by(|a, b| a.0 == b.0).collect();
+    let occupied: Vec<&[([u32; 3], u32)]> = by_cell.chunk_by(|a, b| a.0 == b.0).collect();
+    let find = |cell: [u32; 3]| occupied.binary_search_by_key(&cell, |points| points[0].0).ok();
     let mut seen = vec![false; occupied.len()];
     let mut found = Vec::new();
-    for start in 0..occupied.len() {
+    for start in points.iter().filter_map(|p| find(cell_of(p))) {
         let (mut cluster, mut stack) = (Vec::new(), vec![start]);
         while let Some(at) = stack.pop() {
             if std::mem::replace(&mut seen[at], true) {
                 continue;
             }
             cluster.extend(occupied[at].iter().map(|&(_, i)| i));
-            let around = neighbours(occupied[at][0].0);
-            stack.extend(around.filter_map(|c| occupied.binary_search_by_key(&c, |cell| cell[0].0).ok()));
+            stack.extend(neighbours(occupied[at][0].0).filter_map(find));
         }
         if !cluster.is_empty() {
             found.push(cluster);
         }
     }
-    found.sort_by_key(|cluster| cluster.iter().copied().min());
     found
 }
 
-fn neighbours([x, y, z]: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
+/// Cells by the bits of their places.
+fn neighbours(cell: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
+    let [x, y, z] = cell.map(|k| k as i32);
     let steps = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
-    steps.map(move |[dx, dy, dz]| [x.saturating_add(dx), y.saturating_add(dy), z.saturating_add(dz)])
+    let places =
+        steps.map(move |[dx, dy, dz]| [x.saturating_add(dx), y.saturating_add(dy), z.saturating_add(dz)]);
+    places.map(|place| place.map(|k| k as u32))
 }
 
 #[cfg(test)]

@@ -267,7 +267,8 @@ impl ImplicitSurface {
             Stage::Color(painting) => self.color(*painting),
             Stage::Done => Stage::Done,
         };
-        self.slices = if self.stage.phase() == before { slices + 1 } else { 0 };
+        let goes_on = self.stage.phase() == before && !matches!(self.stage, Stage::Done);
+        self.slices = if goes_on { slices + 1 } else { 0 };
         Ok(())
     }
 

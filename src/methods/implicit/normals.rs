@@ -1,6 +1,7 @@
 //! Normals where none are given: planes through neighbours, turned the same way by walking from place to place (Hoppe,
 //! DeRose, Duchamp, McDonald & Stuetzle, *Surface reconstruction from unorganized points*, 1992).
 
+use crate::math::order::{rank_f64, sort_by_rank};
 use crate::math::{DMat3, DVec3, Vec3, symmetric};
 use crate::spatial::PointGrid;
 use std::cmp::Reverse;
@@ -81,7 +82,7 @@ fn flattest_radius(grid: &PointGrid, places: &[Vec3], spacing: f32) -> (f32, f64
     for radius in RADII.map(|r| r * spacing) {
         let planes = places.iter().step_by(step).map(|&p| Plane::around(grid, p, radius));
         let mut found: Vec<(f64, f64)> = planes.map(|plane| (plane.flatness(), plane.thickness)).collect();
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        sort_by_rank(&mut found, |&(flatness, _)| rank_f64(flatness));
         let (flatness, thickness) = found[found.len() / 2];
         if flatness < best.0 {
             best = (flatness, radius, thickness);

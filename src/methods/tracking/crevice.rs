@@ -5,10 +5,10 @@
 use super::follow::{Follower, FrameFacts, Going, Ground, middle};
 use super::project::Onto;
 use crate::math::Vec3;
+use crate::math::order::{by_both, rank, sort_by_rank};
 use crate::mesh::{Mesh, VertexId};
 use crate::remesh::{Changes, restructure};
 use crate::spatial::PointGrid;
-use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
 /// How often what is left without a boundary is looked for at most, and at least where there is any.
@@ -90,16 +90,13 @@ impl Follower {
         self.guard.follow_with(mesh, self.bounds.max);
         let depth = depths(mesh, sheets);
         let mut order = sheets.to_vec();
-        order.sort_by_key(|v| (Reverse(depth[v.index()]), v.index()));
+        sort_by_rank(&mut order, |v| by_both(!depth[v.index()], v.0));
         let mut gone = 0;
         for v in order {
             let from = mesh.position(v);
             let ring = mesh.ring(v).as_slice().iter().copied();
             let mut outer: Vec<VertexId> = ring.filter(|w| depth[w.index()] < depth[v.index()]).collect();
-            outer.sort_by(|&a, &b| {
-                let away = |w: VertexId| mesh.position(w).distance_squared(from);
-                away(a).total_cmp(&away(b))
-            });
+            sort_by_rank(&mut outer, |&w| rank(mesh.position(w).distance_squared(from)).into());
             let drawn = outer.into_iter().any(|w| {
                 let place = mesh.position(w);
                 self.guard.attempt(mesh, |mesh| mesh.collapse(w, v, place)).is_ok()

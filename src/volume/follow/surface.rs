@@ -40,9 +40,10 @@ pub(super) struct Surface {
 impl Surface {
     /// The surface in the given cells, vertices where lines through the nodes' values pass 0.
     pub fn new(cut: &[CutCell], blocks: &Blocks) -> Result<Self, VolumeError> {
-        let mut cells = reserve(cut.len())?;
-        cells.extend_from_slice(cut);
-        cells.sort_unstable_by_key(|cell| blocks.rank(cell.slot));
+        let (mut order, mut cells) = (reserve(cut.len())?, reserve(cut.len())?);
+        order.extend(cut.iter().map(|cell| blocks.rank(cell.slot)).zip(0_u32..));
+        order.sort_unstable();
+        cells.extend(order.iter().map(|&(_, i)| cut[i as usize]));
         let count = cells.iter().map(|cell| near_cuts(cell.case).count_ones() as usize).sum();
         let (mut vertices, mut first, mut index) =
             (reserve(count)?, reserve(cells.len())?, reserve(blocks.slots())?);

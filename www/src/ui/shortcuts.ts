@@ -114,6 +114,7 @@ function furtherHelp(guide: string): HTMLElement {
       link(DOCUMENTATION, 'Documentation: all labs, and the package'),
       link('./bench.html', 'Measurements: how fast it is'),
       link('./embed/index.html', 'In other software: three.js, NiiVue, vtk.js, itk-wasm'),
+      link('./licences.txt', 'Other people’s work in it, and its licences'),
     ),
   );
 }

@@ -188,11 +188,11 @@ impl FastField {
     /// Sorts the terms into the finest cubes, and carries them up to the larger ones.
     fn gather_sources(&mut self) {
         let finest = self.levels.len() - 1;
-        let mut keyed: Vec<(usize, usize)> = (0..self.terms.len())
-            .map(|i| (self.levels[finest].index(self.place_of(self.terms[i].0, finest)).unwrap_or(0), i))
-            .collect();
+        let index =
+            |i: u32| self.levels[finest].index(self.place_of(self.terms[i as usize].0, finest)).unwrap_or(0);
+        let mut keyed: Vec<(u64, u32)> = (0..self.terms.len() as u32).map(|i| (index(i) as u64, i)).collect();
         keyed.sort_unstable();
-        self.terms = keyed.iter().map(|&(_, i)| self.terms[i]).collect();
+        self.terms = keyed.iter().map(|&(_, i)| self.terms[i as usize]).collect();
         let mut start = 0;
         for same in keyed.chunk_by(|a, b| a.0 == b.0) {
             let range = [start, start + same.len()];
@@ -201,7 +201,7 @@ impl FastField {
             for &(c, w) in &self.terms[range[0]..range[1]] {
                 self.chebyshev.spread(&mut nodal, self.within(c, place, finest), w);
             }
-            self.levels[finest].with_sources[same[0].0] = self.ranges.len() as u32;
+            self.levels[finest].with_sources[same[0].0 as usize] = self.ranges.len() as u32;
             self.levels[finest].sources.push(nodal);
             self.ranges.push(range);
             start = range[1];

@@ -1,5 +1,6 @@
 //! Centres grouped by place, in a binary tree.
 
+use crate::math::order::{by_both, rank};
 use crate::math::{Bounds, Vec3};
 
 /// Centres in a leaf at most. 32 doubles the blocks, 128 the numbers that are stored in full.
@@ -61,8 +62,10 @@ impl ClusterTree {
         self.clusters.push(Cluster { start, end: start + order.len(), bounds, halves: None });
         if order.len() > LEAF {
             let (axis, middle) = (bounds.widest_axis(), order.len() / 2);
-            let along = |i: &u32| points[*i as usize][axis];
-            order.select_nth_unstable_by(middle, |i, j| along(i).total_cmp(&along(j)).then(i.cmp(j)));
+            let along = |i: u32| by_both(rank(points[i as usize][axis]), i);
+            let mut ranked: Vec<u64> = order.iter().map(|&i| along(i)).collect();
+            ranked.select_nth_unstable(middle);
+            order.iter_mut().zip(ranked).for_each(|(i, ranked)| *i = ranked as u32);
             let (low, high) = order.split_at_mut(middle);
             let halves = [self.split(points, low, start), self.split(points, high, start + middle)];
             self.clusters[at].halves = Some(halves);

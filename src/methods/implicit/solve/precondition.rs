@@ -2,6 +2,7 @@
 //! coarse to fine (Vecchia's approximation; Schäfer, Katzfuss & Owhadi, *Sparse Cholesky factorization by Kullback–Leibler
 //! minimization*, 2021).
 
+use crate::math::order::rank_f64;
 use crate::math::{DVec3, Vec3};
 use crate::methods::implicit::kernel::KernelTable;
 use crate::spatial::PointGrid;
@@ -123,14 +124,13 @@ impl SparseInverse {
 
 /// The [`NEIGHBOURS`] of the points `among` that are nearest to `p`, nearest first.
 fn nearest(points: &[DVec3], p: DVec3, among: impl Fn(usize) -> bool) -> Vec<u32> {
-    let with_distance = |i: usize| (points[i].distance_squared(p), i as u32);
-    let mut found: Vec<(f64, u32)> = (0..points.len()).filter(|&i| among(i)).map(with_distance).collect();
-    let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    let with_distance = |i: usize| (rank_f64(points[i].distance_squared(p)), i as u32);
+    let mut found: Vec<(u64, u32)> = (0..points.len()).filter(|&i| among(i)).map(with_distance).collect();
     if found.len() > NEIGHBOURS {
-        found.select_nth_unstable_by(NEIGHBOURS, order);
+        found.select_nth_unstable(NEIGHBOURS);
         found.truncate(NEIGHBOURS);
     }
-    found.sort_unstable_by(order);
+    found.sort_unstable();
     found.into_iter().map(|(_, i)| i).collect()
 }
 

@@ -1,0 +1,59 @@
+//! How much memory a run takes: what it asks for counts, whether it gets it or not.
+#![allow(
+    unsafe_code,
+    reason = "an allocator cannot be written without; this one hands all on to the system's"
+)]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+thread_local! {
+    static NOW: Cell<usize> = const { Cell::new(0) };
+    static PEAK: Cell<usize> = const { Cell::new(0) };
+}
+
+struct Meter;
+
+#[global_allocator]
+static METER: Meter = Meter;
+
+unsafe impl GlobalAlloc for Meter {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        take(layout.size());
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        take(layout.size());
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        give_back(layout.size());
+        unsafe { System.dealloc(memory, layout) }
+    }
+
+    unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        take(size);
+        give_back(layout.size());
+        unsafe { System.realloc(memory, layout, size) }
+    }
+}
+
+fn take(bytes: usize) {
+    NOW.set(NOW.get().saturating_add(bytes));
+    PEAK.set(PEAK.get().max(NOW.get()));
+}
+
+/// What was taken before counting began, or by another thread, may be given back as well.
+fn give_back(bytes: usize) {
+    NOW.set(NOW.get().saturating_sub(bytes));
+}
+
+/// The most bytes that were held at a time by this thread while `work` ran.
+pub fn peak_of(work: impl FnOnce()) -> usize {
+    NOW.set(0);
+    PEAK.set(0);
+    work();
+    PEAK.get()
+}

@@ -1,0 +1,86 @@
+//! Saved states with their checksum right and their contents changed: refused, or a run that goes on.
+
+use super::steppers;
+use std::sync::LazyLock;
+use vesicle::mesh::Mesh;
+use vesicle::methods::deformable::DeformableModel;
+use vesicle::methods::implicit::ImplicitSurface;
+use vesicle::methods::multires::MultiresolutionModel;
+use vesicle::methods::tracking::SurfaceTracker;
+
+/// Mark and checksum.
+const HEADER: usize = 16;
+
+/// Bytes that begin as those of `saved` do, up to the number that tells inputs apart, with a checksum that is right.
+pub fn resealed(saved: &[u8], contents: &[u8]) -> Vec<u8> {
+    let body = [&saved[HEADER..contents_of(saved)], contents].concat();
+    let mix = |hash: u64, &byte: &u8| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+    let sum = body.iter().fold(0xcbf2_9ce4_8422_2325, mix);
+    [&saved[..8], &sum.to_le_bytes(), &body].concat()
+}
+
+/// Where the contents begin after the number that tells inputs apart, which ends with its first byte below 128.
+pub fn contents_of(saved: &[u8]) -> usize {
+    let number = &saved[HEADER..];
+    HEADER + 1 + number.iter().position(|&byte| byte < 0x80).unwrap_or(0)
+}
+
+/// A scene that is always the same, small, some steps on its way.
+macro_rules! scene {
+    ($name:ident, $model:ty, $make:expr) => {
+        fn $name() -> (&'static [u8], $model) {
+            static SAVED: LazyLock<Vec<u8>> = LazyLock::new(|| {
+                let mut model = $make;
+                for _ in 0..3 {
+                    _ = model.step();
+                }
+                model.save()
+            });
+            (&SAVED, $make)
+        }
+    };
+}
+
+/// Restores a changed state; where it is taken, its own state comes out of it, and a few steps are made.
+macro_rules! target {
+    ($name:ident, $saved:ident, $scene:ident, $meshes:expr) => {
+        pub fn $name(data: &[u8]) {
+            let (saved, mut model) = $scene();
+            if model.restore(&resealed(saved, data)).is_err() {
+                assert_eq!(model.restore(saved), Ok(()), "a refusal changed the run");
+                assert!(model.save() == saved, "a refusal changed the run");
+                return;
+            }
+            let own = model.save();
+            assert_eq!(model.restore(&own), Ok(()), "its own state");
+            assert!(model.save() == own, "another state comes out");
+            for _ in 0..2 {
+                _ = model.step();
+                for mesh in $meshes(&model) {
+                    assert_eq!(mesh.check(), Ok(()));
+                }
+            }
+        }
+
+        /// What the target begins with.
+        pub fn $saved() -> Vec<u8> {
+            let (saved, _) = $scene();
+            saved[contents_of(saved)..].to_vec()
+        }
+    };
+}
+
+scene!(small_deformable, DeformableModel, steppers::small_deformable());
+target!(deformable, deformable_seed, small_deformable, |model: &DeformableModel| [model.mesh().clone()]);
+
+scene!(small_implicit, ImplicitSurface, steppers::small_implicit());
+target!(implicit, implicit_seed, small_implicit, |_: &ImplicitSurface| Vec::<Mesh>::new());
+
+scene!(small_multires, MultiresolutionModel, steppers::small_multires());
+target!(multires, multires_seed, small_multires, |model: &MultiresolutionModel| [
+    model.mesh().clone(),
+    model.base_mesh().clone()
+]);
+
+scene!(small_tracking, SurfaceTracker, steppers::small_tracking());
+target!(tracking, tracking_seed, small_tracking, |model: &SurfaceTracker| [model.mesh().clone()]);

@@ -1,0 +1,457 @@
+//! The methods on small random scenes, with parameters changed on the way: sound after every step.
+
+use super::bytes::Bytes;
+use vesicle::math::{DAffine3, DVec3, Vec3};
+use vesicle::mesh::{Mesh, TriangleMesh, count_crossings, measure, report};
+use vesicle::methods::deformable::{
+    Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Start,
+};
+use vesicle::methods::implicit::{
+    Camera, Cloud, Edits, ImplicitOptions, ImplicitParams, ImplicitSurface, KernelKind, Level,
+};
+use vesicle::methods::multires::{
+    ControlEllipsoid, Energy, MultiresOptions, MultiresParams, MultiresolutionModel, Topology,
+};
+use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
+use vesicle::methods::{MethodError, deformable};
+use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
+
+/// Closed, oriented, manifold, as the edits predict, and no triangles cross.
+fn assert_sound(mesh: &Mesh) {
+    assert_eq!(mesh.check(), Ok(()));
+    assert_eq!(count_crossings(&mesh.to_triangles()), 0, "triangles cross");
+}
+
+/// Blobs in noise, in a grid that is turned and not of cubes; a voxel may be no number.
+fn volume(bytes: &mut Bytes, dims: [usize; 4]) -> Volume {
+    let [nx, ny, nz, frames] = dims;
+    let blobs: Vec<[DVec3; 2]> = (0..1 + bytes.below(3))
+        .map(|_| {
+            let mut corner = || {
+                DVec3::new(
+                    bytes.within(0.0, nx as f64),
+                    bytes.within(0.0, ny as f64),
+                    bytes.within(0.0, nz as f64),
+                )
+            };
+            [corner(), corner()]
+        })
+        .collect();
+    let (radius, noise, holes) = (bytes.within(0.5, 6.0), bytes.within(0.0, 1.0), bytes.chance(8));
+    let spacing = DVec3::new(bytes.within(0.5, 2.0), bytes.within(0.5, 2.0), bytes.within(0.5, 2.0));
+    let unit = bytes.one_of(&[1.0, 1.0, 100.0, 1e-6, 1e9]);
+    let value = |i: usize| {
+        let (at, t) = (i % (nx * ny * nz), (i / (nx * ny * nz)) as f64 / frames as f64);
+        let p = DVec3::new((at % nx) as f64, (at / nx % ny) as f64, (at / (nx * ny)) as f64);
+        let nearest =
+            blobs.iter().map(|[from, to]| p.distance(*from + (*to - *from) * t)).fold(f64::MAX, f64::min);
+        let bright = (0.5 + 0.25 * (radius - nearest)).clamp(0.0, 1.0);
+        let value = if holes && bytes.chance(40) { f64::NAN } else { bright + noise * bytes.unit() };
+        (unit * value) as f32
+    };
+    let values = (0..nx * ny * nz * frames).map(value).collect();
+    let affine = DAffine3::from_rotation_z(bytes.within(-3.0, 3.0)) * DAffine3::from_scale(spacing);
+    let init = VolumeInit {
+        voxels: Voxels::F32(values),
+        dims,
+        affine,
+        slope: 1.0,
+        intercept: 0.0,
+        frame_seconds: 0.0,
+        space: Space::Ras,
+    };
+    Volume::new(init).unwrap_or_else(|_| flat())
+}
+
+/// In place of one without numbers.
+fn flat() -> Volume {
+    let voxels = Voxels::U8(vec![1; 27]);
+    let affine = DAffine3::IDENTITY;
+    let init = VolumeInit {
+        voxels,
+        dims: [3, 3, 3, 1],
+        affine,
+        slope: 1.0,
+        intercept: 0.0,
+        frame_seconds: 0.0,
+        space: Space::Ras,
+    };
+    Volume::new(init).unwrap()
+}
+
+pub fn deformable(data: &[u8]) {
+    let bytes = &mut Bytes::new(data);
+    let dims = [2 + bytes.below(11), 2 + bytes.below(11), 1 + bytes.below(11), 1 + bytes.below(2)];
+    let volume = volume(bytes, dims);
+    let options = DeformableOptions {
+        frame: bytes.below(2),
+        start: start(bytes, &volume),
+        levels: bytes.below(3),
+        edge: bytes.chance(2).then(|| bytes.within(0.8, 4.0)),
+        params: Some(deformable_params(bytes, &volume)),
+    };
+    let Ok(mut model) = DeformableModel::new(&volume, options) else { return };
+    for _ in 0..8 {
+        match model.step() {
+            Ok(report) => assert_eq!(i64::from(report.euler), model.mesh().euler()),
+            Err(MethodError::TooManyVertices { .. }) => {}
+            Err(error) => panic!("{error}"),
+        }
+        assert_sound(model.mesh());
+        match bytes.below(12) {
+            0 => _ = model.set_params(deformable_params(bytes, &volume)),
+            1 => _ = model.set_attractors(vec![attractor(bytes)]),
+            2 => restored(&mut model),
+            _ => {}
+        }
+    }
+}
+
+/// Goes on from what it has saved.
+fn restored(model: &mut DeformableModel) {
+    let saved = model.save();
+    model.restore(&saved).unwrap_or_else(|error| panic!("its own state: {error}"));
+    assert!(model.save() == saved, "another state comes out");
+}
+
+fn start(bytes: &mut Bytes, volume: &Volume) -> Start {
+    match bytes.below(6) {
+        0 => Start::Bubbles(1 + bytes.below(4) as u32),
+        1 => Start::MarchingCubes(bytes.within(volume.range()[0], volume.range()[1])),
+        2 => Start::Seeds {
+            points: (0..1 + bytes.below(3)).map(|_| bytes.place(12.0)).collect(),
+            radius: bytes.within(0.3, 9.0),
+        },
+        3 => Start::Mesh(shape(bytes)),
+        _ => Start::Enclosing,
+    }
+}
+
+fn attractor(bytes: &mut Bytes) -> Attractor {
+    Attractor { point: bytes.place(15.0), strength: bytes.within(-2.0, 2.0), radius: bytes.within(0.1, 20.0) }
+}
+
+fn deformable_params(bytes: &mut Bytes, volume: &Volume) -> DeformableParams {
+    let [low, high] = volume.range();
+    let mut rarely = |low: f64, high: f64| if bytes.chance(3) { bytes.within(low, high) } else { 0.0 };
+    let [gradient_normal, gradient_tangent, stiffness] =
+        [rarely(-2.0, 2.0), rarely(-2.0, 2.0), rarely(0.0, 0.3)];
+    DeformableParams {
+        iso: bytes.within(low, high),
+        iso_force: if bytes.chance(3) { bytes.within(-10.0, 10.0) } else { -1.0 },
+        gradient_normal,
+        gradient_tangent,
+        rigidity: bytes.within(0.0, 0.4),
+        stiffness,
+        rest_length: bytes.one_of(&[RestLength::Zero, RestLength::Mean, RestLength::Given(1.0)]),
+        damping: bytes.within(0.1, 1.0),
+        max_move: bytes.within(0.05, 0.5),
+        integrator: bytes.one_of(&[Integrator::Euler, Integrator::Euler, Integrator::RungeKutta]),
+        topology: bytes.one_of(&[
+            deformable::Topology::Adaptive,
+            deformable::Topology::Adaptive,
+            deformable::Topology::Fixed,
+        ]),
+        ..DeformableParams::default()
+    }
+}
+
+pub fn implicit(data: &[u8]) {
+    let bytes = &mut Bytes::new(data);
+    let cloud = cloud(bytes);
+    let (count, size) = (cloud.points.len(), size(&cloud.points));
+    let options = implicit_options(bytes, size);
+    let Ok(mut surface) = ImplicitSurface::new(cloud, options) else { return };
+    let mut changes = bytes.below(4);
+    for _ in 0..5000 {
+        let done = match surface.step() {
+            Ok(report) => report.done,
+            Err(MethodError::Singular { .. } | MethodError::InvalidArgument { .. }) => true,
+            Err(error) => panic!("{error}"),
+        };
+        if done {
+            assert_healthy(surface.surface());
+            if changes == 0 || implicit_change(&mut surface, bytes, count, size).is_err() {
+                return;
+            }
+            changes -= 1;
+        }
+    }
+    panic!("no end");
+}
+
+fn assert_healthy(mesh: &TriangleMesh) {
+    assert!(mesh.triangles.is_empty() || report(mesh).unwrap().is_healthy());
+    assert!(mesh.normals.iter().flatten().all(|n| n.is_finite()));
+}
+
+fn implicit_change(
+    surface: &mut ImplicitSurface,
+    bytes: &mut Bytes,
+    count: usize,
+    size: f64,
+) -> Result<(), MethodError> {
+    match bytes.below(3) {
+        0 => surface.set_params(implicit_params(bytes, size)),
+        1 => {
+            let saved = surface.save();
+            surface.restore(&saved).unwrap_or_else(|error| panic!("its own state: {error}"));
+            assert!(surface.save() == saved, "another state comes out");
+            Ok(())
+        }
+        _ => {
+            let mut places = |most| (0..bytes.below(most)).map(|_| bytes.place(2.0).as_vec3()).collect();
+            let (added, outside) = (places(6), places(3));
+            let removed = (0..bytes.below(4)).map(|_| bytes.below(count + 1) as u32).collect();
+            surface.set_edits(Edits { added, removed, outside })
+        }
+    }
+}
+
+/// How far the points go, about.
+fn size(points: &[Vec3]) -> f64 {
+    points.iter().map(|p| p.as_dvec3().distance(points[0].as_dvec3())).fold(0.0, f64::max)
+}
+
+/// Points on a ball, in a plane, on a line or anywhere; some in one place; large, small or far away.
+fn cloud(bytes: &mut Bytes) -> Cloud {
+    let (count, kind) = (1 + bytes.below(24), bytes.below(5));
+    let (scale, away) = bytes.one_of(&[(1.0, 0.0), (1.0, 0.0), (300.0, 3000.0), (1e-20, 0.0), (1e20, 0.0)]);
+    let point = |_| {
+        let p = match kind {
+            0 | 1 => bytes.direction(),
+            2 => bytes.place(1.0),
+            3 => bytes.place(1.0) * DVec3::new(1.0, 1.0, 0.0),
+            _ => bytes.place(1.0) * DVec3::X,
+        };
+        (p * scale + away).as_vec3()
+    };
+    let points: Vec<Vec3> = (0..count).map(point).collect();
+    let normals = bytes.chance(3).then(|| points.iter().map(|p| p.normalize_or_zero()).collect());
+    let confidence = bytes.chance(4).then(|| (0..count).map(|_| bytes.within(-0.1, 1.1) as f32).collect());
+    let colors = bytes.chance(4).then(|| vec![Vec3::splat(0.5); count]);
+    Cloud { points, normals, confidence, colors }
+}
+
+fn camera(bytes: &mut Bytes) -> Option<Camera> {
+    let rows: [f64; 12] = std::array::from_fn(|i| {
+        [100.0, 32.0, 0.0, 160.0, 0.0, 32.0, 100.0, 160.0, 0.0, 1.0, 0.0, 5.0][i] + bytes.within(-3.0, 3.0)
+    });
+    let image = bytes.chance(2).then(|| vec![200; 16 * 16 * 4]);
+    Camera::new(rows, 16, 16, image).ok()
+}
+
+fn implicit_options(bytes: &mut Bytes, size: f64) -> ImplicitOptions {
+    ImplicitOptions {
+        exterior: bytes.chance(4).then(|| (0..bytes.below(8)).map(|_| bytes.place(3.0).as_vec3()).collect()),
+        cameras: (0..bytes.one_of(&[0, 0, 0, 1, 2])).filter_map(|_| camera(bytes)).collect(),
+        max_points: bytes.one_of(&[20_000, 20_000, 4, 10]),
+        keep_components: bytes.chance(4).then(|| 1 + bytes.below(3)),
+        params: implicit_params(bytes, size),
+    }
+}
+
+/// Coarse, so that a run takes milliseconds.
+fn implicit_params(bytes: &mut Bytes, size: f64) -> ImplicitParams {
+    ImplicitParams {
+        delta: bytes.one_of(&[0.1, 1.0, 5.0, 20.0, 100.0]),
+        tau: bytes.one_of(&[0.001, 0.01, 0.025, 0.1, 1.0]),
+        sigma: bytes.one_of(&[0.005, 0.07, 0.3, 1.0]),
+        lambda_surface: bytes.one_of(&[0.0, 0.001, 0.01, 10.0]),
+        lambda_exterior: bytes.one_of(&[0.0, 2.0, 1000.0]),
+        tolerance: bytes.one_of(&[1e-2, 1e-5, 1e-8, 1e-12]),
+        cell: if bytes.chance(16) { 0.0 } else { size * bytes.within(0.1, 0.4) },
+        level: bytes.one_of(&[Level::Zero, Level::Mean]),
+        kernel: if bytes.chance(2) {
+            bytes.one_of(&[KernelKind::ThinPlate, KernelKind::Biharmonic, KernelKind::Gaussian])
+        } else {
+            ImplicitParams::default().kernel
+        },
+    }
+}
+
+pub fn multires(data: &[u8]) {
+    let bytes = &mut Bytes::new(data);
+    let detail = bytes.chance(2).then(|| shape(bytes));
+    let base = bytes.chance(6).then(|| shape(bytes));
+    let ellipsoids = ellipsoids(bytes, 1.0);
+    let options = MultiresOptions { detail, base, ellipsoids, params: multires_params(bytes) };
+    let Ok(mut model) = MultiresolutionModel::new(options) else { return };
+    for _ in 0..3 {
+        match bytes.below(6) {
+            0 => _ = model.set_params(multires_params(bytes)),
+            1 => {
+                let saved = model.save();
+                model.restore(&saved).unwrap_or_else(|error| panic!("its own state: {error}"));
+                assert!(model.save() == saved, "another state comes out");
+            }
+            _ => {}
+        }
+        _ = model.set_ellipsoids(&ellipsoids_near(bytes));
+        let stepped = model.step();
+        if !matches!(stepped, Ok(_) | Err(MethodError::TooManyVertices { .. })) {
+            panic!("{stepped:?}");
+        }
+        assert_sound(model.base_mesh());
+        assert_sound(model.mesh());
+    }
+}
+
+fn ellipsoids_near(bytes: &mut Bytes) -> Vec<ControlEllipsoid> {
+    ellipsoids(bytes, 1.8)
+}
+
+fn ellipsoids(bytes: &mut Bytes, spread: f64) -> Vec<ControlEllipsoid> {
+    (0..1 + bytes.below(3)).map(|_| ellipsoid(bytes, spread)).collect()
+}
+
+fn ellipsoid(bytes: &mut Bytes, spread: f64) -> ControlEllipsoid {
+    let x = bytes.direction();
+    let y = bytes.direction().cross(x).try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
+    let axes = [x, y, x.cross(y)].map(|axis| (axis * bytes.within(0.3, 1.0)).to_array());
+    ControlEllipsoid { center: bytes.place(spread).to_array(), axes }
+}
+
+fn multires_params(bytes: &mut Bytes) -> MultiresParams {
+    let edge = bytes.within(0.35, 0.8);
+    MultiresParams {
+        edge_min: 0.65 * edge,
+        edge_max: bytes.within(1.4, 2.0) * edge,
+        levels: bytes.below(4) as u32,
+        refine_factor: bytes.within(0.3, 0.9),
+        smoothing: 1 + bytes.below(6) as u32,
+        distribute: bytes.below(5) as u32,
+        supersample: bytes.below(2) as u32,
+        energy: bytes.one_of(&[Energy::Membrane, Energy::ThinPlate]),
+        topology: bytes.one_of(&[Topology::Never, Topology::Split, Topology::SplitAndJoin]),
+    }
+}
+
+pub fn tracking(data: &[u8]) {
+    let bytes = &mut Bytes::new(data);
+    let dims = [2 + bytes.below(7), 2 + bytes.below(7), 1 + bytes.below(5), 2 + bytes.below(2)];
+    let volume = volume(bytes, dims);
+    let last = volume.dims().map(|n| n - 1);
+    let bounds = bytes.chance(4).then(|| {
+        let low = last.map(|n| bytes.below(n / 2 + 1));
+        Bounds::Voxels([low, [0, 1, 2].map(|k| low[k] + bytes.below(last[k] - low[k] + 1))])
+    });
+    let component = if bytes.chance(2) { Component::Nearest(bytes.place(12.0)) } else { Component::Largest };
+    let start = bytes.chance(5).then(|| shape(bytes));
+    let parts = start.as_ref().map_or(1, |mesh| measure(mesh).components);
+    let options = TrackingOptions { volume, bounds, component, start, params: tracking_params(bytes) };
+    let Ok(mut tracker) = SurfaceTracker::new(options) else { return };
+    for _ in 0..200 {
+        if tracker.is_done() || tracker.step().is_err() {
+            return;
+        }
+        assert_eq!(tracker.mesh().check(), Ok(()));
+        if let Some(mesh) = tracker.meshes().last() {
+            let found = measure(mesh);
+            assert_eq!((found.components, count_crossings(mesh)), (parts, 0));
+        }
+        if bytes.chance(8) {
+            let saved = tracker.save();
+            tracker.restore(&saved).unwrap_or_else(|error| panic!("its own state: {error}"));
+            assert!(tracker.save() == saved, "another state comes out");
+        }
+    }
+    panic!("no end");
+}
+
+fn tracking_params(bytes: &mut Bytes) -> TrackingParams {
+    let mut or_zero = |low: f64, high: f64| if bytes.chance(2) { bytes.within(low, high) } else { 0.0 };
+    let [radius, time_scale] = [or_zero(1.0, 8.0), or_zero(0.1, 10.0)];
+    let edge_min = bytes.within(0.2, 0.5);
+    TrackingParams {
+        threshold: if bytes.chance(2) { bytes.within(0.01, 0.6) } else { 0.0 },
+        window: 1 + bytes.below(4) as u32,
+        window_frames: bytes.below(5) as u32,
+        radius,
+        time_scale,
+        damping: bytes.within(0.5, 1.0),
+        edge_min,
+        edge_max: edge_min * bytes.within(2.1, 5.0) + 0.9,
+        prediction: bytes.chance(2),
+        cyclic: bytes.chance(2),
+    }
+}
+
+/// Balls and rings side by side or within each other; bumps may make them cross themselves. Some are as small or large as
+/// numbers are.
+pub fn shape(bytes: &mut Bytes) -> TriangleMesh {
+    let mut whole = TriangleMesh::default();
+    for _ in 0..bytes.one_of(&[1, 1, 1, 2, 3]) {
+        let part = if bytes.chance(2) { ring(bytes) } else { ball(bytes) };
+        let (away, first) = (bytes.place(2.0).as_vec3(), whole.positions.len() as u32);
+        whole.positions.extend(part.positions.iter().map(|p| *p + away));
+        whole.triangles.extend(part.triangles.iter().map(|t| t.map(|v| v + first)));
+    }
+    if bytes.chance(4) {
+        let size = bytes.within(0.0, 0.4);
+        whole.positions.iter_mut().for_each(|p| *p += (bytes.direction() * size).as_vec3());
+    }
+    let scale = if bytes.chance(5) { bytes.one_of(&[1e-42, 1e-25, 1e-6, 1e12, 1e20, 1e37]) } else { 1.0 };
+    whole.positions.iter_mut().for_each(|p| *p *= scale);
+    whole
+}
+
+fn ball(bytes: &mut Bytes) -> TriangleMesh {
+    let (radius, edge) = (bytes.within(0.4, 2.0) as f32, bytes.within(0.35, 0.9) as f32);
+    let mesh = Mesh::icosphere(Vec3::ZERO, radius, edge * radius);
+    let flat = Vec3::new(1.0, 1.0, bytes.one_of(&[1.0, 1.0, 0.3, 0.01]));
+    let mut mesh = mesh.unwrap_or_else(|_| Mesh::icosahedron(Vec3::ZERO, radius)).to_triangles();
+    mesh.positions.iter_mut().for_each(|p| *p *= flat);
+    TriangleMesh { positions: mesh.positions, triangles: mesh.triangles, ..TriangleMesh::default() }
+}
+
+/// A torus.
+fn ring(bytes: &mut Bytes) -> TriangleMesh {
+    let (n, m) = (3 + bytes.below(12) as u32, 3 + bytes.below(6) as u32);
+    let (wide, thin) = (bytes.within(0.8, 2.0), bytes.within(0.05, 0.7));
+    let mut mesh = TriangleMesh::default();
+    for k in 0..n * m {
+        let (i, j) = (k / m, k % m);
+        let [a, b] = [f64::from(i) / f64::from(n), f64::from(j) / f64::from(m)]
+            .map(|turn| turn * std::f64::consts::TAU);
+        let r = wide + thin * libm::cos(b);
+        mesh.positions.push(DVec3::new(r * libm::cos(a), r * libm::sin(a), thin * libm::sin(b)).as_vec3());
+        let at = |i: u32, j: u32| (i % n) * m + j % m;
+        mesh.triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+        mesh.triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+    }
+    mesh
+}
+
+/// Scenes of few vertices that are always the same, for states.
+pub fn small_deformable() -> DeformableModel {
+    let volume = volume(&mut Bytes::new(&[0; 24]), [6, 6, 6, 1]);
+    let options = DeformableOptions { edge: Some(3.0), levels: 1, ..DeformableOptions::default() };
+    DeformableModel::new(&volume, options).unwrap()
+}
+
+pub fn small_implicit() -> ImplicitSurface {
+    let points = vec![Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
+    let params = ImplicitParams { cell: 0.5, ..ImplicitParams::default() };
+    let options = ImplicitOptions { params, ..ImplicitOptions::default() };
+    ImplicitSurface::new(Cloud { points, ..Cloud::default() }, options).unwrap()
+}
+
+pub fn small_multires() -> MultiresolutionModel {
+    let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let ellipsoids = vec![ControlEllipsoid { center: [0.0; 3], axes }];
+    let params = MultiresParams { edge_min: 0.6, edge_max: 1.4, ..MultiresParams::default() };
+    MultiresolutionModel::new(MultiresOptions { ellipsoids, params, ..MultiresOptions::default() }).unwrap()
+}
+
+pub fn small_tracking() -> SurfaceTracker {
+    let volume = volume(&mut Bytes::new(&[0; 24]), [6, 6, 4, 3]);
+    let options = TrackingOptions {
+        volume,
+        bounds: None,
+        component: Component::Largest,
+        start: None,
+        params: TrackingParams::default(),
+    };
+    SurfaceTracker::new(options).unwrap()
+}

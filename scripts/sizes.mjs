@@ -1,0 +1,45 @@
+// What the package weighs on its way to a page: `npm run sizes` prints it and writes sizes.json, which the tests hold it to.
+import { readFile, writeFile } from 'node:fs/promises';
+import { gzipSync } from 'node:zlib';
+import { at, say, script, startedAs } from './shell.mjs';
+
+const MODULES = ['vesicle_bg.wasm', 'vesicle_plain_bg.wasm'];
+
+/** What is bundled for a page that imports this, with all it brings; modules of wasm are fetched beside it. */
+const ENTRIES = {
+  vesicle: 'index.js',
+  'vesicle/inline': 'inline.js',
+  'vesicle/worker': 'worker.js',
+  'vesicle/worker-host': 'worker-host.js',
+  'vesicle/three': 'adapters/three.js',
+  'vesicle/niivue': 'adapters/niivue.js',
+  'vesicle/vtk': 'adapters/vtk.js',
+  'vesicle/element': 'element.js',
+};
+
+async function bundled(file) {
+  const { build } = await import('esbuild');
+  const { outputFiles } = await build({
+    entryPoints: [at('pkg', file)],
+    ...{ bundle: true, minify: true, format: 'esm', target: 'es2022', write: false, logLevel: 'error' },
+    // Met in Node alone, and fetched there alone.
+    external: ['node:*'],
+  });
+  return outputFiles[0].contents;
+}
+
+/** Bytes of each part of the package, compressed as servers do it. */
+export async function sizes() {
+  const all = {};
+  for (const name of MODULES) all[name] = gzipSync(await readFile(at('pkg', name)), { level: 9 }).length;
+  for (const [name, file] of Object.entries(ENTRIES)) all[name] = gzipSync(await bundled(file), { level: 9 }).length;
+  return all;
+}
+
+if (startedAs(import.meta.url)) {
+  await script(async () => {
+    const all = await sizes();
+    for (const [name, bytes] of Object.entries(all)) say(name, `${(bytes / 1000).toFixed(1)} kB`);
+    await writeFile(at('sizes.json'), `${JSON.stringify(all, null, 2)}\n`);
+  });
+}

@@ -1,0 +1,25 @@
+// What the package weighs, against what it weighed when somebody last said why.
+import { execFileSync } from 'node:child_process';
+import { readFileSync } from 'node:fs';
+import { fileURLToPath } from 'node:url';
+import { beforeAll, expect, test } from 'vitest';
+
+const root = fileURLToPath(new URL('../..', import.meta.url));
+const known: Record<string, number> = JSON.parse(readFileSync(`${root}sizes.json`, 'utf8'));
+let present: Record<string, number> = {};
+
+beforeAll(() => {
+  const print = "import('./scripts/sizes.mjs').then(async ({ sizes }) => console.log(JSON.stringify(await sizes())))";
+  present = JSON.parse(execFileSync(process.execPath, ['--eval', print], { cwd: root, encoding: 'utf8' }));
+});
+
+test.each(Object.keys(known))('%s weighs what sizes.json says', (name) => {
+  const growth = (present[name] ?? Number.POSITIVE_INFINITY) / (known[name] ?? 0) - 1;
+  const advice = `${name} changed by ${(100 * growth).toFixed(1)} %: npm run sizes, and say why in CHANGELOG.md`;
+  expect(Math.abs(growth), advice).toBeLessThan(0.05);
+});
+
+test('every part is known, and adapters are small', () => {
+  expect(Object.keys(present)).toEqual(Object.keys(known));
+  for (const name of ['three', 'niivue', 'vtk']) expect(present[`vesicle/${name}`], name).toBeLessThan(15_000);
+});
