@@ -1,6 +1,6 @@
 import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
-import { defineConfig, type Plugin } from 'vite';
+import { defineConfig, type Plugin, type Rolldown } from 'vite';
 import { noteBundled } from '../scripts/licences.mjs';
 
 /** A live page for each host that there is an adapter for. */
@@ -38,6 +38,41 @@ function dicomBeside(): Plugin {
   };
 }
 
+/** Chunks that one of `entries` leads to, these included. */
+function reached(bundle: Rolldown.OutputBundle, entries: Rolldown.OutputChunk[]): Set<string> {
+  const found = new Set(entries.map(({ fileName }) => fileName));
+  for (const name of found) {
+    const chunk = bundle[name];
+    if (chunk?.type === 'chunk') for (const next of [...chunk.imports, ...chunk.dynamicImports]) found.add(next);
+  }
+  return found;
+}
+
+/** Names the built files of the app, for the service worker to keep: without other people's libraries in the live pages, and one module of the two. */
+function listFiles(): Plugin {
+  const isEmbed = ({ facadeModuleId }: Rolldown.OutputChunk) => facadeModuleId?.includes('/embed/') === true;
+  return {
+    name: 'list-files',
+    apply: 'build',
+    // Late: Vite takes out scripts that only stood for styles.
+    enforce: 'post',
+    generateBundle(_, bundle) {
+      const entries = Object.values(bundle)
+        .filter((one) => one.type === 'chunk')
+        .filter(({ isEntry }) => isEntry);
+      const own = reached(
+        bundle,
+        entries.filter((one) => !isEmbed(one)),
+      );
+      const theirs = reached(bundle, entries.filter(isEmbed));
+      const wanted = (name: string) =>
+        name.startsWith('assets/') && (own.has(name) || !theirs.has(name)) && !name.includes('_plain_');
+      const listed = Object.keys(bundle).filter(wanted).sort();
+      this.emitFile({ type: 'asset', fileName: 'files.json', source: `${JSON.stringify(listed, null, 1)}\n` });
+    },
+  };
+}
+
 /** For the notices beside the page. */
 const noted = noteBundled('app', ['@itk-wasm/dicom']);
 
@@ -52,7 +87,7 @@ export default defineConfig({
       { find: /^vesicle$/, replacement: here('../pkg') },
     ],
   },
-  plugins: [relaxPolicyWhileDeveloping(), dicomBeside(), noted.page],
+  plugins: [relaxPolicyWhileDeveloping(), dicomBeside(), listFiles(), noted.page],
   worker: { format: 'es', plugins: () => [noted.worker] },
   build: {
     outDir: here('../dist'),

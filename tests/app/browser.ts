@@ -16,16 +16,26 @@ export interface App {
   close: () => Promise<void>;
 }
 
-/** The built app in a browser of its own. */
-export async function openApp(viewport = { width: 1280, height: 800 }): Promise<App> {
+/** The labs, with the address of an example that each is soon done with. */
+export const QUICK = {
+  extract: 'extract?example=linked-rings',
+  reconstruct: 'reconstruct?example=two-balls',
+  track: 'track?example=ventricle',
+  sculpt: 'sculpt?example=globe',
+};
+export const LABS = Object.keys(QUICK) as (keyof typeof QUICK)[];
+
+/** The built app in a browser of its own, at an address within the app. */
+export async function openApp(viewport = { width: 1280, height: 800 }, address = ''): Promise<App> {
   if (!existsSync(at('dist/index.html'))) await buildApp();
   const server = await serve(at('dist'), 0);
   const browser = await launchChromium();
-  const page = await browser.newPage({ viewport });
+  const page = await (await browser.newContext({ viewport })).newPage();
   // A machine that draws in software, and is busy, is slow, not wrong.
   page.setDefaultTimeout(PATIENCE);
-  const complaints = listen(page, server.address);
-  await page.goto(server.address);
+  const complaints: string[] = [];
+  listen(page, server.address, complaints);
+  await page.goto(server.address + address);
   return { page, address: server.address, complaints, close: () => closeAll(browser, server) };
 }
 
@@ -34,8 +44,7 @@ async function closeAll(browser: Browser, server: { close: () => unknown }): Pro
   await server.close();
 }
 
-function listen(page: Page, address: string): string[] {
-  const complaints: string[] = [];
+function listen(page: Page, address: string, complaints: string[]): void {
   page.on('console', (message) => {
     if (message.type() === 'error') complaints.push(`console: ${message.text()}`);
   });
@@ -45,7 +54,28 @@ function listen(page: Page, address: string): string[] {
     if (new URL(url).origin !== new URL(address).origin && !/^(blob|data):/.test(url))
       complaints.push(`foreign: ${url}`);
   });
-  return complaints;
+}
+
+/** A page beside that of the app, for which `prepare` runs before its own scripts; its complaints go to the same list. */
+export async function anotherPage({ page, address, complaints }: App, prepare = () => {}): Promise<Page> {
+  const another = await page.context().newPage();
+  another.setDefaultTimeout(PATIENCE);
+  listen(another, address, complaints);
+  await another.addInitScript(prepare);
+  return another;
+}
+
+/** The page anew, at an address such as `track`. */
+export async function open({ page, address }: Pick<App, 'page' | 'address'>, hash: string): Promise<void> {
+  await page.goto('about:blank');
+  await page.goto(`${address}#${hash}`);
+}
+
+/** Unfolds all that can be. */
+export function unfold(page: Page): Promise<void> {
+  return page.locator('details').evaluateAll((all) => {
+    for (const one of all) (one as HTMLDetailsElement).open = true;
+  });
 }
 
 /** Waits until the lab is in one of the states; an error that is not among them fails with its message. */

@@ -17,12 +17,13 @@ const HOSTS = ['three', 'niivue', 'niivue-next', 'vtk', 'itk'];
 
 test('the list of hosts is found from the help of the app', async () => {
   await page.click('#help');
-  await page.click('dialog a[href*=embed]');
-  await page.waitForSelector('.each a');
-  const links = await page.locator('.each a').evaluateAll((all) => all.map((one) => one.getAttribute('href')));
+  // In a tab of its own.
+  const [list] = await Promise.all([page.waitForEvent('popup'), page.click('dialog a[href*=embed]')]);
+  await list.waitForSelector('.each a');
+  const links = await list.locator('.each a').evaluateAll((all) => all.map((one) => one.getAttribute('href')));
   expect(links).toEqual([...HOSTS, 'element'].map((name) => `./${name}.html`));
-  expect(await overflow(page, 360, 780)).toBeLessThanOrEqual(0);
-  await page.setViewportSize({ width: 800, height: 640 });
+  expect(await overflow(list, 360, 780)).toBeLessThanOrEqual(0);
+  await list.close();
 });
 
 test('a plain page, without a script of its own', async () => {

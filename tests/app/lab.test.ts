@@ -49,7 +49,7 @@ describe('a figure of the paper', () => {
     );
     expect(levels.map(({ width }) => width)).toEqual([20, 36, 64, 112]);
     expect(levels.map(({ inUse }) => inUse)).toEqual([false, false, false, true]);
-    expect(levels[0]?.label).toBe('Level 3, 20 × 20 × 20 voxels');
+    expect(levels[0]?.label).toBe('I₃: level 3, 20 × 20 × 20 voxels');
     expect(levels[3]?.label).toContain('the model is here');
   });
 
@@ -119,7 +119,7 @@ describe('a figure of the paper', () => {
     expect(direct.milliseconds).toBeGreaterThan(2.75 * coarseToFine.milliseconds);
     expect(await text('.compare [role=status]')).toMatch(/times less time than direct\. Area differs by 0\.\d\d %/);
     const table = app.page.getByRole('region', { name: 'Time of both ways' });
-    expect(await table.locator('thead th').allTextContents()).toEqual(['', 'I₃', 'I₂', 'I₁', 'I₀', 'total']);
+    expect(await table.locator('thead th').allTextContents()).toEqual(['Part', 'I₃', 'I₂', 'I₁', 'I₀', 'total']);
     const heads = await table.locator('tbody th').allTextContents();
     expect(heads).toEqual(['coarse to fine', 'T', 'N', 'F', '=', 'steps', 'direct', 'T', 'N', 'F', '=', 'steps']);
     expect(await measures(app.page)).toEqual(before);

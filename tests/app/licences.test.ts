@@ -71,9 +71,9 @@ test('the app leads to them', async () => {
   const app = await openApp();
   try {
     await app.page.click('#help');
-    await app.page.click('dialog a[href*=licences]');
-    await app.page.waitForURL(/licences\.txt$/);
-    expect((await app.page.textContent('body'))?.slice(0, 19)).toBe('Vesicle is licensed');
+    const [notices] = await Promise.all([app.page.waitForEvent('popup'), app.page.click('dialog a[href*=licences]')]);
+    await notices.waitForURL(/licences\.txt$/);
+    expect((await notices.textContent('body'))?.slice(0, 19)).toBe('Vesicle is licensed');
   } finally {
     await app.close();
   }

@@ -1,5 +1,5 @@
 import { afterAll, beforeAll, expect, test } from 'vitest';
-import { type App, openApp, overflow, reach, unnamedControls } from './browser';
+import { type App, LABS, openApp, overflow, reach, unnamedControls } from './browser';
 
 let app: App;
 
@@ -27,6 +27,26 @@ test('the help lists the keys and closes again', async () => {
   expect(await app.page.textContent('dialog')).toContain('play or pause');
   await app.page.keyboard.press('Escape');
   expect(await app.page.locator('dialog').isVisible()).toBe(false);
+});
+
+test.each(LABS)('%s leads to the page on its method, and from its list of keys to all other help', async (lab) => {
+  await app.page.click(`[data-lab=${lab}]`);
+  // The list of keys of the lab before is gone by then.
+  await expect.poll(async () => (await app.page.title()).toLowerCase()).toBe(`vesicle: ${lab}`);
+  await app.page.waitForSelector('dialog', { state: 'attached' });
+  const hrefs = await app.page
+    .locator('dialog a')
+    .evaluateAll((all) => all.map((one) => (one as HTMLAnchorElement).href));
+  expect(hrefs[0]).toBe(await app.page.locator('#guide').evaluate((one) => (one as HTMLAnchorElement).href));
+  const pages = await Promise.all(hrefs.map(async (href) => (await app.page.request.get(href)).text()));
+  expect(pages[0]).toContain(`index.html#${lab}"`);
+  expect(pages.pop()).toContain('three');
+  expect(pages.map((page) => /<title>(.*)<\/title>/.exec(page)?.[1])).toEqual([
+    expect.stringMatching(/^A surface .* Vesicle documentation$/),
+    'Vesicle documentation',
+    'Vesicle: Measurements',
+    'Vesicle in other software',
+  ]);
 });
 
 test('the page forbids itself to load anything from elsewhere', async () => {

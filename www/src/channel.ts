@@ -56,6 +56,8 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
   readonly #onEvent: (event: Event | { event: 'failure'; failure: Failure }) => void;
   readonly #waiting = new Map<number, Waiting>();
   #worker: Worker;
+  /** What broke the worker, until it is started again. */
+  #failure: Failure | undefined;
   #lastId = 0;
 
   constructor(spawn: () => Worker, onEvent: (event: Event | { event: 'failure'; failure: Failure }) => void) {
@@ -69,6 +71,7 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
     body: Requests[K]['body'],
     transfer: Transferable[] = [],
   ): Promise<Requests[K]['reply']> {
+    if (this.#failure) return Promise.reject(new RequestError(this.#failure));
     const id = ++this.#lastId;
     return new Promise((resolve, reject) => {
       this.#waiting.set(id, { resolve, reject });
@@ -85,6 +88,7 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
   restart(failure: Failure): void {
     this.#worker.terminate();
     this.#fail(failure);
+    this.#failure = undefined;
     this.#worker = this.#start();
   }
 
@@ -97,7 +101,11 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
   #start(): Worker {
     const worker = takeWorker(this.#spawn);
     worker.onmessage = ({ data }: MessageEvent<Reply | Event>) => this.#receive(data);
-    worker.onerror = (event) => this.#broken(event.message || 'the worker could not be started');
+    worker.onerror = (event) => {
+      // Told on the page, and not once more in the console.
+      event.preventDefault();
+      this.#broken(event.message || 'the worker could not be started');
+    };
     worker.onmessageerror = () => this.#broken('a message could not be read');
     return worker;
   }
@@ -116,6 +124,9 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
 
   #broken(message: string): void {
     const failure: Failure = { code: 'internal', message };
+    this.#failure = failure;
+    // Whatever it still did would be of no use.
+    this.#worker.terminate();
     this.#fail(failure);
     this.#onEvent({ event: 'failure', failure });
   }

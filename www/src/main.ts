@@ -1,7 +1,9 @@
 import './style.css';
 import { spawnAhead } from './channel';
 import { spawnExtract } from './client';
+import { GUIDES } from './guides';
 import type { Lab, LabKind, PassedOn } from './labs/labs';
+import { workOffline } from './offline';
 import { spawnReconstruct } from './reconstruct/client';
 import { spawnSculpt } from './sculpt/client';
 import { spawnTrack } from './track/client';
@@ -13,6 +15,7 @@ const LABS: [LabKind, ...LabKind[]] = [
     id: 'extract',
     name: 'Extract',
     tagline: 'A closed surface that splits and merges as it grows onto your data. Nothing leaves this machine.',
+    guide: GUIDES.extract,
     spawn: spawnExtract,
     load: async () => (await import('./labs/extract')).ExtractLab,
   },
@@ -20,6 +23,7 @@ const LABS: [LabKind, ...LabKind[]] = [
     id: 'reconstruct',
     name: 'Reconstruct',
     tagline: 'A smooth closed surface through sparse and noisy points. Nothing leaves this machine.',
+    guide: GUIDES.reconstruct,
     spawn: spawnReconstruct,
     load: async () => (await import('./labs/reconstruct')).ReconstructLab,
   },
@@ -27,6 +31,7 @@ const LABS: [LabKind, ...LabKind[]] = [
     id: 'track',
     name: 'Track',
     tagline: 'A closed surface that follows what moves in a 4D image. Nothing leaves this machine.',
+    guide: GUIDES.track,
     spawn: spawnTrack,
     load: async () => (await import('./labs/track')).TrackLab,
   },
@@ -34,6 +39,7 @@ const LABS: [LabKind, ...LabKind[]] = [
     id: 'sculpt',
     name: 'Sculpt',
     tagline: 'A detailed surface that follows ellipsoids, as far as you like. Nothing leaves this machine.',
+    guide: GUIDES.sculpt,
     spawn: spawnSculpt,
     load: async () => (await import('./labs/sculpt')).SculptLab,
   },
@@ -85,7 +91,7 @@ class Labs {
       void this.#lab.start(passedOn);
     } catch (error) {
       this.#root.dataset.state = 'error';
-      this.#root.textContent = `This page needs WebGL 2 and Web Workers, and could not use them here: ${error instanceof Error ? error.message : error}`;
+      this.#root.textContent = `This page needs WebAssembly and Web Workers, and could not use them here; another or a newer browser may. It said: ${error instanceof Error ? error.message : error}`;
     }
   }
 
@@ -102,7 +108,7 @@ class Labs {
     if (link && location.hash.startsWith(`#${this.#kind?.id}`)) link.setAttribute('href', location.hash);
   }
 
-  #present({ id, name, tagline }: LabKind): void {
+  #present({ id, name, tagline, guide }: LabKind): void {
     document.title = `Vesicle: ${name}`;
     for (const [one, link] of this.#links) {
       if (one === id) {
@@ -113,8 +119,9 @@ class Labs {
     }
     const title = document.getElementById('lab-name');
     if (title) title.textContent = name;
-    const text = document.querySelector('.tagline');
+    const text = document.getElementById('tagline');
     if (text) text.textContent = tagline;
+    document.getElementById('guide')?.setAttribute('href', guide);
   }
 }
 
@@ -122,3 +129,4 @@ const lab = document.getElementById('lab');
 const help = document.getElementById('help');
 const nav = document.getElementById('labs');
 if (lab && help && nav) new Labs(lab, help, nav);
+workOffline();

@@ -14,7 +14,7 @@ export function drawSection({ id, title, measured, command, notes, charts }: Sec
     h('p', {}, h('code', {}, command)),
     ...list,
     ...charts.map((chart) => drawChart(chart)),
-    h('details', {}, h('summary', {}, 'As tables'), ...charts.map((chart) => tableOf(chart))),
+    h('details', {}, h('summary', {}, 'As tables'), ...charts.map((chart) => tableOf(title, chart))),
   );
 }
 
@@ -106,11 +106,12 @@ function axis({ ticks, at }: Drawing): HTMLElement {
 const short = (value: number) => new Intl.NumberFormat('en', { maximumSignificantDigits: 3 }).format(value);
 
 /** The numbers of a chart: a row for each figure where all have the same hosts, else for each bar. */
-function tableOf(chart: Chart): HTMLElement {
+function tableOf(section: string, chart: Chart): HTMLElement {
   const { title, kind } = chart;
   const [head, rows] = kind === 'ratio' ? listed(chart) : byHost(chart);
   return scrolling(
-    title,
+    // Charts of several sections have the same title.
+    `${section}: ${title}`,
     h(
       'table',
       { class: 'times bench-table' },
@@ -138,7 +139,7 @@ function byHost({ unit, figures }: Chart): Table {
   const row = (figure: Figure) => [figure.name, ...hosts.map((host) => shownAt(figure, host, unit))];
   const asked = (figure: Figure) => (figure.target ? [askedOf(figure.target, unit), verdict(figure)] : ['–', '–']);
   return [
-    ['', ...hosts, ...(asks ? ['Asked', 'Outcome'] : [])],
+    ['Measured', ...hosts, ...(asks ? ['Asked', 'Outcome'] : [])],
     figures.map((figure) => [...row(figure), ...(asks ? asked(figure) : [])]),
   ];
 }
@@ -156,7 +157,7 @@ function listed({ unit, figures }: Chart): Table {
     remark ?? skipped ?? '',
   ];
   return [
-    ['', 'Beside', 'Ours to theirs', 'What came of both'],
+    ['Measured', 'Beside', 'Ours to theirs', 'What came of both'],
     figures.flatMap(({ name, bars }) => bars.map((bar) => row(name, bar))),
   ];
 }

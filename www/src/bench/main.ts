@@ -22,7 +22,7 @@ function askedIn({ charts }: Section): Asked[] {
 function summary(sections: Section[]): HTMLElement {
   const asked = sections.flatMap(askedIn);
   const met = asked.filter(({ figure }) => verdict(figure) === 'met').length;
-  const heads = ['', 'Outcome', 'Asked', 'Found at worst'].map((text) => h('th', { scope: 'col' }, text));
+  const heads = ['Measured', 'Outcome', 'Asked', 'Found at worst'].map((text) => h('th', { scope: 'col' }, text));
   return h(
     'section',
     { class: 'panel', id: 'summary' },

@@ -17,7 +17,14 @@ export function fetchBytes(url: string): Promise<Uint8Array> {
 }
 
 async function download(url: string): Promise<Uint8Array> {
-  const response = await fetch(url);
+  return new Uint8Array(await (await fetched(url)).arrayBuffer());
+}
+
+/** A file that comes with the page, from the server or as it was kept. */
+export async function fetched(url: string): Promise<Response> {
+  const response = await fetch(url).catch(() => undefined);
+  if (!response)
+    throw new Error(`The network does not answer, and ${url} has not been opened here before. Try again when it does.`);
   if (!response.ok) throw new Error(`The server answered ${response.status} for ${url}.`);
-  return new Uint8Array(await response.arrayBuffer());
+  return response;
 }

@@ -1,5 +1,6 @@
 import { Client, RequestError, toFailure } from '../client';
 import { EXAMPLES, type Example, exampleUrl, type Unit } from '../examples';
+import { GUIDES } from '../guides';
 import { exampleById, isPreset, PRESETS, type Preset, startOf, type Variant, variantOf } from '../presets';
 import type {
   MeshFormat,
@@ -26,7 +27,7 @@ import { FigurePanel } from '../ui/figure';
 import { acceptDrops, fileChooser, nameOf, readFiles } from '../ui/files';
 import { count, plural } from '../ui/format';
 import { Histogram } from '../ui/histogram';
-import { History } from '../ui/history';
+import { History, underWay } from '../ui/history';
 import { EventLog } from '../ui/log';
 import { MeasurePanel } from '../ui/measures';
 import { ParamControls } from '../ui/params';
@@ -81,8 +82,9 @@ export class ExtractLab {
   readonly #banner = new ErrorBanner(() => this.#dismiss());
   readonly #canvas = h('canvas', {
     tabindex: 0,
-    role: 'img',
-    'aria-label': '3D view of the surface and the slices. Arrow keys turn it, plus and minus zoom.',
+    role: 'application',
+    'aria-label':
+      '3D view of the surface and the slices. Arrow keys turn it, plus and minus zoom; while attractors are placed, Enter is a click in its middle.',
   });
   readonly #slices = h('div', { class: 'slices' });
   readonly #drop = h('div', { class: 'drop', hidden: true }, 'Drop a volume to open it');
@@ -193,7 +195,7 @@ export class ExtractLab {
     this.#state.follow((state) => this.#showState(state));
     const { signal } = this.#closing;
     acceptDrops(this.#drop, (files) => void this.#openFiles(files), signal);
-    offerShortcuts(this.#shortcuts, help, signal);
+    offerShortcuts(this.#shortcuts, help, GUIDES.extract, signal);
   }
 
   /** Gives everything back: the lab is not used again. */
@@ -397,7 +399,7 @@ export class ExtractLab {
   /** Starts the model over, with the parameters as they are. */
   async #reset(): Promise<void> {
     if (!this.#volume || this.#state.value === 'loading') return;
-    if (this.#engineBroken && this.#source) return this.#open(this.#source);
+    if (this.#engineBroken && this.#source) return this.#recover(this.#source);
     const forget = this.#rewinder.remember('Reset');
     this.#enterLoading('Starting over.');
     try {
@@ -481,6 +483,35 @@ export class ExtractLab {
     this.#shown = undefined;
     await this.#greet();
     this.#engineBroken = false;
+    await this.#client.request('shade', this.#shade);
+  }
+
+  /** Another engine, with the volume and the settings as they were, in the last state that was kept. */
+  async #recover(source: Source): Promise<void> {
+    const turn = ++this.#turn;
+    this.#enterLoading('Starting the engine again.');
+    try {
+      await this.#restartEngine();
+      const volume = await source.volume();
+      if (turn !== this.#turn) return;
+      const setup = this.#setup(this.#start.inForce, this.#params);
+      const ready = await this.#client.request(
+        'load',
+        { name: source.name, source: volume, setup },
+        transferable(volume),
+      );
+      // The new engine does not know the slices yet.
+      this.#stage.goTo(this.#stage.crosshair);
+      const { last } = this.#rewinder;
+      if (last) await this.#client.request('restore', last.saved);
+      if (last) this.#adoptMoment(last);
+      else this.#adoptModel(ready);
+      this.#status.say(
+        `Started again ${last ? `from iteration ${count(last.saved.iteration)}` : 'from the beginning'}.`,
+      );
+    } catch (error) {
+      if (turn === this.#turn) this.#fail('The engine could not be started again.', error);
+    }
   }
 
   // ── running ───────────────────────────────────────────────────────────────────────────────────
@@ -519,7 +550,7 @@ export class ExtractLab {
   }
 
   #setPlanes(planes: Plane[]): void {
-    this.#ask(this.#client.request('planes', planes));
+    if (!this.#engineBroken) this.#ask(this.#client.request('planes', planes));
   }
 
   async #setParam(name: string, value: unknown): Promise<void> {
@@ -596,7 +627,9 @@ export class ExtractLab {
 
   /** One after the other, however fast they are asked for. */
   #travel(way: 'undo' | 'redo'): Promise<void> {
-    this.#travels = this.#travels.then(() => this.#travelOnce(way));
+    const turn = this.#turn;
+    // What was asked on the volume before is not done to this one.
+    this.#travels = this.#travels.then(() => (turn === this.#turn ? this.#travelOnce(way) : undefined));
     return this.#travels;
   }
 
@@ -709,7 +742,9 @@ export class ExtractLab {
   }
 
   #onReports(reports: StepReport[]): void {
-    if (this.#history.add(reports)) this.#transport.showReport(reports.at(-1));
+    if (!this.#history.add(reports)) return;
+    this.#transport.showReport(reports.at(-1));
+    if (this.#state.value === 'running') this.#status.report(() => underWay(this.#history));
   }
 
   #showMeasures({ measures }: SnapshotEvent): void {

@@ -25,6 +25,8 @@ export interface LabKind {
   id: string;
   name: string;
   tagline: string;
+  /** Where the documentation says how it works. */
+  guide: string;
   /** Starts its worker. */
   spawn: () => Worker;
   /** Fetches its code. */

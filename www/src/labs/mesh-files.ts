@@ -3,6 +3,7 @@ import { dataUrl } from '../reconstruct/examples';
 import type { ExampleMesh, SculptExample } from '../sculpt/examples';
 import type { MeshSource, MeshTexture, SceneSource } from '../sculpt/protocol';
 import { readFiles } from '../ui/files';
+import { fetched } from './downloads';
 
 export const ACCEPT = '.glb,.obj,.ply,.stl,.png,.jpg,.jpeg,.webp';
 
@@ -19,8 +20,7 @@ export async function fromExample({ detail, base }: SculptExample): Promise<Scen
 
 async function fetchMesh(mesh: ExampleMesh): Promise<MeshSource> {
   if ('shape' in mesh) return mesh;
-  const response = await fetch(dataUrl(mesh.file));
-  if (!response.ok) throw new Error(`The server answered ${response.status} for ${mesh.file}.`);
+  const response = await fetched(dataUrl(mesh.file));
   return { file: { name: mesh.file, bytes: new Uint8Array(await response.arrayBuffer()) } };
 }
 

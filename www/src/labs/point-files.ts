@@ -2,6 +2,7 @@
 import { type CloudExample, dataUrl } from '../reconstruct/examples';
 import type { CloudSource } from '../reconstruct/protocol';
 import { readFiles } from '../ui/files';
+import { fetched } from './downloads';
 import { type Photograph, readPhotographs } from './photographs';
 
 export const ACCEPT = '.ply,.obj,.xyz,.pts,.csv,.txt,.json,.png,.jpg,.jpeg,.webp';
@@ -22,19 +23,13 @@ export async function fromExample({ source, photographs }: CloudExample): Promis
 }
 
 async function fetchPoints(file: string): Promise<CloudSource> {
-  const bytes = new Uint8Array(await (await fetched(file)).arrayBuffer());
+  const bytes = new Uint8Array(await (await fetched(dataUrl(file))).arrayBuffer());
   return { file: { name: file, bytes } };
 }
 
 async function fetchPhotographs(folder: string): Promise<Photograph[]> {
-  const list = await (await fetched(`${folder}/cameras.json`)).text();
-  return readPhotographs(list, async (name) => (await fetched(`${folder}/${name}`)).blob());
-}
-
-async function fetched(file: string): Promise<Response> {
-  const response = await fetch(dataUrl(file));
-  if (!response.ok) throw new Error(`The server answered ${response.status} for ${file}.`);
-  return response;
+  const list = await (await fetched(dataUrl(`${folder}/cameras.json`))).text();
+  return readPhotographs(list, async (name) => (await fetched(dataUrl(`${folder}/${name}`))).blob());
 }
 
 /** Points in one file; a list of cameras and the photographs it names. */

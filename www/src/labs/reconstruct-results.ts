@@ -2,7 +2,7 @@ import type { ReconstructClient } from '../reconstruct/client';
 import type { ConstraintsEvent, MeasuredEvent, ProgressEvent, SurfaceEvent, TimedEvent } from '../reconstruct/protocol';
 import type { LabState } from '../state';
 import { count, figure, plural } from '../ui/format';
-import type { History } from '../ui/history';
+import { type History, underWay } from '../ui/history';
 import { overallProgress } from '../ui/phases';
 import type { LabStates } from './lab-states';
 import { fitValues } from './reconstruct-measures';
@@ -39,6 +39,7 @@ export class Results {
       case 'progress':
         this.#history.add(event.reports);
         this.#showHistory();
+        if (this.#states.value === 'running') this.#ui.status.report(() => underWay(this.#history));
         break;
       case 'surface':
         this.#takeSurface(event);

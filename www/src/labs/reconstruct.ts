@@ -1,4 +1,5 @@
 import { RequestError } from '../channel';
+import { GUIDES } from '../guides';
 import { ReconstructClient } from '../reconstruct/client';
 import { CLOUDS } from '../reconstruct/examples';
 import { type CloudPreset, type CloudVariant, isCloudPreset, variantInForce } from '../reconstruct/presets';
@@ -53,7 +54,7 @@ export class ReconstructLab implements Lab {
     this.#opening = new Opening(client, ui, states, this.#settings, (opened) => this.#adopt(opened));
     this.#sharing = new Sharing(client, ui, states, this.#settings, this.#opening);
     states.follow((state) => this.#showState(state));
-    offerShortcuts(this.#shortcuts(), help, signal);
+    offerShortcuts(this.#shortcuts(), help, GUIDES.reconstruct, signal);
   }
 
   /** Opens what the address says, or else the built-in example, and runs it. */

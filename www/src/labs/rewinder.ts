@@ -51,6 +51,11 @@ export class Rewinder<Page = PageState, Saved extends { state: Uint8Array } = Sa
     this.#onChange = onChange;
   }
 
+  /** The newest moment that was kept. */
+  get last(): Moment<Page, Saved> | undefined {
+    return this.#stack.last;
+  }
+
   /** Another volume: no state of the one before fits it. */
   clear(): void {
     this.#volume += 1;

@@ -2,7 +2,7 @@ import type { SculptClient } from '../sculpt/client';
 import type { FrameEvent, MeasuredEvent, StageKind } from '../sculpt/protocol';
 import type { LabState } from '../state';
 import { count, plural } from '../ui/format';
-import type { History } from '../ui/history';
+import { type History, underWay } from '../ui/history';
 import type { LabStates } from './lab-states';
 import type { SculptParts } from './sculpt-parts';
 
@@ -64,6 +64,7 @@ export class Results {
   /** Shows a frame at the next animation frame; only then the worker goes on. */
   take(frame: FrameEvent): void {
     this.#history.add(frame.reports);
+    if (this.#states.value === 'running') this.#ui.status.report(() => underWay(this.#history));
     this.#frame = frame;
     if (this.#framePending) return;
     this.#framePending = true;

@@ -1,10 +1,12 @@
 import { RequestError } from '../channel';
+import { GUIDES } from '../guides';
 import { SculptClient } from '../sculpt/client';
 import { SCENES } from '../sculpt/examples';
 import { lastFrame } from '../sculpt/film';
 import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
 import type { FrameEvent, Opened, ParamValues, SculptShade, Shown, WorkerEvent } from '../sculpt/protocol';
 import type { LabState } from '../state';
+import { wantsStillness } from '../ui/dom';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { SculptViewOptions } from '../view/sculpture';
@@ -54,7 +56,7 @@ export class SculptLab implements Lab {
     this.#filming = new Filming(client, ui, states, this.#settings);
     this.#opening = new Opening(client, ui, states, (opened, source) => this.#adopt(opened, source));
     states.follow((state) => this.#showState(state));
-    offerShortcuts(this.#shortcuts(), help, signal);
+    offerShortcuts(this.#shortcuts(), help, GUIDES.sculpt, signal);
   }
 
   /** Opens what the address says, or else the built-in example, and runs it. */
@@ -169,7 +171,8 @@ export class SculptLab implements Lab {
     if (preset?.stages) this.#results.showStages(preset.stages);
     await this.#settings.setFilm(film, 0);
     await this.#client.request('show', this.#shown);
-    await this.#client.request(film && !linked?.pose ? 'play' : 'settle', undefined);
+    const endless = film?.loop === true && wantsStillness();
+    await this.#client.request(film && !linked?.pose && !endless ? 'play' : 'settle', undefined);
   }
 
   #openVariant(preset: SculptPreset, { name, params, pose }: SculptVariant): void {

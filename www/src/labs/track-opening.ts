@@ -5,6 +5,7 @@ import { FILMS, type TrackExample } from '../track/examples';
 import { filmById } from '../track/presets';
 import type { FilmSource, Opened, Setup } from '../track/protocol';
 import { readFiles } from '../ui/files';
+import { fetched } from './downloads';
 import type { LabStates } from './lab-states';
 import { fromHash, type LinkedTrack, setupOf } from './track-link';
 import type { TrackParts } from './track-parts';
@@ -134,7 +135,6 @@ export class Opening {
 
 async function fromExample({ source }: TrackExample): Promise<FilmSource> {
   if ('cine' in source) return source;
-  const response = await fetch(exampleUrl(source.file));
-  if (!response.ok) throw new Error(`The server answered ${response.status} for ${source.file}.`);
+  const response = await fetched(exampleUrl(source.file));
   return { files: [{ name: source.file, bytes: new Uint8Array(await response.arrayBuffer()) }] };
 }

@@ -1,10 +1,12 @@
 import { RequestError, toFailure } from '../channel';
+import { GUIDES } from '../guides';
 import type { LabState } from '../state';
 import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
 import { TrackClient } from '../track/client';
 import { FILMS } from '../track/examples';
 import { isTrackPreset, type TrackPreset, type TrackVariant, variantInForce, viewOf } from '../track/presets';
 import type { Opened, Setup, StepEvent, VolumeView, WorkerEvent } from '../track/protocol';
+import { wantsStillness } from '../ui/dom';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { Other } from '../ui/track-compare';
@@ -17,9 +19,6 @@ import { type PartEvents, TrackParts } from './track-parts';
 import { TrackResults } from './track-results';
 import { TrackSettings } from './track-settings';
 import { TrackSharing } from './track-sharing';
-
-/** Frames between two reports in words. */
-const REPORT_EVERY = 5;
 
 /**
  * The Track lab: a surface that is followed through the frames of a 4D image. Here its parts are put together; what is
@@ -66,7 +65,7 @@ export class TrackLab implements Lab {
     );
     this.#sharing = new TrackSharing(this.#client, ui, states, this.#results, this.#settings, this.#opening);
     states.follow((state) => this.#showState(state));
-    offerShortcuts(this.#shortcuts(), help, signal);
+    offerShortcuts(this.#shortcuts(), help, GUIDES.track, signal);
   }
 
   /** Opens what the address says, or else the built-in example, and runs it. */
@@ -294,15 +293,13 @@ export class TrackLab implements Lab {
     if (index === undefined || this.#states.value !== 'running') return;
     const { frames } = this.#results;
     if (index === 0) this.#ui.status.say(this.#results.describe('running'));
-    else if ((index + 1) % REPORT_EVERY === 0)
-      this.#ui.status.say(`${frames.length} of ${this.#volume?.frames} frames have their surface.`);
+    else this.#ui.status.report(() => `${frames.length} of ${this.#volume?.frames} frames have their surface.`);
   }
 
   #settled(state: 'running' | 'paused' | 'done'): void {
     this.#time(state);
     this.#ui.status.say(this.#results.describe(state));
-    const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
-    if (state === 'done' && !calm) this.#ui.frames.start();
+    if (state === 'done' && !wantsStillness()) this.#ui.frames.start();
     else this.#ui.frames.stop();
   }
 

@@ -31,7 +31,7 @@ export class AttractorControls {
   constructor(events: AttractorEvents) {
     this.#events = events;
     const add = () => this.add(events.crosshair());
-    const label = 'Place an attractor at the crosshair';
+    const label = 'At crosshair: place an attractor there';
     const button = h(
       'button',
       { type: 'button', onclick: add, 'data-attractor': 'add', title: label, 'aria-label': label },

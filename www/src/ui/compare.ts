@@ -127,7 +127,7 @@ function scrolling(label: string, table: HTMLTableElement): HTMLElement {
 /** Rows T, N, F and their sum, a column a level, for both ways. */
 function timeTable(coarseToFine: ComparedRun, direct: ComparedRun): HTMLTableElement {
   const levels = coarseToFine.byLevel.map(({ level }) => level);
-  const head = ['', ...levels.map((level) => levelSymbol(level)), 'total'].map((title) =>
+  const head = ['Part', ...levels.map((level) => levelSymbol(level)), 'total'].map((title) =>
     h('th', { scope: 'col' }, title),
   );
   const body = [...rowsOf('coarse to fine', coarseToFine, levels), ...rowsOf('direct', direct, levels)];
@@ -162,7 +162,7 @@ function outcomeTable(coarseToFine: ComparedRun, direct: ComparedRun): HTMLTable
   const runs = [coarseToFine, direct];
   const row = (name: string, value: (run: ComparedRun) => string) =>
     h('tr', {}, h('th', { scope: 'row' }, name), ...runs.map((run) => h('td', {}, value(run))));
-  const head = ['', 'coarse to fine', 'direct'].map((title) => h('th', { scope: 'col' }, title));
+  const head = ['Measure', 'coarse to fine', 'direct'].map((title) => h('th', { scope: 'col' }, title));
   return h(
     'table',
     { class: 'times' },

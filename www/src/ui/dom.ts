@@ -60,6 +60,11 @@ export function onSchemeChange(callback: () => void): void {
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', callback);
 }
 
+/** Whether the reader asked for nothing to move that was not asked for. */
+export function wantsStillness(): boolean {
+  return matchMedia('(prefers-reduced-motion: reduce)').matches;
+}
+
 let ids = 0;
 /** An id that no other element has. */
 export function uniqueId(prefix: string): string {

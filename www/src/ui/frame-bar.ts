@@ -113,7 +113,7 @@ export class FrameBar {
   #label(): void {
     this.#icon.replaceChildren(icon(this.beating ? PAUSE : PLAY));
     this.#text.textContent = this.beating ? 'Hold' : 'Beat';
-    const title = this.beating ? 'Hold this frame' : 'Show the frames that are done in a loop';
+    const title = this.beating ? 'Hold this frame' : 'Beat: show the frames that are done in a loop';
     this.#beat.title = title;
     this.#beat.setAttribute('aria-label', title);
   }

@@ -90,10 +90,26 @@ export class Histogram {
   }
 
   #describe(): void {
-    const [low, high] = this.#volume?.range ?? [0, 0];
-    const text = `Histogram of intensities from ${figure(low)} to ${figure(high)}, counts on a logarithmic scale`;
-    this.#canvas.setAttribute('aria-label', text);
+    if (this.#volume) this.#canvas.setAttribute('aria-label', tellHistogram(this.#volume, this.#slider.valueAsNumber));
   }
+}
+
+/** The picture in words. */
+function tellHistogram(
+  { histogram, range: [low, high] }: Pick<VolumeView, 'histogram' | 'range'>,
+  iso: number,
+): string {
+  const all = histogram.reduce((sum, n) => sum + n, 0);
+  const isoBin = ((iso - low) / (high - low)) * histogram.length;
+  let [half, below, above] = [0, 0, 0];
+  for (const [bin, n] of histogram.entries()) {
+    below += n;
+    if (2 * below <= all) half = bin + 1;
+    if (bin >= isoBin) above += n;
+  }
+  const middle = low + (half / histogram.length) * (high - low);
+  const share = all > 0 ? (100 * above) / all : 0;
+  return `Histogram of intensities from ${figure(low)} to ${figure(high)}. Half of the voxels are below about ${figure(Math.round(middle))}; ${share.toFixed(1)} % are at the iso value or above.`;
 }
 
 /** A slider step that whole-number intensities fall on, and fine enough for any other range. */

@@ -1,4 +1,5 @@
 import type { StepReport } from '../protocol';
+import { count, plural } from './format';
 
 /** Steps at which the topology changed. */
 export interface Change {
@@ -65,4 +66,13 @@ export class History {
     this.times.set(now, times);
     for (const [part, time] of Object.entries(report.times)) times.set(part, (times.get(part) ?? 0) + time);
   }
+}
+
+/** How far a run is, for the status line. */
+export function underWay({ reports }: History): string {
+  const last = reports.at(-1);
+  if (!last) return 'Running.';
+  const { iteration, phase, vertices, components } = last;
+  const surface = vertices > 0 ? `: ${count(vertices)} vertices in ${plural(components, 'component')}` : '';
+  return `Running. Iteration ${count(iteration)}, ${phase}${surface}.`;
 }

@@ -5,6 +5,7 @@ import { h, onSchemeChange, token } from './dom';
 import { count, figure } from './format';
 import type { History } from './history';
 import { totals } from './log';
+import { PlotTable } from './plot-table';
 
 const PLOT_HEIGHT = 144;
 /** Above a plot, for the names of the levels. */
@@ -58,6 +59,7 @@ export class Plots {
   readonly #plots: Plot[];
   readonly #history: History;
   readonly #events = h('p', { class: 'help', 'data-plot-events': '' });
+  readonly #table: PlotTable;
   readonly #stale = new Set<Plot>();
   #pending = 0;
 
@@ -66,7 +68,9 @@ export class Plots {
     this.#history = history;
     this.#plots = kinds.map((kind) => new Plot(kind, history));
     this.element = h('div', { class: 'plots' }, ...this.#plots.map((plot) => plot.element));
+    this.#table = new PlotTable(kinds.flatMap(({ curves }) => curves));
     if (events) this.element.append(this.#legend(), this.#events);
+    this.element.append(this.#table.element);
     onSchemeChange(() => this.update());
   }
 
@@ -96,8 +100,12 @@ export class Plots {
     // One that becomes stale again waits behind the others.
     this.#stale.delete(plot);
     plot.update(this.#history);
-    if (this.#stale.size > 0) this.#pending = requestAnimationFrame(() => this.#redrawOne());
-    else this.#events.textContent = tellEvents(this.#history);
+    if (this.#stale.size > 0) {
+      this.#pending = requestAnimationFrame(() => this.#redrawOne());
+      return;
+    }
+    this.#events.textContent = tellEvents(this.#history);
+    this.#table.update(this.#history.reports);
   }
 }
 
@@ -293,5 +301,5 @@ function tellChange({ reports }: History, name: string, of: (report: StepReport)
     low = Math.min(low, of(report));
     high = Math.max(high, of(report));
   }
-  return `${name[0]?.toUpperCase()}${name.slice(1)}: now ${count(of(last))}; between ${count(low)} to ${count(high)} so far.`;
+  return `${name[0]?.toUpperCase()}${name.slice(1)}: now ${count(of(last))}; between ${count(low)} and ${count(high)} so far.`;
 }

@@ -2,7 +2,7 @@ import type { LevelView } from '../protocol';
 import { h } from './dom';
 import { levelSymbol } from './format';
 
-const VOLUME = 'Level 0: the volume itself';
+const VOLUME = 'level 0, the volume itself';
 
 /** The levels of the image pyramid as small pictures of the present slice; the one the model works on is marked. */
 export class PyramidPanel {
@@ -93,8 +93,9 @@ export class PyramidPanel {
       const inUse = level === this.#inUse;
       button.setAttribute('aria-pressed', String(level === this.#shown));
       button.classList.toggle('in-use', inUse);
-      const name = level === 0 ? VOLUME : `Level ${level}`;
-      const label = `${name}, ${this.#dims[level]} voxels${inUse ? ', the model is here' : ''}`;
+      const name = level === 0 ? VOLUME : `level ${level}`;
+      // With the letter that is seen: who speaks to the page says it.
+      const label = `${levelSymbol(level)}: ${name}, ${this.#dims[level]} voxels${inUse ? ', the model is here' : ''}`;
       button.setAttribute('aria-label', label);
       button.title = level === 0 ? label : `${label}. On it the surface rests a little outside πI.`;
     }

@@ -1,3 +1,4 @@
+import { DOCUMENTATION } from '../guides';
 import { h } from './dom';
 
 export interface Shortcut {
@@ -16,10 +17,10 @@ const VIEW_KEYS: [string, string][] = [
   ['Tab', 'to the next control; arrow keys move sliders'],
 ];
 
-/** Acts on keys and lists them when asked, by `?` or by a button, until aborted. */
-export function offerShortcuts(shortcuts: Shortcut[], opener: HTMLElement, signal: AbortSignal): void {
+/** Acts on keys and lists them when asked, by `?` or by a button, with a way to further help, until aborted. */
+export function offerShortcuts(shortcuts: Shortcut[], opener: HTMLElement, guide: string, signal: AbortSignal): void {
   const list: Shortcut = { key: '?', shown: '?', text: 'this list', act: () => dialog.showModal() };
-  const dialog = shortcutDialog([...shortcuts, list], opener, signal);
+  const dialog = shortcutDialog([...shortcuts, list], opener, guide, signal);
   document.body.append(dialog);
   listenForShortcuts([...shortcuts, list], signal);
 }
@@ -73,7 +74,12 @@ function isTakenBy({ target, key }: KeyboardEvent): boolean {
 }
 
 /** The list of shortcuts, opened by a button or by `?`; gone when aborted. */
-function shortcutDialog(shortcuts: Shortcut[], opener: HTMLElement, signal: AbortSignal): HTMLDialogElement {
+function shortcutDialog(
+  shortcuts: Shortcut[],
+  opener: HTMLElement,
+  guide: string,
+  signal: AbortSignal,
+): HTMLDialogElement {
   const rows = [...shortcuts.map(({ shown, text }) => [shown, text]), ...VIEW_KEYS];
   const list = h(
     'dl',
@@ -86,12 +92,29 @@ function shortcutDialog(shortcuts: Shortcut[], opener: HTMLElement, signal: Abor
     { 'aria-labelledby': 'keys-title' },
     h('h2', { id: 'keys-title' }, 'Keyboard'),
     list,
-    h('p', {}, h('a', { href: './bench.html' }, 'Measurements: how fast it is')),
-    h('p', {}, h('a', { href: './embed/index.html' }, 'In other software: three.js, NiiVue, vtk.js, itk-wasm')),
-    h('p', {}, h('a', { href: './licences.txt' }, 'Other people’s work in it, and its licences')),
+    furtherHelp(guide),
     form,
   );
   opener.addEventListener('click', () => dialog.showModal(), { signal });
   signal.addEventListener('abort', () => dialog.remove());
   return dialog;
+}
+
+/** In tabs of their own: the model stays open. */
+function furtherHelp(guide: string): HTMLElement {
+  const link = (href: string, text: string) => h('li', {}, h('a', { class: 'link', href, target: '_blank' }, text));
+  return h(
+    'nav',
+    { 'aria-labelledby': 'further-title' },
+    h('h3', { id: 'further-title' }, 'More, in new tabs'),
+    h(
+      'ul',
+      { class: 'further-help' },
+      link(guide, 'How this lab works'),
+      link(DOCUMENTATION, 'Documentation: all labs, and the package'),
+      link('./bench.html', 'Measurements: how fast it is'),
+      link('./embed/index.html', 'In other software: three.js, NiiVue, vtk.js, itk-wasm'),
+      link('./licences.txt', 'Other people’s work in it, and its licences'),
+    ),
+  );
 }

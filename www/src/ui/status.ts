@@ -1,11 +1,21 @@
 import { h } from './dom';
 
-/** One line that screen readers speak politely: what the lab is doing. Set only when that changes, never per step. */
+/** Milliseconds between two reports of something that goes on: they can be listened to, and leave time for the rest of the page. */
+const REPORT_EVERY = 10_000;
+
+/** One line that screen readers speak politely: what the lab is doing. Set when that changes, and now and then while it goes on. */
 export class StatusLine {
   readonly element = h('p', { class: 'status', role: 'status', 'aria-live': 'polite' });
+  #saidAt = 0;
 
   say(text: string): void {
+    this.#saidAt = performance.now();
     if (this.element.textContent !== text) this.element.textContent = text;
+  }
+
+  /** How far something is that goes on, called as often as it likes; `text` only when it is time for it. */
+  report(text: () => string): void {
+    if (performance.now() - this.#saidAt >= REPORT_EVERY) this.say(text());
   }
 }
 

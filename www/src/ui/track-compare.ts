@@ -174,7 +174,7 @@ function tableOf(runs: [ComparedRun, ComparedRun]): HTMLElement {
       : []),
     row('Time', ({ took }) => (took === undefined ? '–' : milliseconds(took))),
   ];
-  const head = ['', ...runs.map(({ name }) => name)].map((title) => h('th', { scope: 'col' }, title));
+  const head = ['Measure', ...runs.map(({ name }) => name)].map((title) => h('th', { scope: 'col' }, title));
   const table = h('table', { class: 'times' }, h('thead', {}, h('tr', {}, ...head)), h('tbody', {}, ...rows));
   const label = `What came of both ways, ${count(runs[0].facts.length)} frames`;
   return h('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': label }, table);

@@ -1,6 +1,6 @@
 import type { StepReport } from '../protocol';
 import type { LabState } from '../state';
-import { h, icon } from './dom';
+import { h, icon, wantsStillness } from './dom';
 import { count } from './format';
 
 const PLAY = 'M7 4.5v15l12-7.5z';
@@ -90,7 +90,7 @@ export class Transport {
 
   #showBusy(state: LabState): void {
     // A bar without a value moves by itself: something is going on, and nobody knows how long.
-    if (state === 'loading') this.#progress.removeAttribute('value');
+    if (state === 'loading' && !wantsStillness()) this.#progress.removeAttribute('value');
     else if (!this.#progress.hasAttribute('value')) this.#progress.value = 0;
     if (state === 'done') this.#progress.value = 1;
   }

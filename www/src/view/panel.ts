@@ -59,7 +59,7 @@ export class SlicePanel {
     this.#pixels = new ImageData(width, height);
     const id = uniqueId('slice');
     const last = volume.dims[frame.axis] - 1;
-    this.#canvas = h('canvas', { role: 'img', 'aria-label': `${frame.name} slice with the outline of the surface` });
+    this.#canvas = h('canvas', { role: 'img' });
     this.#slider = h('input', { type: 'range', id, min: 0, max: last, step: 1, value: last >> 1 });
     this.#slider.addEventListener('input', () => events.onIndex(this.#slider.valueAsNumber));
     // The slider speaks the number already.
@@ -82,6 +82,7 @@ export class SlicePanel {
   setOutline(segments: Float32Array): void {
     this.#outline = projectSegments(segments, this.#inverse, this.#volume, this.frame);
     this.draw();
+    this.#describe();
   }
 
   /** Shows a coarser copy of the volume, voxel by voxel, or the volume itself. */
@@ -148,6 +149,14 @@ export class SlicePanel {
     this.#slider.valueAsNumber = index;
     this.#output.value = String(index);
     this.#color = token('--outline');
+    this.#describe();
+  }
+
+  /** What is to be seen, in words. */
+  #describe(): void {
+    const { name, axis } = this.frame;
+    const where = `${name} slice ${this.#crosshair[axis]} of 0 to ${this.#volume.dims[axis] - 1}`;
+    this.#canvas.setAttribute('aria-label', `${where}, ${tellOutline(this.#outline, this.picture)}`);
   }
 
   /** The picture fitted into the canvas, voxels in their true proportions. */
@@ -254,6 +263,20 @@ export class SlicePanel {
     const place = this.#placeAt(canvasX, canvasY);
     return place.map((at, axis) => Math.min((this.#volume.dims[axis] ?? 1) - 1, Math.max(0, Math.round(at)))) as Vec3;
   }
+}
+
+/** How large the surface's cut is. Points as in {@link projectSegments}. */
+function tellOutline(points: Float32Array, { width, height }: HTMLCanvasElement): string {
+  if (points.length === 0) return 'which does not cut the surface';
+  const side = (first: 0 | 1) => {
+    let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
+    for (let i = first; i < points.length; i += 2) {
+      low = Math.min(low, points[i] ?? low);
+      high = Math.max(high, points[i] ?? high);
+    }
+    return Math.round(high - low);
+  };
+  return `with the outline of the surface, ${side(0)} by ${side(1)} of ${width} by ${height} voxels`;
 }
 
 function line(context: CanvasRenderingContext2D, color: string, x1: number, y1: number, x2: number, y2: number): void {

@@ -11,11 +11,11 @@ import {
   Spherical,
   Vector2,
   Vector3,
-  WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
 import { anatomicalSigns, type Grid } from './anatomy';
+import { Drawing } from './drawing';
 import { type PinholeCamera, placeEye } from './eye';
 
 const FIELD_OF_VIEW = 30;
@@ -28,7 +28,7 @@ const CLICK_SLACK = 4;
 /** The 3D view: a canvas, a camera that orbits by mouse, touch and keyboard, and light that comes with the camera. */
 export class Viewport {
   readonly canvas: HTMLCanvasElement;
-  readonly #renderer: WebGLRenderer;
+  readonly #drawing: Drawing;
   readonly #scene = new Scene();
   /** All that is shown, turned so that its upward axis is the scene's z. */
   readonly #world = new Group();
@@ -53,7 +53,6 @@ export class Viewport {
   #dragged = false;
   /** It has moved, and was not only touched. */
   #turning = false;
-  #inSoftware: boolean | undefined;
   #disposed = false;
   #pending = 0;
   /** To be done before the next drawing. */
@@ -64,9 +63,7 @@ export class Viewport {
 
   constructor(canvas: HTMLCanvasElement) {
     this.canvas = canvas;
-    this.#renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
-    // Who asks whether a shader has errors waits until it is compiled.
-    this.#renderer.debug.checkShaderErrors = false;
+    this.#drawing = new Drawing(canvas, () => this.invalidate());
     this.#camera.up.set(0, 0, 1);
     this.#controls = new OrbitControls(this.#camera, canvas);
     this.#controls.addEventListener('change', () => this.#moved());
@@ -195,8 +192,7 @@ export class Viewport {
     cancelAnimationFrame(this.#pending);
     this.#observer.disconnect();
     this.#controls.dispose();
-    this.#renderer.dispose();
-    this.#renderer.forceContextLoss();
+    this.#drawing.dispose();
   }
 
   #light(): void {
@@ -216,12 +212,6 @@ export class Viewport {
     this.#turning = false;
     // What was drawn in a hurry is drawn as it is.
     this.invalidate();
-  }
-
-  /** Asked only when it matters: the page has to wait for the answer. */
-  #drawsInSoftware(): boolean {
-    this.#inSoftware ??= isSoftware(this.#renderer.getContext());
-    return this.#inSoftware;
   }
 
   #moved(): void {
@@ -264,8 +254,7 @@ export class Viewport {
   #resize(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width === 0 || height === 0) return;
-    this.#renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.#renderer.setSize(width, height, false);
+    this.#drawing.setSize(width, height);
     this.#camera.aspect = width / height;
     this.#standOff(Math.min(1, this.#camera.aspect));
     this.#camera.updateProjectionMatrix();
@@ -284,12 +273,12 @@ export class Viewport {
   }
 
   #draw(): void {
-    this.onDraw(this.#camera.position, this.#turning && this.#drawsInSoftware());
+    this.onDraw(this.#camera.position, this.#turning && this.#drawing.inSoftware);
     const viewer = this.#viewer();
     // The eye's is up to date; the other's is brought so before its light is placed.
     if (viewer === this.#camera) viewer.updateMatrixWorld();
     this.#lamp.matrix.copy(viewer.matrixWorld);
-    this.#renderer.render(this.#scene, viewer);
+    this.#drawing.render(this.#scene, viewer);
   }
 
   #onKey(event: KeyboardEvent): void {
@@ -341,13 +330,6 @@ export class Viewport {
     this.#controls.update();
     this.invalidate();
   }
-}
-
-/** Whether pictures are made by the processor: SwiftShader in Chromium, llvmpipe in Mesa, WARP in Windows. */
-function isSoftware(context: WebGLRenderingContext | WebGL2RenderingContext): boolean {
-  const info = context.getExtension('WEBGL_debug_renderer_info');
-  const renderer = context.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : context.RENDERER);
-  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(String(renderer));
 }
 
 function worldBox(grid: Grid): Box3 {

@@ -1,0 +1,82 @@
+import type { Result } from 'axe-core';
+import axe from 'axe-core';
+import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
+import { type App, LABS, open, openApp, QUICK, reach, unfold } from './browser';
+
+/** All that WCAG 2.2 asks for up to AA, what is good besides, and what axe only tries out. */
+const TAGS = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice', 'experimental'];
+const WIDE = { width: 1280, height: 800 };
+const NARROW = { width: 390, height: 844 };
+const LOOKS = [
+  { colorScheme: 'light', size: WIDE },
+  { colorScheme: 'dark', size: WIDE },
+  { colorScheme: 'dark', size: NARROW },
+  { colorScheme: 'light', size: NARROW },
+] as const;
+
+let app: App;
+
+beforeAll(async () => {
+  app = await openApp(WIDE, 'bench.html');
+  // Before the page's own scripts: its policy lets in none that comes later.
+  await app.page.addInitScript({ content: axe.source });
+  // The frames of Track stand still.
+  await app.page.emulateMedia({ reducedMotion: 'reduce' });
+});
+afterAll(() => app.close());
+afterEach(() => {
+  expect(app.complaints.splice(0)).toEqual([]);
+});
+
+/** What axe finds wrong with a part of the page as it is, one line each. */
+function violations(part: string): Promise<string[]> {
+  return app.page.evaluate(
+    async ([part, values]) => {
+      const { axe } = window as unknown as { axe: { run: (...given: unknown[]) => Promise<{ violations: Result[] }> } };
+      const found = await axe.run(part, { resultTypes: ['violations'], runOnly: { type: 'tag', values } });
+      return found.violations.flatMap(({ id, nodes }) => nodes.map(({ html }) => `${id}: ${html.slice(0, 200)}`));
+    },
+    [part, TAGS] as const,
+  );
+}
+
+/** Fails with all that is wrong with a part of the page in any of its looks. */
+async function expectNothing(part = 'html', looks: readonly (typeof LOOKS)[number][] = LOOKS): Promise<void> {
+  for (const { colorScheme, size } of looks) {
+    await app.page.emulateMedia({ colorScheme });
+    await app.page.setViewportSize(size);
+    await app.page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
+    expect(await violations(part), `${colorScheme}, ${size.width} wide`).toEqual([]);
+  }
+}
+
+describe.each(LABS)('the %s lab', (lab) => {
+  test('has nothing against it while it runs', async () => {
+    await open(app, lab);
+    await reach(app.page, 'running');
+    await expectNothing('html', [LOOKS[1]]);
+  });
+
+  test('has nothing against it when it is done, all unfolded, nor against a message', async () => {
+    await open(app, QUICK[lab]);
+    await reach(app.page, 'done');
+    await app.page.evaluate((address) => {
+      location.hash = address;
+    }, `${lab}?example=nowhere`);
+    await app.page.waitForSelector('.banner:not([hidden])');
+    await unfold(app.page);
+    await expectNothing();
+  });
+
+  test('has nothing against its list of keys', async () => {
+    await app.page.click('#help');
+    await expectNothing('dialog');
+  });
+});
+
+test('the measurements have nothing against them', async () => {
+  await app.page.goto(`${app.address}bench.html`);
+  await app.page.waitForSelector('[data-bench]');
+  await unfold(app.page);
+  await expectNothing();
+});

@@ -1,0 +1,181 @@
+import type { Browser } from 'playwright-core';
+import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
+import { type App, LABS, open, openApp, overflow, QUICK, reach, recordNews, unfold } from './browser';
+
+let app: App;
+
+beforeAll(async () => {
+  app = await openApp(undefined, 'bench.html');
+  await app.page.emulateMedia({ reducedMotion: 'reduce' });
+});
+afterAll(() => app.close());
+afterEach(() => {
+  expect(app.complaints.splice(0)).toEqual([]);
+});
+
+/** Counts what the page draws, of its canvases, within some animation frames. */
+function drawings(frames: number): Promise<number> {
+  return app.page.evaluate(async (frames) => {
+    const { prototype } = WebGL2RenderingContext;
+    const { drawElements } = prototype;
+    let count = 0;
+    prototype.drawElements = function (...given) {
+      count += 1;
+      return drawElements.apply(this, given);
+    };
+    for (let i = 0; i < frames; i++) await new Promise((drawn) => requestAnimationFrame(drawn));
+    prototype.drawElements = drawElements;
+    return count;
+  }, frames);
+}
+
+/** Every text that is seen, but numbers, which may go on changing. */
+function words(): Promise<string[]> {
+  return app.page.evaluate(() => {
+    const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    const found: string[] = [];
+    while (walker.nextNode()) {
+      const text = walker.currentNode.textContent?.trim() ?? '';
+      const seen = walker.currentNode.parentElement?.checkVisibility() === true;
+      if (/[a-z]{3}/i.test(text) && !/\d/.test(text) && text !== 'Vesicle' && seen) found.push(text);
+    }
+    return found;
+  });
+}
+
+/** What sticks out of its box and is hidden there. */
+function cut(): Promise<string[]> {
+  return app.page.evaluate(() => {
+    const hides = (one: Element) => /hidden|clip/.test(getComputedStyle(one).overflowX);
+    return [...document.querySelectorAll('main *, header *')]
+      .filter((one) => one.checkVisibility() && one.clientWidth > 1 && hides(one))
+      .filter((one) => one.scrollWidth > one.clientWidth + 1 && !one.matches('select, input, .plot, .plot *'))
+      .map((one) => one.outerHTML.slice(0, 120));
+  });
+}
+
+describe.each(LABS)('the %s lab', (lab) => {
+  test('stands still for who asks for little motion, when its example is done', async () => {
+    await open(app, QUICK[lab]);
+    await reach(app.page, 'done');
+    // What was still to be drawn is drawn.
+    await expect.poll(() => drawings(5)).toBe(0);
+    expect(await drawings(60)).toBe(0);
+    const animations = await app.page.evaluate(() => document.getAnimations().length);
+    expect(animations).toBe(0);
+  });
+
+  test('shows in colours of the own what is pressed, where the page is, and what colours mean', async () => {
+    await app.page.emulateMedia({ forcedColors: 'active' });
+    const styles = await app.page.evaluate(() => {
+      const all = (selector: string) =>
+        [...document.querySelectorAll<HTMLElement>(selector)].filter((one) => one.checkVisibility());
+      const outlined = (one: HTMLElement) => getComputedStyle(one).outlineStyle !== 'none';
+      const color = (one: HTMLElement) => getComputedStyle(one).backgroundColor;
+      return {
+        forced: matchMedia('(forced-colors: active)').matches,
+        current: all('.labs a').map((one) => outlined(one) === one.hasAttribute('aria-current')),
+        pressed: all('button[aria-pressed]').map(
+          (one) => outlined(one) === (one.getAttribute('aria-pressed') === 'true'),
+        ),
+        swatches: new Set(all('.swatch').map(color)).size,
+      };
+    });
+    await app.page.emulateMedia({ forcedColors: null });
+    expect(styles.forced).toBe(true);
+    expect(styles.current).toEqual([true, true, true, true]);
+    expect(styles.pressed.every(Boolean)).toBe(true);
+    expect(styles.swatches).toBe(['extract', 'track'].includes(lab) ? 3 : 0);
+  });
+
+  test('tells all that its pictures show', async () => {
+    await unfold(app.page);
+    const untold = await app.page.evaluate(() => {
+      const shown = [...document.querySelectorAll('canvas')].filter((one) => one.checkVisibility());
+      const named = (one: Element) => (one.getAttribute('aria-label') ?? '').length > 10;
+      const caption = (one: Element) => one.closest('figure')?.querySelector('figcaption')?.textContent ?? '';
+      // A picture on a button is told by the button.
+      const button = (one: Element) => (one.closest('button')?.getAttribute('aria-label') ?? '').length > 10;
+      return shown.filter((one) => !named(one) && !button(one) && caption(one).length < 20).map((one) => one.outerHTML);
+    });
+    expect(untold).toEqual([]);
+  });
+
+  test.runIf(lab !== 'track')('has the numbers of its plots in a table', async () => {
+    const table = app.page.locator('[data-plot-table]');
+    const last = table.locator('tbody tr:not([hidden])').last();
+    await expect.poll(() => last.locator('th').textContent()).toMatch(/^\d/);
+    const iteration = (await app.page.textContent('.iteration'))?.replace('Iteration ', '');
+    await expect.poll(() => last.locator('th').textContent()).toBe(iteration);
+    const heads = await table.locator('thead th').count();
+    expect(await last.locator('td').count()).toBe(heads - 1);
+  });
+
+  test.each([
+    [640, 400],
+    [320, 256],
+  ])('loses nothing at %i by %i, as when it is zoomed', async (width, height) => {
+    await app.page.setViewportSize({ width: 1280, height: 800 });
+    const wide = await words();
+    expect(wide).toContain('How it works');
+    expect(await overflow(app.page, width, height)).toBeLessThanOrEqual(0);
+    const narrow = await words();
+    expect(wide.filter((word) => !narrow.includes(word))).toEqual([]);
+    expect(await cut()).toEqual([]);
+  });
+});
+
+describe('who asks for little motion', () => {
+  test('sees Track beat when that is asked for, and others see it without', async () => {
+    const beat = () => app.page.textContent('[data-frame=beat]');
+    await open(app, QUICK.track);
+    await reach(app.page, 'done');
+    expect(await beat()).toBe('Beat');
+    await app.page.locator('canvas[tabindex]').first().press('b');
+    expect(await beat()).toBe('Hold');
+    await expect.poll(() => drawings(5)).toBeGreaterThan(0);
+    await app.page.emulateMedia({ reducedMotion: 'no-preference' });
+    await open(app, QUICK.track);
+    await expect.poll(beat).toBe('Hold');
+    await app.page.emulateMedia({ reducedMotion: 'reduce' });
+  });
+
+  test('sees a film without end in Sculpt only when it is played', async () => {
+    await open(app, 'sculpt?loop=true');
+    await reach(app.page, 'done', 'paused');
+    await expect.poll(() => drawings(5)).toBe(0);
+    await app.page.locator('canvas[tabindex]').first().press(' ');
+    await reach(app.page, 'running');
+  });
+});
+
+describe('who listens', () => {
+  test.each(['extract?example=tooth&levels=0', 'sculpt?example=lava-lamp'])(
+    'hears now and then how far %s is, not with each step',
+    async (address) => {
+      // A clock that runs twenty times as fast, or a test would wait for minutes.
+      const page = await (app.page.context().browser() as Browser).newPage();
+      await page.addInitScript(() => {
+        const now = performance.now.bind(performance);
+        performance.now = () => 20 * now();
+      });
+      await page.goto(`${app.address}#${address}`);
+      await reach(page, 'running');
+      const news = await recordNews(page);
+      const times = await page.evaluateHandle(() => {
+        const list: number[] = [];
+        const line = document.querySelector('.status');
+        const note = () => list.push(performance.now());
+        if (line) new MutationObserver(note).observe(line, { childList: true });
+        return list;
+      });
+      const reports = async () =>
+        (await news()).filter((text) => /^Running\. Iteration [\d,]+, .+ vertices/.test(text));
+      await expect.poll(async () => (await reports()).length).toBeGreaterThan(2);
+      const said = await times.jsonValue();
+      const pauses = said.slice(1).map((time, i) => time - (said[i] ?? 0));
+      expect(Math.min(...pauses)).toBeGreaterThan(9000);
+      await page.close();
+    },
+  );
+});

@@ -1,0 +1,267 @@
+import { gzipSync } from 'node:zlib';
+import type { Page } from 'playwright-core';
+import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
+import {
+  type App,
+  anotherPage,
+  drop,
+  iteration,
+  LABS,
+  measures,
+  open,
+  openApp,
+  QUICK,
+  reach,
+  recordStates,
+} from './browser';
+import { ball } from './volumes';
+
+let app: App;
+let page: Page;
+
+beforeAll(async () => {
+  // Small: what draws in software is sooner done.
+  app = await openApp({ width: 900, height: 640 }, 'bench.html');
+  page = app.page;
+});
+afterAll(() => app.close());
+afterEach(() => {
+  expect(app.complaints.splice(0)).toEqual([]);
+});
+
+/** A lab in a page for which `prepare` ran before its own scripts. */
+async function openLab(address: string, prepare: () => void = () => undefined): Promise<void> {
+  if (page !== app.page) await page.close();
+  page = await anotherPage(app, prepare);
+  // The frames of Track stand still.
+  await page.emulateMedia({ reducedMotion: 'reduce' });
+  await open({ page, address: app.address }, address);
+}
+
+const banner = () => page.locator('.banner');
+
+async function view(): Promise<string> {
+  return (await page.locator('.lab canvas[tabindex]').screenshot()).toString('base64');
+}
+
+/** How many colours the view shows. */
+async function colors(): Promise<number> {
+  return page.evaluate(
+    async (base64) => {
+      const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
+      const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+      const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+      context?.drawImage(image, 0, 0);
+      return new Set(new Uint32Array(context?.getImageData(0, 0, image.width, image.height).data.buffer ?? [])).size;
+    },
+    await view(),
+  );
+}
+
+describe.each(LABS)('the %s lab', (lab) => {
+  test('draws its view again when the graphics card gives it back', async () => {
+    await openLab(QUICK[lab]);
+    await reach(page, 'done');
+    await page.locator('canvas[tabindex]').first().press('Home');
+    const before = await view();
+    const extension = await page.evaluateHandle(() => {
+      const canvas = document.querySelector<HTMLCanvasElement>('.lab canvas[tabindex]');
+      return canvas?.getContext('webgl2')?.getExtension('WEBGL_lose_context');
+    });
+    await extension.evaluate((one) => one?.loseContext());
+    await expect
+      .poll(() => page.locator('.view-note').allTextContents())
+      .toEqual([expect.stringContaining('comes back')]);
+    await extension.evaluate((one) => one?.restoreContext());
+    await expect.poll(() => page.locator('.view-note').count()).toBe(0);
+    await expect.poll(view).toBe(before);
+    expect(await colors()).toBeGreaterThan(500);
+  });
+
+  test('refuses files that promise what they do not hold, and keeps what was there', async () => {
+    const before = await measures(page);
+    const states = await recordStates(page);
+    for (const file of hostile(lab)) {
+      await drop(page, [file]);
+      await page.waitForSelector('[data-state=error]');
+      expect(await banner().textContent()).toContain(`${file.name} could not be opened`);
+      expect((await page.textContent('[data-error]'))?.length).toBeGreaterThan(20);
+      expect(await measures(page)).toEqual(before);
+      await page.click('.banner button');
+      await reach(page, 'done');
+    }
+    expect(await states()).not.toContain('running');
+  });
+
+  test('bears whatever is pressed in whatever order', async () => {
+    const keys = [' ', 's', 'd', 'r', 'Control+z', 'Control+y', 'Escape', ' ', 'ArrowLeft'];
+    const quick = new URLSearchParams(QUICK[lab].split('?')[1]).get('example') ?? '';
+    const all = await page
+      .locator('.data select option')
+      .evaluateAll((list) => list.map((one) => one.getAttribute('value') ?? ''));
+    const others = all.filter((value) => value !== '' && value !== quick).slice(0, 3);
+    let seed = 20261123;
+    const random = (below: number) => {
+      seed = (Math.imul(seed, 1664525) + 1013904223) >>> 0;
+      return Math.floor((seed / 2 ** 32) * below);
+    };
+    await page.locator('canvas[tabindex]').first().focus();
+    for (let i = 0; i < 40; i++) {
+      if (i % 20 === 15) await page.selectOption('.data select', others[random(others.length)] ?? '');
+      await page
+        .locator('canvas[tabindex]')
+        .first()
+        .press(keys[random(keys.length)] ?? ' ');
+    }
+    const states = await recordStates(page);
+    await page.selectOption('.data select', quick);
+    await expect.poll(states).toContain('done');
+    expect(await banner().isVisible()).toBe(false);
+    await page.locator('canvas[tabindex]').first().press('r');
+    await expect.poll(() => iteration(page)).toBe(0);
+    await reach(page, 'paused');
+  });
+
+  test('runs without WebGL 2 and without any storage, and says what is missing', async () => {
+    await openLab(QUICK[lab], () => {
+      const { getContext } = HTMLCanvasElement.prototype as { getContext: (...given: unknown[]) => unknown };
+      Object.assign(HTMLCanvasElement.prototype, {
+        getContext(this: HTMLCanvasElement, kind: string, ...more: unknown[]) {
+          return kind.startsWith('webgl') ? null : getContext.call(this, kind, ...more);
+        },
+      });
+      const refuse = {
+        get(): never {
+          throw new DOMException('The operation is insecure.', 'SecurityError');
+        },
+      };
+      for (const name of ['localStorage', 'sessionStorage', 'caches', 'indexedDB'])
+        Object.defineProperty(window, name, refuse);
+      // Not on the empty page before.
+      if ('serviceWorker' in navigator)
+        Object.assign(ServiceWorkerContainer.prototype, {
+          register: () => Promise.reject(new DOMException('The operation is insecure.', 'SecurityError')),
+        });
+    });
+    await reach(page, 'done');
+    expect(await page.textContent('.view-note')).toContain('no WebGL 2');
+    expect(await measures(page)).toMatchObject({ closed: true });
+    await page.locator('canvas[tabindex]').first().press('ArrowLeft');
+  });
+
+  test('keeps the last surface when its worker breaks in the middle of a run, and starts again', async () => {
+    // Two balls are done with the first surface that is shown.
+    await openLab(lab === 'reconstruct' ? lab : QUICK[lab], () => {
+      const { Worker } = window;
+      let broken = false;
+      const isUnderWay = () =>
+        document.querySelector('[data-state=running]') !== null &&
+        /[1-9]/.test(document.querySelector('[data-measure=vertices]')?.textContent ?? '');
+      // In the page: the run is over soon.
+      class Breaking extends Worker {
+        constructor(...given: ConstructorParameters<typeof Worker>) {
+          super(...given);
+          this.addEventListener('message', () => {
+            if (broken || !isUnderWay()) return;
+            broken = true;
+            setTimeout(() =>
+              this.dispatchEvent(new ErrorEvent('error', { message: 'out of memory', cancelable: true })),
+            );
+          });
+        }
+      }
+      Object.assign(window, { Worker: Breaking });
+    });
+    await page.waitForSelector('[data-state=error]');
+    expect(await banner().textContent()).toMatch(/Reset starts the engine again.*out of memory/);
+    await expect.poll(colors).toBeGreaterThan(100);
+    await page.getByRole('button', { name: 'Reset', exact: true }).click();
+    await expect.poll(() => banner().isVisible()).toBe(false);
+    await reach(page, 'paused', 'running', 'done');
+    // The others play what they open again.
+    if (lab === 'extract') await page.click('.play');
+    await reach(page, 'done');
+    expect(await measures(page)).toMatchObject({ closed: true });
+  });
+
+  test('goes on, or waits, in a tab that nobody sees, and shows all when it is looked at', async () => {
+    await openLab(QUICK[lab], () => {
+      // As in the background: no animation frame comes.
+      const request = window.requestAnimationFrame.bind(window);
+      const held: FrameRequestCallback[] = [];
+      const state = { seen: true, shown: false, messages: 0 };
+      window.requestAnimationFrame = (callback) => (state.seen ? request(callback) : held.push(callback));
+      const { Worker } = window;
+      class Counted extends Worker {
+        constructor(...given: ConstructorParameters<typeof Worker>) {
+          super(...given);
+          // In the page: the run is over soon.
+          this.addEventListener('message', () => {
+            if (!state.shown && document.querySelector('[data-state=running]')) state.seen = false;
+            if (!state.seen) state.messages += 1;
+          });
+        }
+      }
+      const show = () => {
+        Object.assign(state, { seen: true, shown: true });
+        for (const callback of held.splice(0)) request(callback);
+      };
+      Object.assign(window, { Worker: Counted, tab: state, show });
+    });
+    // Until nothing more comes: a whole run, or what it goes on with before it waits for the page.
+    const messages = () => page.evaluate(() => (window as unknown as { tab: { messages: number } }).tab.messages);
+    await expect.poll(messages).toBeGreaterThan(0);
+    let count = -1;
+    await expect
+      .poll(
+        async () => {
+          const before = count;
+          count = await messages();
+          return count === before;
+        },
+        { interval: 1500 },
+      )
+      .toBe(true);
+    expect(count).toBeLessThan(60);
+    await page.evaluate(() => (window as unknown as { show: () => void }).show());
+    await reach(page, 'done');
+    expect(await measures(page)).toMatchObject({ closed: true });
+    expect(await colors()).toBeGreaterThan(500);
+  });
+});
+
+/** Files that promise what they do not hold. */
+function hostile(lab: string): { name: string; bytes: Uint8Array }[] {
+  const text = (words: string) => new TextEncoder().encode(words);
+  if (lab === 'reconstruct' || lab === 'sculpt')
+    return [
+      {
+        name: 'endless.ply',
+        bytes: text(
+          `ply\nformat binary_little_endian 1.0\nelement vertex 4294967295\nproperty float x\nproperty float y\nproperty float z\nend_header\nabc`,
+        ),
+      },
+      { name: 'nothing.obj', bytes: new Uint8Array(0) },
+    ];
+  const whole = gzipSync(nifti([32, 32, 32, 1], ball()));
+  return [
+    { name: 'cut.nii.gz', bytes: whole.subarray(0, whole.length / 2) },
+    { name: 'huge.nii', bytes: nifti([32767, 32767, 32767, 32767], new Uint8Array(8)) },
+    { name: 'bomb.nii.gz', bytes: gzipSync(nifti([32, 32, 32, 1], new Uint8Array(3e8))) },
+  ];
+}
+
+/** The 352 bytes before the voxels of a NIfTI-1 file of bytes, and these. */
+function nifti(dims: number[], data: Uint8Array): Uint8Array {
+  const bytes = new Uint8Array(352 + data.length);
+  const header = new DataView(bytes.buffer);
+  header.setInt32(0, 348, true);
+  for (const [i, n] of [4, ...dims].entries()) header.setInt16(40 + 2 * i, n, true);
+  header.setInt16(70, 2, true);
+  header.setInt16(72, 8, true);
+  for (let i = 0; i < 8; i++) header.setFloat32(76 + 4 * i, 1, true);
+  header.setFloat32(108, 352, true);
+  bytes.set(new TextEncoder().encode('n+1'), 344);
+  bytes.set(data, 352);
+  return bytes;
+}

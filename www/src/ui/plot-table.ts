@@ -1,0 +1,56 @@
+import type { StepReport } from '../protocol';
+import { h } from './dom';
+import { count, figure } from './format';
+import type { Curve } from './plots';
+
+/** Iterations that are listed: few enough to be read, or listened to. */
+const ROWS = 12;
+
+/** The curves of several plots as numbers, at a few iterations from the first to the last. */
+export class PlotTable {
+  readonly element: HTMLDetailsElement;
+  readonly #curves: Curve[];
+  readonly #cells: HTMLElement[][];
+  #reports: readonly StepReport[] = [];
+
+  constructor(curves: Curve[]) {
+    this.#curves = curves;
+    const row = () => [h('th', { scope: 'row' }), ...curves.map(() => h('td'))];
+    this.#cells = Array.from({ length: ROWS }, row);
+    const heads = ['iteration', ...curves.map(({ label }) => label)].map((text) => h('th', { scope: 'col' }, text));
+    const body = h('tbody', {}, ...this.#cells.map((cells) => h('tr', {}, ...cells)));
+    const table = h('table', { class: 'times', 'data-plot-table': '' }, h('thead', {}, h('tr', {}, ...heads)), body);
+    const holder = h(
+      'div',
+      { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'The plots as a table' },
+      table,
+    );
+    this.element = h('details', {}, h('summary', {}, 'As a table'), holder);
+    this.element.addEventListener('toggle', () => this.#fill());
+  }
+
+  update(reports: readonly StepReport[]): void {
+    this.#reports = reports;
+    if (this.element.open) this.#fill();
+  }
+
+  /** Into the same cells: who reads in them is not thrown out. */
+  #fill(): void {
+    const chosen = spread(this.#reports);
+    for (const [i, cells] of this.#cells.entries()) {
+      const report = chosen[i];
+      const texts = report ? [count(report.iteration), ...this.#curves.map(({ of }) => figure(of(report)))] : [];
+      for (const [k, cell] of cells.entries()) cell.textContent = texts[k] ?? '';
+      cells[0]?.parentElement?.toggleAttribute('hidden', !report);
+    }
+  }
+}
+
+/** So many of them, evenly, with the first and the last. */
+function spread(reports: readonly StepReport[]): StepReport[] {
+  const { length } = reports;
+  if (length <= ROWS) return [...reports];
+  return Array.from({ length: ROWS }, (_, i) => reports[Math.round((i * (length - 1)) / (ROWS - 1))]).filter(
+    (report) => report !== undefined,
+  );
+}
