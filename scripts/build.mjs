@@ -33,6 +33,9 @@ const PAPERS = [
   'docs/sculpt.jpg',
   'docs/start.md',
   'docs/hosts.md',
+  'docs/evidence.md',
+  'docs/access.md',
+  'docs/fuzzing.md',
 ];
 
 // Between the package and other people's: `vesicle/three` and so on.
