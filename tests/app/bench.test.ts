@@ -1,9 +1,12 @@
 import { readFile } from 'node:fs/promises';
+import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import { at } from '../../scripts/shell.mjs';
 import { type App, openApp, overflow } from './browser';
 
 let app: App;
+/** The page of measurements, in a tab of its own. */
+let page: Page;
 let report: Record<string, unknown>;
 
 beforeAll(async () => {
@@ -11,29 +14,32 @@ beforeAll(async () => {
   app = await openApp({ width: 1100, height: 900 });
   // From the list of keys, as a reader comes there.
   await app.page.click('#help');
-  await app.page.click('dialog a');
-  await app.page.waitForSelector('[data-bench]');
+  const opened = app.page.waitForEvent('popup');
+  await app.page.click('dialog a[href$="bench.html"]');
+  page = await opened;
+  await page.setViewportSize({ width: 1100, height: 900 });
+  await page.waitForSelector('[data-bench]');
 });
 afterAll(() => app.close());
 
 /** The numbers that are drawn in a part of the page. */
 const drawn = (part: string) =>
-  app.page.locator(`${part} data`).evaluateAll((all) => all.map((one) => Number((one as HTMLDataElement).value)));
+  page.locator(`${part} data`).evaluateAll((all) => all.map((one) => Number((one as HTMLDataElement).value)));
 
 /** The names of benches in the report: what is a list, or has rows or a host. */
 const benches = () => Object.keys(report).filter((name) => typeof report[name] === 'object');
 
 test('every bench of the report is drawn, with numbers and tables of them', async () => {
-  const found = await app.page
+  const found = await page
     .locator('[data-bench]')
     .evaluateAll((all) => all.map((one) => one.getAttribute('data-bench') ?? ''));
   expect(found.toSorted()).toEqual(benches().toSorted());
   for (const name of found) {
     const values = await drawn(`[data-bench=${name}]`);
-    const skipped = await app.page.locator(`[data-bench=${name}] .bench-skipped`).count();
+    const skipped = await page.locator(`[data-bench=${name}] .bench-skipped`).count();
     expect(values.length + skipped, name).toBeGreaterThan(0);
     expect(values.every(Number.isFinite), name).toBe(true);
-    const rows = await app.page.locator(`[data-bench=${name}] tbody tr`).allTextContents();
+    const rows = await page.locator(`[data-bench=${name}] tbody tr`).allTextContents();
     expect(rows.length, name).toBeGreaterThan(0);
   }
 });
@@ -46,11 +52,11 @@ test('the numbers are those of the report', async () => {
 });
 
 test('what does not keep to its bound is said not to', async () => {
-  const count = (outcome: string) => app.page.locator(`#summary tr[data-verdict="${outcome}"]`).count();
-  const all = await app.page.locator('#summary tr[data-verdict]').count();
-  const title = await app.page.textContent('#summary h2');
+  const count = (outcome: string) => page.locator(`#summary tr[data-verdict="${outcome}"]`).count();
+  const all = await page.locator('#summary tr[data-verdict]').count();
+  const title = await page.textContent('#summary h2');
   expect(title).toBe(`${await count('met')} of ${all} bounds kept`);
-  const [model] = await app.page.locator('#head .verdict').allTextContents();
+  const [model] = await page.locator('#head .verdict').allTextContents();
   const slow = (report.head as { model: { milliseconds: number } }[]).some(({ model }) => model.milliseconds > 2000);
   expect(model).toBe(`asked: ≤ 2 s; ${slow ? 'not met' : 'met'}`);
 });
@@ -59,14 +65,14 @@ test.each([
   [360, 800],
   [1100, 900],
 ])('nothing is wider than a page of %i by %i, tables unfolded', async (width, height) => {
-  await app.page.locator('details').evaluateAll((all) => {
+  await page.locator('details').evaluateAll((all) => {
     for (const one of all) (one as HTMLDetailsElement).open = true;
   });
-  expect(await overflow(app.page, width, height)).toBeLessThanOrEqual(0);
+  expect(await overflow(page, width, height)).toBeLessThanOrEqual(0);
 });
 
 test('nothing was complained of, under the same policy as the labs', async () => {
-  const policy = await app.page.getAttribute('meta[http-equiv=Content-Security-Policy]', 'content');
+  const policy = await page.getAttribute('meta[http-equiv=Content-Security-Policy]', 'content');
   expect(policy).toContain("default-src 'self'");
   expect(policy).not.toContain('unsafe-inline');
   expect(app.complaints).toEqual([]);

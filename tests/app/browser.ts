@@ -30,11 +30,13 @@ export async function openApp(viewport = { width: 1280, height: 800 }, address =
   if (!existsSync(at('dist/index.html'))) await buildApp();
   const server = await serve(at('dist'), 0);
   const browser = await launchChromium();
-  const page = await (await browser.newContext({ viewport })).newPage();
+  const context = await browser.newContext({ viewport });
   // A machine that draws in software, and is busy, is slow, not wrong.
-  page.setDefaultTimeout(PATIENCE);
+  context.setDefaultTimeout(PATIENCE);
   const complaints: string[] = [];
-  listen(page, server.address, complaints);
+  // Tabs that the page opens are listened to like the page.
+  context.on('page', (one) => listen(one, server.address, complaints));
+  const page = await context.newPage();
   await page.goto(server.address + address);
   return { page, address: server.address, complaints, close: () => closeAll(browser, server) };
 }
@@ -57,10 +59,8 @@ function listen(page: Page, address: string, complaints: string[]): void {
 }
 
 /** A page beside that of the app, for which `prepare` runs before its own scripts; its complaints go to the same list. */
-export async function anotherPage({ page, address, complaints }: App, prepare = () => {}): Promise<Page> {
+export async function anotherPage({ page }: App, prepare = () => {}): Promise<Page> {
   const another = await page.context().newPage();
-  another.setDefaultTimeout(PATIENCE);
-  listen(another, address, complaints);
   await another.addInitScript(prepare);
   return another;
 }

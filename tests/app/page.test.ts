@@ -49,6 +49,18 @@ test.each(LABS)('%s leads to the page on its method, and from its list of keys t
   ]);
 });
 
+test('a lab that was asked for opens, also where the one before says its address just then', async () => {
+  await app.page.click('[data-lab=extract]');
+  await app.page.getByText('Copy link to these settings').waitFor();
+  await reach(app.page, 'running', 'done', 'paused');
+  await app.page.evaluate(() => {
+    const buttons = [...document.querySelectorAll('button')];
+    document.querySelector<HTMLElement>('[data-lab=track]')?.click();
+    buttons.find(({ textContent }) => textContent === 'Copy link to these settings')?.click();
+  });
+  await expect.poll(() => app.page.title()).toBe('Vesicle: Track');
+});
+
 test('the page forbids itself to load anything from elsewhere', async () => {
   const policy = await app.page.getAttribute('meta[http-equiv=Content-Security-Policy]', 'content');
   expect(policy).toContain("default-src 'self'");

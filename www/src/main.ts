@@ -2,6 +2,7 @@ import './style.css';
 import { spawnAhead } from './channel';
 import { spawnExtract } from './client';
 import { GUIDES } from './guides';
+import { labOf } from './labs/address';
 import type { Lab, LabKind, PassedOn } from './labs/labs';
 import { workOffline } from './offline';
 import { spawnReconstruct } from './reconstruct/client';
@@ -71,7 +72,7 @@ class Labs {
   }
 
   #follow(): void {
-    const kind = LABS.find(({ id }) => location.hash === `#${id}` || location.hash.startsWith(`#${id}?`));
+    const kind = LABS.find(({ id }) => id === labOf(location.hash));
     if (kind ? kind !== this.#kind : !this.#kind) void this.#open(kind ?? LABS[0]);
   }
 

@@ -40,6 +40,7 @@ import { TimeTable } from '../ui/times';
 import { Transport } from '../ui/transport';
 import { ViewOptionControls, type ViewOptions } from '../ui/view-options';
 import { Stage } from '../view/stage';
+import { showAddress } from './address';
 import { Attracting } from './attracting';
 import { fetchAhead, fetchBytes } from './downloads';
 import { DataPanel, folded, layOut } from './extract-page';
@@ -678,7 +679,8 @@ export class ExtractLab {
         color: this.#options.value.color,
       }),
     );
-    if (hash !== (location.hash || ADDRESS)) window.history.replaceState(null, '', hash);
+    // The lab without an address is this one, as it opens by itself.
+    if (hash !== ADDRESS || location.hash) showAddress(hash);
   }
 
   async #copyLink(): Promise<void> {

@@ -6,7 +6,7 @@ import type { Edits } from '../reconstruct/protocol';
 import type { CloudChoice } from '../ui/cloud-setup';
 import { differing, readValue } from './link';
 
-export const ADDRESS = '#reconstruct';
+const ADDRESS = '#reconstruct';
 /** More points by hand than this do not go into a link: some programs cut long addresses. */
 export const MOST_EDITS = 200;
 

@@ -1,7 +1,8 @@
 import type { ReconstructClient } from '../reconstruct/client';
+import { showAddress } from './address';
 import type { LabStates } from './lab-states';
 import type { PassOn } from './labs';
-import { ADDRESS, fits, linkOf, toHash } from './reconstruct-link';
+import { fits, linkOf, toHash } from './reconstruct-link';
 import type { Opening } from './reconstruct-opening';
 import type { ReconstructParts } from './reconstruct-parts';
 import type { ModelSettings } from './reconstruct-settings';
@@ -46,8 +47,7 @@ export class Sharing {
       color: this.#ui.options.value.color,
       photo: this.#ui.photos.chosen,
     });
-    const hash = toHash(linked);
-    if (hash !== (location.hash || ADDRESS)) window.history.replaceState(null, '', hash);
+    showAddress(toHash(linked));
   }
 
   async copyLink(): Promise<void> {

@@ -6,7 +6,7 @@ import type { Film } from '../sculpt/film';
 import type { Pose } from '../sculpt/protocol';
 import { differing, readValue } from './link';
 
-export const ADDRESS = '#sculpt';
+const ADDRESS = '#sculpt';
 /** More keyframes than this do not go into a link: some programs cut long addresses. */
 export const MOST_KEYS = 12;
 

@@ -10,6 +10,7 @@ import { wantsStillness } from '../ui/dom';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { SculptViewOptions } from '../view/sculpture';
+import { showAddress } from './address';
 import { LabStates } from './lab-states';
 import type { Lab, PassedOn } from './labs';
 import { Filming } from './sculpt-filming';
@@ -269,8 +270,7 @@ export class SculptLab implements Lab {
       color,
       layout,
     });
-    const hash = toHash(linked);
-    if (hash !== location.hash) window.history.replaceState(null, '', hash);
+    showAddress(toHash(linked));
   }
 
   async #copyLink(): Promise<void> {

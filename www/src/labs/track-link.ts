@@ -6,7 +6,7 @@ import type { Box, Enrichment, Preparation, Setup } from '../track/protocol';
 import type { TrackViewOptions } from '../view/beating';
 import { differing, readValue } from './link';
 
-export const ADDRESS = '#track';
+const ADDRESS = '#track';
 
 export interface LinkedTrack {
   example?: string;

@@ -1,6 +1,7 @@
 /** Gives on what the Track lab has: as an address, as files, and to the Sculpt lab. */
 import { zipSync } from 'three/addons/libs/fflate.module.js';
 import type { TrackClient } from '../track/client';
+import { showAddress } from './address';
 import type { LabStates } from './lab-states';
 import type { PassOn } from './labs';
 import { linkOf, toHash } from './track-link';
@@ -40,8 +41,7 @@ export class TrackSharing {
     if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
     const { example, name: file } = source;
     const { setup } = this.#settings;
-    const hash = toHash(linkOf({ example, file, setup, view: this.#ui.options.value }));
-    if (hash !== location.hash) window.history.replaceState(null, '', hash);
+    showAddress(toHash(linkOf({ example, file, setup, view: this.#ui.options.value })));
   }
 
   async copyLink(): Promise<void> {
