@@ -3,11 +3,8 @@
 
 #[path = "../tests/common/mod.rs"]
 mod common;
-#[path = "../tests/common/scenes.rs"]
-mod scenes;
-#[path = "../tests/common/shapes.rs"]
-mod shapes;
 
+use common::shapes;
 use std::time::Instant;
 use vesicle::io::{MeshFormat, parse_mesh, write_mesh};
 use vesicle::math::Vec3;

@@ -6,9 +6,8 @@
 
 #[path = "../tests/common/mod.rs"]
 mod common;
-#[path = "../tests/common/scenes.rs"]
-mod scenes;
 
+use common::scenes;
 use std::sync::OnceLock;
 use std::time::Instant;
 use vesicle::math::{DVec3, Vec3};

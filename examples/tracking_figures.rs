@@ -7,12 +7,10 @@
 //! without, `PLAIN=1` does not enrich, `BOX=<first and last voxel>` is looked at in files, `BIN=<n>` takes means of n × n voxels of a slice first.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program for the terminal")]
 
-#[path = "../tests/common/cine.rs"]
-mod cine;
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use cine::Cine;
+use common::cine::Cine;
 use std::time::Instant;
 use vesicle::io::parse_volume;
 use vesicle::math::{DAffine3, DVec3};

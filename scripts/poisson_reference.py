@@ -1,11 +1,11 @@
 """Prints how far screened Poisson surface reconstruction, given the true normals, is from shapes that are known.
 
     pip install pymeshlab==2025.7.post1 numpy==2.4.6
-    cargo test --release --test implicit_accuracy -- --ignored
+    cargo test --release --test core implicit_accuracy -- --ignored
     python scripts/poisson_reference.py target/tmp/accuracy
 
 The second line writes the points, with the outward normals of the shapes where they were before noise moved them, as
-<shape>-<noise>-<seed>.xyz. tests/implicit_accuracy.rs has the table that comes out, and holds the implicit surface of the
+<shape>-<noise>-<seed>.xyz. tests/core/implicit_accuracy.rs has the table that comes out, and holds the implicit surface of the
 same points, without the normals, against it.
 
 Each row is the mean over the seeds of the mean distance to the shape: that of the centre of each triangle, weighted by area.

@@ -1,4 +1,4 @@
-// Every check there is, one after the other. Goes on after a failure; the last line is the sum.
+// Every check there is. Goes on after a failure; the last line is the sum.
 // `npm test -- build package` runs the stages of these names only. On a terminal everything is shown as it comes;
 // elsewhere only what failed, and all of it is in `target/test-logs`.
 import { existsSync } from 'node:fs';
@@ -89,6 +89,10 @@ const STAGES = [
   ['app', vitest('tests/app')],
 ];
 
+// Has one thread only: what stands between it and the app's tests runs beside it.
+const ALONG = 'wasm';
+const AFTER = 'app';
+
 async function attempt([name, work]) {
   const started = performance.now();
   process.stdout.write(`\n── ${name}\n`);
@@ -97,7 +101,7 @@ async function attempt([name, work]) {
     return { passed: 0, failed: 1 };
   });
   await writeFile(at(LOGS, `${name.replace(' ', '-')}.log`), output);
-  if (counts.failed && !echo) process.stdout.write(`${failuresIn(output)}\n`);
+  if (counts.failed && !echo) process.stdout.write(`\n── ${name}: failed\n${failuresIn(output)}\n`);
   const seconds = ((performance.now() - started) / 1000).toFixed(1);
   return { name, seconds, ...counts };
 }
@@ -119,15 +123,24 @@ function chosen(names) {
   return STAGES.filter(([stage]) => names.length === 0 || names.includes(stage));
 }
 
-async function all(names) {
+async function inTurn(stages) {
   const results = [];
-  await mkdir(at(LOGS), { recursive: true });
-  for (const stage of [['set-up', works(setup)], ...chosen(names)]) {
-    results.push(await attempt(stage));
-    // Without tools and packages nothing else can tell anything.
-    if (results.length === 1 && results[0].failed) break;
-  }
+  for (const stage of stages) results.push(await attempt(stage));
   return results;
+}
+
+async function all(names) {
+  await mkdir(at(LOGS), { recursive: true });
+  const ready = await attempt(['set-up', works(setup)]);
+  // Without tools and packages nothing else can tell anything.
+  if (ready.failed) return [ready];
+  const stages = chosen(names);
+  const first = stages.findIndex(([name]) => name === ALONG);
+  const last = stages.findIndex(([name]) => name === AFTER);
+  if (first < 0 || last < 0) return [ready, ...(await inTurn(stages))];
+  const before = await inTurn(stages.slice(0, first));
+  const beside = await Promise.all([[stages[first]], stages.slice(first + 1, last)].map(inTurn));
+  return [ready, ...before, ...beside.flat(), ...(await inTurn(stages.slice(last)))];
 }
 
 const results = await all(process.argv.slice(2));

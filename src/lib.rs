@@ -1,7 +1,7 @@
 //! **Vesicle** grows living surfaces out of 3D data: a closed triangle mesh that splits, merges and
 //! refines itself while it is fitted to a volume.
 //!
-//! Modules form one-way layers, kept by `tests/architecture.rs`:
+//! Modules form one-way layers, kept by `tests/core/architecture.rs`:
 //! `math < mesh < {spatial, volume} < remesh < methods < bindings`; `io` uses only math, mesh and volume.
 
 pub mod io;

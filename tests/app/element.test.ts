@@ -10,6 +10,7 @@ import { launchChromium } from '../../scripts/chromium.mjs';
 import { serve } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
 import { beating } from '../js/beating';
+import { countPixels } from './pixels';
 import { metaImageHeader, ring } from './volumes';
 
 const POLICY =
@@ -63,16 +64,7 @@ const press = (name: string) => page.getByRole('button', { name, exact: true }).
 /** Of the pixels of the view, those that are not the ground: more than a few, or nothing is seen. */
 async function drawnPixels(): Promise<number> {
   const picture = await page.locator('vesicle-lab canvas').screenshot();
-  return page.evaluate(async (base64) => {
-    const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
-    const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
-    context?.drawImage(bitmap, 0, 0);
-    const { data } = context?.getImageData(0, 0, bitmap.width, bitmap.height) ?? { data: [] };
-    let others = 0;
-    for (let i = 0; i < data.length; i += 4) if (Math.abs((data[i] ?? 0) - (data[0] ?? 0)) > 12) others += 1;
-    return others;
-  }, picture.toString('base64'));
+  return countPixels(page, picture, (r, _g, _b, ground) => Math.abs(r - ground) > 12);
 }
 
 test('it grows the surface of its volume by itself, under a strict policy', async () => {

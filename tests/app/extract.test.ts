@@ -2,6 +2,7 @@ import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { type App, drop, iteration, measures, openApp, reach, recordStates } from './browser';
+import { countColors } from './pixels';
 import { ball, metaImageHeader, ring } from './volumes';
 
 let app: App;
@@ -37,15 +38,7 @@ describe('the built-in example', () => {
 
   test('is drawn: the view shows far more than one colour', async () => {
     const png = await app.page.locator('.view > canvas').screenshot();
-    const colors = await app.page.evaluate(async (base64) => {
-      const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
-      const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-      const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
-      context?.drawImage(image, 0, 0);
-      const pixels = new Uint32Array(context?.getImageData(0, 0, image.width, image.height).data.buffer ?? []);
-      return new Set(pixels).size;
-    }, png.toString('base64'));
-    expect(colors).toBeGreaterThan(1000);
+    expect(await countColors(app.page, png)).toBeGreaterThan(1000);
   });
 
   test('says in words what the plots show', async () => {

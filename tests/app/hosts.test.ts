@@ -2,7 +2,8 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { type App, openApp, overflow, reach } from './browser';
-import { difference, found, hide, watch, watched } from './hosts';
+import { found, hide, watch, watched } from './hosts';
+import { difference } from './pixels';
 
 let app: App;
 let page: Page;

@@ -208,24 +208,3 @@ export function hide(page: Page, name: string): Promise<void> {
   const drawn = 'await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));';
   return page.evaluate(`(async () => { ${ways[name]} ${drawn} })()`);
 }
-
-/** Share of the pixels that differ clearly between two pictures. */
-export function difference(page: Page, before: Buffer, after: Buffer): Promise<number> {
-  const pictures = [before, after].map((one) => one.toString('base64'));
-  return page.evaluate(async (list) => {
-    const pixels = async (base64: string) => {
-      const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
-      const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-      const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
-      context?.drawImage(image, 0, 0);
-      return context?.getImageData(0, 0, image.width, image.height).data ?? new Uint8ClampedArray();
-    };
-    const [a, b] = await Promise.all(list.map(pixels));
-    if (!a || !b) return 0;
-    let count = 0;
-    for (let i = 0; i < a.length; i += 4) {
-      if ([0, 1, 2].some((k) => Math.abs((a[i + k] ?? 0) - (b[i + k] ?? 0)) > 24)) count++;
-    }
-    return (4 * count) / a.length;
-  }, pictures);
-}

@@ -9,6 +9,7 @@ import type { Traits } from '../../examples/notebook/surface';
 import { launchChromium } from '../../scripts/chromium.mjs';
 import { makeNotebook, WIDGET } from '../../scripts/notebook.mjs';
 import { serve } from '../../scripts/serve.mjs';
+import { countPixels } from './pixels';
 
 /** What a notebook lets a widget do: no files beside it, no network. */
 const POLICY =
@@ -140,26 +141,14 @@ test('a volume goes in, the surface of its two rings comes back, and both places
   expect(bounds.min[0]).toBeCloseTo(10 + 2 * 3.5, -0.5);
   expect((await told('vertices'))?.shape).toEqual([rings.vertexCount, 3]);
   expect((await told('triangles'))?.shape).toEqual([rings.triangleCount, 3]);
-  for (const canvas of await page.locator('canvas').all())
-    expect(await light(await canvas.screenshot())).toBeGreaterThan(2000);
+  for (const canvas of await page.locator('canvas').all()) {
+    const light = await countPixels(page, await canvas.screenshot(), (r) => r > 90);
+    expect(light).toBeGreaterThan(2000);
+  }
   expect(await page.locator('output').allTextContents()).toEqual(
     Array(2).fill(`Step ${await told('iteration')}, ${rings.vertexCount} vertices`),
   );
 });
-
-/** Of the pixels of a picture, those that are no dark ground. */
-function light(picture: Buffer): Promise<number> {
-  return page.evaluate(async (base64) => {
-    const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
-    const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
-    context?.drawImage(bitmap, 0, 0);
-    const { data } = context?.getImageData(0, 0, bitmap.width, bitmap.height) ?? { data: [] };
-    let light = 0;
-    for (let i = 0; i < data.length; i += 4) if ((data[i] ?? 0) > 90) light += 1;
-    return light;
-  }, picture.toString('base64'));
-}
 
 test('it pauses, goes on, and with other parameters once more', async () => {
   await open('{ running: false }');

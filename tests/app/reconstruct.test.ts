@@ -5,6 +5,7 @@ import init, { Mesh, Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import { computedCloud } from '../../www/src/reconstruct/clouds';
 import { type App, drop, iteration, openApp, overflow, reach, recordStates, unnamedControls } from './browser';
+import { countPixels } from './pixels';
 
 let app: App;
 
@@ -67,22 +68,10 @@ describe('the built-in example', () => {
   test('is drawn with white and black and brown', async () => {
     await app.page.uncheck('[data-view=points]');
     const png = await app.page.locator('.scene > canvas').screenshot();
-    const shares = await app.page.evaluate(async (base64) => {
-      const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
-      const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-      const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
-      context?.drawImage(image, 0, 0);
-      const { data } = context?.getImageData(0, 0, image.width, image.height) ?? { data: [] };
-      const counts = { dark: 0, brown: 0 };
-      for (let i = 0; i < data.length; i += 4) {
-        const [r = 0, g = 0, b = 0] = [data[i], data[i + 1], data[i + 2]];
-        if (r < 70 && g < 70 && b < 70) counts.dark += 1;
-        if (r > b + 60) counts.brown += 1;
-      }
-      return counts;
-    }, png.toString('base64'));
-    expect(shares.dark).toBeGreaterThan(500);
-    expect(shares.brown).toBeGreaterThan(100);
+    const dark = await countPixels(app.page, png, (r, g, b) => r < 70 && g < 70 && b < 70);
+    const brown = await countPixels(app.page, png, (r, _g, b) => r > b + 60);
+    expect(dark).toBeGreaterThan(500);
+    expect(brown).toBeGreaterThan(100);
     await app.page.check('[data-view=points]');
   });
 

@@ -4,6 +4,7 @@ import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import { type App, drop, openApp, overflow, reach, recordNews, unnamedControls } from './browser';
+import { countPixels } from './pixels';
 
 let app: App;
 
@@ -254,22 +255,8 @@ describe('the view', () => {
     await openAt(SMALL, 'done');
     await app.page.uncheck('[data-view=ellipsoids]');
     const png = await view().screenshot();
-    const shares = await app.page.evaluate(async (base64) => {
-      const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
-      const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-      const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
-      context?.drawImage(image, 0, 0);
-      const { data } = context?.getImageData(0, 0, image.width, image.height) ?? { data: [] };
-      const counts = { sea: 0, land: 0 };
-      for (let i = 0; i < data.length; i += 4) {
-        const [r = 0, g = 0, b = 0] = [data[i], data[i + 1], data[i + 2]];
-        if (b > r + 50) counts.sea += 1;
-        if (g > b + 25) counts.land += 1;
-      }
-      return counts;
-    }, png.toString('base64'));
-    expect(shares.sea).toBeGreaterThan(1000);
-    expect(shares.land).toBeGreaterThan(1000);
+    expect(await countPixels(app.page, png, (r, _g, b) => b > r + 50)).toBeGreaterThan(1000);
+    expect(await countPixels(app.page, png, (_r, g, b) => g > b + 25)).toBeGreaterThan(1000);
   });
 });
 

@@ -10,6 +10,7 @@ import { afterAll, afterEach, beforeAll, beforeEach, expect, test } from 'vitest
 import { launchChromium } from '../../scripts/chromium.mjs';
 import { serve } from '../../scripts/serve.mjs';
 import { at, must } from '../../scripts/shell.mjs';
+import { countPixels } from './pixels';
 
 let home = '';
 /** Where the commands of the page lead to. */
@@ -91,18 +92,8 @@ async function balls(): Promise<Uint8Array> {
 /** Of the pixels of the page, those in the warm colours that the surfaces have. */
 async function warmPixels(): Promise<number> {
   const picture = await page.screenshot();
-  return page.evaluate(async (base64) => {
-    const bytes = Uint8Array.from(atob(base64), (character) => character.charCodeAt(0));
-    const bitmap = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
-    context?.drawImage(bitmap, 0, 0);
-    const { data } = context?.getImageData(0, 0, bitmap.width, bitmap.height) ?? { data: [] };
-    let warm = 0;
-    // Lines that NiiVue draws are pure red.
-    for (let i = 0; i < data.length; i += 4)
-      if ((data[i] ?? 0) > (data[i + 2] ?? 0) + 30 && (data[i + 1] ?? 0) > 30) warm += 1;
-    return warm;
-  }, picture.toString('base64'));
+  // Lines that NiiVue draws are pure red.
+  return countPixels(page, picture, (r, g, b) => r > b + 30 && g > 30);
 }
 
 async function found(): Promise<void> {

@@ -1,6 +1,5 @@
 //! A beating ventricle with known truth: a cavity with papillary muscles, as cine MR would show it.
 
-#![allow(dead_code, reason = "each test file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
 
 use crate::common::Random;

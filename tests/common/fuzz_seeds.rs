@@ -1,12 +1,11 @@
 //! What fuzzing starts from: small files of every kind, and scenes.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "the lints spare tests, but not their helpers")]
 
-use super::common::Random;
+use super::common::{Random, shapes};
 use super::fuzz::states;
 use std::fs;
 use std::path::Path;
 use vesicle::io::{MeshFormat, write_animation, write_mesh};
-use vesicle::math::{Vec2, Vec3};
 use vesicle::mesh::{Texture, TriangleMesh};
 
 /// A name and the bytes.
@@ -122,50 +121,30 @@ fn deflated(kind: u8) -> Vec<u8> {
     [vec![kind], miniz_oxide::deflate::compress_to_vec(&content, 6)].concat()
 }
 
-/// An octahedron with everything that a mesh can have.
-fn octahedron() -> TriangleMesh {
-    let quarter = |[x, y]: [u32; 2]| [[x, y, 4], [y, x, 5]];
-    let positions = vec![Vec3::X, Vec3::Y, -Vec3::X, -Vec3::Y, Vec3::Z, -Vec3::Z];
-    TriangleMesh {
-        triangles: [[0, 1], [1, 2], [2, 3], [3, 0]].into_iter().flat_map(quarter).collect(),
-        normals: Some(positions.clone()),
-        uvs: Some(positions.iter().map(|p| Vec2::new(0.1 + p.x / 3.0, p.y)).collect()),
-        colors: Some(positions.iter().map(|p| (*p + 1.0) / 2.0).collect()),
-        positions,
-        ..TriangleMesh::default()
-    }
-}
-
-fn bare() -> TriangleMesh {
-    let TriangleMesh { positions, triangles, .. } = octahedron();
-    TriangleMesh { positions, triangles, ..TriangleMesh::default() }
-}
-
-/// With a seam: one triangle has texture coordinates of its own.
-fn seamed() -> TriangleMesh {
-    let mesh = octahedron();
-    let uvs = mesh.uvs.clone().unwrap();
-    let mut corner_uvs: Vec<[Vec2; 3]> = mesh.triangles.iter().map(|t| t.map(|v| uvs[v as usize])).collect();
-    corner_uvs[3] = [Vec2::new(7.0, 7.5), Vec2::new(8.0, 7.5), Vec2::new(7.0, 8.5)];
-    TriangleMesh { uvs: None, corner_uvs: Some(corner_uvs), ..mesh }
-}
-
 fn textured() -> TriangleMesh {
     let picture = Texture::new(b"\x89PNG\r\n\x1a\nnot looked at".to_vec()).unwrap();
-    TriangleMesh { texture: Some(picture.into()), ..octahedron() }
+    TriangleMesh { texture: Some(picture.into()), ..shapes::octahedron() }
 }
 
 fn mesh(format: MeshFormat) -> Vec<Seed> {
     let written = |(name, mesh): (&str, TriangleMesh)| {
         (format!("{name}.{}", format.extension()), write_mesh(&mesh, format).unwrap())
     };
-    [("bare", bare()), ("full", octahedron()), ("seamed", seamed()), ("textured", textured())]
-        .map(written)
-        .to_vec()
+    [
+        ("bare", shapes::bare_octahedron()),
+        ("full", shapes::octahedron()),
+        ("seamed", shapes::octahedron_with_seam()),
+        ("textured", textured()),
+    ]
+    .map(written)
+    .to_vec()
 }
 
 fn movie() -> Vec<Seed> {
-    vec![("movie.glb".into(), write_animation([bare(), octahedron()], 0.1).unwrap())]
+    vec![(
+        "movie.glb".into(),
+        write_animation([shapes::bare_octahedron(), shapes::octahedron()], 0.1).unwrap(),
+    )]
 }
 
 /// The text of a GLB, a 0, and its binary part.

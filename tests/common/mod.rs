@@ -2,6 +2,10 @@
 #![allow(dead_code, reason = "each test file uses a part of it")]
 #![allow(clippy::panic, clippy::print_stdout, reason = "the lints spare tests, but not their helpers")]
 
+pub mod cine;
+pub mod points;
+pub mod scenes;
+pub mod shapes;
 pub mod skins;
 
 use std::f32::consts::TAU;

@@ -1,7 +1,6 @@
 //! Points on shapes whose distance is known.
-#![allow(dead_code, reason = "each test file uses a part of it")]
 
-use super::common::Random;
+use crate::common::Random;
 use vesicle::math::{DVec3, Vec3};
 
 /// A body by a function that is its distance near the surface, negative inside. All fit a box of side 2.

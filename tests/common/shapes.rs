@@ -1,9 +1,8 @@
-//! Closed surfaces that are hard in one way each.
-#![allow(dead_code, reason = "each program uses a part of it")]
+//! Closed surfaces that are hard in one way each, and one with everything that a file can hold.
 
+use crate::common::scenes::{chain, potential, volume};
 use crate::common::{Random, torus_around};
-use crate::scenes::{chain, potential, volume};
-use vesicle::math::Vec3;
+use vesicle::math::{Vec2, Vec3};
 use vesicle::mesh::{Mesh, TriangleMesh};
 use vesicle::volume::marching_cubes_world;
 
@@ -12,6 +11,35 @@ pub fn ellipsoid(edge: f32, stretch: Vec3) -> TriangleMesh {
     let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, edge).unwrap().to_triangles();
     mesh.positions.iter_mut().for_each(|p| *p *= stretch);
     TriangleMesh { normals: None, ..mesh }
+}
+
+/// The octahedron |x| + |y| + |z| = 1, with every extra that a mesh can have.
+pub fn octahedron() -> TriangleMesh {
+    let quarter = |[x, y]: [u32; 2]| [[x, y, 4], [y, x, 5]];
+    let positions = vec![Vec3::X, Vec3::Y, -Vec3::X, -Vec3::Y, Vec3::Z, -Vec3::Z];
+    TriangleMesh {
+        triangles: [[0, 1], [1, 2], [2, 3], [3, 0]].into_iter().flat_map(quarter).collect(),
+        normals: Some(positions.clone()),
+        uvs: Some(positions.iter().map(|p| Vec2::new(0.1 + p.x / 3.0, p.y)).collect()),
+        colors: Some(positions.iter().map(|p| (*p + 1.0) / 2.0).collect()),
+        positions,
+        ..TriangleMesh::default()
+    }
+}
+
+/// The same without any extra.
+pub fn bare_octahedron() -> TriangleMesh {
+    let TriangleMesh { positions, triangles, .. } = octahedron();
+    TriangleMesh { positions, triangles, ..TriangleMesh::default() }
+}
+
+/// The octahedron with a seam: one triangle has texture coordinates of its own.
+pub fn octahedron_with_seam() -> TriangleMesh {
+    let mesh = octahedron();
+    let uvs = mesh.uvs.clone().unwrap_or_default();
+    let mut corner_uvs: Vec<[Vec2; 3]> = mesh.triangles.iter().map(|t| t.map(|v| uvs[v as usize])).collect();
+    corner_uvs[3] = [Vec2::new(7.0, 7.5), Vec2::new(8.0, 7.5), Vec2::new(7.0, 8.5)];
+    TriangleMesh { uvs: None, corner_uvs: Some(corner_uvs), ..mesh }
 }
 
 /// Several surfaces as one.

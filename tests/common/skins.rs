@@ -1,5 +1,4 @@
 //! What holds for every skin over ellipsoids, whatever was done to it.
-#![allow(dead_code, reason = "each test file uses a part of it")]
 #![allow(clippy::panic, reason = "the lints spare tests, but not their helpers")]
 
 use vesicle::math::{DVec3, Vec3, triangle};

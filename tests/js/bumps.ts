@@ -2,7 +2,7 @@
 // that it can be sent into a browser.
 import type * as Package from '../../pkg/index.js';
 
-/** FNV-1a over all positions: what the core gives natively (`tests/implicit.rs`). */
+/** FNV-1a over all positions: what the core gives natively (`tests/core/implicit.rs`). */
 export const BUMPS_BITS = '78aedacfbadc8109';
 
 export function bumpsBits({ ImplicitSurface }: typeof Package): string {

@@ -2,7 +2,7 @@
 // outside itself, so that it can be sent into a browser.
 import type * as Package from '../../pkg/index.js';
 
-/** FNV-1a over all positions: what the core gives natively (`tests/multires.rs`). */
+/** FNV-1a over all positions: what the core gives natively (`tests/core/multires.rs`). */
 export const LAMP_BITS = '82280a25d547c21c';
 
 export function lampBits({ MultiresolutionModel }: typeof Package): string {

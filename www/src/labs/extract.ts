@@ -156,7 +156,13 @@ export class ExtractLab {
       act: () => this.#attracting.add(this.#stage.crosshair),
     },
     { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#travel('undo') },
-    { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: () => void this.#travel('redo') },
+    {
+      key: 'shift+z',
+      ctrl: true,
+      shown: 'Ctrl ⇧ Z',
+      text: 'redo',
+      act: () => void this.#travel('redo'),
+    },
     { key: 'y', ctrl: true, shown: 'Ctrl Y', text: 'redo', act: () => void this.#travel('redo') },
   ];
   #paramControls: ParamControls | undefined;
@@ -168,8 +174,8 @@ export class ExtractLab {
   #source: Source | undefined;
   /** What the surface's vertices are asked for. */
   #shade: Shade | undefined;
-  /** Settled when all that was to be undone or done again is. */
-  #travels: Promise<void> = Promise.resolve();
+  /** Settled when all that the model was to be changed by is. */
+  #changes: Promise<void> = Promise.resolve();
   /** The level the model is on. */
   #level = 0;
   /** A link to a file of the user's, until the file is opened. */
@@ -315,6 +321,10 @@ export class ExtractLab {
   /** Another picture of the figure that is open: other parameters, from the same start or from where the surface is. */
   async #openVariant(preset: Preset, variant: Variant): Promise<void> {
     if (!this.#volume || this.#state.value === 'loading' || this.#engineBroken) return;
+    await this.#inTurn(() => this.#changeTo(preset, variant));
+  }
+
+  async #changeTo(preset: Preset, variant: Variant): Promise<void> {
     const params = { ...preset.params, ...variant.params };
     const forget = this.#rewinder.remember(`figure ${variant.id}`);
     try {
@@ -340,25 +350,39 @@ export class ExtractLab {
       const choice = this.#startFor(source);
       const volume = await source.volume();
       if (turn !== this.#turn) return;
-      const body = { name: source.name, source: volume, setup: this.#setupFor(source, choice) };
-      const loaded = await this.#client.request('load', body, transferable(body.source));
-      this.#source = source;
-      this.#awaiting = undefined;
-      this.#start.show(choice);
-      this.#rewinder.clear();
-      this.#compare.clear();
-      this.#adoptVolume(loaded.volume, source);
-      this.#attracting.show(body.setup.attractors);
-      this.#attracting.radius = ATTRACTOR_PART * this.#smallestSide();
-      if (source.linked?.color) this.#options.color = source.linked.color;
-      this.#adoptModel(loaded);
-      this.#rewinder.remember('Play');
-      await this.#play();
+      await this.#inTurn(() => this.#load(source, volume, choice));
     } catch (error) {
       if (turn !== this.#turn) return;
       this.#data.choose(this.#source?.example);
       this.#fail(`${source.name} could not be opened.`, error);
     }
+  }
+
+  async #load(source: Source, volume: VolumeSource, choice: StartChoice): Promise<void> {
+    // What was under way may have ended with the model ready to run.
+    if (this.#state.value !== 'loading') this.#enterLoading(`Opening ${source.name}.`);
+    const body = { name: source.name, source: volume, setup: this.#setupFor(source, choice) };
+    const loaded = await this.#client.request('load', body, transferable(body.source));
+    this.#source = source;
+    this.#awaiting = undefined;
+    this.#start.show(choice);
+    this.#rewinder.clear();
+    this.#compare.clear();
+    this.#adoptVolume(loaded.volume, source);
+    this.#attracting.show(body.setup.attractors);
+    this.#attracting.radius = ATTRACTOR_PART * this.#smallestSide();
+    if (source.linked?.color) this.#options.color = source.linked.color;
+    this.#adoptModel(loaded);
+    this.#rewinder.remember('Play');
+    await this.#play();
+  }
+
+  /** One change after the other; what was asked on the volume before is not done to this one. */
+  #inTurn(work: () => Promise<void>): Promise<void> {
+    const turn = this.#turn;
+    const done = this.#changes.then(() => (turn === this.#turn ? work() : undefined));
+    this.#changes = done.catch(() => undefined);
+    return done;
   }
 
   #adoptVolume(volume: VolumeView, { example, unit = 'mm' }: Source): void {
@@ -401,6 +425,10 @@ export class ExtractLab {
   async #reset(): Promise<void> {
     if (!this.#volume || this.#state.value === 'loading') return;
     if (this.#engineBroken && this.#source) return this.#recover(this.#source);
+    await this.#inTurn(() => this.#startOver());
+  }
+
+  async #startOver(): Promise<void> {
     const forget = this.#rewinder.remember('Reset');
     this.#enterLoading('Starting over.');
     try {
@@ -416,8 +444,11 @@ export class ExtractLab {
   async #restart(): Promise<void> {
     if (!this.#volume || this.#state.value === 'loading') return this.#start.refuse('Not while a volume is opened.');
     if (this.#engineBroken) return this.#start.refuse(BROKEN);
+    await this.#inTurn(() => this.#startFrom(this.#start.value));
+  }
+
+  async #startFrom(choice: StartChoice): Promise<void> {
     const running = this.#state.value === 'running';
-    const choice = this.#start.value;
     const forget = this.#rewinder.remember('another start');
     this.#enterLoading('Starting over.');
     try {
@@ -626,12 +657,8 @@ export class ExtractLab {
     return { choice: this.#start.inForce, params: this.#params, attractors: this.#attracting.inForce, mark };
   }
 
-  /** One after the other, however fast they are asked for. */
   #travel(way: 'undo' | 'redo'): Promise<void> {
-    const turn = this.#turn;
-    // What was asked on the volume before is not done to this one.
-    this.#travels = this.#travels.then(() => (turn === this.#turn ? this.#travelOnce(way) : undefined));
-    return this.#travels;
+    return this.#inTurn(() => this.#travelOnce(way));
   }
 
   async #travelOnce(way: 'undo' | 'redo'): Promise<void> {

@@ -10,6 +10,10 @@ export class LabStates {
   readonly #signal: AbortSignal;
   /** The state to return to when an error has been read. */
   #calm: 'loading' | 'paused' | 'done' = 'loading';
+  /** Something else is being opened: what the model does that is still there counts no more. */
+  #opening = false;
+  /** One change after the other. */
+  #turns: Promise<unknown> = Promise.resolve();
   /** There is a model. */
   ready = false;
   /** The worker has to be started again before it can do anything. */
@@ -53,16 +57,36 @@ export class LabStates {
     this.#status.say(text);
   }
 
+  /** Something else is about to be opened: once what is being changed has been. Nothing else is until it is {@link opened}. */
+  async open(text: string): Promise<void> {
+    this.#opening = true;
+    this.load(text);
+    await this.#turns;
+  }
+
+  /** All that comes from now on is of what was opened, or of what was there before where that failed. */
+  opened(): void {
+    this.#opening = false;
+  }
+
+  /** One change after the other, so that each begins with what the one before it left. */
+  inTurn(work: () => Promise<void>): Promise<void> {
+    const turn = this.#turns.then(work);
+    this.#turns = turn.catch(() => undefined);
+    return turn;
+  }
+
   /** Loading is over, and nothing runs yet. */
   stand(text: string): void {
+    if (this.#opening) return;
     this.#state.value = 'paused';
     this.#status.say(text);
   }
 
   /** What the model does now. While something is loading only a start counts; false where this does not. */
   enter(state: 'running' | 'paused' | 'done'): boolean {
-    if (this.value === 'loading' && state !== 'running') {
-      this.#calm = state;
+    if (this.#opening || (this.value === 'loading' && state !== 'running')) {
+      if (state !== 'running') this.#calm = state;
       return false;
     }
     this.#state.value = state;
@@ -79,6 +103,7 @@ export class LabStates {
         ? 'What you see is the last result; Reset starts the engine again. It said: '
         : '';
     this.#banner.show(title, hint + failure.message);
+    if (this.#opening) return;
     if (this.value === 'running' && !this.engineBroken) return;
     this.#status.say('');
     if (this.value === 'running') this.#calm = 'paused';

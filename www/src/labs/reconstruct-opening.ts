@@ -111,9 +111,10 @@ export class Opening {
   /** Opens points and runs the model on them. When it fails, everything stays as it was. */
   async #open(source: Source): Promise<void> {
     const turn = ++this.#turn;
-    this.#states.load(`Opening ${source.name}.`);
+    const calm = this.#states.open(`Opening ${source.name}.`);
     try {
       if (this.#states.engineBroken) await this.#restartEngine();
+      await calm;
       const { source: points, photographs } = await source.opened();
       if (turn !== this.#turn) return;
       const from = points ?? (await this.#presentPoints());
@@ -121,12 +122,14 @@ export class Opening {
       const cameras = photographs.map(({ view }) => view);
       const { cloud, params } = await this.#client.request('load', { source: from, cameras, setup });
       if (turn !== this.#turn) return;
+      this.#states.opened();
       const whole = async () => ({ source: from, photographs });
       this.#source = points ? source : { ...source, name: this.#source?.name ?? source.name, opened: whole };
       this.#awaiting = undefined;
       await this.#adopt({ cloud, params, photographs, setup, source });
     } catch (error) {
       if (turn !== this.#turn) return;
+      this.#states.opened();
       if (source.linked) return this.#openWithoutLink(source, toFailure(error).message);
       this.#ui.data.choose(this.#source?.example);
       this.#states.fail(`${source.name} could not be opened.`, error);

@@ -34,8 +34,6 @@ export class ModelSettings {
   #cloud: Cloud | undefined;
   #params: ParamValues = {};
   #edits: Edits = NO_EDITS;
-  /** Ends when all changes so far are in force, or refused. */
-  #turn: Promise<unknown> = Promise.resolve();
 
   /** `onParams` hears whenever other parameters may be in force. */
   constructor(
@@ -85,19 +83,19 @@ export class ModelSettings {
 
   /** Other settings; the surface stays until the new one is there. When they are refused, all stays. */
   change(changed: Partial<Settings>, label: string): Promise<void> {
-    return this.#inTurn(() => this.#change(changed, label));
+    return this.#states.inTurn(() => this.#change(changed, label));
   }
 
   /** Live: the run goes on, or is taken up again, with the new value. */
   setParam(name: string, value: unknown): Promise<void> {
-    return this.#inTurn(() => this.#setParam(name, value));
+    return this.#states.inTurn(() => this.#setParam(name, value));
   }
 
   /** A click in the view, with the tool that is chosen. */
   pick(hit: Hit): Promise<void> {
     const { tool, distance } = this.#ui.tools;
     const length = distance * this.#ui.view.size;
-    return this.#inTurn(async () => {
+    return this.#states.inTurn(async () => {
       if (!this.#cloud || !this.#states.canChange) return;
       const edits = editedBy(tool, hit, length, this.#edits, this.#cloud.points);
       if (edits) await this.#change({ edits }, 'points by hand');
@@ -110,19 +108,12 @@ export class ModelSettings {
   }
 
   travel(way: 'undo' | 'redo'): Promise<void> {
-    return this.#inTurn(() => this.#travel(way));
+    return this.#states.inTurn(() => this.#travel(way));
   }
 
   /** A new model with the same settings, before its first step. */
-  async rebuild(): Promise<void> {
-    this.showParams(await this.#handOver(this.#now));
-  }
-
-  /** One change after the other, so that each begins with what the one before it left. */
-  #inTurn(work: () => Promise<void>): Promise<void> {
-    const turn = this.#turn.then(work);
-    this.#turn = turn.catch(() => undefined);
-    return turn;
+  rebuild(): Promise<void> {
+    return this.#states.inTurn(async () => this.showParams(await this.#handOver(this.#now)));
   }
 
   async #change(changed: Partial<Settings>, label: string): Promise<void> {

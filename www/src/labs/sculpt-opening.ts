@@ -106,9 +106,10 @@ export class Opening {
   /** Opens meshes and plays. When it fails, everything stays as it was. */
   async #open(source: Source): Promise<void> {
     const turn = ++this.#turn;
-    this.#states.load(`Opening ${source.name}.`);
+    const calm = this.#states.open(`Opening ${source.name}.`);
     try {
       if (this.#states.engineBroken) await this.#restartEngine();
+      await calm;
       const meshes = await source.opened();
       if (turn !== this.#turn) return;
       if (meshes.detail && !meshes.base)
@@ -120,11 +121,13 @@ export class Opening {
       const setup = { start: example?.start, params, pose: linked?.pose ?? usual };
       const opened = await this.#client.request('open', { source: meshes, setup });
       if (turn !== this.#turn) return;
+      this.#states.opened();
       this.#source = source;
       this.#awaiting = undefined;
       await this.#adopt(opened, source);
     } catch (error) {
       if (turn !== this.#turn) return;
+      this.#states.opened();
       if (source.linked) return this.#openWithoutLink(source, toFailure(error).message);
       this.#ui.data.choose(this.#source?.example);
       this.#states.fail(`${source.name} could not be opened.`, error);

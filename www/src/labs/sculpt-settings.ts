@@ -43,8 +43,6 @@ export class ModelSettings {
   #frame = 0;
   /** The last pose that was sent. */
   #turn = 0;
-  /** One change after the other. */
-  #queue: Promise<unknown> = Promise.resolve();
 
   /** `onChange` hears whenever something else may be in force. */
   constructor(client: SculptClient, ui: SculptParts, states: LabStates, history: History, onChange: () => void) {
@@ -176,7 +174,8 @@ export class ModelSettings {
 
   /** Live: the run goes on, or is taken up again, with the new value. */
   setParams(values: ParamValues, what: string): Promise<void> {
-    return this.#inTurn(async () => {
+    return this.#states.inTurn(async () => {
+      if (!this.#states.canChange) return this.show();
       const forget = this.remember(`change of ${what}`, what);
       try {
         this.#params = await this.#client.request('setParams', values);
@@ -194,7 +193,7 @@ export class ModelSettings {
   }
 
   travel(way: 'undo' | 'redo'): Promise<void> {
-    return this.#inTurn(async () => {
+    return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return;
       try {
         const moment = await this.#rewinder.travel(way);
@@ -206,16 +205,18 @@ export class ModelSettings {
   }
 
   /** A new model of the same meshes, before its first step, with the parameters in force. */
-  async rebuild(start: Pose | undefined): Promise<void> {
-    const ready = await this.#client.request('rebuild', { start, params: this.#params, pose: undefined });
-    this.#rewinder.clear();
-    this.#pose = ready.pose;
-    this.#names = named(this.#names, ready.pose.length);
-    this.#params = ready.params;
-    this.#posed = false;
-    this.#frame = 0;
-    await this.#client.request('film', { film: this.#film, frame: 0 });
-    this.show();
+  rebuild(start: Pose | undefined): Promise<void> {
+    return this.#states.inTurn(async () => {
+      const ready = await this.#client.request('rebuild', { start, params: this.#params, pose: undefined });
+      this.#rewinder.clear();
+      this.#pose = ready.pose;
+      this.#names = named(this.#names, ready.pose.length);
+      this.#params = ready.params;
+      this.#posed = false;
+      this.#frame = 0;
+      await this.#client.request('film', { film: this.#film, frame: 0 });
+      this.show();
+    });
   }
 
   /** Everything that is in force, on the page. */
@@ -238,12 +239,6 @@ export class ModelSettings {
     this.#pose = ready.pose;
     this.show();
     await this.#client.request('settle', undefined);
-  }
-
-  #inTurn(work: () => Promise<void>): Promise<void> {
-    const turn = this.#queue.then(work);
-    this.#queue = turn.catch(() => undefined);
-    return turn;
   }
 
   #showPose(): void {

@@ -99,20 +99,23 @@ export class Opening {
   /** Opens an image and tracks. When it fails, everything stays as it was. */
   async #open(source: Source): Promise<void> {
     const turn = ++this.#turn;
-    this.#states.load(`Opening ${source.name}.`);
+    const calm = this.#states.open(`Opening ${source.name}.`);
     try {
       if (this.#states.engineBroken) await this.#restartEngine();
+      await calm;
       const film = await source.opened();
       if (turn !== this.#turn) return;
       const { example, linked, name } = source;
       const setup = setupOf(example, linked);
       const opened = await this.#client.request('open', { name, source: film, setup });
       if (turn !== this.#turn) return;
+      this.#states.opened();
       this.#source = source;
       this.#awaiting = undefined;
       await this.#adopt(opened, setup, source);
     } catch (error) {
       if (turn !== this.#turn) return;
+      this.#states.opened();
       if (source.linked) return this.#openWithoutLink(source, toFailure(error).message);
       this.#ui.data.choose(this.#source?.example);
       this.#states.fail(`${source.name} could not be opened.`, error);

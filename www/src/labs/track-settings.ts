@@ -28,8 +28,6 @@ export class TrackSettings {
     params: {},
   };
   #ready: Omit<Ready, 'volume'> = { params: {}, suggested: 1, noise: 0 };
-  /** One change after the other. */
-  #queue: Promise<unknown> = Promise.resolve();
 
   /** `onChange` hears whenever something else may be in force; `onVolume` of the image prepared in another way. */
   constructor(
@@ -84,7 +82,7 @@ export class TrackSettings {
 
   /** What a tracker is made with is changed: a new one, which runs. */
   change(changed: Partial<Omit<Setup, 'params'>>, what: string): Promise<void> {
-    return this.#inTurn(async () => {
+    return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return;
       await this.#client.request('pause', undefined);
       const forget = this.remember(`change of ${what}`);
@@ -108,7 +106,7 @@ export class TrackSettings {
 
   /** All frames anew with the new value, as far as it makes a difference to them. */
   setParams(values: ParamValues, what: string): Promise<void> {
-    return this.#inTurn(async () => {
+    return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return;
       const forget = this.remember(`change of ${what}`, what);
       try {
@@ -133,7 +131,7 @@ export class TrackSettings {
 
   /** A new tracker of the same image, before its first step. */
   rebuild(): Promise<void> {
-    return this.#inTurn(async () => {
+    return this.#states.inTurn(async () => {
       const ready = await this.#client.request('rebuild', this.#setup);
       this.#rewinder.clear();
       this.#take(this.#setup, ready);
@@ -142,7 +140,7 @@ export class TrackSettings {
   }
 
   travel(way: 'undo' | 'redo'): Promise<void> {
-    return this.#inTurn(async () => {
+    return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return;
       try {
         const moment = await this.#rewinder.travel(way);
@@ -175,11 +173,5 @@ export class TrackSettings {
   #inForce(): void {
     const { window, threshold } = this.#ready.params;
     Object.assign(this.#results, { window: Number(window), threshold: Number(threshold), noise: this.#ready.noise });
-  }
-
-  #inTurn(work: () => Promise<void>): Promise<void> {
-    const turn = this.#queue.then(work);
-    this.#queue = turn.catch(() => undefined);
-    return turn;
   }
 }

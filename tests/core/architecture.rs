@@ -1,8 +1,6 @@
 //! The layers of the crate: no module uses one above it, and no method uses another.
 //!
 //! Reads the sources, so it runs natively only.
-#![cfg(not(target_arch = "wasm32"))]
-#![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
 
 use std::fs;
 use std::path::{Path, PathBuf};

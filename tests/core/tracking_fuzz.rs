@@ -2,11 +2,8 @@
 //! by name.
 //!
 //! `FUZZ_SEEDS=<first>..<last>` chooses other seeds; a seed that fails is said.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "the lints spare tests, but not their helpers")]
 
-mod common;
-
-use common::{Named, Random, seeds};
+use crate::common::{Named, Random, seeds};
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::{count_crossings, measure};
 use vesicle::methods::MethodError;

@@ -1,12 +1,8 @@
 //! The deformable model against shapes with a known answer, and its promises: sound at every iteration, the same bits
 //! every time, clear refusals.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
-mod common;
-#[path = "common/scenes.rs"]
-mod scenes;
-
-use common::euler_of_parts;
+use crate::common::euler_of_parts;
+use crate::common::scenes;
 use vesicle::math::{DAffine3, DMat3, DVec3, Vec3};
 use vesicle::mesh::{Measures, Mesh, MeshError, TriangleMesh, count_crossings, measure};
 use vesicle::methods::deformable::{
@@ -301,7 +297,7 @@ fn damaged_states_are_refused_and_nothing_is_lost() {
         model.step().unwrap();
     }
     let state = model.save();
-    let mut random = common::Random(1);
+    let mut random = crate::common::Random(1);
     for length in [0, 4, 8, 9, 100, state.len() - 1] {
         assert!(matches!(model.restore(&state[..length]), Err(MethodError::BadState { .. })));
     }
@@ -462,7 +458,7 @@ fn a_start_mesh_turned_inside_out_is_refused() {
 #[test]
 fn a_handle_too_thin_to_keep_vanishes_once() {
     let volume = ball([24, 24, 24], 7.0);
-    let torus = common::torus_around(Vec3::splat(4.0), [8, 3], [1.3, 0.25]);
+    let torus = crate::common::torus_around(Vec3::splat(4.0), [8, 3], [1.3, 0.25]);
     let mut start = Mesh::from_triangles(&torus).unwrap();
     start.append(&Mesh::icosphere(Vec3::splat(14.0), 5.0, 1.5).unwrap()).unwrap();
     let options = DeformableOptions { start: Start::Mesh(start.to_triangles()), ..Default::default() };

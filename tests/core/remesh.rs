@@ -1,13 +1,7 @@
 //! Remeshing: triangles alike, the same topology and shape, and nothing crosses.
 
-#![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
-mod common;
-#[path = "common/scenes.rs"]
-mod scenes;
-#[path = "common/shapes.rs"]
-mod shapes;
-
-use common::{Named, Random, euler_of_parts, seeds, torus_around};
+use crate::common::shapes;
+use crate::common::{Named, Random, euler_of_parts, seeds, torus_around};
 use vesicle::math::{DVec3, Vec3, triangle};
 use vesicle::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure, report};
 use vesicle::remesh::{EdgeBounds, remesh};

@@ -1,10 +1,6 @@
 //! A mesh that is moved and edited at random never crosses itself.
 
-#![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
-
-mod common;
-
-use common::{Random, torus_around};
+use crate::common::{Random, torus_around};
 use vesicle::math::Vec3;
 use vesicle::mesh::{EditError, Mesh, TriangleMesh, VertexId, count_crossings};
 use vesicle::remesh::{Embedding, Resolver, Sampling};

@@ -1,7 +1,5 @@
 //! Pictures on meshes, in files and through what is done to meshes; and meshes one after the other as an animation.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "the lints spare tests, but not their helpers")]
-
 use std::sync::Arc;
 use vesicle::io::{FormatError, MeshFormat, parse_mesh, parse_textured_mesh, write_animation, write_mesh};
 use vesicle::math::{DAffine3, DVec3, Vec2, Vec3};
@@ -10,8 +8,8 @@ use vesicle::mesh::{ImageKind, Mesh, MeshError, Texture, TriangleMesh, report};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-const SPOT: &[u8] = include_bytes!("data/meshes/spot.glb");
-const FUZE: &[u8] = include_bytes!("data/meshes/fuze.obj");
+const SPOT: &[u8] = include_bytes!("../data/meshes/spot.glb");
+const FUZE: &[u8] = include_bytes!("../data/meshes/fuze.obj");
 
 /// Bytes that begin as a picture of each kind does.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n12345";

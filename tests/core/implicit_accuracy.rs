@@ -4,25 +4,16 @@
 //! The figures of the other were recorded with pymeshlab 2025.7.post1 (MeshLab's library, which has M. Kazhdan's code) by
 //!
 //! ```sh
-//! cargo test --release --test implicit_accuracy -- --ignored   # writes the points of the tests, with normals
+//! cargo test --release --test core implicit_accuracy -- --ignored  # writes the points of the tests, with normals
 //! python scripts/poisson_reference.py target/tmp/accuracy      # prints the table
 //! ```
 //!
 //! that is `generate_surface_reconstruction_screened_poisson(depth=<depth>, threads=1)` on each, all else as it comes.
 //! Noise is the standard deviation along each axis. The ball, the torus and the pair fill a box of side 2; the blend's box
 //! is 1.8 wide, so that there the same noise is a tenth more.
-#![cfg(not(target_arch = "wasm32"))]
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "a test fails by panicking, and says its figures"
-)]
-mod common;
-#[path = "common/points.rs"]
-mod points;
 
-use common::{Random, euler_of_parts};
-use points::{Shape, blend, distance, noisy, pair, sphere, surface_points, torus};
+use crate::common::points::{Shape, blend, distance, noisy, pair, sphere, surface_points, torus};
+use crate::common::{Random, euler_of_parts};
 use std::fmt::Write;
 use std::path::Path;
 use vesicle::mesh::{TriangleMesh, report};

@@ -1,12 +1,9 @@
 //! Skins over random ellipsoids on random ways, with random parameters: closed, without crossings, after every frame.
 //!
 //! `FUZZ_SEEDS=<first>..<last>` chooses other seeds; a seed that fails is said.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "the lints spare tests, but not their helpers")]
 
-mod common;
-
-use common::skins::assert_sound;
-use common::{Named, Random, seeds};
+use crate::common::skins::assert_sound;
+use crate::common::{Named, Random, seeds};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::Mesh;
 use vesicle::methods::MethodError;

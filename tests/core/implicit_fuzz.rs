@@ -2,19 +2,8 @@
 //!
 //! A seed that fails prints itself. `FUZZ_SEEDS=<first>..<last>` runs others than the usual ones.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stdout,
-    reason = "the lints spare tests, but not their helpers"
-)]
-
-mod common;
-#[path = "common/points.rs"]
-mod points;
-
-use common::{Named, Random, seeds};
-use points::{direction, normal};
+use crate::common::points::{direction, normal};
+use crate::common::{Named, Random, seeds};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{measure, report};
 use vesicle::methods::MethodError;

@@ -1,18 +1,8 @@
 //! The implicit surface against shapes with a known answer, and its promises: a sound mesh, the same bits every time and
 //! after every restore, clear refusals.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stdout,
-    reason = "a test fails by panicking, and says its figures"
-)]
-mod common;
-#[path = "common/points.rs"]
-mod points;
-
-use common::{Random, euler_of_parts, fingerprint};
-use points::{Shape, blend, distance, noisy, pair, sphere, surface_points, torus};
+use crate::common::points::{Shape, blend, distance, noisy, pair, sphere, surface_points, torus};
+use crate::common::{Random, euler_of_parts, fingerprint};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{TriangleMesh, curvature, measure, report};
 use vesicle::methods::implicit::{

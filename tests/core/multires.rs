@@ -1,10 +1,7 @@
 //! The multiresolution model against what is known: spheres, rigid motion, necks, contacts, and bad input.
-#![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
 
-mod common;
-
-use common::fingerprint;
-use common::skins::{assert_held, assert_sound, ball, ellipsoid, settle, turned};
+use crate::common::fingerprint;
+use crate::common::skins::{assert_held, assert_sound, ball, ellipsoid, settle, turned};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{Mesh, MeshError, TriangleMesh, measure};
 use vesicle::methods::MethodError;

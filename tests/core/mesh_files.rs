@@ -1,7 +1,6 @@
 //! Mesh files: real ones, hand-made ones of every kind, round trips, and broken ones.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "the lints spare tests, but not their helpers")]
-
+use crate::common::shapes::{octahedron, octahedron_with_seam};
 use std::sync::Arc;
 use vesicle::io::{FormatError, MeshFormat, parse_mesh, write_animation, write_mesh};
 use vesicle::math::{Vec2, Vec3};
@@ -10,33 +9,10 @@ use vesicle::mesh::{MeshError, Texture, TriangleMesh, measure, report};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-const KNOT: &[u8] = include_bytes!("data/meshes/knot.ply");
-const FUZE: &[u8] = include_bytes!("data/meshes/fuze.obj");
-const SPOT: &[u8] = include_bytes!("data/meshes/spot.glb");
-const DRACO: &[u8] = include_bytes!("data/meshes/suzi_draco.glb");
-
-/// The octahedron |x| + |y| + |z| = 1, with every extra that a mesh can have.
-fn octahedron() -> TriangleMesh {
-    let quarter = |[x, y]: [u32; 2]| [[x, y, 4], [y, x, 5]];
-    let positions = vec![Vec3::X, Vec3::Y, -Vec3::X, -Vec3::Y, Vec3::Z, -Vec3::Z];
-    TriangleMesh {
-        triangles: [[0, 1], [1, 2], [2, 3], [3, 0]].into_iter().flat_map(quarter).collect(),
-        normals: Some(positions.clone()),
-        uvs: Some(positions.iter().map(|p| Vec2::new(0.1 + p.x / 3.0, p.y)).collect()),
-        colors: Some(positions.iter().map(|p| (*p + 1.0) / 2.0).collect()),
-        positions,
-        ..TriangleMesh::default()
-    }
-}
-
-/// The same with a seam: one triangle has texture coordinates of its own.
-fn octahedron_with_seam() -> TriangleMesh {
-    let mesh = octahedron();
-    let uvs = mesh.uvs.clone().unwrap_or_default();
-    let mut corner_uvs: Vec<[Vec2; 3]> = mesh.triangles.iter().map(|t| t.map(|v| uvs[v as usize])).collect();
-    corner_uvs[3] = [Vec2::new(7.0, 7.5), Vec2::new(8.0, 7.5), Vec2::new(7.0, 8.5)];
-    TriangleMesh { uvs: None, corner_uvs: Some(corner_uvs), ..mesh }
-}
+const KNOT: &[u8] = include_bytes!("../data/meshes/knot.ply");
+const FUZE: &[u8] = include_bytes!("../data/meshes/fuze.obj");
+const SPOT: &[u8] = include_bytes!("../data/meshes/spot.glb");
+const DRACO: &[u8] = include_bytes!("../data/meshes/suzi_draco.glb");
 
 fn describe(mesh: &TriangleMesh) -> (usize, usize, usize, i64) {
     let m = measure(mesh);

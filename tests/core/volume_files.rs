@@ -1,8 +1,6 @@
 //! Volume files of every accepted format against what their usual libraries (nibabel, pynrrd, SimpleITK) read from
 //! them, and against what must happen to broken ones.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
-
 use vesicle::io::{FormatError, parse_volume, write_nifti};
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
@@ -10,11 +8,11 @@ use vesicle::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
 macro_rules! made {
-    ($($name:expr),+) => { &include_bytes!(concat!("data/volumes/made/", $($name),+))[..] };
+    ($($name:expr),+) => { &include_bytes!(concat!("../data/volumes/made/", $($name),+))[..] };
 }
 macro_rules! i2nii {
     ($name:expr) => {
-        &include_bytes!(concat!("data/volumes/i2nii/", $name))[..]
+        &include_bytes!(concat!("../data/volumes/i2nii/", $name))[..]
     };
 }
 

@@ -2,17 +2,8 @@
 //!
 //! By default those that take seconds. `VESICLE_SCENES=all` runs all (some minutes): `npm run scenes`.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "a test fails by panicking, a scene reports a line"
-)]
-
-mod common;
-#[path = "common/scenes.rs"]
-mod scenes;
-
-use common::{Random, euler_of_parts, fingerprint};
+use crate::common::scenes;
+use crate::common::{Random, euler_of_parts, fingerprint};
 use std::collections::BTreeMap;
 use vesicle::math::Vec3;
 use vesicle::mesh::{Measures, Mesh, count_crossings, measure};

@@ -1,11 +1,6 @@
 //! A surface followed through a beating heart with known truth.
-#![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
 
-#[path = "common/cine.rs"]
-mod cine;
-mod common;
-
-use cine::Cine;
+use crate::common::cine::Cine;
 use vesicle::math::{DAffine3, DVec3, Vec3};
 use vesicle::mesh::{MeshError, TriangleMesh, count_crossings, measure};
 use vesicle::methods::MethodError;
@@ -76,7 +71,7 @@ fn the_same_bits_everywhere() {
     let cine = Cine::small().first(3);
     let tracker = tracked(open_ended(&cine));
     let positions: Vec<Vec3> = tracker.meshes().iter().flat_map(|mesh| mesh.positions.clone()).collect();
-    assert_eq!(format!("{:016x}", common::fingerprint(&positions)), BITS);
+    assert_eq!(format!("{:016x}", crate::common::fingerprint(&positions)), BITS);
 }
 
 #[test]
@@ -140,7 +135,7 @@ fn crevices_that_open_faster_than_the_boundary_pulls_are_grown_into() {
 
 /// A tube that beats, along the third axis through the whole of a volume; its signal falls to a third along the way.
 fn tube(mirrored: bool) -> Volume {
-    let mut random = common::Random(5);
+    let mut random = crate::common::Random(5);
     let mut values = Vec::new();
     for frame in 0..6 {
         let radius = 7.0 + libm::cos(f64::from(frame) * std::f64::consts::TAU / 6.0);
@@ -375,17 +370,17 @@ fn what_cannot_be_tracked_is_refused_by_name() {
     let refusal = SurfaceTracker::new(TrackingOptions { start: Some(open), ..good() });
     assert!(matches!(refusal, Err(MethodError::Mesh(_))));
     assert_eq!(refused(TrackingOptions { start: Some(TriangleMesh::default()), ..good() }).0, "start");
-    let far = common::torus_around(Vec3::splat(-500.0), [24, 12], [3.0, 1.0]);
+    let far = crate::common::torus_around(Vec3::splat(-500.0), [24, 12], [3.0, 1.0]);
     let (parameter, problem) = refused(TrackingOptions { start: Some(far), ..good() });
     assert!(parameter == "start" && problem.contains("in the box"), "{problem}");
-    let mut turned = common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
+    let mut turned = crate::common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
     turned.triangles.iter_mut().for_each(|corners| corners.reverse());
     let (parameter, problem) = refused(TrackingOptions { start: Some(turned), ..good() });
     assert!(parameter == "start" && problem.contains("face inwards"), "{problem}");
     // Two rings, one through the other.
     let middle = Vec3::splat(35.0);
-    let mut crossing = common::torus_around(middle, [24, 12], [3.0, 1.0]);
-    let other = common::torus_around(middle + Vec3::X, [24, 12], [3.0, 1.0]);
+    let mut crossing = crate::common::torus_around(middle, [24, 12], [3.0, 1.0]);
+    let other = crate::common::torus_around(middle + Vec3::X, [24, 12], [3.0, 1.0]);
     let first = crossing.positions.len() as u32;
     crossing.triangles.extend(other.triangles.iter().map(|corners| corners.map(|v| v + first)));
     crossing.positions.extend(other.positions);

@@ -1,9 +1,6 @@
 //! Every edit and every refusal, and long seeded runs of random edits with all invariants checked after each.
 
-#![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
-mod common;
-
-use common::{Random, torus_around};
+use crate::common::{Random, torus_around};
 use std::collections::BTreeSet;
 use vesicle::math::Vec3;
 use vesicle::mesh::{EditError, Mesh, TriangleMesh, VectorKey, VertexId};

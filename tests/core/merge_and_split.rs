@@ -2,18 +2,8 @@
 //!
 //! A seed that fails prints itself. `FUZZ_SEEDS=<first>..<last>` runs others than the usual ones.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stdout,
-    reason = "the lints spare tests, but not their helpers"
-)]
-
-mod common;
-#[path = "common/scenes.rs"]
-mod scenes;
-
-use common::{Named, Random, euler_of_parts, misplaced_parts, seeds};
+use crate::common::scenes;
+use crate::common::{Named, Random, euler_of_parts, misplaced_parts, seeds};
 use vesicle::math::Vec3;
 use vesicle::mesh::count_crossings;
 use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Start};

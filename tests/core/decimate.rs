@@ -1,11 +1,7 @@
 //! Decimation: fewer triangles, the same topology, nothing crosses, and little of the shape is lost.
 
-#![allow(clippy::unwrap_used, reason = "the lints spare tests, but not their helpers")]
-mod common;
-#[path = "common/scenes.rs"]
-mod scenes;
-
-use common::{Random, euler_of_parts, torus_around};
+use crate::common::scenes;
+use crate::common::{Random, euler_of_parts, torus_around};
 use vesicle::math::{Vec3, triangle};
 use vesicle::mesh::{Mesh, TriangleMesh, count_crossings, measure, report};
 use vesicle::remesh::decimate;

@@ -1,0 +1,36 @@
+//! The core against known answers, natively and in wasm: one program, which is linked once.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails by panicking, and says its figures"
+)]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+// Reads the sources.
+#[cfg(not(target_arch = "wasm32"))]
+mod architecture;
+mod decimate;
+mod deformable;
+mod deformable_fuzz;
+mod embedding;
+mod implicit;
+// Takes minutes in wasm.
+#[cfg(not(target_arch = "wasm32"))]
+mod implicit_accuracy;
+mod implicit_fuzz;
+mod merge_and_split;
+mod mesh_edits;
+mod mesh_files;
+mod multires;
+mod multires_fuzz;
+mod remesh;
+mod scenes;
+mod textured_meshes;
+mod tracking;
+mod tracking_fuzz;
+mod volume_files;
