@@ -11,6 +11,8 @@ const EDGES = [4.6, 1.6, 0.46];
 /** Steps that are not counted, while the sphere takes up speed, and steps that are. */
 const BEFORE = 4;
 const COUNTED = 6;
+/** Runs of each size: steps of the small ones are soon over, and something else may run meanwhile. */
+const RUNS = [6, 3, 1];
 const PARAMS = { iso: 128, isoForce: -1, rigidity: 0.2 };
 
 function ball() {
@@ -50,7 +52,13 @@ function row(volume, edge) {
 export async function measure() {
   await init();
   const volume = ball();
-  // Code is compiled while it runs: the first steps do not count.
-  row(volume, EDGES[0]);
-  return { version: version(), rows: EDGES.map((edge) => row(volume, edge)) };
+  // Code is compiled while it runs, by other threads: a second of it does not count.
+  row(volume, EDGES[1]);
+  return { version: version(), rows: EDGES.map((edge, k) => best(volume, edge, RUNS[k])) };
+}
+
+function best(volume, edge, runs) {
+  const rows = Array.from({ length: runs }, () => row(volume, edge));
+  const least = (key) => Math.min(...rows.map((one) => one[key]));
+  return { ...rows[0], step: least('step'), topology: least('topology') };
 }

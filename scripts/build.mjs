@@ -15,7 +15,7 @@ const WITH_VECTORS = { target: 'target', glue: 'target/glue', module: 'vesicle_b
 const PLAIN = {
   ...{ target: 'target/plain', glue: 'target/plain-glue', module: 'vesicle_plain_bg.wasm' },
   // In place of what .cargo/config.toml says of the target.
-  env: { RUSTFLAGS: '-Ctarget-feature=-simd128 -Cllvm-args=-inline-threshold=40' },
+  env: { RUSTFLAGS: '-Ctarget-feature=-simd128 -Cllvm-args=-inline-threshold=100' },
 };
 
 const compiled = ({ target }) => at(target, 'wasm32-unknown-unknown/release/vesicle.wasm');
