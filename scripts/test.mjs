@@ -67,31 +67,37 @@ function atLeastOneFailed(code, { passed, failed }) {
   return { passed, failed: code === 0 ? failed : Math.max(failed, 1) };
 }
 
-const STAGES = [
-  ['format', check('cargo', ['fmt', '--all', '--check'])],
-  ['clippy', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--all-targets', ...DENY])],
-  ['clippy wasm', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--lib', ...WASM, ...DENY])],
+/** Lanes of a group run side by side, the groups and the stages of a lane one after the other. */
+const GROUPS = [
   [
-    'rust docs',
-    check('cargo', ['doc', '--locked', '-p', 'vesicle', '--no-deps'], { env: { RUSTDOCFLAGS: '-D warnings' } }),
+    [
+      ['format', check('cargo', ['fmt', '--all', '--check'])],
+      ['clippy', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--all-targets', ...DENY])],
+      ['clippy wasm', check('cargo', ['clippy', '--locked', '-p', 'vesicle', '--lib', ...WASM, ...DENY])],
+      [
+        'rust docs',
+        check('cargo', ['doc', '--locked', '-p', 'vesicle', '--no-deps'], { env: { RUSTDOCFLAGS: '-D warnings' } }),
+      ],
+      // With what the tests measure, for the log.
+      ['native', cargoTests('--', '--show-output')],
+    ],
   ],
-  // With what the tests measure, for the log.
-  ['native', cargoTests('--', '--show-output')],
-  ['wasm', cargoTests('--lib', '--tests', ...WASM)],
-  ['build', works(build)],
-  ['biome', check(tool('biome'), ['ci', '--colors=off'])],
-  ['types', check(tool('tsc'), ['-p', at('tests/js')])],
-  ['publint', check(tool('publint'), ['run', '--strict', at('pkg')])],
-  ['package', vitest('tests/js')],
-  ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')])],
-  ['app build', works(buildApp)],
-  ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')])],
-  ['app', vitest('tests/app')],
+  [
+    // Has one thread only.
+    [['wasm', cargoTests('--lib', '--tests', ...WASM)]],
+    [
+      ['build', works(build)],
+      ['biome', check(tool('biome'), ['ci', '--colors=off'])],
+      ['types', check(tool('tsc'), ['-p', at('tests/js')])],
+      ['publint', check(tool('publint'), ['run', '--strict', at('pkg')])],
+      ['package', vitest('tests/js')],
+      ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')])],
+      ['app build', works(buildApp)],
+      ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')])],
+    ],
+  ],
+  [[['app', vitest('tests/app')]]],
 ];
-
-// Has one thread only: what stands between it and the app's tests runs beside it.
-const ALONG = 'wasm';
-const AFTER = 'app';
 
 async function attempt([name, work]) {
   const started = performance.now();
@@ -117,10 +123,10 @@ function failuresIn(output) {
     .join('\n');
 }
 
-function chosen(names) {
-  const unknown = names.filter((name) => !STAGES.some(([stage]) => stage === name));
-  if (unknown.length > 0) throw new Error(`no stage is called ${unknown}; there are ${STAGES.map(([stage]) => stage)}`);
-  return STAGES.filter(([stage]) => names.length === 0 || names.includes(stage));
+function checkNames(names) {
+  const known = GROUPS.flat(2).map(([stage]) => stage);
+  const unknown = names.filter((name) => !known.includes(name));
+  if (unknown.length > 0) throw new Error(`no stage is called ${unknown}; there are ${known}`);
 }
 
 async function inTurn(stages) {
@@ -130,17 +136,17 @@ async function inTurn(stages) {
 }
 
 async function all(names) {
+  checkNames(names);
   await mkdir(at(LOGS), { recursive: true });
   const ready = await attempt(['set-up', works(setup)]);
   // Without tools and packages nothing else can tell anything.
   if (ready.failed) return [ready];
-  const stages = chosen(names);
-  const first = stages.findIndex(([name]) => name === ALONG);
-  const last = stages.findIndex(([name]) => name === AFTER);
-  if (first < 0 || last < 0) return [ready, ...(await inTurn(stages))];
-  const before = await inTurn(stages.slice(0, first));
-  const beside = await Promise.all([[stages[first]], stages.slice(first + 1, last)].map(inTurn));
-  return [ready, ...before, ...beside.flat(), ...(await inTurn(stages.slice(last)))];
+  const results = [ready];
+  for (const lanes of GROUPS) {
+    const wanted = lanes.map((lane) => lane.filter(([stage]) => names.length === 0 || names.includes(stage)));
+    results.push(...(await Promise.all(wanted.map(inTurn))).flat());
+  }
+  return results;
 }
 
 const results = await all(process.argv.slice(2));

@@ -56,7 +56,7 @@ impl FormatError {
         field: impl Into<String>,
         problem: impl Into<String>,
     ) -> Self {
-        Self::Invalid { format, field: field.into(), problem: problem.into() }
+        Self::Invalid { format, field: shown(field), problem: shown(problem) }
     }
 
     /// Something [`Unsupported`](Self::Unsupported).
@@ -66,7 +66,7 @@ impl FormatError {
         found: impl Into<String>,
         accepted: &'static str,
     ) -> Self {
-        Self::Unsupported { format, field: field.into(), found: found.into(), accepted }
+        Self::Unsupported { format, field: shown(field), found: shown(found), accepted }
     }
 
     /// A [`Truncated`](Self::Truncated) part.
@@ -76,11 +76,24 @@ impl FormatError {
         needed: usize,
         found: usize,
     ) -> Self {
-        Self::Truncated { format, field: field.into(), needed: needed as u64, found: found as u64 }
+        Self::Truncated { format, field: shown(field), needed: needed as u64, found: found as u64 }
     }
 
     /// Something [`TooLarge`](Self::TooLarge).
     pub(crate) fn too_large(format: &'static str, field: impl Into<String>, needed: u64) -> Self {
-        Self::TooLarge { format, field: field.into(), needed }
+        Self::TooLarge { format, field: shown(field), needed }
     }
+}
+
+/// Characters of a file's own words that a message repeats.
+const MOST_SHOWN: usize = 200;
+
+/// Cut to what can be read: a file may have anything of any length where one word belongs.
+fn shown(text: impl Into<String>) -> String {
+    let mut text = text.into();
+    if let Some((end, _)) = text.char_indices().nth(MOST_SHOWN) {
+        text.truncate(end);
+        text.push('…');
+    }
+    text
 }

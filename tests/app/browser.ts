@@ -163,3 +163,17 @@ export function unnamedControls(page: Page): Promise<string[]> {
     return [...controls].filter((one) => !hidden(one) && !named(one)).map((one) => one.outerHTML);
   });
 }
+
+/** Presses Cancel, in the page, the moment it can be: a fast machine is done before a click from outside arrives. */
+export async function cancelAtOnce(page: Page): Promise<void> {
+  await page.evaluate(() => {
+    const cancel = document.querySelector<HTMLButtonElement>('[data-action=cancel]');
+    const press = () => {
+      if (!cancel || cancel.hidden) return;
+      watch.disconnect();
+      cancel.click();
+    };
+    const watch = new MutationObserver(press);
+    if (cancel) watch.observe(cancel, { attributeFilter: ['hidden'] });
+  });
+}

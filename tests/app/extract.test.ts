@@ -1,7 +1,7 @@
 import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
-import { type App, drop, iteration, measures, openApp, reach, recordStates } from './browser';
+import { type App, cancelAtOnce, drop, iteration, measures, openApp, reach, recordStates } from './browser';
 import { countColors } from './pixels';
 import { ball, metaImageHeader, ring } from './volumes';
 
@@ -201,5 +201,29 @@ describe('the mean edge', () => {
     expect(await app.page.inputValue('.start select')).toBe('enclosing');
     await reach(app.page, 'done');
     expect(await measures(app.page)).toMatchObject({ components: 1, genus: 0, closed: true });
+  });
+});
+
+describe('Cancel', () => {
+  test('while another volume is opened brings the one before back, where it was', async () => {
+    const states = await recordStates(app.page);
+    await app.page.selectOption('.data select', 'linked-rings');
+    await expect.poll(states).toEqual(['loading', 'running', 'done']);
+    const before = await measures(app.page);
+    await cancelAtOnce(app.page);
+    await app.page.selectOption('.data select', 'head-full');
+    await expect.poll(() => app.page.textContent('.status')).toBe('Cancelled.');
+    expect(await app.page.textContent('.facts')).toContain('linked rings');
+    expect(await app.page.locator('.banner').isVisible()).toBe(false);
+    await reach(app.page, 'done');
+    await expect.poll(() => measures(app.page)).toEqual(before);
+  });
+
+  test('while the model starts over, too', async () => {
+    await cancelAtOnce(app.page);
+    await app.page.selectOption('.start select', 'bubbles');
+    await expect.poll(() => app.page.textContent('.status')).toBe('Cancelled.');
+    expect(await app.page.inputValue('.start select')).toBe('enclosing');
+    await expect.poll(() => app.page.getAttribute('.lab', 'data-state')).toMatch(/paused|done/);
   });
 });

@@ -4,7 +4,7 @@ import { strFromU8, unzipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { cineVoxels } from '../../www/src/track/cine';
-import { type App, drop, openApp, overflow, reach, recordNews, unnamedControls } from './browser';
+import { type App, cancelAtOnce, drop, openApp, overflow, reach, recordNews, unnamedControls } from './browser';
 
 let app: App;
 
@@ -355,16 +355,7 @@ test('hands the surface of a frame to the Sculpt lab, and is there again on the 
 
 test('is cancelled while an image is being opened: what was open is there again', async () => {
   const news = await recordNews(app.page);
-  await app.page.evaluate(() => {
-    const cancel = document.querySelector<HTMLButtonElement>('[data-action=cancel]');
-    const press = () => {
-      if (!cancel || cancel.hidden) return;
-      watch.disconnect();
-      cancel.click();
-    };
-    const watch = new MutationObserver(press);
-    if (cancel) watch.observe(cancel, { attributeFilter: ['hidden'] });
-  });
+  await cancelAtOnce(app.page);
   const before = await text('.facts');
   await app.page.selectOption('.data select', 'thick-slices');
   await expect.poll(news).toContainEqual('Cancelled.');

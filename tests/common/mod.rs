@@ -3,6 +3,7 @@
 #![allow(clippy::panic, clippy::print_stdout, reason = "the lints spare tests, but not their helpers")]
 
 pub mod cine;
+pub mod files;
 pub mod points;
 pub mod scenes;
 pub mod shapes;

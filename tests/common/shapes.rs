@@ -6,6 +6,16 @@ use vesicle::math::{Vec2, Vec3};
 use vesicle::mesh::{Mesh, TriangleMesh};
 use vesicle::volume::marching_cubes_world;
 
+/// What makes a good mesh flat, a line, a point, too small or too large for squares in single precision, or a thread.
+pub const HOSTILE_SCALES: [Vec3; 6] = [
+    Vec3::new(1.0, 1.0, 0.0),
+    Vec3::new(1.0, 0.0, 0.0),
+    Vec3::ZERO,
+    Vec3::splat(1e-30),
+    Vec3::splat(1e30),
+    Vec3::new(100.0, 1e-3, 1e-3),
+];
+
 /// A ball about the origin, its points stretched.
 pub fn ellipsoid(edge: f32, stretch: Vec3) -> TriangleMesh {
     let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, edge).unwrap().to_triangles();

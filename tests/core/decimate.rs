@@ -1,6 +1,7 @@
 //! Decimation: fewer triangles, the same topology, nothing crosses, and little of the shape is lost.
 
 use crate::common::scenes;
+use crate::common::shapes::HOSTILE_SCALES;
 use crate::common::{Random, euler_of_parts, torus_around};
 use vesicle::math::{Vec3, triangle};
 use vesicle::mesh::{Mesh, TriangleMesh, count_crossings, measure, report};
@@ -168,13 +169,7 @@ fn what_crosses_keeps_its_topology() {
 /// Flat, doubled, tiny and huge ones: the work ends, the invariants hold.
 #[test]
 fn hostile_meshes() {
-    for size in [
-        Vec3::new(1.0, 1.0, 0.0),
-        Vec3::new(1.0, 0.0, 0.0),
-        Vec3::ZERO,
-        Vec3::splat(1e-30),
-        Vec3::splat(1e30),
-    ] {
+    for size in HOSTILE_SCALES {
         let mut mesh = Mesh::from_triangles(&ball(0.3)).unwrap();
         mesh.positions_mut().iter_mut().for_each(|p| *p *= size);
         decimate(&mut mesh, 50);

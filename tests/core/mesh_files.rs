@@ -1,5 +1,6 @@
 //! Mesh files: real ones, hand-made ones of every kind, round trips, and broken ones.
 
+use crate::common::files::glb;
 use crate::common::shapes::{octahedron, octahedron_with_seam};
 use std::sync::Arc;
 use vesicle::io::{FormatError, MeshFormat, parse_mesh, write_animation, write_mesh};
@@ -324,19 +325,6 @@ fn binary_stl_that_calls_itself_solid() {
     let mut bytes = write_mesh(&octahedron(), MeshFormat::Stl).unwrap();
     bytes[..6].copy_from_slice(b"solid ");
     assert_eq!(describe(&parse_mesh(&bytes).unwrap()), (6, 8, 1, 0));
-}
-
-/// A GLB with the given JSON and binary chunk.
-fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
-    let mut out = b"glTF\x02\0\0\0".to_vec();
-    out.extend((28 + json.len() as u32 + binary.len() as u32).to_le_bytes());
-    out.extend((json.len() as u32).to_le_bytes());
-    out.extend(b"JSON");
-    out.extend(json.as_bytes());
-    out.extend((binary.len() as u32).to_le_bytes());
-    out.extend(b"BIN\0");
-    out.extend(binary);
-    out
 }
 
 /// A tetrahedron of bytes, its vertices four bytes apart, and a strip of four triangles over it.

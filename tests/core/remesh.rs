@@ -1,6 +1,7 @@
 //! Remeshing: triangles alike, the same topology and shape, and nothing crosses.
 
 use crate::common::shapes;
+use crate::common::shapes::HOSTILE_SCALES;
 use crate::common::{Named, Random, euler_of_parts, seeds, torus_around};
 use vesicle::math::{DVec3, Vec3, triangle};
 use vesicle::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure, report};
@@ -150,14 +151,7 @@ fn what_crosses_does_not_stop_it() {
 /// Flat, tiny, huge and nearly endless ones: the work ends, the invariants hold.
 #[test]
 fn hostile_meshes() {
-    for size in [
-        Vec3::new(1.0, 1.0, 0.0),
-        Vec3::new(1.0, 0.0, 0.0),
-        Vec3::ZERO,
-        Vec3::splat(1e-30),
-        Vec3::splat(1e30),
-        Vec3::new(100.0, 1e-3, 1e-3),
-    ] {
+    for size in HOSTILE_SCALES {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
         mesh.positions_mut().iter_mut().for_each(|p| *p *= size);
         let largest = size.max_element();

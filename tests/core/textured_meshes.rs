@@ -1,5 +1,6 @@
 //! Pictures on meshes, in files and through what is done to meshes; and meshes one after the other as an animation.
 
+use crate::common::files;
 use std::sync::Arc;
 use vesicle::io::{FormatError, MeshFormat, parse_mesh, parse_textured_mesh, write_animation, write_mesh};
 use vesicle::math::{DAffine3, DVec3, Vec2, Vec3};
@@ -145,16 +146,7 @@ fn glb(material: &str, image: &str) -> Vec<u8> {
         "textures":[{{"source":0}},{{"source":7}},{{}}],"buffers":[{{"byteLength":{}}}]}}"#,
         binary.len()
     );
-    let mut out = b"glTF\x02\0\0\0".to_vec();
-    for word in [28 + json.len() + binary.len(), json.len()] {
-        out.extend((word as u32).to_le_bytes());
-    }
-    out.extend(b"JSON");
-    out.extend(json.as_bytes());
-    out.extend((binary.len() as u32).to_le_bytes());
-    out.extend(b"BIN\0");
-    out.extend(binary);
-    out
+    files::glb(&json, &binary)
 }
 
 const IN_VIEW: &str = r#"{"bufferView":3}"#;

@@ -296,6 +296,22 @@ fn wrong_nrrd_fields_are_named() {
 }
 
 #[test]
+fn what_a_file_says_at_length_is_told_in_short() {
+    let long = "é".repeat(5000);
+    let files = [
+        nrrd_with(&format!("space: {long}")),
+        nrrd_with(&format!("encoding: {long}")),
+        nrrd_with(&format!("{long}: 1")),
+        meta_with(&format!("ElementType = {long}")),
+        meta_with(&format!("BinaryData = {long}")),
+    ];
+    for file in files {
+        let message = parse_volume(&file, None).unwrap_err().to_string();
+        assert!(message.contains("éé") && message.chars().count() < 600, "{message}");
+    }
+}
+
+#[test]
 fn nrrd_skips_hex_and_lists() {
     let skipped = [&nrrd_with("byte skip: 3")[..], &[8, 9, 10]].concat();
     assert_eq!(read(&skipped).range(), [3.0, 10.0]);

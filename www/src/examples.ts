@@ -23,7 +23,7 @@ const HEAD_CREDIT =
 const BONE = { iso: 95, isoForce: -1, rigidity: 0.1 };
 
 /** The first is shown when the page opens. */
-export const EXAMPLES: Example[] = [
+export const EXAMPLES: [Example, ...Example[]] = [
   {
     id: 'head-bone',
     name: 'Head, CT: bone',

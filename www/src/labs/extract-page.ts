@@ -5,8 +5,7 @@ import { figure } from '../ui/format';
 
 /** The parts the page is put together from. */
 export interface Parts {
-  chooser: HTMLElement;
-  data: DataPanel;
+  data: HTMLElement;
   figure: HTMLElement;
   histogram: HTMLElement;
   start: HTMLElement;
@@ -14,6 +13,7 @@ export interface Parts {
   pyramid: HTMLElement;
   attractors: HTMLElement;
   transport: HTMLElement;
+  cancel: HTMLElement;
   options: HTMLElement;
   legend: HTMLElement;
   banner: HTMLElement;
@@ -40,11 +40,18 @@ export function layOut(root: HTMLElement, parts: Parts): void {
   const params = folded('Parameters', parts.params);
   params.open = matchMedia('(min-width: 700px)').matches;
   root.replaceChildren(
-    h('div', { class: 'stage' }, view, parts.transport, parts.status, parts.slices),
+    h(
+      'div',
+      { class: 'stage' },
+      view,
+      parts.transport,
+      h('div', { class: 'saying' }, parts.status, parts.cancel),
+      parts.slices,
+    ),
     h(
       'div',
       { class: 'column setup' },
-      section('Data', parts.data.element, parts.figure),
+      section('Data', parts.data, parts.figure),
       section('Intensities', parts.histogram),
       section('Start', parts.start),
       section('Pyramid', parts.pyramid),

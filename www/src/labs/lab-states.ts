@@ -77,13 +77,23 @@ export class LabStates {
   }
 
   /** Loading is over, and nothing runs yet. */
-  stand(text: string): void {
+  stand(text: string, state: 'paused' | 'done' = 'paused'): void {
     if (this.#opening) return;
-    this.#state.value = 'paused';
+    this.#state.value = state;
     this.#status.say(text);
   }
 
-  /** What the model does now. While something is loading only a start counts; false where this does not. */
+  /** Loading came to nothing: what was there before is there again, in words too. */
+  back(describe: (state: LabState) => string): void {
+    if (this.#opening) return;
+    this.#state.value = this.#calm;
+    this.#status.say(describe(this.#calm));
+  }
+
+  /**
+   * What the model does now; false where this does not count: while something is loading only a start does, while
+   * something else is being opened nothing.
+   */
   enter(state: 'running' | 'paused' | 'done'): boolean {
     if (this.#opening || (this.value === 'loading' && state !== 'running')) {
       if (state !== 'running') this.#calm = state;
@@ -98,12 +108,13 @@ export class LabStates {
     if (this.#signal.aborted) return;
     const failure = toFailure(error);
     if (failure.code === 'internal') this.engineBroken = true;
+    // It is of what is to be replaced, or else whoever opens tells it.
+    if (this.#opening) return;
     const hint =
       failure.code === 'internal' && this.ready
         ? 'What you see is the last result; Reset starts the engine again. It said: '
         : '';
     this.#banner.show(title, hint + failure.message);
-    if (this.#opening) return;
     if (this.value === 'running' && !this.engineBroken) return;
     this.#status.say('');
     if (this.value === 'running') this.#calm = 'paused';

@@ -1,9 +1,9 @@
 import type { ReconstructClient } from '../reconstruct/client';
-import { showAddress } from './address';
+import { copyAddress, FILE_LACKS, showAddress } from './address';
 import type { LabStates } from './lab-states';
 import type { PassOn } from './labs';
 import { fits, linkOf, toHash } from './reconstruct-link';
-import type { Opening } from './reconstruct-opening';
+import type { ReconstructOpening } from './reconstruct-opening';
 import type { ReconstructParts } from './reconstruct-parts';
 import type { ModelSettings } from './reconstruct-settings';
 
@@ -16,14 +16,14 @@ export class Sharing {
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;
   readonly #settings: ModelSettings;
-  readonly #opening: Opening;
+  readonly #opening: ReconstructOpening;
 
   constructor(
     client: ReconstructClient,
     ui: ReconstructParts,
     states: LabStates,
     settings: ModelSettings,
-    opening: Opening,
+    opening: ReconstructOpening,
   ) {
     this.#client = client;
     this.#ui = ui;
@@ -52,16 +52,11 @@ export class Sharing {
 
   async copyLink(): Promise<void> {
     this.updateAddress();
-    const lacks = [
-      ...(this.#opening.source?.example ? [] : ['Your file is not in it: whoever opens it needs the file too.']),
-      ...(fits(this.#settings.edits) ? [] : ['So many points by hand are not in it.']),
-    ];
-    try {
-      await navigator.clipboard.writeText(location.href);
-      this.#ui.status.say(['Link copied.', ...lacks].join(' '));
-    } catch {
-      this.#ui.status.say(['The link is in the address bar.', ...lacks].join(' '));
-    }
+    const fit = fits(this.#settings.edits);
+    await copyAddress(this.#ui.status, [
+      !this.#opening.source?.example && FILE_LACKS,
+      !fit && 'So many points by hand are not in it.',
+    ]);
   }
 
   saveVolume(): void {

@@ -11,7 +11,7 @@ import type { CloudViewOptions } from '../view/reconstruction';
 import { LabStates } from './lab-states';
 import type { Lab, PassOn } from './labs';
 import { photoFor } from './reconstruct-link';
-import { type OpenedCloud, Opening } from './reconstruct-opening';
+import { type CloudOrigin, type OpenedCloud, ReconstructOpening } from './reconstruct-opening';
 import { type PartEvents, ReconstructParts } from './reconstruct-parts';
 import { Results } from './reconstruct-results';
 import { Running } from './reconstruct-running';
@@ -32,7 +32,7 @@ export class ReconstructLab implements Lab {
   readonly #running: Running;
   readonly #results: Results;
   readonly #settings: ModelSettings;
-  readonly #opening: Opening;
+  readonly #opening: ReconstructOpening;
   readonly #sharing: Sharing;
   #shade: PointShade | undefined;
 
@@ -51,7 +51,9 @@ export class ReconstructLab implements Lab {
     this.#settings = new ModelSettings(client, ui, states, this.#results, this.#running, (params) =>
       this.#showParams(params),
     );
-    this.#opening = new Opening(client, ui, states, this.#settings, (opened) => this.#adopt(opened));
+    this.#opening = new ReconstructOpening(client, ui, states, this.#settings, (opened, origin) =>
+      this.#adopt(opened, origin),
+    );
     this.#sharing = new Sharing(client, ui, states, this.#settings, this.#opening);
     states.follow((state) => this.#showState(state));
     offerShortcuts(this.#shortcuts(), help, GUIDES.reconstruct, signal);
@@ -139,8 +141,8 @@ export class ReconstructLab implements Lab {
   }
 
   /** Shows points that have been opened, as their example or link wants it, and runs the model. */
-  async #adopt({ cloud, params, photographs, setup, source }: OpenedCloud): Promise<void> {
-    const { name, example, linked } = source;
+  async #adopt(opened: OpenedCloud, { name, example, linked }: CloudOrigin): Promise<void> {
+    const { cloud, params, photographs, setup } = opened;
     const pictured = photographs.some(({ picture }) => picture);
     this.#states.ready = true;
     this.#results.clear();

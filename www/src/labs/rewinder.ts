@@ -1,23 +1,11 @@
-import type { Attractor, ParamValues, SavedRun } from '../protocol';
-import type { HistoryMark } from '../ui/history';
-import type { StartChoice } from '../ui/start';
 import { UndoStack } from './undo';
 
 const LIMITS = { entries: 60, bytes: 96e6 };
 /** Milliseconds within which changes of the same thing are one, as when a slider is dragged. */
 const TOGETHER = 1500;
 
-/** What the page holds beside the model. */
-export interface PageState {
-  choice: StartChoice;
-  params: ParamValues;
-  attractors: Attractor[];
-  /** What had happened, up to whatever iteration the model was saved at. */
-  mark: (iteration: number) => HistoryMark;
-}
-
 /** A moment one can go back to. */
-export interface Moment<Page = PageState, Saved = SavedRun> {
+export interface Moment<Page, Saved> {
   saved: Saved;
   page: Page;
 }
@@ -30,7 +18,7 @@ export interface SavingWorker<Saved> {
 }
 
 /** Undo and redo of everything that changes the model: the worker's saved states, kept by the page. */
-export class Rewinder<Page = PageState, Saved extends { state: Uint8Array } = SavedRun> {
+export class Rewinder<Page, Saved extends { state: Uint8Array }> {
   readonly #client: SavingWorker<Saved>;
   readonly #page: () => Page;
   readonly #onChange: (undoable: string | undefined, redoable: string | undefined) => void;
@@ -38,6 +26,7 @@ export class Rewinder<Page = PageState, Saved extends { state: Uint8Array } = Sa
   /** Resolves when all that was to be remembered is. */
   #ready: Promise<void> = Promise.resolve();
   #last = { together: '', at: 0 };
+  #newest: Moment<Page, Saved> | undefined;
   /** Counts volumes: what is still on its way from the one before is not taken. */
   #volume = 0;
 
@@ -51,9 +40,9 @@ export class Rewinder<Page = PageState, Saved extends { state: Uint8Array } = Sa
     this.#onChange = onChange;
   }
 
-  /** The newest moment that was kept. */
-  get last(): Moment<Page, Saved> | undefined {
-    return this.#stack.last;
+  /** The newest moment that was kept, also where nothing was done after it: for when the engine fails. */
+  get newest(): Moment<Page, Saved> | undefined {
+    return this.#newest;
   }
 
   /** Another volume: no state of the one before fits it. */
@@ -61,7 +50,22 @@ export class Rewinder<Page = PageState, Saved extends { state: Uint8Array } = Sa
     this.#volume += 1;
     this.#last = { together: '', at: 0 };
     this.#stack.clear();
+    this.#newest = undefined;
     this.#tell();
+  }
+
+  /** Keeps the state as it is, for {@link newest} alone. Where the engine broke there is nothing to keep. */
+  async keep(): Promise<Moment<Page, Saved> | undefined> {
+    const page = this.#page();
+    const volume = this.#volume;
+    try {
+      const moment = { saved: await this.#client.request('save', undefined), page };
+      if (volume === this.#volume) this.#newest = moment;
+      return moment;
+    } catch {
+      // Whoever asks it next tells.
+      return undefined;
+    }
   }
 
   /**
@@ -74,18 +78,15 @@ export class Rewinder<Page = PageState, Saved extends { state: Uint8Array } = Sa
     const isOne = together !== '' && together === this.#last.together && now - this.#last.at < TOGETHER;
     this.#last = { together, at: now };
     if (isOne) return () => undefined;
-    const page = this.#page();
     const volume = this.#volume;
-    const saving = this.#client.request('save', undefined);
+    const keeping = this.keep();
     const kept = this.#ready
-      .then(() => saving)
-      .then((saved) => {
-        const checkpoint = { label, bytes: saved.state.byteLength, state: { saved, page } };
-        if (volume === this.#volume) this.#stack.push(checkpoint);
+      .then(() => keeping)
+      .then((state) => {
+        const checkpoint = state && { label, bytes: state.saved.state.byteLength, state };
+        if (checkpoint && volume === this.#volume) this.#stack.push(checkpoint);
         return checkpoint;
-      })
-      // Where the engine broke there is nothing to keep; whoever asked it next tells.
-      .catch(() => undefined);
+      });
     this.#ready = kept.then(() => this.#tell());
     return () => {
       this.#last.together = '';
@@ -105,7 +106,10 @@ export class Rewinder<Page = PageState, Saved extends { state: Uint8Array } = Sa
     const page = this.#page();
     const saved = await this.#client.request('save', undefined);
     const moment = this.#stack[way]({ bytes: saved.state.byteLength, state: { saved, page } });
-    if (moment) await this.#client.request('restore', moment.saved);
+    if (moment) {
+      await this.#client.request('restore', moment.saved);
+      this.#newest = moment;
+    }
     this.#tell();
     return moment;
   }

@@ -10,12 +10,12 @@ import { wantsStillness } from '../ui/dom';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { SculptViewOptions } from '../view/sculpture';
-import { showAddress } from './address';
+import { copyAddress, FILE_LACKS, showAddress } from './address';
 import { LabStates } from './lab-states';
 import type { Lab, PassedOn } from './labs';
 import { Filming } from './sculpt-filming';
 import { filmOf, linkOf, toHash } from './sculpt-link';
-import { Opening, type Source } from './sculpt-opening';
+import { SculptOpening, type SculptSource } from './sculpt-opening';
 import { type PartEvents, SculptParts } from './sculpt-parts';
 import { Posing } from './sculpt-posing';
 import { Results } from './sculpt-results';
@@ -37,7 +37,7 @@ export class SculptLab implements Lab {
   readonly #settings: ModelSettings;
   readonly #posing: Posing;
   readonly #filming: Filming;
-  readonly #opening: Opening;
+  readonly #opening: SculptOpening;
   /** The parameters as the scene was opened, with what the model chose. */
   #usual: ParamValues = {};
   #shown: Shown = { layout: 'result', shade: undefined, textured: false };
@@ -55,7 +55,7 @@ export class SculptLab implements Lab {
     this.#settings = new ModelSettings(client, ui, states, history, () => this.#showSettings());
     this.#posing = new Posing(ui, this.#settings);
     this.#filming = new Filming(client, ui, states, this.#settings);
-    this.#opening = new Opening(client, ui, states, (opened, source) => this.#adopt(opened, source));
+    this.#opening = new SculptOpening(client, ui, states, (opened, source) => this.#adopt(opened, source));
     states.follow((state) => this.#showState(state));
     offerShortcuts(this.#shortcuts(), help, GUIDES.sculpt, signal);
   }
@@ -147,7 +147,7 @@ export class SculptLab implements Lab {
   }
 
   /** Shows a scene that has been opened, as its example or link wants it, and plays it. */
-  async #adopt(opened: Opened, { name, example, linked }: Source): Promise<void> {
+  async #adopt(opened: Opened, { name, example, linked }: SculptSource): Promise<void> {
     this.#states.ready = true;
     this.#usual = { ...opened.params };
     for (const [name, value] of Object.entries(linked?.params ?? {}))
@@ -275,13 +275,7 @@ export class SculptLab implements Lab {
 
   async #copyLink(): Promise<void> {
     this.#updateAddress();
-    const lacks = this.#opening.source?.example ? '' : ' Your file is not in it: whoever opens it needs the file too.';
-    try {
-      await navigator.clipboard.writeText(location.href);
-      this.#ui.status.say(`Link copied.${lacks}`);
-    } catch {
-      this.#ui.status.say(`The link is in the address bar.${lacks}`);
-    }
+    await copyAddress(this.#ui.status, [!this.#opening.source?.example && FILE_LACKS]);
   }
 
   #onEvent(event: WorkerEvent): void {

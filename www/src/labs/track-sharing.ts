@@ -1,12 +1,12 @@
 /** Gives on what the Track lab has: as an address, as files, and to the Sculpt lab. */
 import { zipSync } from 'three/addons/libs/fflate.module.js';
 import type { TrackClient } from '../track/client';
-import { showAddress } from './address';
+import { copyAddress, FILE_LACKS, showAddress } from './address';
 import type { LabStates } from './lab-states';
 import type { PassOn } from './labs';
 import { linkOf, toHash } from './track-link';
 import { framesCsv } from './track-measures';
-import type { Opening } from './track-opening';
+import type { TrackOpening } from './track-opening';
 import type { TrackParts } from './track-parts';
 import type { TrackResults } from './track-results';
 import type { TrackSettings } from './track-settings';
@@ -17,7 +17,7 @@ export class TrackSharing {
   readonly #states: LabStates;
   readonly #results: TrackResults;
   readonly #settings: TrackSettings;
-  readonly #opening: Opening;
+  readonly #opening: TrackOpening;
 
   constructor(
     client: TrackClient,
@@ -25,7 +25,7 @@ export class TrackSharing {
     states: LabStates,
     results: TrackResults,
     settings: TrackSettings,
-    opening: Opening,
+    opening: TrackOpening,
   ) {
     this.#client = client;
     this.#ui = ui;
@@ -46,13 +46,7 @@ export class TrackSharing {
 
   async copyLink(): Promise<void> {
     this.updateAddress();
-    const lacks = this.#opening.source?.example ? '' : ' Your file is not in it: whoever opens it needs the file too.';
-    try {
-      await navigator.clipboard.writeText(location.href);
-      this.#ui.status.say(`Link copied.${lacks}`);
-    } catch {
-      this.#ui.status.say(`The link is in the address bar.${lacks}`);
-    }
+    await copyAddress(this.#ui.status, [!this.#opening.source?.example && FILE_LACKS]);
   }
 
   save(what: 'frames' | 'animation' | 'table'): void {

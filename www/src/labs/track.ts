@@ -5,7 +5,7 @@ import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
 import { TrackClient } from '../track/client';
 import { FILMS } from '../track/examples';
 import { isTrackPreset, type TrackPreset, type TrackVariant, variantInForce, viewOf } from '../track/presets';
-import type { Opened, Setup, StepEvent, VolumeView, WorkerEvent } from '../track/protocol';
+import type { StepEvent, VolumeView, WorkerEvent } from '../track/protocol';
 import { wantsStillness } from '../ui/dom';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
@@ -14,7 +14,7 @@ import { invert, sliceFrames } from '../view/anatomy';
 import { LabStates } from './lab-states';
 import type { Lab, PassedOn, PassOn } from './labs';
 import { compareWith } from './track-comparing';
-import { Opening, type Source } from './track-opening';
+import { type Opened, TrackOpening, type TrackSource } from './track-opening';
 import { type PartEvents, TrackParts } from './track-parts';
 import { TrackResults } from './track-results';
 import { TrackSettings } from './track-settings';
@@ -32,7 +32,7 @@ export class TrackLab implements Lab {
   readonly #states: LabStates;
   readonly #results: TrackResults;
   readonly #settings: TrackSettings;
-  readonly #opening: Opening;
+  readonly #opening: TrackOpening;
   readonly #sharing: TrackSharing;
   readonly #passOn: PassOn;
   #volume: VolumeView | undefined;
@@ -60,9 +60,7 @@ export class TrackLab implements Lab {
       () => this.#showSettings(),
       (volume) => this.#takeVolume(volume, true),
     );
-    this.#opening = new Opening(this.#client, ui, states, (opened, setup, source) =>
-      this.#adopt(opened, setup, source),
-    );
+    this.#opening = new TrackOpening(this.#client, ui, states, (opened, source) => this.#adopt(opened, source));
     this.#sharing = new TrackSharing(this.#client, ui, states, this.#results, this.#settings, this.#opening);
     states.follow((state) => this.#showState(state));
     offerShortcuts(this.#shortcuts(), help, GUIDES.track, signal);
@@ -146,7 +144,8 @@ export class TrackLab implements Lab {
   }
 
   /** Shows an image that has been opened, as its example or link wants it, and tracks. */
-  async #adopt(opened: Opened, setup: Setup, { name, example, linked }: Source): Promise<void> {
+  async #adopt(opened: Opened, { name, example, linked }: TrackSource): Promise<void> {
+    const { setup } = opened;
     this.#states.ready = true;
     this.#slices = opened.dims[2];
     this.#truth = opened.truth;

@@ -27,11 +27,6 @@ export class UndoStack<State> {
     return this.#past.at(-1)?.label;
   }
 
-  /** The newest state to go back to. */
-  get last(): State | undefined {
-    return this.#past.at(-1)?.state;
-  }
-
   get redoable(): string | undefined {
     return this.#future.at(-1)?.label;
   }

@@ -1,0 +1,145 @@
+import type { Client } from '../client';
+import { EXAMPLES, type Example, exampleUrl } from '../examples';
+import { exampleById, startOf } from '../presets';
+import type { Loaded, ParamValues, Setup, VolumeSource } from '../protocol';
+import { nameOf, readFiles } from '../ui/files';
+import { count } from '../ui/format';
+import type { StartChoice } from '../ui/start';
+import { fetchAhead, fetchBytes } from './downloads';
+import type { ExtractParts } from './extract-parts';
+import type { ExtractResults } from './extract-results';
+import type { ExtractSettings } from './extract-settings';
+import type { LabStates } from './lab-states';
+import type { PassedOn } from './labs';
+import { fromHash, type Linked, withLink } from './link';
+import { Opening, type Source } from './opening';
+
+export type ExtractSource = Source<Example, Linked, VolumeSource>;
+
+/** A volume that was opened, and the model of it that has not begun. */
+interface Opened extends Loaded {
+  choice: StartChoice;
+  setup: Setup;
+}
+
+/** Opens volumes. */
+export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opened> {
+  protected readonly first = EXAMPLES[0];
+  readonly #client: Client;
+  readonly #ui: ExtractParts;
+  readonly #settings: ExtractSettings;
+  readonly #results: ExtractResults;
+  /** Tells a new engine what the view wants to know of the surface. */
+  readonly #onRestart: () => Promise<unknown>;
+
+  constructor(
+    client: Client,
+    ui: ExtractParts,
+    states: LabStates,
+    settings: ExtractSettings,
+    results: ExtractResults,
+    onRestart: () => Promise<unknown>,
+  ) {
+    super(client, ui, states);
+    this.#client = client;
+    this.#ui = ui;
+    this.#settings = settings;
+    this.#results = results;
+    this.#onRestart = onRestart;
+  }
+
+  /** The volume that the address asks for comes while the engine starts. */
+  static fetchLinked(): void {
+    const linked = fromHash(location.hash);
+    const example = linked?.example ? exampleById(linked.example) : EXAMPLES[0];
+    if (example && !linked?.file && 'file' in example.source) fetchAhead(exampleUrl(example.source.file));
+  }
+
+  /** What another lab passes on. */
+  passedOn({ name, bytes, params }: PassedOn): Promise<void> {
+    const opened = async () => ({ files: [{ name, bytes: bytes.slice() }] });
+    return this.open({ name, opened, linked: { params, attractors: [] }, unit: '' });
+  }
+
+  protected find(id: string): Example | undefined {
+    return exampleById(id);
+  }
+
+  protected linkedBy(hash: string): Linked | undefined {
+    return fromHash(hash);
+  }
+
+  protected fromExample(example: Example): ExtractSource {
+    const { source } = example;
+    if ('shape' in source) return { name: source.shape, opened: async () => source, example };
+    const { file } = source;
+    const opened = async () => ({ files: [{ name: file, bytes: await fetchBytes(exampleUrl(file)) }] });
+    return { name: file, opened, example };
+  }
+
+  protected fromFiles(files: File[]): ExtractSource {
+    return { name: nameOf(files), opened: async () => ({ files: await readFiles(files) }) };
+  }
+
+  protected async load(source: ExtractSource, volume: VolumeSource, again: boolean): Promise<Opened> {
+    const choice = again ? this.#ui.start.inForce : this.#startFor(source);
+    const setup = again ? this.#settings.setup(choice) : this.#setupFor(source, choice);
+    const body = { name: source.name, source: volume, setup };
+    return { ...(await this.#client.request('load', body, transferable(volume))), choice, setup };
+  }
+
+  protected async adopt(opened: Opened, source: ExtractSource, again: boolean): Promise<void> {
+    if (again) return this.#takeUp(opened);
+    const { volume, choice, params, setup } = opened;
+    this.states.ready = true;
+    this.#ui.adopt(volume, source);
+    if (source.linked?.color) this.#ui.options.color = source.linked.color;
+    this.#settings.adopt(volume, choice, params, setup.attractors);
+    this.#settings.remember('Play');
+    await this.#client.request('play', undefined);
+  }
+
+  /** The volume and the settings are as they were: back to the last state that was kept. */
+  async #takeUp({ choice, params }: Opened): Promise<void> {
+    // The new engine does not know the slices yet.
+    this.#ui.stage.goTo(this.#ui.stage.crosshair);
+    const { newest } = this.#settings;
+    if (newest) {
+      await this.#client.request('restore', newest.saved);
+      this.#settings.adoptMoment(newest);
+    } else this.#settings.begin(choice, params);
+    const where = newest ? `from iteration ${count(newest.saved.iteration)}` : 'from the beginning';
+    this.#ui.status.say(`Started again ${where}.`);
+  }
+
+  protected override async keep(): Promise<void> {
+    await this.#settings.keep();
+  }
+
+  protected override async restarted(): Promise<void> {
+    this.#results.forgetBuffers();
+    await this.#onRestart();
+  }
+
+  /** What suits an example; for a file, the settings as they are, except the iso value, which no other volume shares. */
+  #setupFor({ example, linked }: ExtractSource, choice: StartChoice): Setup {
+    const { iso: _, ...params } = this.#settings.params;
+    const wanted: ParamValues = { ...(example?.params ?? params), ...linked?.params };
+    const setup = this.#settings.setup(choice, wanted, linked?.attractors ?? []);
+    if (linked?.sphere && choice.kind === 'sphere') setup.start = { kind: 'sphere', ...linked.sphere };
+    return setup;
+  }
+
+  /** What suits an example; for a file, the start as it is, except lengths and places of another volume's world. */
+  #startFor({ example, linked }: ExtractSource): StartChoice {
+    const choice = this.#ui.start.value;
+    const suits: StartChoice = example
+      ? { ...choice, ...startOf(example), levels: example.levels, edge: example.edge }
+      : { ...choice, kind: choice.kind === 'sphere' ? 'enclosing' : choice.kind, edge: undefined };
+    return linked ? withLink(suits, linked) : suits;
+  }
+}
+
+function transferable(source: VolumeSource): Transferable[] {
+  return 'files' in source ? source.files.map(({ bytes }) => bytes.buffer as ArrayBuffer) : [];
+}

@@ -1,0 +1,254 @@
+import { EXAMPLES, type Example } from '../examples';
+import { isPreset, PRESETS, type Preset, type Variant, variantOf } from '../presets';
+import type { Attractor, MeshFormat, ParamSpec, ParamValues, Plane, VolumeView } from '../protocol';
+import type { LabState } from '../state';
+import { AttractorControls } from '../ui/attractors';
+import { ComparePanel } from '../ui/compare';
+import { h } from '../ui/dom';
+import { EXTRACT_EXERCISES, exercises } from '../ui/exercises';
+import { ExportButtons } from '../ui/exports';
+import { FigurePanel } from '../ui/figure';
+import { acceptDrops, fileChooser } from '../ui/files';
+import { Histogram } from '../ui/histogram';
+import type { History } from '../ui/history';
+import { EventLog } from '../ui/log';
+import { MeasurePanel } from '../ui/measures';
+import { ParamControls } from '../ui/params';
+import { ENERGY_PLOTS, Plots } from '../ui/plots';
+import { PyramidPanel } from '../ui/pyramid';
+import { StartControls } from '../ui/start';
+import { ErrorBanner, StatusLine } from '../ui/status';
+import { TimeTable } from '../ui/times';
+import { Transport, type TransportEvents } from '../ui/transport';
+import { ViewOptionControls, type ViewOptions } from '../ui/view-options';
+import { Stage } from '../view/stage';
+import type { ExtractSource } from './extract-opening';
+import { DataPanel, folded, layOut } from './extract-page';
+import { Saving } from './saving';
+
+const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, color: 'plain', slices: 'walls' };
+
+export interface PartEvents extends TransportEvents {
+  onFiles: (files: File[]) => void;
+  onExample: (example: Example) => void;
+  onExampleId: (id: string) => void;
+  onVariant: (preset: Preset, variant: Variant) => void;
+  onStart: () => void;
+  onParam: (name: string, value: unknown) => void;
+  onAttractors: (attractors: Attractor[], what: string, tuning: boolean) => void;
+  onOptions: (options: ViewOptions) => void;
+  onPlanes: (planes: Plane[]) => void;
+  onCompare: () => void;
+  onCancelCompare: () => void;
+  onSculpt: () => void;
+  onCancel: () => void;
+  onDismiss: () => void;
+  onCopyLink: () => void;
+  onError: (title: string, error: unknown) => void;
+}
+
+/** All that the Extract lab shows, put in its place. It shows what it is told and tells what was asked for. */
+export class ExtractParts {
+  readonly #canvas = h('canvas', {
+    tabindex: 0,
+    role: 'application',
+    'aria-label':
+      '3D view of the surface and the slices. Arrow keys turn it, plus and minus zoom; while attractors are placed, Enter is a click in its middle.',
+  });
+  readonly #slices = h('div', { class: 'slices' });
+  readonly stage: Stage;
+  readonly status = new StatusLine();
+  readonly measures = new MeasurePanel();
+  readonly banner: ErrorBanner;
+  readonly data: DataPanel;
+  readonly histogram: Histogram;
+  readonly start: StartControls;
+  readonly pyramid: PyramidPanel;
+  readonly attractors: AttractorControls;
+  readonly options: ViewOptionControls;
+  readonly transport: Transport;
+  readonly compare: ComparePanel;
+  readonly saving: Saving;
+  readonly #root: HTMLElement;
+  readonly #history: History;
+  readonly #events: PartEvents;
+  readonly #figure: FigurePanel<Variant, Preset>;
+  readonly #exports: ExportButtons;
+  readonly #sculpt: HTMLButtonElement;
+  readonly #cancel: HTMLButtonElement;
+  readonly #csv: HTMLButtonElement;
+  readonly #plots: Plots;
+  readonly #times = new TimeTable();
+  readonly #log = new EventLog();
+  readonly #compareHolder: HTMLDetailsElement;
+  readonly #paramsHolder = h('div');
+  #params: ParamControls | undefined;
+
+  constructor(
+    root: HTMLElement,
+    history: History,
+    fetchMesh: (format: MeshFormat) => Promise<Uint8Array>,
+    signal: AbortSignal,
+    events: PartEvents,
+  ) {
+    this.#root = root;
+    this.#history = history;
+    this.#events = events;
+    this.stage = new Stage(this.#canvas, this.#slices, INITIAL_VIEW, events.onPlanes);
+    this.banner = new ErrorBanner(events.onDismiss);
+    this.data = new DataPanel(EXAMPLES, PRESETS, fileChooser(events.onFiles), events.onExample);
+    this.#figure = new FigurePanel<Variant, Preset>(events.onVariant);
+    this.histogram = new Histogram((iso) => events.onParam('iso', iso));
+    this.start = new StartControls(events.onStart);
+    this.pyramid = new PyramidPanel(
+      (level) => this.stage.thumbnail(level),
+      (level) => this.stage.showLevel(level),
+    );
+    this.stage.onMoved = () => this.pyramid.redraw();
+    this.attractors = new AttractorControls({
+      onChange: events.onAttractors,
+      onPlacing: (placing) => this.#setPlacing(placing),
+      onGoTo: (point) => this.stage.goTo(point),
+      crosshair: () => this.stage.crosshair,
+    });
+    this.options = new ViewOptionControls(INITIAL_VIEW, (options) => {
+      this.stage.setOptions(options);
+      events.onOptions(options);
+    });
+    this.transport = new Transport(events);
+    this.compare = new ComparePanel({ onStart: events.onCompare, onCancel: events.onCancelCompare });
+    this.#compareHolder = folded('Direct against coarse to fine', this.compare.element);
+    this.saving = new Saving(fetchMesh, (text) => this.status.say(text));
+    this.#exports = new ExportButtons((format, type) => {
+      this.saving.mesh(format, type).catch((error) => events.onError('The surface could not be saved.', error));
+    });
+    this.#sculpt = h(
+      'button',
+      { type: 'button', class: 'wide', 'data-action': 'sculpt', onclick: events.onSculpt },
+      'Open in Sculpt',
+    );
+    this.#cancel = h(
+      'button',
+      { type: 'button', hidden: true, 'data-action': 'cancel', onclick: events.onCancel },
+      'Cancel',
+    );
+    this.#plots = new Plots(history, ENERGY_PLOTS, true);
+    this.#csv = h(
+      'button',
+      { type: 'button', onclick: () => this.saving.plots(history), disabled: true },
+      'Plot data (CSV)',
+    );
+    this.#layOut(signal);
+  }
+
+  #layOut(signal: AbortSignal): void {
+    const drop = h('div', { class: 'drop', hidden: true }, 'Drop a volume to open it');
+    acceptDrops(drop, this.#events.onFiles, signal);
+    layOut(this.#root, {
+      data: this.data.element,
+      figure: this.#figure.element,
+      histogram: this.histogram.element,
+      start: this.start.element,
+      params: this.#paramsHolder,
+      transport: this.transport.element,
+      cancel: this.#cancel,
+      pyramid: this.pyramid.element,
+      attractors: this.attractors.element,
+      options: this.options.element,
+      legend: this.stage.legend.element,
+      banner: this.banner.element,
+      status: this.status.element,
+      canvas: this.#canvas,
+      slices: this.#slices,
+      drop,
+      measures: this.measures.element,
+      exports: this.#exports.element,
+      sculpt: this.#sculpt,
+      link: h(
+        'button',
+        { type: 'button', class: 'wide', onclick: this.#events.onCopyLink },
+        'Copy link to these settings',
+      ),
+      plots: this.#plots.element,
+      csv: this.#csv,
+      times: this.#times.element,
+      log: this.#log.element,
+      compare: this.#compareHolder,
+      exercises: exercises(EXTRACT_EXERCISES, this.#events.onExampleId),
+    });
+  }
+
+  makeParams(specs: ParamSpec[]): void {
+    if (this.#params) return;
+    this.#params = new ParamControls(specs, ['iso'], this.#events.onParam);
+    this.#paramsHolder.replaceWith(this.#params.element);
+  }
+
+  /** Another volume is open. */
+  adopt(volume: VolumeView, { example, unit = 'mm' }: ExtractSource): void {
+    this.saving.name = volume.name;
+    this.measures.unit = example?.unit ?? unit;
+    this.stage.unit = example?.unit ?? unit;
+    this.histogram.setVolume(volume);
+    this.data.show(volume, example);
+    this.stage.setVolume(volume);
+    this.compare.clear();
+    if (isPreset(example) && example.compares) this.#compareHolder.open = true;
+  }
+
+  labelOf(param: string): string {
+    return this.#params?.labelOf(param) ?? param;
+  }
+
+  showParams(params: ParamValues, example: Example | undefined): void {
+    this.#params?.show(params);
+    if (typeof params.iso === 'number') this.histogram.setIso(params.iso);
+    if (isPreset(example)) this.#figure.show(example, variantOf(example, params));
+    else this.#figure.show(undefined);
+  }
+
+  refuseParam(name: string, message: string): void {
+    if (name === 'iso') this.histogram.complain(message);
+    else this.#params?.complain(name, message);
+  }
+
+  /** Those that are in force, in the list and in the views. */
+  showAttractors(attractors: Attractor[]): void {
+    this.attractors.show(attractors);
+    this.stage.showAttractors(attractors);
+  }
+
+  showHistory(): void {
+    this.#plots.update();
+    this.#times.update(this.#history);
+    this.#csv.disabled = this.#history.reports.length === 0;
+    this.#log.update(this.#history);
+  }
+
+  /** Another past than the one that was shown. */
+  replaceHistory(): void {
+    this.#log.clear();
+    this.transport.showReport(this.#history.reports.at(-1));
+    this.showHistory();
+  }
+
+  showState(state: LabState, beneath: LabState, ready: boolean): void {
+    this.#root.dataset.state = state;
+    this.transport.showState(beneath, ready);
+    const idle = ready && state !== 'loading';
+    this.#exports.enabled = idle;
+    this.#sculpt.disabled = !idle;
+    this.compare.enabled = idle;
+    this.#cancel.hidden = state !== 'loading' || !ready;
+  }
+
+  dispose(): void {
+    this.stage.dispose();
+  }
+
+  #setPlacing(placing: boolean): void {
+    this.stage.onPlace = placing ? (point) => this.attractors.add(point) : undefined;
+    this.#root.toggleAttribute('data-placing', placing);
+    this.status.say(placing ? 'Click in a slice or on the surface to place attractors.' : '');
+  }
+}

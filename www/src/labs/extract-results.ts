@@ -1,0 +1,132 @@
+import type { Client } from '../client';
+import type { ProgressEvent, SectionsEvent, SnapshotEvent, StepReport, SurfaceBuffers, VolumeView } from '../protocol';
+import type { LabState } from '../state';
+import { count, plural } from '../ui/format';
+import { type History, type HistoryMark, underWay } from '../ui/history';
+import type { ExtractParts } from './extract-parts';
+import type { LabStates } from './lab-states';
+
+export type ResultEvent = SnapshotEvent | ProgressEvent | SectionsEvent;
+
+const VANISHED =
+  'It found nothing to hold it: try fewer pyramid levels (thin parts blur away on coarse ones), another iso value or start shape, or less rigidity.';
+
+/** What comes of a run, on the screen: surface, sections, measures and history as the worker tells them. */
+export class ExtractResults {
+  readonly #client: Client;
+  readonly #ui: ExtractParts;
+  readonly #states: LabStates;
+  readonly #history: History;
+  /** The level the model is on. */
+  #level = 0;
+  /** The newest, until it is shown. */
+  #snapshot: SnapshotEvent | undefined;
+  /** The surface on the screen, in the worker's buffers. */
+  #shown: SurfaceBuffers | undefined;
+  #framePending = 0;
+  /** Counts what was asked to be shown of the pyramid. */
+  #pyramids = 0;
+
+  constructor(client: Client, ui: ExtractParts, states: LabStates, history: History) {
+    this.#client = client;
+    this.#ui = ui;
+    this.#states = states;
+    this.#history = history;
+  }
+
+  take(event: ResultEvent): void {
+    if (event.event === 'snapshot') this.#takeSnapshot(event);
+    else if (event.event === 'progress') this.#takeReports(event.reports);
+    else this.#ui.stage.showSections(event.sections);
+  }
+
+  /** A model that was just built has no past. */
+  startOver(): void {
+    this.#history.clear();
+    this.#ui.replaceHistory();
+  }
+
+  /** Marks this run at an iteration, which may be told only later. */
+  marker(): (iteration: number) => HistoryMark {
+    return this.#history.marker();
+  }
+
+  rewind(mark: HistoryMark): void {
+    this.#history.rewind(mark);
+    this.#ui.replaceHistory();
+  }
+
+  /** Asks for the coarser copies the model works on, to show them. */
+  async showPyramid({ dims }: VolumeView, levels: number): Promise<void> {
+    const asked = ++this.#pyramids;
+    try {
+      const coarser = await this.#client.request('pyramid', { levels });
+      if (asked === this.#pyramids) this.#ui.pyramid.setLevels(dims, coarser, this.#level);
+    } catch (error) {
+      if (asked === this.#pyramids) this.#states.fail('The pyramid cannot be shown.', error);
+    }
+  }
+
+  /** The model runs or stands: says how far it has come, and why where nothing is left of it. */
+  showState(state: LabState): void {
+    this.#ui.status.say(this.describe(state));
+    if (this.#history.reports.at(-1)?.vertices === 0) this.#ui.banner.show('The surface has vanished.', VANISHED);
+  }
+
+  /** In words, for the status line. */
+  describe(state: LabState): string {
+    const last = this.#history.reports.at(-1);
+    if (!last) return state === 'running' ? 'Running.' : 'Ready to start.';
+    if (last.vertices === 0) return `The surface vanished at iteration ${count(last.iteration)}.`;
+    if (state === 'running') return 'Running.';
+    const where = `${count(last.vertices)} vertices in ${plural(last.components, 'component')}`;
+    if (state === 'done') return `Settled after ${count(last.iteration)} iterations: ${where}.`;
+    return `Paused at iteration ${count(last.iteration)}: ${where}.`;
+  }
+
+  /** Another engine has buffers of its own. */
+  forgetBuffers(): void {
+    this.#shown = undefined;
+  }
+
+  close(): void {
+    this.#pyramids += 1;
+    cancelAnimationFrame(this.#framePending);
+  }
+
+  /** Shows a snapshot at the next animation frame; only then the worker may send another. */
+  #takeSnapshot(event: SnapshotEvent): void {
+    this.#takeReports(event.reports);
+    if (this.#snapshot) this.#client.giveBack(this.#snapshot.surface);
+    this.#snapshot = event;
+    this.#level = event.level;
+    this.#ui.pyramid.setInUse(event.level);
+    this.#showMeasures(event);
+    this.#framePending ||= requestAnimationFrame(() => this.#showSnapshot());
+  }
+
+  #showSnapshot(): void {
+    this.#framePending = 0;
+    const snapshot = this.#snapshot;
+    if (!snapshot) return;
+    this.#snapshot = undefined;
+    this.#ui.stage.showSurface(snapshot.surface);
+    this.#ui.stage.showSections(snapshot.sections);
+    // The one before is not drawn any more.
+    if (this.#shown) this.#client.giveBack(this.#shown);
+    this.#shown = snapshot.surface;
+    this.#ui.showHistory();
+  }
+
+  #takeReports(reports: StepReport[]): void {
+    if (!this.#history.add(reports)) return;
+    this.#ui.transport.showReport(reports.at(-1));
+    if (this.#states.value === 'running') this.#ui.status.report(() => underWay(this.#history));
+  }
+
+  #showMeasures({ measures }: SnapshotEvent): void {
+    const last = this.#history.reports.at(-1);
+    if (measures) this.#ui.measures.showMeasures(measures);
+    else if (last) this.#ui.measures.showReport(last);
+  }
+}
