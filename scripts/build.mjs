@@ -14,8 +14,8 @@ import { at, must, say, script, startedAs, tool } from './shell.mjs';
 const WITH_VECTORS = { target: 'target', glue: 'target/glue', module: 'vesicle_bg.wasm', env: {} };
 const PLAIN = {
   ...{ target: 'target/plain', glue: 'target/plain-glue', module: 'vesicle_plain_bg.wasm' },
-  // In place of what .cargo/config.toml says of the target.
-  env: { RUSTFLAGS: '-Ctarget-feature=-simd128 -Cllvm-args=-inline-threshold=100' },
+  // After what .cargo/config.toml says of the target: the last word counts.
+  env: { CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS: '-Ctarget-feature=-simd128' },
 };
 
 const compiled = ({ target }) => at(target, 'wasm32-unknown-unknown/release/vesicle.wasm');

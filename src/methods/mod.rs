@@ -2,6 +2,7 @@
 
 pub mod deformable;
 mod error;
+mod given;
 pub mod implicit;
 pub mod multires;
 mod saved;

@@ -411,6 +411,12 @@ fn bad_input_is_named() {
     let not_closed = |error| matches!(error, MethodError::Mesh(MeshError::NotClosed { .. }));
     assert!(not_closed(refusal(MultiresOptions { detail: Some(open.clone()), ..good() })));
     assert!(not_closed(refusal(MultiresOptions { base: Some(open), ..good() })));
+    let mut speck = bumpy(0.2);
+    speck.positions.iter_mut().for_each(|p| *p *= 1e-42);
+    let detail = message(MultiresOptions { detail: Some(speck.clone()), ..good() });
+    assert!(detail.starts_with("detail: its edges are"), "{detail}");
+    let base = message(MultiresOptions { base: Some(speck), ..good() });
+    assert!(base.starts_with("base: its edges are"), "{base}");
     let mut crossing = bumpy(0.2);
     crossing.positions[0] *= -3.0;
     let error = refusal(MultiresOptions { base: Some(crossing), ..good() });

@@ -377,6 +377,10 @@ fn what_cannot_be_tracked_is_refused_by_name() {
     turned.triangles.iter_mut().for_each(|corners| corners.reverse());
     let (parameter, problem) = refused(TrackingOptions { start: Some(turned), ..good() });
     assert!(parameter == "start" && problem.contains("face inwards"), "{problem}");
+    let mut speck = crate::common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
+    speck.positions.iter_mut().for_each(|p| *p *= 1e-42);
+    let (parameter, problem) = refused(TrackingOptions { start: Some(speck), ..good() });
+    assert!(parameter == "start" && problem.contains("1e-12 and more"), "{problem}");
     // Two rings, one through the other.
     let middle = Vec3::splat(35.0);
     let mut crossing = crate::common::torus_around(middle, [24, 12], [3.0, 1.0]);

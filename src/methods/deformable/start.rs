@@ -3,8 +3,9 @@
 use super::domain::{Domain, rounded_axes};
 use super::image::LevelImage;
 use crate::math::{Bounds, DAffine3, DVec3, Vec3};
-use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure};
+use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings};
 use crate::methods::MethodError;
+use crate::methods::given::surface;
 use crate::remesh::{Resolver, Sampling};
 use crate::volume::marching_cubes;
 
@@ -257,15 +258,5 @@ fn given(frame: &Frame, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
         let problem = format!("vertex {far} at {} is not in or near the image", mesh.positions[far]);
         return Err(MethodError::invalid("start.mesh", problem));
     }
-    let surface = Mesh::from_triangles(&local)?;
-    let triangles = surface.to_triangles();
-    if measure(&triangles).volume <= 0.0 {
-        let problem = "the triangles face inwards; counter-clockwise seen from outside is needed";
-        return Err(MethodError::invalid("start.mesh", problem));
-    }
-    let pairs = count_crossings(&triangles);
-    if pairs > 0 {
-        return Err(MeshError::SelfIntersecting { pairs }.into());
-    }
-    Ok(surface)
+    surface("start.mesh", &local)
 }

@@ -8,6 +8,7 @@ use super::{MOST_VERTICES, MultiresParams};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::methods::MethodError;
+use crate::methods::given::check_edges;
 use crate::spatial::Terrain;
 use std::rc::Rc;
 
@@ -29,17 +30,17 @@ pub(super) fn set_up(
     };
     let bands = match (detail, base) {
         (detail, Some(base)) => {
-            let base = closed(base)?;
+            let base = closed("base", base)?;
             check_embedded(&base)?;
             let params = sized(measure(&base).area)?;
             let mut bands = vec![Band::of(base)?];
             if let Some(detail) = detail {
-                bands.push(Band::of(closed(detail)?)?);
+                bands.push(Band::of(closed("detail", detail)?)?);
             }
             (bands, params)
         }
         (Some(detail), None) => {
-            let detail = closed(detail)?;
+            let detail = closed("detail", detail)?;
             let params = sized(measure(&detail).area)?;
             (decomposition(detail, ellipsoids, &params)?, params)
         }
@@ -54,9 +55,12 @@ pub(super) fn set_up(
 }
 
 /// The mesh, with vertices of no triangle left out.
-fn closed(mesh: TriangleMesh) -> Result<TriangleMesh, MethodError> {
+fn closed(parameter: &'static str, mesh: TriangleMesh) -> Result<TriangleMesh, MethodError> {
     mesh.validate()?;
-    Ok(mesh.welded()).and_then(|mesh| Mesh::from_triangles(&mesh).map(|_| mesh).map_err(MethodError::from))
+    let mesh = mesh.welded();
+    Mesh::from_triangles(&mesh)?;
+    check_edges(parameter, &mesh)?;
+    Ok(mesh)
 }
 
 /// Tests that an ellipsoid reaches the base: else nothing would hold it.

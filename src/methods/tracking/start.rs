@@ -4,8 +4,9 @@ use super::first::bright_surface;
 use super::region::Region;
 use super::{Component, SurfaceTracker};
 use crate::math::{Vec3, triangle};
-use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure};
+use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::methods::MethodError;
+use crate::methods::given::surface;
 use crate::remesh::{EdgeBounds, remesh};
 
 /// Edges of the first frame's mesh, in the shortest side of a voxel.
@@ -16,23 +17,13 @@ const EDGE_SPREAD: f32 = 1.5;
 
 /// A mesh of the caller's, as it is.
 pub(super) fn checked(start: &TriangleMesh, region: &Region) -> Result<Mesh, MethodError> {
-    if start.triangles.is_empty() {
-        return Err(MethodError::invalid("start", "the mesh is empty; a closed surface is needed"));
-    }
-    let mesh = Mesh::from_triangles(start)?;
-    if measure(start).volume <= 0.0 {
-        let problem = "the triangles face inwards; counter-clockwise seen from outside is needed";
-        return Err(MethodError::invalid("start", problem));
-    }
+    let mesh = surface("start", start)?;
     if start.positions.iter().all(|&p| region.nearest_inside(region.place(p)).is_some()) {
         let problem =
             "no vertex of the mesh is in the box; a surface of the first frame, in the world, is needed";
         return Err(MethodError::invalid("start", problem));
     }
-    match count_crossings(start) {
-        0 => Ok(mesh),
-        pairs => Err(MeshError::SelfIntersecting { pairs }.into()),
-    }
+    Ok(mesh)
 }
 
 impl SurfaceTracker {

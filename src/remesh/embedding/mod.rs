@@ -35,6 +35,10 @@ const PIERCING: f32 = 0.763_763;
 /// with less, they look more often. Few vertices of an ordinary mesh have anything near.
 const SEARCH_ROOM: f32 = 0.04;
 
+/// Squares of lengths below this are rounded to few digits, or to 0: an edge counts as that long at least, a way as that
+/// far, and less room than that is none.
+const FINEST: f32 = 1e-17;
+
 /// Keeps one mesh embedded.
 ///
 /// A vertex that was looked at has some room: it is not looked at again before the vertices of its star have used it up.
@@ -77,6 +81,7 @@ impl Embedding {
     /// As [`Self::follow`]. `edge` is longer than most of its edges. It makes a difference to speed, and bounds what
     /// [`Self::company`] can be asked for; not to what is found to cross.
     pub fn follow_with(&mut self, mesh: &Mesh, edge: f32) {
+        let edge = if edge > FINEST { edge } else { FINEST };
         if self.edge != edge {
             self.edge = edge;
             self.version = None;

@@ -131,4 +131,30 @@ mod tests {
         }
         assert!(all_held > 1000, "{all_held} held back");
     }
+    /// Squares of small lengths are rounded to few digits or to 0, those of large ones are infinite.
+    #[test]
+    fn nothing_crosses_in_any_unit() {
+        for power in (-44..=36).step_by(2) {
+            let scale = libm::pow(10.0, f64::from(power)) as f32;
+            let mut random = Random::new(5);
+            let mut mesh = Mesh::icosahedron(Vec3::ZERO, scale);
+            mesh.append(&Mesh::icosahedron(Vec3::X * 2.5 * scale, scale)).unwrap();
+            let mut embedding = Embedding::default();
+            embedding.follow_with(&mesh, 1.2 * scale);
+            let mut held = 0;
+            for step in 0..40 {
+                let unit = |random: &mut Random| random.unit() as f32 - 0.5;
+                let mut ways = vec![Vec3::ZERO; mesh.slots()];
+                for v in mesh.vertices() {
+                    let together = Vec3::X * if v.index() < mesh.slots() / 2 { 0.1 } else { -0.1 };
+                    let way =
+                        together + Vec3::new(unit(&mut random), unit(&mut random), unit(&mut random)) * 0.2;
+                    ways[v.index()] = way * scale;
+                }
+                held += embedding.carry(&mut mesh, &mut ways).len();
+                assert_eq!(count_crossings(&mesh.to_triangles()), 0, "10^{power}, step {step}");
+            }
+            assert!(held > 0, "10^{power}");
+        }
+    }
 }

@@ -3,8 +3,8 @@
 //! Triangles at two vertices, with so much room that they do not cross as long as no vertex of both stars goes further, are
 //! looked at again when the longest ways in one of both stars add up to that.
 
-use super::Embedding;
 use super::star::higher;
+use super::{Embedding, FINEST};
 use crate::mesh::{Mesh, VertexId};
 
 /// What a vertex is looked at for: pairs of triangles that are both at the vertex, or one at a neighbour of it; pairs with
@@ -75,8 +75,9 @@ impl Embedding {
         let mut touched = std::mem::take(&mut self.touched);
         for &v in moving {
             // As it came out rounded, not as it was meant to be.
-            let way = mesh.position(v).distance(self.from[v.index()]);
-            if way > 0.0 {
+            let (from, to) = (self.from[v.index()], mesh.position(v));
+            if from != to {
+                let way = higher(FINEST, to.distance(from));
                 for &w in mesh.ring(v).as_slice().iter().chain([&v]) {
                     let gone = &mut self.gone[w.index()];
                     if *gone == 0.0 {

@@ -3,7 +3,8 @@
 //! A quick test settles what lies simply, and tells how far all vertices may move before it must be asked again. What it
 //! cannot settle is worked out exactly. The quick tests allow for rounding by a wide margin.
 
-use crate::math::{Bounds, Vec3};
+use super::FINEST;
+use crate::math::{Bounds, DVec3, Vec3};
 use crate::mesh::{Facet, Mesh, VertexId, facets_cross};
 use smallvec::SmallVec;
 
@@ -21,14 +22,24 @@ const SMALL: f32 = 0.125;
 const LEFT_BY_TURN: f32 = 0.94;
 const TURN: f32 = 1.0 / 6.0;
 
-/// The longest edge at `v`.
+/// The longest edge at `v`; not less than [`FINEST`].
 pub(super) fn longest_edge(mesh: &Mesh, v: VertexId) -> f32 {
     let p = mesh.position(v);
     let square = mesh.ring(v).as_slice().iter().fold(0.0f32, |longest, &w| {
         let square = p.distance_squared(mesh.position(w));
         if square > longest { square } else { longest }
     });
-    square.sqrt()
+    higher(FINEST, square.sqrt())
+}
+
+/// Its direction; 0 where it has no length. Where its square is beyond what single precision holds, in double.
+fn unit(way: Vec3) -> Vec3 {
+    let square = way.length_squared();
+    if (1e-30..1e30).contains(&square) {
+        way * (1.0 / square.sqrt())
+    } else {
+        way.as_dvec3().try_normalize().unwrap_or(DVec3::ZERO).as_vec3()
+    }
 }
 
 /// By how much all vertices may move and all triangles at `v` still show their front along a direction, and turn about it
@@ -59,13 +70,13 @@ fn shown_along(mesh: &Mesh, v: VertexId, direction: Vec3, longest: f32) -> f32 {
     }
     // With fewer than five no second turn is possible.
     let once = ring.len() < 5 || turns + u32::from(before) == 1;
-    if once { room } else { 0.0 }
+    if once && room > FINEST { room } else { 0.0 }
 }
 
 /// A star that can be seen as a whole from one side has no triangles that cross. Returns by how much every vertex may
 /// move and it still can; not positive where it cannot be seen so. `longest` is the longest edge at `v`.
 pub(super) fn flatness(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
-    shown_along(mesh, v, mesh.area_normal(v).normalize_or_zero(), longest)
+    shown_along(mesh, v, unit(mesh.area_normal(v)), longest)
 }
 
 /// The stars of two neighbours `u` and `v` that can both be seen from one side have no triangles that cross, if those of
@@ -87,7 +98,7 @@ pub(super) fn spread_out(
     longest: f32,
 ) -> f32 {
     let at = |w: VertexId| mesh.position(w);
-    let normal = (at(v) - at(u)).cross(at(left) - at(right)).normalize_or_zero();
+    let normal = unit((at(v) - at(u)).cross(at(left) - at(right)));
     let shown = lower(shown_along(mesh, u, normal, longest), shown_along(mesh, v, normal, longest));
     if shown <= 0.0 {
         return 0.0;
@@ -124,7 +135,7 @@ pub(super) fn divided_through(
     let per_length = divider * (1.0 / square);
     let way = mesh.position(v) - mesh.position(u);
     // Without length there is no plane, and no room: the distances are NaN or 0.
-    let normal = (way - divider * way.dot(per_length)).normalize_or_zero();
+    let normal = unit(way - divider * way.dot(per_length));
     let (mut gap, mut reach) = (f32::INFINITY, 1.0);
     let mut meet = |w: VertexId, side: f32| {
         let from_origin = mesh.position(w) - origin;
@@ -143,7 +154,7 @@ pub(super) fn divided_through(
 
 /// As [`divided_through`], with a plane across the way from `u` to `v` that goes through `p`, a neighbour of both.
 pub(super) fn divided_at(mesh: &Mesh, [u, v]: [VertexId; 2], p: VertexId, longest: f32) -> f32 {
-    let normal = (mesh.position(v) - mesh.position(u)).normalize_or_zero();
+    let normal = unit(mesh.position(v) - mesh.position(u));
     // The plane follows p and keeps its direction.
     0.5 * (gap(mesh, [u, v], [p, p], mesh.position(p), normal) - ROUNDING * longest)
 }
@@ -151,12 +162,12 @@ pub(super) fn divided_at(mesh: &Mesh, [u, v]: [VertexId; 2], p: VertexId, longes
 /// As [`divided_through`], with the plane in the middle between `u` and `v`.
 pub(super) fn divided_between(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) -> f32 {
     let (p, q) = (mesh.position(u), mesh.position(v));
-    gap(mesh, [u, v], [u, v], (p + q) * 0.5, (q - p).normalize_or_zero()) - ROUNDING * longest
+    gap(mesh, [u, v], [u, v], (p + q) * 0.5, unit(q - p)) - ROUNDING * longest
 }
 
 /// As [`divided_through`], with a plane between two sheets that face each other, or turn their backs on each other.
 pub(super) fn divided_as_sheets(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) -> f32 {
-    let normal = (mesh.area_normal(u) - mesh.area_normal(v)).normalize_or_zero();
+    let normal = unit(mesh.area_normal(u) - mesh.area_normal(v));
     let (p, q) = (mesh.position(u), mesh.position(v));
     let normal = if normal.dot(q - p) < 0.0 { -normal } else { normal };
     let height = |w: &VertexId| (mesh.position(*w) - p).dot(normal);
