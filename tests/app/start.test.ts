@@ -27,7 +27,8 @@ beforeAll(async () => {
   // A block of a file comes after its name.
   for (const [, name = '', kind, body = ''] of text.matchAll(/(?:`([\w./]+)`:\n\n)?```(\w+)\n([\s\S]*?)```/g)) {
     if (kind === 'sh') await type(body);
-    else await writeFile(join(folder, name), body);
+    else if (name) await writeFile(join(folder, name), body);
+    else await writeInWorker(body);
   }
   await writeFile(join(folder, 'public/volume.nii.gz'), await balls());
   await cp(join(folder, 'public/volume.nii.gz'), join(folder, 'plain/volume.nii.gz'));
@@ -57,12 +58,20 @@ async function clone(): Promise<void> {
 
 /** Does what is typed, but for servers, which are the tests, and for what would come from the registry. */
 async function type(block: string): Promise<void> {
-  const lines = block.split('\n').filter((line) => !/^npx vite|^npm install @/.test(line));
+  const lines = block.split('\n').filter((line) => !/^npx vite|^npm install @|^npm ci|^npm run build/.test(line));
   const env = { npm_config_offline: 'true', npm_config_audit: 'false', npm_config_fund: 'false' };
   const printed = await must('sh', ['-ec', `${lines.join('\n')}\necho "now in $PWD"`], { cwd: folder, env });
   folder = printed.match(/^now in (.*)$/m)?.[1] ?? '';
   const wanted = block.match(/^npm install (@.*)$/m)?.[1]?.split(' ') ?? [];
   for (const named of wanted) await link(named);
+}
+
+/** The page with what it says of a worker. */
+async function writeInWorker(rest: string): Promise<void> {
+  const [main, page] = await Promise.all(['main.js', 'index.html'].map((name) => readFile(join(folder, name), 'utf8')));
+  const [first] = (main ?? '').replace("from 'vesicle'", "from 'vesicle/worker'").split(/(?<=await init\(\);\n)/);
+  await writeFile(join(folder, 'in-worker.js'), `${first}${rest}`);
+  await writeFile(join(folder, 'in-worker.html'), (page ?? '').replace('main.js', 'in-worker.js'));
 }
 
 /** A package of the version that the page names, from those that are here. */
@@ -113,7 +122,11 @@ test('`npx vite`: in NiiVue, and what is clicked on', async () => {
     await page.goto(address);
     await found();
     await page.mouse.click(80, 170);
-    await expect.poll(() => page.locator('#place').textContent()).toMatch(/= \d+/);
+    await expect
+      .poll(() => page.locator('#place').textContent())
+      .toMatch(/^Intensity \d+ at x = -?\d+, y = -?\d+, z = -?\d+ mm$/);
+    await page.goto(`${address}in-worker.html`);
+    await found();
     await page.goto(`${address}three.html`);
     await expect.poll(warmPixels).toBeGreaterThan(1000);
   } finally {
