@@ -101,7 +101,7 @@ export class SurfaceTracker implements Stepper {
    * A tracker before its first step.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: a volume of one frame, of too few voxels,
-   *   without contrast or with slanted axes, a box outside of it, a start that is empty, inside out or outside the box; `not-closed`, `self-intersecting` for a start
+   *   without contrast or with slanted axes, a box outside of it, a start that is empty, inside out, outside the box or much finer than its voxels; `not-closed`, `self-intersecting` for a start
    *   that is.
    */
   constructor(given: TrackingOptions) {

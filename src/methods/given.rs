@@ -3,7 +3,7 @@
 use super::MethodError;
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure};
 
-/// Squares of edges that are shorter than this in the mean are rounded to few digits in single precision, or to 0.
+/// With shorter edges in the mean, what is reckoned of areas is rounded to few digits in single precision, or to 0.
 const SHORTEST: f64 = 1e-12;
 
 /// The mesh as a surface to begin with: closed, its front outside, and not crossing itself.

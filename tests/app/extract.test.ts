@@ -214,6 +214,7 @@ describe('Cancel', () => {
     await app.page.selectOption('.data select', 'head-full');
     await expect.poll(() => app.page.textContent('.status')).toBe('Cancelled.');
     expect(await app.page.textContent('.facts')).toContain('linked rings');
+    expect(await app.page.inputValue('.data select')).toBe('linked-rings');
     expect(await app.page.locator('.banner').isVisible()).toBe(false);
     await reach(app.page, 'done');
     await expect.poll(() => measures(app.page)).toEqual(before);
@@ -225,5 +226,59 @@ describe('Cancel', () => {
     await expect.poll(() => app.page.textContent('.status')).toBe('Cancelled.');
     expect(await app.page.inputValue('.start select')).toBe('enclosing');
     await expect.poll(() => app.page.getAttribute('.lab', 'data-state')).toMatch(/paused|done/);
+  });
+});
+
+describe('what cannot be opened', () => {
+  const state = () => app.page.getAttribute('.lab', 'data-state');
+
+  /** Opens a file the moment that the worker has begun with another volume. */
+  const openNotesDuringLoad = () =>
+    app.page.evaluate(() => {
+      const { postMessage } = Worker.prototype;
+      Worker.prototype.postMessage = function (this: Worker, ...sent: unknown[]) {
+        Reflect.apply(postMessage, this, sent);
+        if ((sent[0] as { kind?: string }).kind !== 'load') return;
+        Worker.prototype.postMessage = postMessage;
+        const chosen = new DataTransfer();
+        chosen.items.add(new File(['not a volume at all'], 'notes.txt'));
+        const input = document.querySelector<HTMLInputElement>('input[type=file]');
+        if (input) input.files = chosen.files;
+        input?.dispatchEvent(new Event('change'));
+      };
+    });
+
+  test('leaves what was there, also where it came while another volume was opened', async () => {
+    await app.page.selectOption('.data select', 'tooth');
+    await app.page.selectOption('.data select', 'linked-rings');
+    await reach(app.page, 'done');
+    const before = await measures(app.page);
+    expect(before.components).toBe(2);
+    await openNotesDuringLoad();
+    await app.page.selectOption('.data select', 'head-full');
+    await expect.poll(state).toBe('error');
+    expect(await app.page.textContent('.banner')).toContain('notes.txt could not be opened');
+    expect(await app.page.inputValue('.data select')).toBe('linked-rings');
+    await app.page.click('button:has-text("Reset")');
+    await expect.poll(state).toMatch(/paused|done/);
+    await app.page.keyboard.press('Escape');
+    if ((await state()) === 'paused') await app.page.click('text=Play');
+    await reach(app.page, 'done');
+    await expect.poll(() => measures(app.page)).toEqual(before);
+  });
+
+  test('leaves a model that runs running', async () => {
+    await app.page.evaluate(() => {
+      const { fetch } = window;
+      window.fetch = (input, init) => (`${input}`.includes('ovule') ? Promise.reject(new Error()) : fetch(input, init));
+    });
+    await app.page.selectOption('.data select', 'head-bone');
+    await reach(app.page, 'running');
+    await app.page.selectOption('.data select', 'ovule');
+    await expect.poll(() => app.page.textContent('.banner')).toContain('ovule.nrrd could not be opened');
+    expect(await state()).toMatch(/running|done/);
+    await app.page.click('.banner button');
+    await reach(app.page, 'done');
+    expect(await app.page.textContent('.facts')).toContain('visible-human-head');
   });
 });

@@ -267,8 +267,9 @@ describe('undo', () => {
     await openAt('#extract?example=figure-7');
     const before = await measures(app.page);
     const captions = () => app.page.locator('figcaption').allTextContents();
-    // They follow at the next frame, which a busy machine draws late.
-    await expect.poll(async () => (await captions())[0]).toContain(`After ${CHAIN} iterations`);
+    // They follow at the next frames, one after the other, which a busy machine draws late.
+    const ends = [`After ${CHAIN} iterations`, `now ${before.vertices};`, `now ${before.chi};`];
+    await expect.poll(captions).toEqual(ends.map((end) => expect.stringContaining(end)));
     const told = await captions();
     await app.page.click('text=Reset');
     await reach(app.page, 'paused');

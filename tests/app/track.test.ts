@@ -91,7 +91,9 @@ describe('the computed ventricle', () => {
   });
 
   test('tells in words what the curve shows, beside the truth', async () => {
-    expect(await text('[data-beat]')).toMatch(/^End-diastole \(ED\) in frame \d+: [\d.]+ ml; end-systole .* In truth /);
+    // It is written when the curve is drawn, in the next frame of the screen.
+    const words = /^End-diastole \(ED\) in frame \d+: [\d.]+ ml; end-systole .* In truth /;
+    await expect.poll(() => text('[data-beat]')).toMatch(words);
     expect(await text('.status')).toMatch(/^Done: all 12 frames have their surface\. Ejection fraction [\d.]+ %\.$/);
     expect(await app.page.locator('.results table').first().locator('tbody tr').count()).toBe(12);
   });

@@ -381,6 +381,10 @@ fn what_cannot_be_tracked_is_refused_by_name() {
     speck.positions.iter_mut().for_each(|p| *p *= 1e-42);
     let (parameter, problem) = refused(TrackingOptions { start: Some(speck), ..good() });
     assert!(parameter == "start" && problem.contains("1e-12 and more"), "{problem}");
+    let mut fine = crate::common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
+    fine.positions.iter_mut().for_each(|p| *p *= 1e-6);
+    let (parameter, problem) = refused(TrackingOptions { start: Some(fine), ..good() });
+    assert!(parameter == "start" && problem.contains("a tenth of a voxel"), "{problem}");
     // Two rings, one through the other.
     let middle = Vec3::splat(35.0);
     let mut crossing = crate::common::torus_around(middle, [24, 12], [3.0, 1.0]);

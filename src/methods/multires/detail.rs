@@ -145,10 +145,20 @@ pub(super) fn detailed(
     guard: &mut Embedding,
     fineness: Fineness,
 ) -> Detailed {
-    let mut samples = Samples::new(surface, link, bands);
+    let mut fine = Samples::new(surface, link, bands);
     for _ in 0..fineness.rounds {
-        samples.refine(bands, fineness.longest);
+        fine.refine(bands, fineness.longest);
     }
+    let shown = carried(fine, bands, guard);
+    if fineness.rounds > 0 && guard.left_crossing(&shown.mesh) {
+        // A part of the skin is as small as rounding: there, the middles of edges cross what is beside them.
+        return carried(Samples::new(surface, link, bands), bands, guard);
+    }
+    shown
+}
+
+/// The samples with their detail.
+fn carried(samples: Samples, bands: &Bands, guard: &mut Embedding) -> Detailed {
     let Samples { mut mesh, normals, offsets, .. } = samples;
     let mut held = 0;
     for k in 0..bands.leaps.len() {

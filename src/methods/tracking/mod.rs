@@ -128,8 +128,8 @@ impl SurfaceTracker {
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`]: parameters, a volume of one frame, or without contrast, or with axes that are not
-    /// at right angles, a box outside of it; an empty start or one inside out; [`MethodError::Mesh`] for a start
-    /// that is not a closed surface, or crosses itself.
+    /// at right angles, a box outside of it; a start that is empty, inside out, or with edges shorter than a tenth of a voxel;
+    /// [`MethodError::Mesh`] for a start that is not a closed surface, or crosses itself.
     pub fn new(options: TrackingOptions) -> Result<Self, MethodError> {
         let TrackingOptions { volume, bounds, component, start, params } = options;
         params.validate()?;

@@ -15,9 +15,20 @@ const EDGE: f64 = 1.2;
 /// Their bounds, in that length.
 const EDGE_SPREAD: f32 = 1.5;
 
+/// The mean edge of a mesh of the caller's, in that length, at least: edges stay as long as they are, and with shorter ones
+/// a surface as large as the image has more triangles than there is memory for.
+const FINEST: f64 = 0.1;
+
 /// A mesh of the caller's, as it is.
 pub(super) fn checked(start: &TriangleMesh, region: &Region) -> Result<Mesh, MethodError> {
     let mesh = surface("start", start)?;
+    let (edge, least) = (measure(start).edge_mean, FINEST * region.spacing.min_element());
+    if edge < least {
+        let problem = format!(
+            "its edges are {edge:.1e} long in the mean; a tenth of a voxel, {least:.1e}, or more is accepted"
+        );
+        return Err(MethodError::invalid("start", problem));
+    }
     if start.positions.iter().all(|&p| region.nearest_inside(region.place(p)).is_some()) {
         let problem =
             "no vertex of the mesh is in the box; a surface of the first frame, in the world, is needed";

@@ -23,7 +23,7 @@ use crate::mesh::{EditError, Mesh, VertexId};
 use crate::spatial::StarGrid;
 use room::{Concerns, Room};
 use smallvec::SmallVec;
-use star::longest_edge;
+use star::{higher, longest_edge};
 
 /// 1/√3, rounded up: the distance of a point of a triangle from its nearest corner, in the triangle's longest edge.
 const NEAREST_CORNER: f32 = 0.577_351;
@@ -74,6 +74,8 @@ pub struct Embedding {
     found: Vec<VertexId>,
     /// Where vertices were before they moved.
     from: Vec<Vec3>,
+    /// Since all of the mesh was looked at, something crossed at a vertex that did not move, or not any more.
+    stuck: bool,
     effort: u64,
 }
 
@@ -81,7 +83,7 @@ impl Embedding {
     /// As [`Self::follow`]. `edge` is longer than most of its edges. It makes a difference to speed, and bounds what
     /// [`Self::company`] can be asked for; not to what is found to cross.
     pub fn follow_with(&mut self, mesh: &Mesh, edge: f32) {
-        let edge = if edge > FINEST { edge } else { FINEST };
+        let edge = higher(FINEST, edge);
         if self.edge != edge {
             self.edge = edge;
             self.version = None;
@@ -101,6 +103,7 @@ impl Embedding {
             return;
         }
         self.grid = StarGrid::new(self.edge, SEARCH_ROOM * self.edge, mesh.slots());
+        self.stuck = false;
         self.room.clear();
         self.near.clear();
         self.close.clear();

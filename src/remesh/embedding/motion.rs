@@ -10,6 +10,11 @@ use std::collections::BTreeMap;
 const LEAST_SHARE: f32 = 0.125;
 
 impl Embedding {
+    /// Whether the mesh crosses itself after it was moved: only where it did before.
+    pub fn left_crossing(&mut self, mesh: &Mesh) -> bool {
+        self.stuck && !self.is_embedded(mesh)
+    }
+
     /// As [`Self::carry_some`], of all vertices.
     pub fn carry(&mut self, mesh: &mut Mesh, ways: &mut [Vec3]) -> Vec<(VertexId, f32)> {
         let all: Vec<VertexId> = mesh.vertices().collect();
@@ -40,7 +45,9 @@ impl Embedding {
         let mut shares = BTreeMap::new();
         loop {
             let mut held = self.look(mesh);
+            let crossing = held.len();
             held.retain(|v| ways[v.index()] != Vec3::ZERO);
+            self.stuck |= held.len() < crossing;
             if held.is_empty() {
                 break;
             }
@@ -62,7 +69,7 @@ impl Embedding {
 mod tests {
     use super::*;
     use crate::math::Random;
-    use crate::mesh::{count_crossings, shapes};
+    use crate::mesh::{TriangleMesh, count_crossings, shapes};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -131,6 +138,15 @@ mod tests {
         }
         assert!(all_held > 1000, "{all_held} held back");
     }
+    fn octahedron(centre: Vec3, radius: f32) -> Mesh {
+        let positions =
+            [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z].map(|p| centre + p * radius);
+        let triangles =
+            vec![[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]];
+        let positions = positions.to_vec();
+        Mesh::from_triangles(&TriangleMesh { positions, triangles, ..TriangleMesh::default() }).unwrap()
+    }
+
     /// Squares of small lengths are rounded to few digits or to 0, those of large ones are infinite.
     #[test]
     fn nothing_crosses_in_any_unit() {
@@ -138,7 +154,7 @@ mod tests {
             let scale = libm::pow(10.0, f64::from(power)) as f32;
             let mut random = Random::new(5);
             let mut mesh = Mesh::icosahedron(Vec3::ZERO, scale);
-            mesh.append(&Mesh::icosahedron(Vec3::X * 2.5 * scale, scale)).unwrap();
+            mesh.append(&octahedron(Vec3::X * 2.5 * scale, scale)).unwrap();
             let mut embedding = Embedding::default();
             embedding.follow_with(&mesh, 1.2 * scale);
             let mut held = 0;
@@ -146,9 +162,9 @@ mod tests {
                 let unit = |random: &mut Random| random.unit() as f32 - 0.5;
                 let mut ways = vec![Vec3::ZERO; mesh.slots()];
                 for v in mesh.vertices() {
-                    let together = Vec3::X * if v.index() < mesh.slots() / 2 { 0.1 } else { -0.1 };
+                    let together = Vec3::X * if v.index() < 12 { 0.1 } else { -0.1 };
                     let way =
-                        together + Vec3::new(unit(&mut random), unit(&mut random), unit(&mut random)) * 0.2;
+                        together + Vec3::new(unit(&mut random), unit(&mut random), unit(&mut random)) * 0.8;
                     ways[v.index()] = way * scale;
                 }
                 held += embedding.carry(&mut mesh, &mut ways).len();

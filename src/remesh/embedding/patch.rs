@@ -1,7 +1,7 @@
 //! Whether the triangles that an edit made cross anything.
 
 use super::star::{crossings_around, flatness, longest_edge};
-use super::{Embedding, NEAREST_CORNER};
+use super::{Embedding, FINEST, NEAREST_CORNER};
 use crate::math::Bounds;
 use crate::mesh::{Facet, Mesh, VertexId, facets_cross};
 
@@ -61,7 +61,7 @@ fn stars_cross(mesh: &Mesh, changed: &[[VertexId; 3]]) -> bool {
     hubs.dedup();
     let mut crossing = Vec::new();
     hubs.into_iter().any(|hub| {
-        if flatness(mesh, hub, longest_edge(mesh, hub)) <= 0.0 {
+        if flatness(mesh, hub, longest_edge(mesh, hub)) <= FINEST {
             crossings_around(mesh, hub, &mut crossing);
         }
         !crossing.is_empty()

@@ -58,8 +58,9 @@ impl Room {
         *own = if *own < room { *own } else { room };
     }
 
+    /// An infinite way uses up whatever there is.
     fn spend(&mut self, way: f32) {
-        self.0.iter_mut().for_each(|room| *room -= way);
+        self.0.iter_mut().for_each(|room| *room = if way < f32::INFINITY { *room - way } else { 0.0 });
     }
 
     fn used_up(self) -> Concerns {

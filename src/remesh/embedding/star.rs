@@ -70,7 +70,8 @@ fn shown_along(mesh: &Mesh, v: VertexId, direction: Vec3, longest: f32) -> f32 {
     }
     // With fewer than five no second turn is possible.
     let once = ring.len() < 5 || turns + u32::from(before) == 1;
-    if once && room > FINEST { room } else { 0.0 }
+    // Beyond what squares can be, nothing is known.
+    if once && longest < f32::INFINITY { room } else { 0.0 }
 }
 
 /// A star that can be seen as a whole from one side has no triangles that cross. Returns by how much every vertex may

@@ -1,7 +1,7 @@
 import type { Client } from '../client';
 import { EXAMPLES, type Example, exampleUrl } from '../examples';
 import { exampleById, startOf } from '../presets';
-import type { Loaded, ParamValues, Setup, VolumeSource } from '../protocol';
+import type { Loaded, ParamSpec, ParamValues, Setup, VolumeSource } from '../protocol';
 import { nameOf, readFiles } from '../ui/files';
 import { count } from '../ui/format';
 import type { StartChoice } from '../ui/start';
@@ -31,6 +31,8 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   readonly #results: ExtractResults;
   /** Tells a new engine what the view wants to know of the surface. */
   readonly #onRestart: () => Promise<unknown>;
+  /** What the method's parameters are where nothing is said. */
+  defaults: ParamValues = {};
 
   constructor(
     client: Client,
@@ -89,7 +91,7 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   }
 
   protected async adopt(opened: Opened, source: ExtractSource, again: boolean): Promise<void> {
-    if (again) return this.#takeUp(opened);
+    if (again) return this.#takeUp(opened, source);
     const { volume, choice, params, setup } = opened;
     this.states.ready = true;
     this.#ui.adopt(volume, source);
@@ -100,7 +102,8 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   }
 
   /** The volume and the settings are as they were: back to the last state that was kept. */
-  async #takeUp({ choice, params }: Opened): Promise<void> {
+  async #takeUp({ choice, params }: Opened, { example }: ExtractSource): Promise<void> {
+    this.#ui.data.choose(example);
     // The new engine does not know the slices yet.
     this.#ui.stage.goTo(this.#ui.stage.crosshair);
     const { newest } = this.#settings;
@@ -112,13 +115,22 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
     this.#ui.status.say(`Started again ${where}.`);
   }
 
-  protected override async keep(): Promise<void> {
-    await this.#settings.keep();
+  protected override keep(): void {
+    this.#settings.keep();
   }
 
-  protected override async restarted(): Promise<void> {
+  protected override kept(): Promise<unknown> {
+    return this.#settings.kept;
+  }
+
+  protected override greeted(specs: ParamSpec[]): void {
+    const known = specs.filter(({ name }) => name !== 'iso');
+    this.defaults = Object.fromEntries(known.map(({ name, default: value }) => [name, value]));
+  }
+
+  protected override restarted(): Promise<unknown> {
     this.#results.forgetBuffers();
-    await this.#onRestart();
+    return this.#onRestart();
   }
 
   /** What suits an example; for a file, the settings as they are, except the iso value, which no other volume shares. */

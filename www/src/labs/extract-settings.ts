@@ -93,8 +93,13 @@ export class ExtractSettings {
   }
 
   /** Keeps what is, in case that opening something else has to be cancelled. */
-  async keep(): Promise<void> {
-    await this.#rewinder.keep();
+  keep(): void {
+    void this.#rewinder.keep();
+  }
+
+  /** Settled when all that was to be kept is. */
+  get kept(): Promise<unknown> {
+    return this.#rewinder.kept;
   }
 
   /** Keeps what is, before it is changed. */
@@ -182,12 +187,10 @@ export class ExtractSettings {
   travel(way: 'undo' | 'redo'): Promise<void> {
     return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return;
-      const running = this.#states.value === 'running';
       this.#states.load(way === 'undo' ? 'Going back.' : 'Going forth again.');
       try {
         const moment = await this.#rewinder.travel(way);
         if (moment) this.adoptMoment(moment);
-        else if (running) this.#states.enter('running');
         else this.#states.back((state) => this.#results.describe(state));
       } catch (error) {
         this.#states.fail('That did not work.', error);
@@ -201,9 +204,9 @@ export class ExtractSettings {
     this.#attractors = page.attractors;
     this.#ui.showAttractors(page.attractors);
     this.#results.rewind(page.mark(saved.iteration));
+    this.#take(page.params);
     const state = saved.done ? 'done' : 'paused';
     this.#states.stand(this.#results.describe(state), state);
-    this.#take(page.params);
     this.#showPyramid(page.choice);
   }
 

@@ -1,6 +1,5 @@
 /** Gives on what the Extract lab has: as an address, and to the Sculpt lab. */
 import type { Client } from '../client';
-import type { ParamValues } from '../protocol';
 import { copyAddress, FILE_LACKS, showAddress } from './address';
 import type { ExtractOpening } from './extract-opening';
 import type { ExtractParts } from './extract-parts';
@@ -15,8 +14,6 @@ export class ExtractSharing {
   readonly #states: LabStates;
   readonly #settings: ExtractSettings;
   readonly #opening: ExtractOpening;
-  /** The defaults of the parameters that have one. */
-  defaults: ParamValues = {};
 
   constructor(client: Client, ui: ExtractParts, states: LabStates, settings: ExtractSettings, opening: ExtractOpening) {
     this.#client = client;
@@ -28,7 +25,7 @@ export class ExtractSharing {
 
   /** The page's address says what is open and how it is set. */
   updateAddress(): void {
-    const { source } = this.#opening;
+    const { source, defaults } = this.#opening;
     if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
     const hash = toHash(
       linkOf({
@@ -37,7 +34,7 @@ export class ExtractSharing {
         choice: this.#ui.start.inForce,
         sphere: this.#settings.sphere,
         params: this.#settings.params,
-        defaults: this.defaults,
+        defaults,
         attractors: this.#settings.attractors,
         color: this.#ui.options.value.color,
       }),

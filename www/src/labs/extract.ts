@@ -64,10 +64,7 @@ export class ExtractLab implements Lab {
   async start(passedOn?: PassedOn): Promise<void> {
     if (!passedOn) ExtractOpening.fetchLinked();
     try {
-      const { specs } = await this.#client.request('hello', undefined);
-      this.#ui.makeParams(specs);
-      const known = specs.filter(({ name }) => name !== 'iso');
-      this.#sharing.defaults = Object.fromEntries(known.map(({ name, default: value }) => [name, value]));
+      await this.#opening.greet();
     } catch (error) {
       this.#states.fail('Vesicle could not start.', error);
       return;

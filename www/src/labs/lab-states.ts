@@ -8,8 +8,8 @@ export class LabStates {
   readonly #banner: ErrorBanner;
   readonly #status: StatusLine;
   readonly #signal: AbortSignal;
-  /** The state to return to when an error has been read. */
-  #calm: 'loading' | 'paused' | 'done' = 'loading';
+  /** What the model does, beneath what is shown: none is there at first. */
+  #model: 'loading' | 'running' | 'paused' | 'done' = 'loading';
   /** Something else is being opened: what the model does that is still there counts no more. */
   #opening = false;
   /** One change after the other. */
@@ -29,7 +29,7 @@ export class LabStates {
   /** Calls `follower` now and at every change. */
   follow(follower: (state: LabState) => void): void {
     this.#state.follow((state) => {
-      if (state === 'paused' || state === 'done') this.#calm = state;
+      if (state !== 'loading' && state !== 'error') this.#model = state;
       follower(state);
     });
   }
@@ -40,7 +40,7 @@ export class LabStates {
 
   /** The state beneath an error that is being shown. */
   get beneath(): LabState {
-    return this.value === 'error' ? this.#calm : this.value;
+    return this.value === 'error' ? this.#model : this.value;
   }
 
   get canChange(): boolean {
@@ -64,9 +64,10 @@ export class LabStates {
     await this.#turns;
   }
 
-  /** All that comes from now on is of what was opened, or of what was there before where that failed. */
-  opened(): void {
+  /** All that comes from now on is of what was opened, where there is a model that has not begun; else of what was there before. */
+  opened(isThere: boolean): void {
     this.#opening = false;
+    if (isThere) this.#model = 'paused';
   }
 
   /** One change after the other, so that each begins with what the one before it left. */
@@ -86,8 +87,8 @@ export class LabStates {
   /** Loading came to nothing: what was there before is there again, in words too. */
   back(describe: (state: LabState) => string): void {
     if (this.#opening) return;
-    this.#state.value = this.#calm;
-    this.#status.say(describe(this.#calm));
+    this.#state.value = this.#model;
+    this.#status.say(describe(this.#model));
   }
 
   /**
@@ -95,10 +96,8 @@ export class LabStates {
    * something else is being opened nothing.
    */
   enter(state: 'running' | 'paused' | 'done'): boolean {
-    if (this.#opening || (this.value === 'loading' && state !== 'running')) {
-      if (state !== 'running') this.#calm = state;
-      return false;
-    }
+    this.#model = state;
+    if (this.#opening || (this.value === 'loading' && state !== 'running')) return false;
     this.#state.value = state;
     return true;
   }
@@ -111,21 +110,22 @@ export class LabStates {
     // It is of what is to be replaced, or else whoever opens tells it.
     if (this.#opening) return;
     const hint =
-      failure.code === 'internal' && this.ready
+      this.engineBroken && this.ready
         ? 'What you see is the last result; Reset starts the engine again. It said: '
         : '';
     this.#banner.show(title, hint + failure.message);
     if (this.value === 'running' && !this.engineBroken) return;
     this.#status.say('');
-    if (this.value === 'running') this.#calm = 'paused';
-    this.#state.value = 'error';
+    if (this.#model === 'running' && this.engineBroken) this.#model = 'paused';
+    // What was to replace it failed, or was refused: it goes on.
+    this.#state.value = this.#model === 'running' ? 'running' : 'error';
   }
 
   /** The error has been read; true where the lab is back in the state from before. */
   dismiss(): boolean {
     this.#banner.hide();
     if (this.value !== 'error' || !this.ready) return false;
-    this.#state.value = this.#calm;
+    this.#state.value = this.#model;
     return true;
   }
 }

@@ -1,6 +1,6 @@
 import { toFailure } from '../channel';
 import type { Unit } from '../examples';
-import type { Failure } from '../protocol';
+import type { Failure, ParamSpec } from '../protocol';
 import type { ErrorBanner, StatusLine } from '../ui/status';
 import type { LabStates } from './lab-states';
 
@@ -19,8 +19,9 @@ export interface Source<Example, Linked, Data> {
   unit?: Unit;
 }
 
-/** The page, as far as it tells what is opened. */
+/** The page, as far as it tells what is opened, and begins when the engine has. */
 interface OpeningParts<Example> {
+  makeParams(specs: ParamSpec[]): void;
   banner: ErrorBanner;
   status: StatusLine;
   data: { choose(example: Example | undefined): void };
@@ -29,7 +30,7 @@ interface OpeningParts<Example> {
 /** The lab's worker, as far as it is started again. */
 interface Engine {
   restart(failure: Failure): void;
-  request(kind: 'hello', body: undefined): Promise<unknown>;
+  request(kind: 'hello', body: undefined): Promise<{ specs: ParamSpec[] }>;
 }
 
 /**
@@ -45,7 +46,10 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   #awaiting: Linked | undefined;
   /** Counts what was asked to be opened, so that a slow download does not replace what came after it. */
   #turn = 0;
-  #kept: Promise<void> = Promise.resolve();
+  /** Settled when the worker has answered all that was to be loaded. */
+  #loads: Promise<unknown> = Promise.resolve();
+  /** The worker has another model than the page shows, or none. */
+  #astray = false;
 
   constructor(engine: Engine, ui: OpeningParts<Example>, states: LabStates) {
     this.#engine = engine;
@@ -73,15 +77,32 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   protected abstract adopt(opened: Opened, source: Source<Example, Linked, Data>, again: boolean): Promise<void>;
 
   /** What counts as open from now on. */
-  protected kept(source: Source<Example, Linked, Data>, _opened: Opened, _data: Data): Source<Example, Linked, Data> {
+  protected asOpen(source: Source<Example, Linked, Data>, _opened: Opened, _data: Data): Source<Example, Linked, Data> {
     return source;
   }
 
   /** Has the worker give away what is needed to come back to the model as it is now. */
-  protected async keep(): Promise<void> {}
+  protected keep(): void {}
+
+  /** Settled when the worker has given away all that is needed to come back. */
+  protected async kept(): Promise<unknown> {
+    return undefined;
+  }
+
+  /** The engine is there, and has told of its parameters. */
+  protected greeted(_specs: ParamSpec[]): void {}
 
   /** Another engine is there, which knows nothing yet. */
-  protected async restarted(): Promise<void> {}
+  protected async restarted(): Promise<unknown> {
+    return undefined;
+  }
+
+  /** Waits until the engine is there. */
+  async greet(): Promise<void> {
+    const { specs } = await this.#engine.request('hello', undefined);
+    this.#ui.makeParams(specs);
+    this.greeted(specs);
+  }
 
   /** What is open. */
   get source(): Source<Example, Linked, Data> | undefined {
@@ -114,13 +135,14 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
 
   /** Stops what is being opened or prepared: the worker is in the midst of it, so it is started anew. */
   async cancel(): Promise<void> {
-    await Promise.race([this.#kept, later(KEEPING)]);
-    if (this.states.value !== 'loading') return;
-    this.#turn += 1;
+    const turn = this.#turn;
+    await Promise.race([this.kept(), later(KEEPING)]);
+    if (turn !== this.#turn || this.states.value !== 'loading') return;
     this.states.engineBroken = true;
-    if (this.#source) await this.again();
-    else await this.example(this.first);
-    this.#ui.status.say('Cancelled.');
+    const opening = this.#source ? this.again() : this.example(this.first);
+    const own = this.#turn;
+    await opening;
+    if (own === this.#turn && !this.#ui.banner.shown) this.#ui.status.say('Cancelled.');
   }
 
   /** Opens what the page's address asks for; says why where that cannot be. `otherwise` is opened then. */
@@ -143,26 +165,47 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
 
   protected async open(source: Source<Example, Linked, Data>, again = false): Promise<void> {
     const turn = ++this.#turn;
-    if (this.states.ready && !this.states.engineBroken) this.#kept = this.keep();
+    if (this.states.canChange) this.keep();
     const calm = this.states.open(again ? 'Starting the engine again.' : `Opening ${source.name}.`);
     try {
-      if (this.states.engineBroken) await this.#restartEngine();
+      await this.#needEngine();
       await calm;
       const data = await source.opened();
+      // One after the other: what the worker has is what was asked for last.
+      await this.#loads;
       if (turn !== this.#turn) return;
-      const opened = await this.load(source, data, again);
+      await this.#needEngine();
+      const opened = await this.#load(source, data, again);
       if (turn !== this.#turn) return;
-      this.states.opened();
-      this.#source = this.kept(source, opened, data);
-      this.#awaiting = undefined;
+      this.states.opened(true);
+      this.#source = this.asOpen(source, opened, data);
+      this.#astray = false;
+      if (!again) this.#awaiting = undefined;
       await this.adopt(opened, source, again);
     } catch (error) {
-      if (turn !== this.#turn) return;
-      this.states.opened();
-      if (source.linked) return this.#openWithoutLink(source, toFailure(error).message);
-      this.#ui.data.choose(this.#source?.example);
-      this.states.fail(`${source.name} could not be opened.`, error);
+      if (turn === this.#turn) await this.#failed(source, error, again);
     }
+  }
+
+  #load(source: Source<Example, Linked, Data>, data: Data, again: boolean): Promise<Opened> {
+    const loading = this.load(source, data, again);
+    this.#loads = loading.then(
+      () => {
+        this.#astray = true;
+      },
+      () => undefined,
+    );
+    return loading;
+  }
+
+  async #failed(source: Source<Example, Linked, Data>, error: unknown, again: boolean): Promise<void> {
+    this.states.opened(false);
+    const { code, message } = toFailure(error);
+    if (code !== 'internal' && !this.states.engineBroken && !again && source.linked)
+      return this.#openWithoutLink(source, message);
+    this.#ui.data.choose(this.#source?.example);
+    if (this.#astray) this.states.engineBroken = true;
+    this.states.fail(`${source.name} could not be opened.`, error);
   }
 
   /** What a link leads to without what it says of settings: something in them is refused. */
@@ -172,9 +215,12 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     this.#ui.banner.show('The link’s settings are left out.', `One of them cannot be: ${why}.`);
   }
 
-  async #restartEngine(): Promise<void> {
+  /** Starts the engine again where it broke. */
+  async #needEngine(): Promise<void> {
+    if (!this.states.engineBroken) return;
     this.#engine.restart({ code: 'internal', message: 'the engine was started again' });
-    await this.#engine.request('hello', undefined);
+    this.#astray = true;
+    await this.greet();
     await this.restarted();
     this.states.engineBroken = false;
   }

@@ -1,7 +1,7 @@
 import type { ReconstructClient } from '../reconstruct/client';
 import { CLOUDS, type CloudExample } from '../reconstruct/examples';
 import { type CloudVariant, cloudById, isCloudPreset } from '../reconstruct/presets';
-import type { Cloud, CloudSource, ParamValues, Setup } from '../reconstruct/protocol';
+import type { Cloud, CloudSource, ParamSpec, ParamValues, Setup } from '../reconstruct/protocol';
 import type { CloudChoice } from '../ui/cloud-setup';
 import type { LabStates } from './lab-states';
 import { Opening, type Source } from './opening';
@@ -46,6 +46,10 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     this.#onOpened = onOpened;
   }
 
+  protected override greeted(specs: ParamSpec[]): void {
+    this.defaults = Object.fromEntries(specs.map(({ name, default: value }) => [name, value]));
+  }
+
   protected find(id: string): CloudExample | undefined {
     return cloudById(id);
   }
@@ -72,7 +76,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
   }
 
   /** With cameras alone it is the points of before, now seen from them, that are open. */
-  protected override kept(origin: CloudOrigin, { from, photographs }: OpenedCloud, { source }: Data): CloudOrigin {
+  protected override asOpen(origin: CloudOrigin, { from, photographs }: OpenedCloud, { source }: Data): CloudOrigin {
     if (source) return origin;
     return { ...origin, name: this.source?.name ?? origin.name, opened: async () => ({ source: from, photographs }) };
   }

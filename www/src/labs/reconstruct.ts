@@ -62,7 +62,7 @@ export class ReconstructLab implements Lab {
   /** Opens what the address says, or else the built-in example, and runs it. */
   async start(): Promise<void> {
     try {
-      await this.#greet();
+      await this.#opening.greet();
     } catch (error) {
       this.#states.fail('Vesicle could not start.', error);
       return;
@@ -80,12 +80,6 @@ export class ReconstructLab implements Lab {
     this.#results.close();
     this.#ui.dispose();
     this.#root.replaceChildren();
-  }
-
-  async #greet(): Promise<void> {
-    const { specs } = await this.#client.request('hello', undefined);
-    this.#opening.defaults = Object.fromEntries(specs.map(({ name, default: value }) => [name, value]));
-    this.#ui.makeParams(specs);
   }
 
   /** Also where a link could not be followed the address is that of what is open. */

@@ -27,6 +27,7 @@ export class Rewinder<Page, Saved extends { state: Uint8Array }> {
   #ready: Promise<void> = Promise.resolve();
   #last = { together: '', at: 0 };
   #newest: Moment<Page, Saved> | undefined;
+  #saving: Promise<unknown> = Promise.resolve();
   /** Counts volumes: what is still on its way from the one before is not taken. */
   #volume = 0;
 
@@ -45,6 +46,11 @@ export class Rewinder<Page, Saved extends { state: Uint8Array }> {
     return this.#newest;
   }
 
+  /** Settled when the worker has answered for all that was to be kept. */
+  get kept(): Promise<unknown> {
+    return this.#saving;
+  }
+
   /** Another volume: no state of the one before fits it. */
   clear(): void {
     this.#volume += 1;
@@ -58,8 +64,10 @@ export class Rewinder<Page, Saved extends { state: Uint8Array }> {
   async keep(): Promise<Moment<Page, Saved> | undefined> {
     const page = this.#page();
     const volume = this.#volume;
+    const saving = this.#client.request('save', undefined);
+    this.#saving = saving.catch(() => undefined);
     try {
-      const moment = { saved: await this.#client.request('save', undefined), page };
+      const moment = { saved: await saving, page };
       if (volume === this.#volume) this.#newest = moment;
       return moment;
     } catch {

@@ -63,8 +63,7 @@ export class SculptLab implements Lab {
   /** Opens what the address says, or else the built-in example, and runs it. */
   async start(passedOn?: PassedOn): Promise<void> {
     try {
-      const { specs } = await this.#client.request('hello', undefined);
-      this.#ui.makeParams(specs);
+      await this.#opening.greet();
     } catch (error) {
       this.#states.fail('Vesicle could not start.', error);
       return;

@@ -69,8 +69,7 @@ export class TrackLab implements Lab {
   /** Opens what the address says, or else the built-in example, and runs it. */
   async start(_passedOn?: PassedOn): Promise<void> {
     try {
-      const { specs } = await this.#client.request('hello', undefined);
-      this.#ui.makeParams(specs);
+      await this.#opening.greet();
     } catch (error) {
       this.#states.fail('Vesicle could not start.', error);
       return;
