@@ -138,6 +138,7 @@ mod tests {
         }
         assert!(all_held > 1000, "{all_held} held back");
     }
+
     fn octahedron(centre: Vec3, radius: f32) -> Mesh {
         let positions =
             [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z].map(|p| centre + p * radius);

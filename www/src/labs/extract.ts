@@ -1,5 +1,4 @@
 import { Client, RequestError, toFailure } from '../client';
-import { EXAMPLES } from '../examples';
 import { GUIDES } from '../guides';
 import type { Shade, WorkerEvent } from '../protocol';
 import type { LabState } from '../state';
@@ -63,17 +62,8 @@ export class ExtractLab implements Lab {
   /** Opens what another lab passes on, or what the address says, or else the built-in example, and runs it. */
   async start(passedOn?: PassedOn): Promise<void> {
     if (!passedOn) ExtractOpening.fetchLinked();
-    try {
-      await this.#opening.greet();
-    } catch (error) {
-      this.#states.fail('Vesicle could not start.', error);
-      return;
-    }
-    const { signal } = this.#closing;
-    if (signal.aborted) return;
-    window.addEventListener('hashchange', () => void this.#followLink(), { signal });
-    if (passedOn) await this.#opening.passedOn(passedOn);
-    else await this.#opening.link(EXAMPLES[0]);
+    const open = passedOn && (() => this.#opening.passedOn(passedOn));
+    await this.#opening.start(this.#closing.signal, () => this.#sharing.updateAddress(), open);
   }
 
   close(): void {
@@ -83,12 +73,6 @@ export class ExtractLab implements Lab {
     this.#results.close();
     this.#ui.dispose();
     this.#root.replaceChildren();
-  }
-
-  /** Also where a link could not be followed the address is that of what is open. */
-  async #followLink(): Promise<void> {
-    await this.#opening.link();
-    this.#sharing.updateAddress();
   }
 
   /** What is asked for on the page, and who does it. */

@@ -97,8 +97,24 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     return undefined;
   }
 
+  /**
+   * Opens what another lab passes on, or what the address says, or else the first example; then follows the address, until
+   * aborted. Also where that could not be followed it is to be that of what is open: `onFollowed` sees to it.
+   */
+  async start(signal: AbortSignal, onFollowed: () => void, passedOn?: () => Promise<void>): Promise<void> {
+    try {
+      await this.#greet();
+    } catch (error) {
+      this.states.fail('Vesicle could not start.', error);
+      return;
+    }
+    if (signal.aborted) return;
+    window.addEventListener('hashchange', () => void this.#link().then(onFollowed), { signal });
+    await (passedOn ? passedOn() : this.#link(this.first));
+  }
+
   /** Waits until the engine is there. */
-  async greet(): Promise<void> {
+  async #greet(): Promise<void> {
     const { specs } = await this.#engine.request('hello', undefined);
     this.#ui.makeParams(specs);
     this.greeted(specs);
@@ -146,7 +162,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   }
 
   /** Opens what the page's address asks for; says why where that cannot be. `otherwise` is opened then. */
-  async link(otherwise?: Example): Promise<void> {
+  async #link(otherwise?: Example): Promise<void> {
     const linked = this.linkedBy(location.hash);
     const example = linked && this.#exampleOf(linked);
     if (linked && example) return this.example(example, linked);
@@ -220,7 +236,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     if (!this.states.engineBroken) return;
     this.#engine.restart({ code: 'internal', message: 'the engine was started again' });
     this.#astray = true;
-    await this.greet();
+    await this.#greet();
     await this.restarted();
     this.states.engineBroken = false;
   }

@@ -1,7 +1,6 @@
 import { RequestError } from '../channel';
 import { GUIDES } from '../guides';
 import { ReconstructClient } from '../reconstruct/client';
-import { CLOUDS } from '../reconstruct/examples';
 import { type CloudPreset, type CloudVariant, isCloudPreset, variantInForce } from '../reconstruct/presets';
 import type { ParamValues, PointShade, WorkerEvent } from '../reconstruct/protocol';
 import type { LabState } from '../state';
@@ -61,16 +60,7 @@ export class ReconstructLab implements Lab {
 
   /** Opens what the address says, or else the built-in example, and runs it. */
   async start(): Promise<void> {
-    try {
-      await this.#opening.greet();
-    } catch (error) {
-      this.#states.fail('Vesicle could not start.', error);
-      return;
-    }
-    const { signal } = this.#closing;
-    if (signal.aborted) return;
-    window.addEventListener('hashchange', () => void this.#followLink(), { signal });
-    await this.#opening.link(CLOUDS[0]);
+    await this.#opening.start(this.#closing.signal, () => this.#sharing.updateAddress());
   }
 
   close(): void {
@@ -80,12 +70,6 @@ export class ReconstructLab implements Lab {
     this.#results.close();
     this.#ui.dispose();
     this.#root.replaceChildren();
-  }
-
-  /** Also where a link could not be followed the address is that of what is open. */
-  async #followLink(): Promise<void> {
-    await this.#opening.link();
-    this.#sharing.updateAddress();
   }
 
   /** What is asked for on the page, and who does it. */

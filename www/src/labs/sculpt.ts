@@ -1,7 +1,6 @@
 import { RequestError } from '../channel';
 import { GUIDES } from '../guides';
 import { SculptClient } from '../sculpt/client';
-import { SCENES } from '../sculpt/examples';
 import { lastFrame } from '../sculpt/film';
 import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
 import type { FrameEvent, Opened, ParamValues, SculptShade, Shown, WorkerEvent } from '../sculpt/protocol';
@@ -62,17 +61,8 @@ export class SculptLab implements Lab {
 
   /** Opens what the address says, or else the built-in example, and runs it. */
   async start(passedOn?: PassedOn): Promise<void> {
-    try {
-      await this.#opening.greet();
-    } catch (error) {
-      this.#states.fail('Vesicle could not start.', error);
-      return;
-    }
-    const { signal } = this.#closing;
-    if (signal.aborted) return;
-    window.addEventListener('hashchange', () => void this.#followLink(), { signal });
-    if (passedOn) await this.#opening.bytes(passedOn.name, passedOn.bytes);
-    else await this.#opening.link(SCENES[0]);
+    const open = passedOn && (() => this.#opening.bytes(passedOn.name, passedOn.bytes));
+    await this.#opening.start(this.#closing.signal, () => this.#updateAddress(), open);
   }
 
   close(): void {
@@ -82,12 +72,6 @@ export class SculptLab implements Lab {
     this.#client.close();
     this.#ui.dispose();
     this.#root.replaceChildren();
-  }
-
-  /** Also where a link could not be followed the address is that of what is open. */
-  async #followLink(): Promise<void> {
-    await this.#opening.link();
-    this.#updateAddress();
   }
 
   /** What is asked for on the page, and who does it. */

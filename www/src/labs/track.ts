@@ -3,7 +3,6 @@ import { GUIDES } from '../guides';
 import type { LabState } from '../state';
 import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
 import { TrackClient } from '../track/client';
-import { FILMS } from '../track/examples';
 import { isTrackPreset, type TrackPreset, type TrackVariant, variantInForce, viewOf } from '../track/presets';
 import type { StepEvent, VolumeView, WorkerEvent } from '../track/protocol';
 import { wantsStillness } from '../ui/dom';
@@ -68,16 +67,7 @@ export class TrackLab implements Lab {
 
   /** Opens what the address says, or else the built-in example, and runs it. */
   async start(_passedOn?: PassedOn): Promise<void> {
-    try {
-      await this.#opening.greet();
-    } catch (error) {
-      this.#states.fail('Vesicle could not start.', error);
-      return;
-    }
-    const { signal } = this.#closing;
-    if (signal.aborted) return;
-    window.addEventListener('hashchange', () => void this.#followLink(), { signal });
-    await this.#opening.link(FILMS[0]);
+    await this.#opening.start(this.#closing.signal, () => this.#sharing.updateAddress());
   }
 
   close(): void {
@@ -86,12 +76,6 @@ export class TrackLab implements Lab {
     this.#client.close();
     this.#ui.dispose();
     this.#root.replaceChildren();
-  }
-
-  /** Also where a link could not be followed the address is that of what is open. */
-  async #followLink(): Promise<void> {
-    await this.#opening.link();
-    this.#sharing.updateAddress();
   }
 
   /** What is asked for on the page, and who does it. */
