@@ -1,7 +1,8 @@
 import { finite, invalid, knownOnly, list, number, plain, positive, typed, vec3, whole } from './check.js';
+import { type Coverage, type CoverageOptions, checkedCoverage } from './coverage.js';
 import { Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
-import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
+import { inSlices, Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawDeformable, RawStart } from './vesicle.js';
 import { type Vec3, type Volume, volumeHandle } from './volume.js';
 
@@ -27,8 +28,11 @@ export interface DeformableParams {
   mass?: number;
   /** Friction, γ. */
   damping?: number;
-  /** How the motion is integrated. */
-  integrator?: 'euler' | 'runge-kutta';
+  /**
+   * How the motion is integrated: 'implicit' (the default) takes long steps and needs the fewest; 'euler' is the paper's
+   * and needs `rigidity` up to 0.4; 'runge-kutta' evaluates the forces four times and holds up to 3.
+   */
+  integrator?: 'euler' | 'runge-kutta' | 'implicit';
   /** Time of one iteration, Δt. */
   timeStep?: number;
   /** Fraction of δ a vertex may move in one iteration. */
@@ -37,6 +41,18 @@ export interface DeformableParams {
   energyTolerance?: number;
   /** Whether the surface may split and join. */
   topology?: 'adaptive' | 'fixed';
+  /**
+   * How far the surface adapts to the image locally, 0..1; default 1: walls and gaps that the image shows are kept, however
+   * thin. 0 is the paper: whatever comes nearer than the contact distance is joined.
+   */
+  adaptivity?: number;
+  /**
+   * Whether parts and hollows that a level shows and the surface leaves out are added to it: 'auto' (the default) in runs
+   * that start from the contour, 'on' in all, 'off' never. {@link DeformableModel.seed} does it on demand.
+   */
+  seeding?: 'auto' | 'on' | 'off';
+  /** Separate parts and hollows that enclose fewer voxels than this are left out as noise; default 64. */
+  smallestPart?: number;
 }
 
 /** A place that pulls the surface within `radius`. */
@@ -50,11 +66,20 @@ export interface Attractor {
 }
 
 /**
- * The first surface: around all that is brighter than `iso`, as it is when the model is made (around the whole volume where
- * nothing is, or where `isoForce` is not negative); n by n by n bubbles; spheres at packed world points; the iso-surface
- * at an intensity; or a closed mesh that does not cross itself, in world space (which is copied).
+ * The first surface.
+ *
+ * - `'contour'`, for real data: the iso-surface of the coarsest level at `iso`, with its hollows, less what encloses fewer
+ *   voxels than `smallestPart`; the enclosing surface where there is none.
+ * - `'enclosing'`: around all that is brighter than `iso`, as it is when the model is made (around the whole volume where
+ *   nothing is, or where `isoForce` is not negative). This, bubbles and seeds are for teaching, and for objects without a
+ *   usable iso-surface.
+ * - `{ bubbles }`: n by n by n of them, which grow and join.
+ * - `{ seeds, radius }`: spheres at packed world points.
+ * - `{ marchingCubes }`: the iso-surface of the volume itself at an intensity.
+ * - A closed mesh that does not cross itself, in world space; it is copied.
  */
 export type DeformableStart =
+  | 'contour'
   | 'enclosing'
   | { bubbles: number }
   | { seeds: Float32Array; radius: number }
@@ -67,11 +92,11 @@ export interface DeformableOptions {
   volume: Volume;
   /** Of a 4D volume; default 0. */
   frame?: number;
-  /** Default 'enclosing'. */
+  /** Default 'contour'. */
   start?: DeformableStart;
   /**
-   * Pyramid levels above the volume itself; 0 (the default) = direct. On those above, the surface rests a little outside
-   * `iso`, so that thin walls are not lost there.
+   * Pyramid levels above the volume itself; 0 (the default) = direct: the surface works on the volume from the first
+   * iteration. Each level halves the resolution; the surface starts on the coarsest and is refined on the way down.
    */
   levels?: number;
   /** Target edge at the finest level, world units; default from the voxel size. */
@@ -79,6 +104,9 @@ export interface DeformableOptions {
   /** Any of them; the others have their defaults. */
   params?: DeformableParams;
 }
+
+/** Tested between two looks at the clock: some milliseconds of work. */
+const TRIANGLES_AT_ONCE = 512;
 
 const OPTIONS = ['volume', 'frame', 'start', 'levels', 'edge', 'params'];
 
@@ -104,7 +132,7 @@ export class DeformableModel implements Stepper {
    *   `self-intersecting` for a start mesh that is; `too-large`.
    */
   constructor(given: DeformableOptions) {
-    const { volume, frame = 0, start = 'enclosing', levels = 0, edge, params: some = {} } = checked(given);
+    const { volume, frame = 0, start = 'contour', levels = 0, edge, params: some = {} } = checked(given);
     const params = plain('params', some);
     const image = volumeHandle('volume', volume as Volume);
     this.#handle = new Handle('DeformableModel', () =>
@@ -175,6 +203,42 @@ export class DeformableModel implements Stepper {
   }
 
   /**
+   * Searches the current level for parts and hollows that the surface leaves out and adds them, whatever `seeding` says.
+   * A model that had reached its end can go on afterwards.
+   *
+   * @returns A report that counts them in `events.seeds`.
+   * @throws {@link VesicleError} `invalid-argument` while a {@link DeformableModel.run} is under way; `too-large`.
+   */
+  seed(): StepReport {
+    this.#runner.refuseWhileRunning('seed');
+    return this.#handle.use((raw) => raw.seed() as StepReport);
+  }
+
+  /**
+   * Measures how much of the volume's iso-surface the surface covers, as both are now, and where it does not. Yields to
+   * the event loop between slices; the model may move on meanwhile.
+   *
+   * @throws `signal.reason` when aborted; what `onProgress` throws; {@link VesicleError} `invalid-argument` naming the
+   *   option, `freed` when the model is freed meanwhile, `too-large`.
+   */
+  async coverage(given?: CoverageOptions): Promise<Coverage> {
+    const { signal, onProgress } = checkedCoverage(given);
+    signal?.throwIfAborted();
+    const survey = this.#handle.use((raw) => new Handle('survey', () => raw.surveyCoverage()));
+    const advance = () => {
+      // The survey has its own copy of the surface; a model that was freed has to end it all the same.
+      const share = this.#handle.use(() => survey.use((raw) => raw.advance(TRIANGLES_AT_ONCE)));
+      onProgress?.(share);
+      return share < 1 ? undefined : survey.use((raw) => raw.finish() as Coverage);
+    };
+    try {
+      return await inSlices(advance, signal);
+    } finally {
+      survey.free();
+    }
+  }
+
+  /**
    * Live parameters: any subset, validated as a whole before any of it is taken.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the parameter that is misspelled, of the wrong type or out
@@ -233,6 +297,7 @@ function checked(given: DeformableOptions): Partial<DeformableOptions> {
 
 // Made last, when nothing else can fail: whoever takes it frees it.
 function rawStart(start: DeformableStart): RawStart {
+  if (start === 'contour') return RawStart.contour();
   if (start === 'enclosing') return RawStart.enclosing();
   if (start instanceof Mesh) return meshHandle('start', start).use((raw) => RawStart.mesh(raw));
   if (start === null || typeof start !== 'object') throw unknownStart();
@@ -252,7 +317,10 @@ function rawStart(start: DeformableStart): RawStart {
 }
 
 function unknownStart(): Error {
-  return invalid('start', "one of 'enclosing', { bubbles }, { seeds, radius }, { marchingCubes } or a Mesh is needed");
+  return invalid(
+    'start',
+    "one of 'contour', 'enclosing', { bubbles }, { seeds, radius }, { marchingCubes } or a Mesh is needed",
+  );
 }
 
 function numbersOf(attractor: Attractor, index: number): number[] {

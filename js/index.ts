@@ -10,6 +10,7 @@ import { call } from './runtime.js';
 import { version as rawVersion } from './vesicle.js';
 
 export { animationGlb } from './animation.js';
+export type { Coverage, CoverageOptions, UncoveredPart } from './coverage.js';
 export {
   type Attractor,
   DeformableModel,

@@ -20,7 +20,10 @@ export interface StepReport {
   components: number;
   /** Vertices - edges + triangles. */
   euler: number;
-  /** Counted since the last report. axial joins (or splits off) by contact, annular cuts a neck. */
+  /**
+   * Counted since the last report. axial joins (or splits off) by contact, annular cuts a neck; seeds are parts added where
+   * the image shows something that the surface left out.
+   */
   events: {
     creations: number;
     deletions: number;
@@ -28,6 +31,7 @@ export interface StepReport {
     axial: number;
     annular: number;
     vanished: number;
+    seeds: number;
   };
   /** Milliseconds of the last step by part: forces, motion, normals, topology, and so on. */
   times: Record<string, number>;
@@ -65,6 +69,9 @@ export interface Stepper {
   free(): void;
 }
 
+/** Milliseconds of work before the event loop gets its turn, by default. */
+const SLICE = 12;
+
 const OPTIONS = ['signal', 'maxIterations', 'budgetMs', 'onStep'];
 
 /** Gives the event loop its turn: a message comes back sooner than any timer, which browsers hold back. */
@@ -84,6 +91,29 @@ class Pause {
   }
 }
 
+/** Calls `work` until it returns something, and yields to the event loop between slices. Rejects with `signal.reason`. */
+export async function inSlices<T extends object>(
+  work: () => T | undefined,
+  signal: AbortSignal | undefined,
+  budgetMs = SLICE,
+): Promise<T> {
+  const pause = new Pause();
+  try {
+    let sliceEnd = performance.now() + budgetMs;
+    for (;;) {
+      const result = work();
+      if (result) return result;
+      if (performance.now() >= sliceEnd) {
+        await pause.wait();
+        sliceEnd = performance.now() + budgetMs;
+      }
+      signal?.throwIfAborted();
+    }
+  } finally {
+    pause.close();
+  }
+}
+
 /** Runs a model to its end in slices, one run at a time. */
 export class Runner {
   #running = false;
@@ -95,27 +125,20 @@ export class Runner {
 
   /** Steps until done, aborted, or `maxIterations`. See {@link RunOptions}. */
   async run(step: () => StepReport, given: RunOptions | undefined): Promise<StepReport> {
-    const { signal, maxIterations = Number.MAX_SAFE_INTEGER, budgetMs = 12, onStep } = checkedRun(given);
+    const { signal, maxIterations = Number.MAX_SAFE_INTEGER, budgetMs, onStep } = checkedRun(given);
     signal?.throwIfAborted();
     this.refuseWhileRunning('run');
     this.#running = true;
-    const pause = new Pause();
+    let left = maxIterations;
+    const next = () => {
+      const report = step();
+      onStep?.(report);
+      left -= 1;
+      return report.done || left === 0 ? report : undefined;
+    };
     try {
-      let left = maxIterations;
-      let sliceEnd = performance.now() + budgetMs;
-      for (;;) {
-        const report = step();
-        onStep?.(report);
-        left -= 1;
-        if (report.done || left === 0) return report;
-        if (performance.now() >= sliceEnd) {
-          await pause.wait();
-          sliceEnd = performance.now() + budgetMs;
-        }
-        signal?.throwIfAborted();
-      }
+      return await inSlices(next, signal, budgetMs);
     } finally {
-      pause.close();
       this.#running = false;
     }
   }
@@ -127,8 +150,17 @@ export function checkedRun(given: RunOptions | undefined): RunOptions {
   if (run.maxIterations !== undefined)
     whole('maxIterations', run.maxIterations, { min: 1, max: Number.MAX_SAFE_INTEGER });
   if (run.budgetMs !== undefined) positive('budgetMs', run.budgetMs);
-  if (run.signal !== undefined && !(run.signal instanceof AbortSignal))
-    throw invalid('signal', 'an AbortSignal is needed');
-  if (run.onStep !== undefined && typeof run.onStep !== 'function') throw invalid('onStep', 'a function is needed');
+  checkSignal(run.signal);
+  checkListener('onStep', run.onStep);
   return run;
+}
+
+/** An AbortSignal, or nothing. */
+export function checkSignal(signal: unknown): void {
+  if (signal !== undefined && !(signal instanceof AbortSignal)) throw invalid('signal', 'an AbortSignal is needed');
+}
+
+/** A function, or nothing. */
+export function checkListener(parameter: string, listener: unknown): void {
+  if (listener !== undefined && typeof listener !== 'function') throw invalid(parameter, 'a function is needed');
 }

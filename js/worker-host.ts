@@ -18,8 +18,8 @@ import init, {
   version,
 } from './index.js';
 import type { MeshArrays } from './mesh.js';
-import type { RunOptions, Stepper, StepReport } from './stepper.js';
 import {
+  ABORTABLE,
   type Failure,
   FUNCTIONS,
   isReference,
@@ -27,6 +27,7 @@ import {
   MEMBERS,
   type Reference,
   type Reply,
+  type Report,
   type Request,
   STATICS,
   swapped,
@@ -52,7 +53,7 @@ const ABORTED = new VesicleError('aborted', 'the run was called off');
 class Host {
   readonly #post: Post;
   readonly #made = new Map<number, Made>();
-  readonly #runs = new Map<number, AbortController>();
+  readonly #running = new Map<number, AbortController>();
   #last = 0;
 
   constructor(post: Post) {
@@ -60,7 +61,7 @@ class Host {
   }
 
   receive(request: Request): void {
-    if (request.type === 'abort') this.#runs.get(request.id)?.abort(ABORTED);
+    if (request.type === 'abort') this.#running.get(request.id)?.abort(ABORTED);
     else if (request.type === 'free') this.#free(request.object);
     else void this.#answer(request.id, request);
   }
@@ -77,7 +78,7 @@ class Host {
   #perform(id: number, task: Task): unknown {
     if (task.type === 'init') return start(task.module);
     if (task.type === 'make') return this.#make(task.as, task.args);
-    if (task.name === 'run') return this.#run(id, task);
+    if (Object.hasOwn(ABORTABLE, task.name)) return this.#abortable(id, task);
     return task.name === 'copyTo' ? this.#copyTo(task) : this.#call(task);
   }
 
@@ -125,16 +126,17 @@ class Host {
     return { counts: (target as unknown as Mesh).copyTo(arrays), arrays };
   }
 
-  async #run(id: number, { on, args: [options], reports }: Call): Promise<StepReport> {
-    const { target } = this.#find(on, 'run');
+  async #abortable(id: number, { on, name, args: [options], reports }: Call): Promise<unknown> {
+    const { target } = this.#find(on, name);
     const abort = new AbortController();
-    this.#runs.set(id, abort);
-    const onStep = (report: StepReport) => this.#post({ type: 'report', id, report }, []);
+    this.#running.set(id, abort);
+    const listener = (report: Report) => this.#post({ type: 'report', id, report }, []);
+    const heard = reports && { [ABORTABLE[name as keyof typeof ABORTABLE]]: listener };
     try {
-      const given = { ...(options as RunOptions), signal: abort.signal, ...(reports && { onStep }) };
-      return await (target as unknown as Stepper).run(given);
+      const work = target[name] as (options: object) => Promise<unknown>;
+      return await work.call(target, { ...(options as object), signal: abort.signal, ...heard });
     } finally {
-      this.#runs.delete(id);
+      this.#running.delete(id);
     }
   }
 

@@ -23,11 +23,17 @@ export type Task =
 /** From the page. */
 export type Request = (Task & { id: number }) | { type: 'abort'; id: number } | { type: 'free'; object: number };
 
-/** From the worker: an answer, or one report of a run that goes on. */
+/** From the worker: an answer, or one report of a task that goes on. */
 export type Reply =
   | { type: 'value'; id: number; value: unknown }
   | { type: 'error'; id: number; failure: Failure }
-  | { type: 'report'; id: number; report: StepReport };
+  | { type: 'report'; id: number; report: Report };
+
+/** What a task tells while it goes on: the report of a step, or the share done. */
+export type Report = StepReport | number;
+
+/** Methods that can be aborted from the page, and the option of each that is called with reports. */
+export const ABORTABLE = { run: 'onStep', coverage: 'onProgress' } as const;
 
 /** An error, so that it can be made again on the other side. */
 export type Failure =
@@ -103,6 +109,8 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     level: 'value',
     delta: 'value',
     setAttractors: 'method',
+    seed: 'method',
+    coverage: 'method',
     speeds: 'method',
   },
   ImplicitSurface: {

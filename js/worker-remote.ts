@@ -1,9 +1,20 @@
 // The page's side of the objects in the worker.
 import { invalid, knownOnly } from './check.js';
+import { type CoverageOptions, checkedCoverage } from './coverage.js';
 import { VesicleError } from './error.js';
 import type { MeshArrays } from './mesh.js';
-import { checkedRun, type RunOptions, type StepReport } from './stepper.js';
-import { isPlain, isReference, MEMBERS, type Reference, STATICS, swapped, type Task } from './worker-protocol.js';
+import { checkedRun, type RunOptions } from './stepper.js';
+import {
+  type ABORTABLE,
+  isPlain,
+  isReference,
+  MEMBERS,
+  type Reference,
+  type Report,
+  STATICS,
+  swapped,
+  type Task,
+} from './worker-protocol.js';
 import type { Session } from './worker-session.js';
 import { currentSession } from './worker-start.js';
 import type { ClassName, FunctionName, RemoteClass, RemoteFunction } from './worker-types.js';
@@ -158,22 +169,39 @@ async function ask(
   return received(await answer, session);
 }
 
-/** The signal and the function stay here: the one calls off the run from here, the other is told what comes back. */
 async function run(remote: Remote, given?: RunOptions): Promise<unknown> {
   const { signal, onStep, ...rest } = checkedRun(given);
+  return abortable(remote, 'run', rest, signal, onStep as Listener | undefined);
+}
+
+async function coverage(remote: Remote, given?: CoverageOptions): Promise<unknown> {
+  const { signal, onProgress, ...rest } = checkedCoverage(given);
+  return abortable(remote, 'coverage', rest, signal, onProgress as Listener | undefined);
+}
+
+type Listener = (report: Report) => void;
+
+/** The signal and the listener stay here: the one aborts the task from here, the other is called with what comes back. */
+async function abortable(
+  remote: Remote,
+  name: keyof typeof ABORTABLE,
+  options: object,
+  signal: AbortSignal | undefined,
+  listener: Listener | undefined,
+): Promise<unknown> {
   signal?.throwIfAborted();
   const session = sessionOf(remote);
   const stop = new AbortController();
-  const onReport = onStep && ((report: StepReport) => tell(onStep, report, stop));
-  const task: Task = { type: 'call', on: referenceOf(remote), name: 'run', args: [rest], reports: !!onStep };
+  const onReport = listener && ((report: Report) => tell(listener, report, stop));
+  const task: Task = { type: 'call', on: referenceOf(remote), name, args: [options], reports: !!listener };
   const { id, answer } = session.ask(task, { asked: remote, onReport });
   const abort = () => stop.abort(signal?.reason);
   signal?.addEventListener('abort', abort);
   stop.signal.addEventListener('abort', () => session.abort(id));
   try {
-    const report = await answer;
+    const result = await answer;
     stop.signal.throwIfAborted();
-    return report;
+    return result;
   } catch (error) {
     // Whoever stopped it hears why; but of a worker that has ended, everybody hears.
     throw stop.signal.aborted && !session.ended ? stop.signal.reason : error;
@@ -182,11 +210,11 @@ async function run(remote: Remote, given?: RunOptions): Promise<unknown> {
   }
 }
 
-/** What `onStep` throws ends the run, though that may be some steps ahead. */
-function tell(onStep: (report: StepReport) => void, report: StepReport, stop: AbortController): void {
+/** What a listener throws ends the task, though that may be some steps ahead. */
+function tell(listener: Listener, report: Report, stop: AbortController): void {
   if (stop.signal.aborted) return;
   try {
-    onStep(report);
+    listener(report);
   } catch (error) {
     stop.abort(error);
   }
@@ -241,7 +269,7 @@ function remoteClass(name: ClassName): Class {
   return made;
 }
 
-const SPECIAL: Record<string, (remote: Remote, ...args: never[]) => Promise<unknown>> = { run, copyTo };
+const SPECIAL: Record<string, (remote: Remote, ...args: never[]) => Promise<unknown>> = { run, coverage, copyTo };
 
 function memberOf(name: string, kind: string): PropertyDescriptor {
   const special = Object.hasOwn(SPECIAL, name) ? SPECIAL[name] : undefined;

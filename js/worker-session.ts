@@ -1,7 +1,6 @@
 // One worker, from its start to its end: what is asked of it, and what waits for its answers.
 import { VesicleCrash, VesicleError } from './error.js';
-import type { StepReport } from './stepper.js';
-import type { Failure, Reply, Request, Task } from './worker-protocol.js';
+import type { Failure, Reply, Report, Request, Task } from './worker-protocol.js';
 
 /** A worker of `node:worker_threads`, as far as it is used. */
 export interface NodeWorker {
@@ -15,7 +14,7 @@ export interface NodeWorker {
 interface Waiting {
   resolve: (value: unknown) => void;
   reject: (error: unknown) => void;
-  onReport: ((report: StepReport) => void) | undefined;
+  onReport: ((report: Report) => void) | undefined;
   /** The object that is asked must not be given back as garbage meanwhile. */
   asked: unknown;
 }
@@ -24,7 +23,7 @@ interface Waiting {
 interface Extra {
   transfer?: ArrayBuffer[];
   asked?: unknown;
-  onReport?: ((report: StepReport) => void) | undefined;
+  onReport?: ((report: Report) => void) | undefined;
 }
 
 /** A promise and the number it goes by. */
@@ -72,7 +71,7 @@ export class Session {
     return { id, answer };
   }
 
-  /** Calls off a run, whose promise then rejects. */
+  /** Aborts a run or a measurement, whose promise then rejects. */
   abort(id: number): void {
     if (!this.#end) this.#send({ type: 'abort', id }, []);
   }

@@ -25,7 +25,8 @@
  *
  * **Runs.** `run({ signal, onStep })` calls `onStep` here, which hears of steps that are over while the worker goes on. When
  * the signal aborts, or `onStep` throws, the worker stops after the step it is at, so it may be some steps ahead of the
- * last report; the promise then rejects with `signal.reason`, or with what was thrown.
+ * last report; the promise then rejects with `signal.reason`, or with what was thrown. `coverage({ signal, onProgress })` works
+ * the same way.
  *
  * **Arrays.** Typed arrays are copied, once; {@link transfer} hands them over instead. Those of results are handed over by the
  * worker. `mesh.copyTo(out)` sends the buffers of `out` there and back: `out` has empty arrays until the promise resolves,
@@ -56,6 +57,8 @@ export type {
   Attractor,
   Camera,
   ControlEllipsoid,
+  Coverage,
+  CoverageOptions,
   CurvatureKind,
   DeformableParams,
   ErrorCode,
@@ -80,6 +83,7 @@ export type {
   SurfaceDistance,
   TextureType,
   TrackingParams,
+  UncoveredPart,
   Vec3,
   VolumeInit,
   VoxelArray,

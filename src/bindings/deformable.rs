@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use js_sys::{Float32Array, Float64Array, Uint8Array};
+use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::{bytes, doubles, merged, now, points, to_js};
@@ -12,7 +13,8 @@ use super::mesh::{Body, RawMesh};
 use super::volume::RawVolume;
 use crate::math::DVec3;
 use crate::methods::deformable::{
-    Attractor, DeformableModel, DeformableOptions, DeformableParams, Start, param_specs,
+    Attractor, Coverage, CoverageSurvey, DeformableModel, DeformableOptions, DeformableParams, Missing,
+    Start, param_specs,
 };
 
 /// The first surface of a model.
@@ -21,7 +23,12 @@ pub struct RawStart(Start);
 
 #[wasm_bindgen]
 impl RawStart {
-    /// Around the whole volume.
+    /// The iso-surface of the coarsest level.
+    pub fn contour() -> RawStart {
+        RawStart(Start::Contour)
+    }
+
+    /// Around all that the object takes up.
     pub fn enclosing() -> RawStart {
         RawStart(Start::Enclosing)
     }
@@ -93,6 +100,19 @@ impl RawDeformable {
         Ok(to_js(&report)?)
     }
 
+    /// Adds what this level shows and the surface leaves out.
+    pub fn seed(&self) -> Result<JsValue, JsValue> {
+        let report = self.0.borrow_mut().seed().map_err(Failure::from)?;
+        Ok(to_js(&report)?)
+    }
+
+    /// Begins to measure how much of the iso-surface is covered.
+    #[wasm_bindgen(js_name = surveyCoverage)]
+    pub fn survey_coverage(&self) -> Result<RawCoverageSurvey, JsValue> {
+        let survey = self.0.borrow().survey_coverage().map_err(Failure::from)?;
+        Ok(RawCoverageSurvey(Some(survey)))
+    }
+
     /// All parameters.
     pub fn params(&self) -> Result<JsValue, JsValue> {
         Ok(to_js(self.0.borrow().params())?)
@@ -145,6 +165,53 @@ impl RawDeformable {
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())
+    }
+}
+
+/// A measurement of coverage under way, of the surface as it was when it began.
+#[wasm_bindgen]
+pub struct RawCoverageSurvey(Option<CoverageSurvey>);
+
+#[wasm_bindgen]
+impl RawCoverageSurvey {
+    /// Tests so many further triangles; the share of all that have been tested.
+    pub fn advance(&mut self, triangles: usize) -> f64 {
+        self.0.as_mut().map_or(1.0, |survey| survey.advance(triangles))
+    }
+
+    /// The result, once all triangles have been tested.
+    pub fn finish(&mut self) -> Result<JsValue, JsValue> {
+        let survey = self.0.take().ok_or_else(|| Failure::invalid("coverage", "has been measured"))?;
+        Ok(to_js(&Measured::from(survey.finish()))?)
+    }
+}
+
+/// [`Coverage`] as JavaScript has it.
+#[derive(Serialize)]
+struct Measured {
+    recall: f64,
+    precision: f64,
+    uncovered: Vec<Part>,
+}
+
+#[derive(Serialize)]
+struct Part {
+    position: [f64; 3],
+    area: f64,
+    kind: &'static str,
+}
+
+impl From<Coverage> for Measured {
+    fn from(Coverage { recall, precision, uncovered }: Coverage) -> Self {
+        let parts = uncovered.into_iter().map(|part| Part {
+            position: part.position.to_array(),
+            area: part.area,
+            kind: match part.kind {
+                Missing::Matter => "matter",
+                Missing::Hollow => "hollow",
+            },
+        });
+        Self { recall, precision, uncovered: parts.collect() }
     }
 }
 

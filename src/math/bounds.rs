@@ -208,6 +208,12 @@ impl BoxTree {
         );
     }
 
+    /// Visits items whose boxes have a point within a squared distance of `p`, until `visit` says that it is enough.
+    pub fn within(&self, p: Vec3, squared: f64, mut visit: impl FnMut(u32) -> bool) {
+        let entry = |bounds: &Bounds| Some(bounds.distance_squared(p));
+        self.descend(squared, entry, |item| if visit(item) { -1.0 } else { squared });
+    }
+
     /// Visits items whose boxes the ray enters, nearest entry first, leaving out those entered beyond the bound that
     /// `visit` gave back last (in lengths of the ray's direction).
     pub fn along_ray(&self, ray: &Ray, visit: impl FnMut(u32) -> f64) {

@@ -9,6 +9,6 @@ pub mod symmetric;
 pub mod triangle;
 
 pub use bounds::{Bounds, BoxTree, Ray};
-pub use glam::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3, Vec3Swizzles};
+pub use glam::{DAffine3, DMat3, DVec2, DVec3, Mat3, Vec2, Vec3, Vec3Swizzles};
 pub use quadric::Quadric;
 pub use random::Random;

@@ -6,7 +6,7 @@
 //!
 //! Triangles, segments and boxes are closed sets: touching is meeting.
 
-use super::{Bounds, Vec3};
+use super::{Bounds, DVec2, Vec3};
 use robust::{Coord, Coord3D};
 
 /// Six times the signed volume of the tetrahedron `a b c d`, with an exact sign: positive where `d` is on the side
@@ -21,6 +21,12 @@ pub fn orient3d(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> f64 {
 #[inline]
 fn coordinates(p: Vec3) -> Coord3D<f32> {
     Coord3D { x: p.x, y: p.y, z: p.z }
+}
+
+/// Twice the signed area of the triangle `a b c` in a plane, with an exact sign: positive where it is counter-clockwise.
+pub fn orient2d([a, b, c]: [DVec2; 3]) -> f64 {
+    let [a, b, c] = [a, b, c].map(|p| Coord { x: p.x, y: p.y });
+    robust::orient2d(a, b, c)
 }
 
 /// Whether the three points lie on one line, exactly; so whether the triangle has no area.

@@ -96,15 +96,15 @@ impl Mesh {
         TriangleMesh { positions, triangles, normals: Some(normals), ..TriangleMesh::default() }
     }
 
-    /// Adds the vertices of `other`, a mesh without attributes; the two must not touch.
+    /// Adds the vertices of `other`, a mesh without attributes, and returns them; the two must not touch.
     ///
     /// # Errors
     /// [`MeshError::TooLarge`] where ids would run out.
-    pub fn append(&mut self, other: &Self) -> Result<(), MeshError> {
+    pub fn append(&mut self, other: &Self) -> Result<Vec<VertexId>, MeshError> {
         if !self.has_room_for(other.vertex_count()) {
             return Err(MeshError::TooLarge { bytes: 64 * other.vertex_count() as u64 });
         }
-        let mut names = vec![VertexId(u32::MAX); other.slots()];
+        let mut names = vec![NO_NAME; other.slots()];
         for v in other.vertices() {
             names[v.index()] = self.allocate(other.position(v));
             // Taken at once: an empty ring would be handed out again.
@@ -116,9 +116,13 @@ impl Mesh {
         self.half_edges += other.half_edges;
         self.euler += other.euler;
         self.topology_changed();
-        Ok(())
+        names.retain(|&v| v != NO_NAME);
+        Ok(names)
     }
 }
+
+/// The name of a slot that is not in use.
+const NO_NAME: VertexId = VertexId(u32::MAX);
 
 /// As many vertices as fit a browser's memory with room to work in.
 const LARGEST_SPHERE: usize = 16_000_000;

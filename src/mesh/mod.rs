@@ -25,6 +25,7 @@ mod groups;
 mod ids;
 mod journal;
 mod measure;
+mod parts;
 mod refine;
 mod report;
 mod ring;

@@ -16,6 +16,8 @@ pub struct Changes {
     pub axial: u32,
     /// Necks cut.
     pub annular: u32,
+    /// Components added for what the mesh left out.
+    pub seeds: u32,
     /// Components removed because nothing was left of them.
     pub vanished: u32,
 }
@@ -23,7 +25,7 @@ pub struct Changes {
 impl Changes {
     /// Whether connectivity between distant parts changed, not only the sampling.
     pub fn changed_topology(self) -> bool {
-        self.axial + self.annular + self.vanished > 0
+        self.axial + self.annular + self.seeds + self.vanished > 0
     }
 }
 
@@ -34,6 +36,7 @@ impl AddAssign for Changes {
         self.inversions += other.inversions;
         self.axial += other.axial;
         self.annular += other.annular;
+        self.seeds += other.seeds;
         self.vanished += other.vanished;
     }
 }

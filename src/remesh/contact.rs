@@ -1,6 +1,6 @@
 //! Vertices in contact that are no neighbours: equation (3) and the axial change of figures 3 and 4.
 
-use super::{Resolver, Sampling};
+use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::order::{by_both, rank, sort_by_rank};
 use crate::mesh::{Mesh, VertexId};
 
@@ -19,7 +19,12 @@ struct Contact {
 
 impl Resolver {
     /// Joins the stirred vertices with what they touch; says whether anything was changed.
-    pub(super) fn join_contacts(&mut self, mesh: &mut Mesh, sampling: Sampling) -> bool {
+    pub(super) fn join_contacts(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        guide: &dyn TopologyGuide,
+    ) -> bool {
         let contacts = self.find_contacts(mesh, sampling);
         let mut changed = false;
         // Contact next to a fresh tube waits until the tube is settled: joined at once, neighbouring pairs of two
@@ -32,7 +37,7 @@ impl Resolver {
             }
             let reached: Vec<VertexId> =
                 [u, v].iter().flat_map(|&w| mesh.ring(w).as_slice()).copied().collect();
-            let Some(done) = self.mend_contact(mesh, square, u, v) else { continue };
+            let Some(done) = self.mend_contact(mesh, square, [u, v], guide) else { continue };
             changed |= done;
             busy.resize(mesh.slots(), true);
             for w in reached.into_iter().chain([u, v]) {
@@ -62,6 +67,10 @@ impl Resolver {
         stirred.iter().for_each(|v| is_stirred[v.index()] = true);
         for &u in &stirred {
             self.embedding.company(mesh, u, sampling.contact(), |v, square| {
+                let contact = sampling.between(mesh, u, v).contact();
+                if square >= contact * contact {
+                    return;
+                }
                 let counted_from_v = v < u && is_stirred[v.index()] && self.embedding.may_have_company(v);
                 if !counted_from_v {
                     contacts.push(Contact { square, u: u.min(v), v: u.max(v) });
@@ -74,7 +83,13 @@ impl Resolver {
     }
 
     /// Mends one contact: a flip where the two lie across an edge, else a tube. `None` where nothing need be done.
-    fn mend_contact(&mut self, mesh: &mut Mesh, square: f32, u: VertexId, v: VertexId) -> Option<bool> {
+    fn mend_contact(
+        &mut self,
+        mesh: &mut Mesh,
+        square: f32,
+        [u, v]: [VertexId; 2],
+        guide: &dyn TopologyGuide,
+    ) -> Option<bool> {
         if let Some(across) = longest_edge_between(mesh, u, v) {
             let (a, b, length) = across;
             // The fold at a short edge is no contact: its two wings cannot meet before one of them is collapsed.
@@ -83,6 +98,9 @@ impl Resolver {
             }
             self.changes.inversions += 1;
             return Some(true);
+        }
+        if !guide.may_join(mesh, [u, v]) {
+            return None;
         }
         let mut join = |reach: f32| self.embedding.attempt(mesh, |mesh| mesh.join(u, v, reach)).ok();
         let joint = JOINT_REACHES.into_iter().find_map(&mut join)?;

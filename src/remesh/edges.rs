@@ -1,6 +1,6 @@
 //! Edges out of bounds: equations (1) and (2), figure 1, and the annular change of figure 5.
 
-use super::{Resolver, Sampling};
+use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::Vec3;
 use crate::math::order::{rank, sort_by_rank};
 use crate::mesh::{Cut, EditError, Mesh, Opposite, VertexId};
@@ -19,26 +19,26 @@ const LENGTHENED: f32 = 1.6;
 
 impl Resolver {
     /// Works through the queue until every edge around its vertices is within bounds.
-    pub(super) fn settle_edges(&mut self, mesh: &mut Mesh, sampling: Sampling) {
+    pub(super) fn settle_edges(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide) {
         while self.embedding.effort() < self.most_effort {
             let Some(u) = self.pop() else { return };
             if mesh.is_live(u) {
-                self.settle_vertex(mesh, sampling, u);
+                self.settle_vertex(mesh, sampling, guide, u);
             }
         }
     }
 
     /// Mends the first edge around `u` that is out of bounds and can be mended.
-    fn settle_vertex(&mut self, mesh: &mut Mesh, sampling: Sampling, u: VertexId) {
-        let (shortest, longest) = (square(sampling.shortest()), square(sampling.longest()));
+    fn settle_vertex(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide, u: VertexId) {
         let from = mesh.position(u);
         for k in 0..mesh.ring(u).valence() {
             let v = mesh.ring(u).as_slice()[k];
             let length = from.distance_squared(mesh.position(v));
-            let mended = if length > longest {
+            let bounds = sampling.between(mesh, u, v);
+            let mended = if length > square(bounds.longest()) {
                 self.shorten(mesh, sampling, u, v)
-            } else if length < shortest {
-                self.remove_short(mesh, sampling, u, v)
+            } else if length < square(bounds.shortest()) {
+                self.remove_short(mesh, sampling, guide, [u, v])
             } else {
                 Ok(false)
             };
@@ -59,7 +59,8 @@ impl Resolver {
         let Opposite { left, right } = mesh.opposite(u, v)?;
         let middle = (mesh.position(u) + mesh.position(v)) * 0.5;
         let (a, b) = (mesh.position(left), mesh.position(right));
-        let crowded = [a, b].iter().any(|p| p.distance_squared(middle) < square(sampling.shortest()));
+        let shortest = sampling.between(mesh, u, v).shortest();
+        let crowded = [a, b].iter().any(|p| p.distance_squared(middle) < square(shortest));
         let flat = a.distance_squared(b) < mesh.position(u).distance_squared(mesh.position(v));
         if crowded && flat && self.embedding.attempt(mesh, |mesh| mesh.flip(u, v)).is_ok() {
             self.changes.inversions += 1;
@@ -79,12 +80,13 @@ impl Resolver {
         &mut self,
         mesh: &mut Mesh,
         sampling: Sampling,
-        u: VertexId,
-        v: VertexId,
+        guide: &dyn TopologyGuide,
+        [u, v]: [VertexId; 2],
     ) -> Result<bool, EditError> {
         match mesh.can_collapse(u, v) {
+            Ok(_) if !guide.may_collapse(mesh, [u, v]) => Ok(false),
             Ok(_) => self.collapse(mesh, sampling, u, v),
-            Err(EditError::NeckInTheWay(_)) => self.cut_neck(mesh, sampling, u, v),
+            Err(EditError::NeckInTheWay(_)) => self.cut_neck(mesh, sampling, guide, [u, v]),
             Err(EditError::ValenceTooLow(_)) if mesh.is_tetrahedron(u) => {
                 self.remove_part(mesh, u);
                 Ok(true)
@@ -101,8 +103,9 @@ impl Resolver {
         u: VertexId,
         v: VertexId,
     ) -> Result<bool, EditError> {
+        let longest = LENGTHENED * sampling.between(mesh, u, v).longest();
         for place in collapse_places(mesh, u, v) {
-            if lengthens(mesh, [u, v], place, LENGTHENED * sampling.longest()) {
+            if lengthens(mesh, [u, v], place, longest) {
                 continue;
             }
             match self.embedding.attempt(mesh, |mesh| mesh.collapse(u, v, place)) {
@@ -125,8 +128,8 @@ impl Resolver {
         &mut self,
         mesh: &mut Mesh,
         sampling: Sampling,
-        u: VertexId,
-        v: VertexId,
+        guide: &dyn TopologyGuide,
+        [u, v]: [VertexId; 2],
     ) -> Result<bool, EditError> {
         let opposite = mesh.opposite(u, v)?;
         let around = |o: &VertexId| {
@@ -134,7 +137,7 @@ impl Resolver {
             p.distance(mesh.position(u)) + p.distance(mesh.position(v))
         };
         let mut thirds = mesh.common_neighbours(u, v);
-        thirds.retain(|&mut o| o != opposite.left && o != opposite.right);
+        thirds.retain(|&mut o| o != opposite.left && o != opposite.right && guide.may_cut(mesh, [u, v, o]));
         sort_by_rank(&mut thirds, |o| rank(around(o)).into());
         if thirds.is_empty() {
             return Ok(false);
@@ -143,7 +146,7 @@ impl Resolver {
         let cut = cut.ok_or(EditError::WouldCross)?;
         self.changes.annular += 1;
         for side in [cut.kept, cut.copies] {
-            if !self.remove_speck(mesh, sampling, side[0]) {
+            if !self.remove_speck(mesh, sampling, guide, side[0]) {
                 side.into_iter().for_each(|w| self.touch_edited(w));
             }
         }
@@ -164,13 +167,19 @@ impl Resolver {
 
     /// Cuts necks through vertices that could not move: pressed together until its vertices are held, a neck would stay
     /// for ever where no edge gets short.
-    pub(super) fn cut_crushed(&mut self, mesh: &mut Mesh, sampling: Sampling, stuck: &[VertexId]) {
+    pub(super) fn cut_crushed(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        guide: &dyn TopologyGuide,
+        stuck: &[VertexId],
+    ) {
         for &u in stuck {
             if !mesh.is_live(u) || self.embedding.effort() >= self.most_effort {
                 continue;
             }
             let ring = mesh.ring(u).as_slice().to_vec();
-            ring.into_iter().any(|v| self.cut_neck(mesh, sampling, u, v) == Ok(true));
+            ring.into_iter().any(|v| self.cut_neck(mesh, sampling, guide, [u, v]) == Ok(true));
         }
     }
 }

@@ -51,6 +51,43 @@ pub enum Contact {
     Leave,
 }
 
+/// Decides which of the topology changes that the sampling calls for are made.
+pub trait TopologyGuide {
+    /// Whether two vertices in contact may be joined by a tube (axial change).
+    fn may_join(&self, mesh: &Mesh, pair: [VertexId; 2]) -> bool;
+
+    /// Whether the mesh may be cut along a ring of three edges (annular change).
+    fn may_cut(&self, mesh: &Mesh, ring: [VertexId; 3]) -> bool;
+
+    /// Whether a short edge may be drawn together.
+    fn may_collapse(&self, mesh: &Mesh, edge: [VertexId; 2]) -> bool;
+
+    /// Whether a small component is a hollow that is to stay; else it would grow in empty space and is removed.
+    fn is_hollow(&self, mesh: &Mesh, members: &[VertexId]) -> bool;
+}
+
+/// Makes every topology change that the sampling calls for, as in the paper.
+#[derive(Clone, Copy, Debug)]
+pub struct Unguided;
+
+impl TopologyGuide for Unguided {
+    fn may_join(&self, _: &Mesh, _: [VertexId; 2]) -> bool {
+        true
+    }
+
+    fn may_cut(&self, _: &Mesh, _: [VertexId; 3]) -> bool {
+        true
+    }
+
+    fn may_collapse(&self, _: &Mesh, _: [VertexId; 2]) -> bool {
+        true
+    }
+
+    fn is_hollow(&self, _: &Mesh, _: &[VertexId]) -> bool {
+        false
+    }
+}
+
 /// Vertices that the last call left over, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Waiting {
@@ -119,6 +156,17 @@ impl Resolver {
     ///
     /// Vertices that are not named are looked at only where an edit or a contact reaches them.
     pub fn resolve(&mut self, mesh: &mut Mesh, sampling: Sampling, active: &[VertexId]) -> Changes {
+        self.resolve_guided(mesh, sampling, active, &Unguided)
+    }
+
+    /// [`Self::resolve`], changing the topology only where `guide` allows it.
+    pub fn resolve_guided(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        active: &[VertexId],
+        guide: &dyn TopologyGuide,
+    ) -> Changes {
         self.embedding.follow_with(mesh, sampling.longest());
         self.changes = Changes::default();
         self.full = false;
@@ -127,14 +175,17 @@ impl Resolver {
         self.edited.clear();
         let stuck = std::mem::take(&mut self.stuck);
         self.remove_crushed(mesh, sampling, &stuck);
-        self.cut_crushed(mesh, sampling, &stuck);
+        self.cut_crushed(mesh, sampling, guide, &stuck);
         for &v in active {
             self.touch(v);
         }
         for _ in 0..PASSES {
-            self.settle_edges(mesh, sampling);
+            self.settle_edges(mesh, sampling, guide);
             // Between edges out of bounds nearly every pair of vertices is in contact, and joins make it worse.
-            if self.is_waiting() || self.contact == Contact::Leave || !self.join_contacts(mesh, sampling) {
+            if self.is_waiting()
+                || self.contact == Contact::Leave
+                || !self.join_contacts(mesh, sampling, guide)
+            {
                 break;
             }
         }

@@ -1,9 +1,13 @@
-//! The invariant δ and the three bounds derived from it (section 3.2).
+//! The invariant δ and the three bounds derived from it (section 3.2), the same everywhere or with a size by vertex.
+
+use crate::mesh::{Mesh, ScalarKey, VertexId};
 
 /// How densely a mesh is sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
     delta: f32,
+    /// By vertex, by how much its size differs from 1; 0 for those that edits make of nothing.
+    sizes: Option<ScalarKey>,
 }
 
 /// Upper bound of an edge in δ, equation (2): above 2, so that halves of a split edge respect the lower bound.
@@ -16,7 +20,21 @@ const CONTACT: f32 = 1.443_375_7;
 impl Sampling {
     /// The bounds that belong to δ, a positive length.
     pub fn new(delta: f32) -> Self {
-        Self { delta }
+        Self { delta, sizes: None }
+    }
+
+    /// The same with δ times 1 + a scalar of the mesh (above −1) in place of δ at each vertex; small parts and what moves together
+    /// are still measured by δ.
+    pub fn with_sizes(self, sizes: ScalarKey) -> Self {
+        Self { sizes: Some(sizes), ..self }
+    }
+
+    /// The bounds between two vertices.
+    #[inline]
+    pub(super) fn between(self, mesh: &Mesh, u: VertexId, v: VertexId) -> Self {
+        let Some(sizes) = self.sizes else { return self };
+        let of = mesh.scalar(sizes);
+        Self::new(self.delta * (1.0 + 0.5 * (of[u.index()] + of[v.index()])))
     }
 
     /// δ, the lower bound of an edge (1).

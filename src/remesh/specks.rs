@@ -1,6 +1,6 @@
 //! Small parts that vanish: specks without volume, parts crushed, parts turned inside out.
 
-use super::{Resolver, Sampling};
+use super::{Resolver, Sampling, TopologyGuide};
 use crate::mesh::{Mesh, VertexId};
 
 /// Components of more vertices are never removed, whatever their volume: a cavity has a negative one.
@@ -56,9 +56,28 @@ impl Resolver {
     ///
     /// It may be gone already: the two sides of a cut handle are one component.
     ///
-    /// A speck has at most 32 vertices and less than δ³ of volume. Those of negative volume would grow in empty space.
-    pub(super) fn remove_speck(&mut self, mesh: &mut Mesh, sampling: Sampling, v: VertexId) -> bool {
-        self.remove_below(mesh, v, sampling.smallest_volume())
+    /// A speck has at most 32 vertices and less than δ³ of volume. Those of negative volume would grow in empty space, unless
+    /// `guide` knows of a hollow there.
+    pub(super) fn remove_speck(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        guide: &dyn TopologyGuide,
+        v: VertexId,
+    ) -> bool {
+        if !mesh.is_live(v) {
+            return true;
+        }
+        let members = mesh.component_of(v, LARGEST_SPECK + 1);
+        if members.len() > LARGEST_SPECK {
+            return false;
+        }
+        let (volume, least) = (volume(mesh, &members), sampling.smallest_volume());
+        if volume >= least || volume <= -least && guide.is_hollow(mesh, &members) {
+            return false;
+        }
+        self.remove_part(mesh, v);
+        true
     }
 
     /// Removes small components that cannot go on as they are after the vertices were moved.
@@ -103,23 +122,11 @@ impl Resolver {
         self.changes.vanished += 1;
     }
 
-    fn remove_below(&mut self, mesh: &mut Mesh, v: VertexId, least: f32) -> bool {
-        if !mesh.is_live(v) {
-            return true;
-        }
-        let members = mesh.component_of(v, LARGEST_SPECK + 1);
-        if members.len() > LARGEST_SPECK || volume(mesh, &members) >= least {
-            return false;
-        }
-        self.remove_part(mesh, v);
-        true
-    }
-
     /// Removes every speck of the mesh and returns how many there were.
-    pub fn sweep(&mut self, mesh: &mut Mesh, sampling: Sampling) -> u32 {
+    pub fn sweep(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide) -> u32 {
         let before = self.changes.vanished;
         for members in mesh.component_members() {
-            self.remove_speck(mesh, sampling, members[0]);
+            self.remove_speck(mesh, sampling, guide, members[0]);
         }
         self.changes.vanished - before
     }

@@ -61,6 +61,19 @@ impl TriangleTree {
         })
     }
 
+    /// Whether any point of the surface is at most `distance` from `p`.
+    pub fn is_within(&self, p: Vec3, distance: f64) -> bool {
+        let reach = distance * distance;
+        let mut found = false;
+        self.boxes.within(p, reach, |item| {
+            let corners = self.corners[item as usize];
+            let closest = triangle::at(corners, triangle::closest(corners, p));
+            found |= closest.distance_squared(p.as_dvec3()) <= reach;
+            found
+        });
+        found
+    }
+
     /// Where the ray from `origin` along `direction` (of any length) first meets the surface, from either side;
     /// `None` where it does not, where `direction` is zero or where either is not finite.
     pub fn ray_hit(&self, origin: Vec3, direction: Vec3) -> Option<SurfacePoint> {

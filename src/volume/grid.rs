@@ -68,12 +68,12 @@ impl Grid {
         cell.blend(&cell.corners(|index| self.values[index]))
     }
 
-    /// Trilinear value at `p` as if the grid went on with voxels of value 0 on all sides; faster where `p` is in the same
-    /// cell as the last time with this `known`, which is of this grid only.
+    /// Trilinear value at `p` as if the grid went on with voxels of value `beyond` on all sides; faster where `p` is in the
+    /// same cell as the last time with this `known`, which is of this grid only.
     ///
     /// Continuous, unlike a cut at the border: a surface that looks for a value there comes to rest.
     #[inline]
-    pub fn sample_padded(&self, p: Vec3, known: &mut KnownCell) -> f32 {
+    pub fn sample_padded(&self, p: Vec3, beyond: f32, known: &mut KnownCell) -> f32 {
         let last = |n: usize| (n - 1) as f32;
         let share = inside(p.x, last(self.dims[0]))
             * inside(p.y, last(self.dims[1]))
@@ -83,9 +83,9 @@ impl Grid {
             if known.base != cell.base() {
                 *known = KnownCell { base: cell.base(), corners: cell.corners(|index| self.values[index]) };
             }
-            share * cell.blend(&known.corners)
+            beyond + share * (cell.blend(&known.corners) - beyond)
         } else {
-            0.0
+            beyond
         }
     }
 
@@ -238,9 +238,9 @@ mod tests {
             let p = Vec3::new((i % 17) as f32 * 0.45, (i / 17 % 15) as f32 * 0.43, (i / 255) as f32 * 0.57);
             let p = p - Vec3::splat(1.9);
             let expected = padded.sample(p + Vec3::splat(2.0));
-            assert!((g.sample_padded(p, &mut KnownCell::default()) - expected).abs() < 1e-4, "at {p}");
+            assert!((g.sample_padded(p, 0.0, &mut KnownCell::default()) - expected).abs() < 1e-4, "at {p}");
         }
-        assert_eq!(g.sample_padded(Vec3::splat(f32::NAN), &mut KnownCell::default()), 0.0);
+        assert_eq!(g.sample_padded(Vec3::splat(f32::NAN), 0.0, &mut KnownCell::default()), 0.0);
     }
 
     #[test]
@@ -251,8 +251,8 @@ mod tests {
             let t = i as f32;
             let p = Vec3::new((t * 0.013) % 8.0, (t * 0.007) % 6.0, (t * 0.011) % 5.0) - 1.0;
             assert_eq!(
-                g.sample_padded(p, &mut known).to_bits(),
-                g.sample_padded(p, &mut KnownCell::default()).to_bits(),
+                g.sample_padded(p, 0.0, &mut known).to_bits(),
+                g.sample_padded(p, 0.0, &mut KnownCell::default()).to_bits(),
                 "at {p}"
             );
         }

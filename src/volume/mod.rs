@@ -29,6 +29,7 @@ mod error;
 mod flow;
 mod follow;
 mod grid;
+mod inside;
 mod pyramid;
 mod sampling;
 mod sequence;
@@ -40,6 +41,7 @@ pub use enrich::Enrichment;
 pub use error::VolumeError;
 pub use follow::{Follower, Lattice};
 pub use grid::{Grid, KnownCell, VectorGrid};
+pub use inside::voxels_inside;
 pub(crate) use sampling::trilinear;
 pub use voxels::Voxels;
 

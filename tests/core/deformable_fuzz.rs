@@ -7,7 +7,7 @@ use crate::common::{Named, Random, misplaced_parts, seeds};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::count_crossings;
 use vesicle::methods::deformable::{
-    Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, Start,
+    Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, Seeding, Start,
 };
 use vesicle::volume::Volume;
 #[cfg(target_arch = "wasm32")]
@@ -39,7 +39,8 @@ fn image(random: &mut Random, dims: [usize; 3]) -> Volume {
 }
 
 fn start(random: &mut Random, dims: [usize; 3]) -> Start {
-    match random.below(5) {
+    match random.below(7) {
+        5.. => Start::Contour,
         0 => Start::Bubbles(1 + random.below(4) as u32),
         1 => Start::MarchingCubes(random.within(0.3, 0.7)),
         2 => {
@@ -59,7 +60,11 @@ fn params(random: &mut Random, volume: &Volume) -> DeformableParams {
         gradient_normal: if random.below(3) == 0 { random.within(0.0, 1.0) } else { 0.0 },
         damping: random.within(0.2, 0.8),
         max_move: random.within(0.1, 0.5),
-        integrator: if random.below(4) == 0 { Integrator::RungeKutta } else { Integrator::Euler },
+        integrator: [Integrator::Implicit, Integrator::Implicit, Integrator::Euler, Integrator::RungeKutta]
+            [random.below(4)],
+        adaptivity: [0.0, 1.0, 1.0, random.within(0.0, 1.0)][random.below(4)],
+        seeding: [Seeding::On, Seeding::Auto, Seeding::Off][random.below(3)],
+        smallest_part: random.within(0.0, 80.0),
         ..DeformableParams::for_volume(volume)
     }
 }

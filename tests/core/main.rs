@@ -31,6 +31,7 @@ mod multires_fuzz;
 mod remesh;
 mod scenes;
 mod textured_meshes;
+mod thin_structures;
 mod tracking;
 mod tracking_fuzz;
 mod volume_files;

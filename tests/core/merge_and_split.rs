@@ -6,7 +6,7 @@ use crate::common::scenes;
 use crate::common::{Named, Random, euler_of_parts, misplaced_parts, seeds};
 use vesicle::math::Vec3;
 use vesicle::mesh::count_crossings;
-use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Start};
+use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Seeding, Start};
 use vesicle::volume::Volume;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -91,14 +91,15 @@ impl Frame {
         euler
     }
 
-    /// A start that everything is found from: all around; a seed in each part, which grows through its bars and meets
+    /// A start that everything is found from: all around; the contour of the coarsest level; a seed in each part, which grows through its bars and meets
     /// itself behind the holes; or seeds in all balls and bars, which meet each other.
     fn start(&self, random: &mut Random) -> Start {
         let part = self.parts();
         let balls = (0..part.len()).map(|k| self.balls[k]);
         let middles = self.bars.iter().map(|&[a, b]| (self.balls[a] + self.balls[b]) * 0.5);
-        let points: Vec<Vec3> = match random.below(3) {
+        let points: Vec<Vec3> = match random.below(4) {
             0 => return Start::Enclosing,
+            3 => return Start::Contour,
             1 => (0..part.len()).filter(|&k| part[k] == k).map(|k| self.balls[k]).collect(),
             _ => balls.chain(middles).collect(),
         };
@@ -120,6 +121,8 @@ fn run(seed: u64) -> [u32; 2] {
         rigidity: random.within(0.0, 0.1),
         stiffness: random.within(0.0, 0.03),
         damping: random.within(0.3, 0.6),
+        adaptivity: [0.0, 1.0][random.below(2)],
+        seeding: [Seeding::Auto, Seeding::On][random.below(2)],
         ..DeformableParams::for_volume(&volume)
     };
     let levels = random.below(2);

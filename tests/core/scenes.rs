@@ -54,7 +54,7 @@ fn play(name: &str, volume: &Volume, options: DeformableOptions, most: u32) -> (
 }
 
 fn params(volume: &Volume, iso: f64, rigidity: f64, stiffness: f64) -> Option<DeformableParams> {
-    Some(DeformableParams { iso, rigidity, stiffness, ..DeformableParams::for_volume(volume) })
+    Some(DeformableParams { iso, rigidity, stiffness, ..DeformableParams::of_paper(volume) })
 }
 
 /// Mean distance of the vertices from the surface of which `distance` is the distance.
@@ -87,7 +87,11 @@ fn chain_from_twelve_radii() {
 #[test]
 fn the_chain_is_true() {
     let volume = scenes::chain();
-    let options = DeformableOptions { params: params(&volume, 0.5, 0.1, 0.0), ..Default::default() };
+    let options = DeformableOptions {
+        start: Start::Enclosing,
+        params: params(&volume, 0.5, 0.1, 0.0),
+        ..Default::default()
+    };
     let (model, outcome) = play("chain, fine", &volume, options, 600);
     assert_eq!(outcome.euler, [0, 0]);
     let off = mean_distance(&model, |p| scenes::to_chain(p) - 4.5);
@@ -103,8 +107,12 @@ fn menger_sponge_of_depth_three() {
         return;
     }
     let volume = scenes::menger(3);
-    let options =
-        DeformableOptions { levels: 3, params: params(&volume, 0.4, 0.05, 0.001), ..Default::default() };
+    let options = DeformableOptions {
+        start: Start::Enclosing,
+        levels: 3,
+        params: params(&volume, 0.4, 0.05, 0.001),
+        ..Default::default()
+    };
     let (_, outcome) = play("Menger sponge, depth 3", &volume, options, 2000);
     assert_eq!(outcome.euler, [-2816]);
 }
@@ -205,7 +213,12 @@ fn a_state_saved_in_a_merge_goes_on_bit_for_bit() {
 /// Runs a model to rest and prints the seconds by part and level, as the paper's table 1. Returns the measures and the
 /// seconds.
 fn timed(name: &str, volume: &Volume, levels: usize, iso: f64) -> (Measures, f64) {
-    let options = DeformableOptions { levels, params: params(volume, iso, 0.4, 0.0), ..Default::default() };
+    let options = DeformableOptions {
+        start: Start::Enclosing,
+        levels,
+        params: params(volume, iso, 0.4, 0.0),
+        ..Default::default()
+    };
     let mut model = DeformableModel::new(volume, options).unwrap();
     model.set_clock(milliseconds);
     let began = milliseconds();
@@ -281,8 +294,12 @@ fn milliseconds() -> f64 {
 #[test]
 fn two_hundred_steps_end_in_the_same_bits_everywhere() {
     let volume = scenes::menger(2);
-    let options =
-        DeformableOptions { levels: 3, params: params(&volume, 0.4, 0.05, 0.001), ..Default::default() };
+    let options = DeformableOptions {
+        start: Start::Enclosing,
+        levels: 3,
+        params: params(&volume, 0.4, 0.05, 0.001),
+        ..Default::default()
+    };
     let mut model = DeformableModel::new(&volume, options).unwrap();
     for _ in 0..200 {
         model.step().unwrap();

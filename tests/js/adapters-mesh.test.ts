@@ -8,7 +8,7 @@ import { NiivueSurface } from '../../pkg/adapters/niivue.js';
 import { type MeshSource, ThreeSurface } from '../../pkg/adapters/three.js';
 import { VtkSurface } from '../../pkg/adapters/vtk.js';
 import { DeformableModel, Mesh, type MeshArrays, Volume } from '../../pkg/index.js';
-import { failure, rejection, wrong } from './helpers.js';
+import { failure, PAPER, rejection, wrong } from './helpers.js';
 
 /** A surface of somebody else's, that says itself when it has changed. */
 class Plain implements MeshSource {
@@ -62,7 +62,7 @@ function mirrored(): DeformableModel {
     affine: [-2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 9, 9, 9, 1],
     space: 'LPS',
   });
-  return new DeformableModel({ volume, params: { iso: 128, isoForce: -1 } });
+  return new DeformableModel({ volume, start: 'enclosing', params: { iso: 128, isoForce: -1, ...PAPER } });
 }
 
 // ── three.js

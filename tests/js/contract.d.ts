@@ -184,6 +184,7 @@ export interface StepReport {
     axial: number;
     annular: number;
     vanished: number;
+    seeds: number; // parts added where the image shows what the surface leaves out
   };
   /** Milliseconds of the last step by part: forces, motion, normals, topology, and so on. */
   times: Record<string, number>;
@@ -234,11 +235,29 @@ export interface DeformableParams {
   restLength?: 'zero' | 'mean' | number;
   mass?: number;
   damping?: number;
-  integrator?: 'euler' | 'runge-kutta';
+  integrator?: 'euler' | 'runge-kutta' | 'implicit';
   timeStep?: number;
   maxMove?: number; // fraction of δ a vertex may move in one iteration
   energyTolerance?: number; // ε
   topology?: 'adaptive' | 'fixed';
+  adaptivity?: number; // 0..1; 0 = the paper: one δ, contact by distance alone
+  seeding?: 'auto' | 'on' | 'off'; // parts that a level shows and the surface leaves out; auto: with start 'contour'
+  smallestPart?: number; // voxels; what encloses less is left out
+}
+/** Of the volume's iso-surface, less what encloses fewer voxels than smallestPart; within one voxel. */
+export interface Coverage {
+  recall: number; // share of its area that the surface covers
+  precision: number; // share of the surface's area that it covers
+  uncovered: UncoveredPart[]; // largest first
+}
+export interface UncoveredPart {
+  position: Vec3; // world
+  area: number; // square world units
+  kind: 'matter' | 'hollow';
+}
+export interface CoverageOptions {
+  signal?: AbortSignal; // rejects with signal.reason
+  onProgress?: (share: number) => void; // 0..1
 }
 export interface Attractor {
   point: Vec3;
@@ -249,8 +268,9 @@ export class DeformableModel implements Stepper {
   constructor(options: {
     volume: Volume;
     frame?: number;
-    /** enclosing icosahedron | a grid of n^3 bubbles | spheres at points | iso-surface | your own closed mesh */
+    /** iso-surface of the coarsest level (default) | enclosing icosahedron | a grid of n^3 bubbles | spheres at points | iso-surface | your own closed mesh */
     start?:
+      | 'contour'
       | 'enclosing'
       | { bubbles: number }
       | { seeds: Float32Array; radius: number }
@@ -268,6 +288,10 @@ export class DeformableModel implements Stepper {
   readonly params: Required<DeformableParams>;
   step(iterations?: number): StepReport;
   run(options?: RunOptions): Promise<StepReport>;
+  /** Adds what this level shows and the surface leaves out; counted in events.seeds. */
+  seed(): StepReport;
+  /** Yields between slices. */
+  coverage(options?: CoverageOptions): Promise<Coverage>;
   setParams(params: DeformableParams): void;
   save(): Uint8Array;
   restore(state: Uint8Array): void;

@@ -1,17 +1,18 @@
 import { afterEach, expect, test } from 'vitest';
 import * as vesicle from '../../pkg/index.js';
 import { DeformableModel, type DeformableParams, Mesh, paramSpecs, type StepReport } from '../../pkg/index.js';
-import { ball, failure, rejection, wrong } from './helpers.js';
+import { ball, ballWithHollowAndPlate, failure, PAPER, rejection, wrong } from './helpers.js';
 import { SPONGE_BITS, spongeBits } from './sponge.js';
 
 type Options = ConstructorParameters<typeof DeformableModel>[0];
 
 const volume = ball(32, 9);
-const PARAMS: DeformableParams = { iso: 100, isoForce: -1, rigidity: 0.2 };
+const PARAMS: DeformableParams = { iso: 100, isoForce: -1, rigidity: 0.2, ...PAPER };
 const models: DeformableModel[] = [];
 
+/** From outside and in many small steps, by default. */
 function model(more: Partial<Options> = {}): DeformableModel {
-  const made = new DeformableModel({ volume, params: PARAMS, ...more });
+  const made = new DeformableModel({ volume, start: 'enclosing', params: PARAMS, ...more });
   models.push(made);
   return made;
 }
@@ -69,6 +70,7 @@ test('the time of a step is told for each of its parts', () => {
 
 test('every start shape', async () => {
   const starts: [Options['start'], number][] = [
+    ['contour', 1],
     ['enclosing', 1],
     [{ bubbles: 3 }, 1],
     [{ seeds: Float32Array.of(1, 0, 0), radius: 4 }, 1],
@@ -109,7 +111,7 @@ test('a step report has everything', () => {
   expect(report.iteration).toBe(3);
   expect(report.done).toBe(false);
   expect(report.phase).toMatch(/level/);
-  const counts = ['creations', 'deletions', 'inversions', 'axial', 'annular', 'vanished'];
+  const counts = ['creations', 'deletions', 'inversions', 'axial', 'annular', 'vanished', 'seeds'];
   expect(Object.keys(report.events).sort()).toEqual([...counts].sort());
   expect(Object.keys(report.times).length).toBeGreaterThan(0);
   for (const milliseconds of Object.values(report.times)) expect(milliseconds).toBeGreaterThanOrEqual(0);
@@ -226,6 +228,10 @@ test('parameters: any subset, all or nothing', () => {
     ['damping', { rigidity: 0.1, damping: '0.3' }],
     ['mass', { rigidity: 0.1, mass: -1 }],
     ['topology', { rigidity: 0.1, topology: 'none' }],
+    ['integrator', { rigidity: 0.1, integrator: 'explicit' }],
+    ['adaptivity', { rigidity: 0.1, adaptivity: 1.5 }],
+    ['seeding', { rigidity: 0.1, seeding: true }],
+    ['smallestPart', { rigidity: 0.1, smallestPart: -1 }],
   ];
   for (const [name, params] of refused) {
     const error = failure(() => fitted.setParams(params));
@@ -256,6 +262,110 @@ test('an attractor pulls the surface', () => {
   pulled.step(30);
   free.step(30);
   expect(pulled.mesh.info().bounds.max[0]).toBeGreaterThan(free.mesh.info().bounds.max[0] + 0.5);
+});
+
+/** The defaults of the method. */
+const ADAPTING: DeformableParams = { iso: 100 };
+
+test('from the contour, the default, nothing of a ball with a hollow and a thin plate is missing', async () => {
+  const fitted = new DeformableModel({ volume: ballWithHollowAndPlate(), params: ADAPTING });
+  models.push(fitted);
+  expect(await fitted.run()).toMatchObject({ done: true, components: 3, euler: 6 });
+  expect(fitted.mesh.check().selfIntersections).toBe(0);
+  const { recall, precision } = await fitted.coverage();
+  expect(recall).toBeGreaterThan(0.99);
+  expect(precision).toBeGreaterThan(0.99);
+});
+
+test('a hollow that an enclosing surface cannot reach is reported, and seeding adds it', async () => {
+  const apart = ballWithHollowAndPlate();
+  const fitted = model({ volume: apart, params: { ...ADAPTING, seeding: 'off' } });
+  expect((await fitted.run()).events.seeds).toBe(0);
+  const shares: number[] = [];
+  const { recall, precision, uncovered } = await fitted.coverage({ onProgress: (share) => shares.push(share) });
+  expect(precision).toBeGreaterThan(0.99);
+  const hollow = 4 * Math.PI * 6 ** 2;
+  expect(recall).toBeLessThan(0.93);
+  expect(uncovered[0]?.kind).toBe('hollow');
+  expect(Math.abs((uncovered[0]?.area ?? 0) / hollow - 1)).toBeLessThan(0.1);
+  const { position = [0, 0, 0] } = uncovered[0] ?? {};
+  expect(Math.abs(Math.hypot(position[0] - 22, position[1] - 24, position[2] - 24) - 6)).toBeLessThan(1);
+  expect(shares.at(-1)).toBe(1);
+  expect(shares.every((share, i) => share > (shares[i - 1] ?? 0))).toBe(true);
+
+  const seeded = fitted.seed();
+  expect(seeded.events.seeds).toBe(1);
+  expect(seeded.done).toBe(false);
+  await fitted.run();
+  expect((await fitted.coverage()).recall).toBeGreaterThan(0.99);
+  expect(fitted.seed().events.seeds).toBe(0);
+});
+
+test('seeds of a run are counted', async () => {
+  const fitted = model({ volume: ballWithHollowAndPlate(), params: { ...ADAPTING, seeding: 'on' } });
+  let seeds = 0;
+  const onStep = ({ events }: StepReport) => {
+    seeds += events.seeds;
+  };
+  await fitted.run({ onStep });
+  expect(seeds).toBe(1);
+});
+
+test('matter that a surface leaves out is reported as such, and small parts are not', async () => {
+  const start = Mesh.icosphere([22, 24, 24], 14, 2);
+  const given = { volume: ballWithHollowAndPlate(), start };
+  const kinds = async (params: DeformableParams) => {
+    const { uncovered } = await model({ ...given, params: { ...ADAPTING, ...params } }).coverage();
+    return uncovered.map(({ kind }) => kind);
+  };
+  expect(await kinds({})).toEqual(['matter', 'hollow']);
+  // The hollow has 904 voxels, the plate 1250.
+  expect(await kinds({ smallestPart: 1100 })).toEqual(['matter']);
+  expect(await kinds({ smallestPart: 1500 })).toEqual([]);
+});
+
+test('coverage is measured beside a run, of the surface as it was', async () => {
+  const fitted = model();
+  const before = await fitted.coverage();
+  const running = fitted.run({ maxIterations: 30, budgetMs: 0.01 });
+  expect(failure(() => fitted.seed()).message).toContain('under way');
+  const [meanwhile] = await Promise.all([fitted.coverage(), running]);
+  expect(meanwhile.recall).toBeLessThanOrEqual(1);
+  expect(await model().coverage()).toEqual(before);
+});
+
+test('a measurement that is aborted rejects with the reason, one of a freed model with freed', async () => {
+  const fitted = model();
+  const reason = new Error('enough');
+  await expect(fitted.coverage({ signal: AbortSignal.abort(reason) })).rejects.toBe(reason);
+  const abort = new AbortController();
+  const stopped = fitted.coverage({ signal: abort.signal, onProgress: () => abort.abort(reason) });
+  await expect(stopped).rejects.toBe(reason);
+  const thrown = new Error('mine');
+  const failing = fitted.coverage({
+    onProgress: () => {
+      throw thrown;
+    },
+  });
+  await expect(failing).rejects.toBe(thrown);
+  const going = fitted.coverage({ onProgress: () => fitted.free() });
+  expect((await rejection(going)).code).toBe('freed');
+  expect((await rejection(fitted.coverage())).code).toBe('freed');
+  expect(failure(() => fitted.seed()).code).toBe('freed');
+});
+
+test('wrong options of a measurement', async () => {
+  const refused: [string, unknown][] = [
+    ['signal', { signal: {} }],
+    ['onProgress', { onProgress: 1 }],
+    ['budgetMs', { budgetMs: 12 }],
+    ['options', 7],
+  ];
+  for (const [name, options] of refused) {
+    const error = await rejection(model().coverage(wrong(options)));
+    expect(error.code).toBe('invalid-argument');
+    expect(error.message).toContain(name);
+  }
 });
 
 const closed = Mesh.icosphere([0, 0, 0], 6, 2);

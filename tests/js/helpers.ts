@@ -19,6 +19,26 @@ export function ball(size: number, radius: number): Volume {
   return new Volume({ data, dims: [size, size, size], origin: [-middle, -middle, -middle] });
 }
 
+/** The deformable model as in the paper: one sampling distance everywhere, and Euler's steps. */
+export const PAPER = { adaptivity: 0, integrator: 'euler' } as const;
+
+/** A bright ball of radius 14 in 48 voxels, with a hollow of radius 6 in its middle and, apart from it, a plate two voxels thick. */
+export function ballWithHollowAndPlate(): Volume {
+  const size = 48;
+  const data = new Uint8Array(size ** 3);
+  for (let z = 0, at = 0; z < size; z++) {
+    for (let y = 0; y < size; y++) {
+      for (let x = 0; x < size; x++, at++) {
+        const r = Math.hypot(x - 22, y - 24, z - 24);
+        const inBall = Math.min(14.5 - r, r - 5.5);
+        const inPlate = Math.min(1.5 - Math.abs(x - 42.5), 12.5 - Math.abs(y - 24), 12.5 - Math.abs(z - 24));
+        data[at] = 200 * Math.min(1, Math.max(0, inBall, inPlate));
+      }
+    }
+  }
+  return new Volume({ data, dims: [size, size, size] });
+}
+
 /** The VesicleError that something throws; fails the test where it throws none, or anything else. */
 export function failure(work: () => unknown): VesicleError {
   try {

@@ -14,7 +14,9 @@ export async function spongeBits(library: typeof Package | typeof Worker): Promi
     isSolid([i % 81, Math.floor(i / 81) % 81, Math.floor(i / 6561)]) ? 1 : 0,
   );
   const volume = new Volume({ data, dims: [81, 81, 81] });
-  const model = new DeformableModel({ volume, levels: 3, params: { iso: 0.4, rigidity: 0.05, stiffness: 0.001 } });
+  // As in the paper.
+  const params = { iso: 0.4, rigidity: 0.05, stiffness: 0.001, adaptivity: 0, integrator: 'euler' } as const;
+  const model = new DeformableModel({ volume, start: 'enclosing', levels: 3, params });
   await model.step(200);
   const { positions } = await model.mesh.arrays();
   let hash = 0xcbf29ce484222325n;

@@ -93,7 +93,7 @@ test('steps tell how far it is: boundaries first, then surfaces, then back to th
   expect(reports.slice(0, 3).every(({ triangles }) => triangles === 0)).toBe(true);
   const { vertexCount: vertices, triangleCount: triangles } = one.mesh;
   expect(reports[6]).toMatchObject({ vertices, triangles, components: 1, euler: 2, progress: 1 });
-  const counts = ['creations', 'deletions', 'inversions', 'axial', 'annular', 'vanished'];
+  const counts = ['creations', 'deletions', 'inversions', 'axial', 'annular', 'vanished', 'seeds'];
   expect(Object.keys((reports[4] as StepReport).events).sort()).toEqual(counts.sort());
 });
 

@@ -97,8 +97,11 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
     const { iteration } = await model.step(4);
     await model.restore(state);
     await model.step(4);
+    const shares: number[] = [];
+    const coverage = await model.coverage({ onProgress: (share) => shares.push(share) });
     return [
       [heard, iteration, report.events, report.phase, state],
+      [coverage, shares, (await model.seed()).events],
       await Promise.all([model.level, model.delta, model.params, model.speeds(), model.mesh.arrays()]),
     ];
   },
@@ -219,6 +222,31 @@ test('arguments that cannot be sent are refused by name', async () => {
   }
   const misspelled = new worker.DeformableModel({ volume, ...wrong({ level: 2 }) });
   expect((await rejection(misspelled.step())).message).toContain('level');
+});
+
+test('a measurement of coverage that is aborted rejects with the reason, and goes on beside a run', async () => {
+  const model = restless();
+  const reason = { because: 'of this' };
+  const abort = new AbortController();
+  const stopped = model.coverage({ signal: abort.signal, onProgress: () => abort.abort(reason) });
+  await expect(stopped).rejects.toBe(reason);
+  await expect(model.coverage({ signal: AbortSignal.abort(reason) })).rejects.toBe(reason);
+  expect((await rejection(model.coverage(wrong({ onProgress: 1 })))).message).toContain('onProgress');
+  const thrown = new Error('mine');
+  const failing = model.coverage({
+    onProgress: () => {
+      throw thrown;
+    },
+  });
+  await expect(failing).rejects.toBe(thrown);
+  const running = new AbortController();
+  const run = model.run({ signal: running.signal, budgetMs: 1 });
+  expect((await rejection(model.seed())).message).toContain('under way');
+  expect((await model.coverage()).precision).toBeLessThan(1);
+  running.abort('done');
+  await expect(run).rejects.toBe('done');
+  model.free();
+  expect((await rejection(model.coverage())).code).toBe('freed');
 });
 
 test('an aborted run rejects with the reason, and the model goes on', async () => {

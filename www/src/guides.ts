@@ -10,3 +10,6 @@ export const GUIDES = {
   track: `${DOCS}documents/A_surface_through_time.html`,
   sculpt: `${DOCS}documents/A_surface_under_your_hand.html`,
 };
+
+/** Its section on what a surface can miss. */
+export const COVERAGE_GUIDE = `${GUIDES.extract}#what-a-surface-can-miss-and-why`;

@@ -37,8 +37,11 @@ export interface Preset extends Example {
 
 const ENCLOSING = { kind: 'enclosing' } as const;
 const COMPUTED = 'Computed in the page: the image of the paper cannot be passed on.';
+const CONTOUR = { kind: 'contour' } as const;
+/** The method as in the paper: one sampling distance everywhere, and Euler's steps. */
+export const PAPER = { adaptivity: 0, integrator: 'euler' } as const;
 /** Every other force off, so that a preset says all that acts. */
-const BARE = { isoForce: -1, gradientNormal: 0, gradientTangent: 0, rigidity: 0, stiffness: 0 };
+const BARE = { ...PAPER, isoForce: -1, gradientNormal: 0, gradientTangent: 0, rigidity: 0, stiffness: 0 };
 /** Only the force towards maxima of intensity; per voxel here, so that 1 does what 0.1 does in the paper. */
 const RIDGE = { ...BARE, isoForce: 0 };
 
@@ -277,7 +280,7 @@ export function variantOf(preset: Preset, params: ParamValues): Variant | undefi
   );
 }
 
-/** The start shape that suits an example. */
-export function startOf(example: Example): Preset['start'] {
-  return isPreset(example) ? example.start : ENCLOSING;
+/** The start shape that suits an example, or a file. */
+export function startOf(example: Example | undefined): Preset['start'] | typeof CONTOUR {
+  return isPreset(example) ? example.start : CONTOUR;
 }

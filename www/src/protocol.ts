@@ -4,11 +4,21 @@
  * The page sends requests and gets exactly one reply each; the worker also sends events on its own.
  * Stopping a run is an ordinary request with an ordinary reply: a cancellation is not an error.
  */
-import type { Attractor, MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, Vec3 } from 'vesicle';
+import type {
+  Attractor,
+  Coverage,
+  MeshFormat,
+  MeshInfo,
+  MeshReport,
+  ParamSpec,
+  StepReport,
+  UncoveredPart,
+  Vec3,
+} from 'vesicle';
 
 import type { Shape } from './shapes';
 
-export type { Attractor, MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, Vec3 };
+export type { Attractor, Coverage, MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, UncoveredPart, Vec3 };
 
 export type ParamValues = Record<string, unknown>;
 
@@ -19,6 +29,7 @@ export interface NamedBytes {
 
 /** Where the surface starts. Points are world coordinates, packed xyz. */
 export type StartShape =
+  | { kind: 'contour' }
   | { kind: 'enclosing' }
   | { kind: 'bubbles'; count: number }
   | { kind: 'sphere'; center: Vec3; radius: number }
@@ -110,6 +121,11 @@ export interface Ready {
   delta: number;
 }
 
+/** Coverage, and the iteration it was measured at. */
+export interface MeasuredCoverage extends Coverage {
+  iteration: number;
+}
+
 /** One of the two ways in a comparison, and what it cost. */
 export interface ComparedRun {
   levels: number;
@@ -151,6 +167,11 @@ export interface Requests {
   /** The same extraction twice, direct and coarse to fine; nothing when it was cancelled. */
   compare: { body: Setup; reply: { direct: ComparedRun; coarseToFine: ComparedRun } | undefined };
   cancelCompare: { body: undefined; reply: undefined };
+  /** How much of the iso-surface is covered, now and also while a run goes on; nothing when it was cancelled. */
+  coverage: { body: undefined; reply: MeasuredCoverage | undefined };
+  cancelCoverage: { body: undefined; reply: undefined };
+  /** Adds parts that the surface leaves out; replies with how many there were. */
+  seed: { body: undefined; reply: number };
 }
 
 export type RequestKind = keyof Requests;
@@ -204,5 +225,17 @@ export interface ComparingEvent {
   run: 'direct' | 'coarseToFine';
   report: StepReport;
 }
-export type WorkerEvent = SnapshotEvent | ProgressEvent | SectionsEvent | StateEvent | FailureEvent | ComparingEvent;
+/** How far a measurement of coverage is, 0..1. */
+export interface CoveringEvent {
+  event: 'covering';
+  share: number;
+}
+export type WorkerEvent =
+  | SnapshotEvent
+  | ProgressEvent
+  | SectionsEvent
+  | StateEvent
+  | FailureEvent
+  | ComparingEvent
+  | CoveringEvent;
 export type FromWorker = ReplyMessage | WorkerEvent;

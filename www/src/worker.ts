@@ -2,8 +2,10 @@
 import init, { type DeformableModel, type Mesh, paramSpecs, type StepReport, type Volume, version } from 'vesicle';
 import type {
   Attractor,
+  Coverage,
   LevelView,
   Loaded,
+  MeasuredCoverage,
   Measures,
   MeshFormat,
   ParamValues,
@@ -30,6 +32,9 @@ import { levelsOf, viewOf, volumeFrom } from './worker/volumes';
 const BUFFER_SETS = 2;
 /** Milliseconds between two looks at area and volume while running; they cost as much as a step on small meshes. */
 const MEASURE_EVERY = 400;
+
+/** Milliseconds between two messages about the progress of a measurement. */
+const TELL_EVERY = 100;
 
 /** Steps told in one message. With fewer, the messages themselves cost more than what is in them. */
 const MOST_REPORTS = 50;
@@ -62,6 +67,7 @@ class Session {
   #measuredAt = 0;
   #run: Work | undefined;
   #comparison: Work | undefined;
+  #survey: Work | undefined;
 
   readonly handlers: Handlers = {
     hello: async () => {
@@ -83,6 +89,9 @@ class Session {
     restore: (saved) => this.#restore(saved),
     compare: (setup) => this.#compare(setup),
     cancelCompare: () => this.#cancelCompare(),
+    coverage: () => this.#coverage(),
+    cancelCoverage: () => stop(this.#survey),
+    seed: () => this.#seed(),
   };
 
   takeBack(buffers: SurfaceBuffers): void {
@@ -112,6 +121,7 @@ class Session {
   }
 
   #adopt(model: DeformableModel, detail: Detail = 'checked'): Ready {
+    this.#survey?.abort.abort();
     this.#model?.free();
     this.#model = model;
     this.#levels = model.level;
@@ -246,6 +256,7 @@ class Session {
       model.free();
       throw error;
     }
+    this.#survey?.abort.abort();
     this.#model?.free();
     this.#model = model;
   }
@@ -266,6 +277,36 @@ class Session {
 
   async #cancelCompare(): Promise<undefined> {
     await stop(this.#comparison);
+  }
+
+  async #coverage(): Promise<MeasuredCoverage | undefined> {
+    await stop(this.#survey);
+    const iteration = this.#iteration;
+    const abort = new AbortController();
+    let toldAt = 0;
+    const onProgress = (share: number) => {
+      if (performance.now() - toldAt < TELL_EVERY) return;
+      toldAt = performance.now();
+      send({ event: 'covering', share });
+    };
+    const work: Work = { abort, ended: this.#current().coverage({ signal: abort.signal, onProgress }) };
+    this.#survey = work;
+    try {
+      return { ...((await work.ended) as Coverage), iteration };
+    } catch (error) {
+      if (abort.signal.aborted) return undefined;
+      throw error;
+    } finally {
+      if (this.#survey === work) this.#survey = undefined;
+    }
+  }
+
+  async #seed(): Promise<number> {
+    await this.#pause();
+    const report = this.#current().seed();
+    this.#stepped(report);
+    this.#standStill();
+    return report.events.seeds;
   }
 
   #setPlanes(planes: Plane[]): undefined {

@@ -1,9 +1,14 @@
 //! What is different on the coarse levels of the pyramid: they need not be right, they need to be near, and soon.
 
-use super::DeformableParams;
 use super::image::Pyramid;
+use super::{DeformableParams, Integrator};
 
-/// How far outside π_I the surface rests on coarse levels, as a share of the way to the mean intensity out there.
+/// How far outside π_I the surface settles on coarse levels of runs that do not seed, as a share of the way to the mean intensity out
+/// there.
+///
+/// Right for images of two classes only: in a computed tomography all soft tissue then counts as bone. The mean next to the
+/// boundary was tried instead; it loses 1.7 % of the area of a skull. Runs that seed have no margin: what a coarse level
+/// loses comes back.
 ///
 /// A wall thinner than the contact distance of a coarse level is pierced and eaten up, and rigidity keeps it from growing
 /// back on a finer one. A little outside, where the blurred wall is thicker, it is kept; the finer level takes back what
@@ -47,7 +52,7 @@ pub(super) fn gain(
     level: usize,
     [iso, delta]: [f32; 2],
 ) -> f32 {
-    if level == 0 || params.iso_force == 0.0 {
+    if level == 0 || params.iso_force == 0.0 || params.integrator == Integrator::Implicit {
         return 1.0;
     }
     let stiffness = params.iso_force.abs() as f32 * delta * pyramid.levels[level].steepness(iso);
@@ -87,7 +92,13 @@ mod tests {
     }
 
     fn params(iso_force: f64, rigidity: f64) -> DeformableParams {
-        DeformableParams { iso: 0.5, iso_force, rigidity, ..DeformableParams::default() }
+        DeformableParams {
+            iso: 0.5,
+            iso_force,
+            rigidity,
+            integrator: Integrator::Euler,
+            ..DeformableParams::default()
+        }
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Internal and external forces on every vertex (sections 3.7 and 3.8).
 
+use super::contour::ObjectIs;
 use super::image::LevelImage;
-use super::params::{DeformableParams, RestLength};
+use super::params::{DeformableParams, Integrator, RestLength};
 use crate::math::{Mat3, Vec3};
 use crate::mesh::{Ring, VertexId};
 use crate::volume::KnownCell;
@@ -13,6 +14,10 @@ use crate::volume::KnownCell;
 /// collapsed, and each edit throws vertices off the surface, so that the energy never falls. Below 0.02 the sampling
 /// of slow fronts suffers; from 0.3 on the slide does not die out everywhere.
 const SLIDE_SPEED: f32 = 0.1;
+
+/// How far off the contour, in voxels, rigidity alone may take the surface, about: more, and thin strands shrink; less, and noise
+/// is not smoothed.
+const YIELD: f32 = 0.1;
 
 /// A point that pulls the surface, in the space of the model.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +33,7 @@ pub(super) struct Pull {
 pub(super) struct ForceScale {
     iso: f32,
     iso_force: f32,
+    background: f32,
     gradient_across: f32,
     gradient_along: f32,
     gradient_bound: f32,
@@ -36,14 +42,22 @@ pub(super) struct ForceScale {
     rest: RestLength,
     voxel: f64,
     delta: f32,
+    /// Whether rigidity yields to the image.
+    yields: bool,
+    /// Whether [`Forces::slope`] is needed.
+    needs_slope: bool,
 }
 
 impl ForceScale {
     /// `iso` is normalised, `gain` by how much α_I is larger here, `voxel` the world length of a unit of the model.
     pub(super) fn new(params: &DeformableParams, [iso, gain]: [f32; 2], voxel: f64, delta: f32) -> Self {
+        let yields = params.iso_force != 0.0 && params.adaptivity > 0.0;
         Self {
+            yields,
+            needs_slope: yields || params.integrator == Integrator::Implicit,
             iso,
             iso_force: params.iso_force as f32 * gain,
+            background: ObjectIs::by(params).background(),
             gradient_across: (params.gradient_normal - params.gradient_tangent) as f32,
             gradient_along: params.gradient_tangent as f32,
             gradient_bound: params.gradient_bound as f32,
@@ -74,6 +88,8 @@ pub(super) struct Forces {
     laplacian: Vec<Vec3>,
     /// Unit normals, outwards.
     pub(super) normal: Vec<Vec3>,
+    /// By how much Π changes over a voxel along the normal.
+    pub(super) slope: Vec<f32>,
     /// The image around each vertex, where it was last felt.
     cells: Vec<KnownCell>,
     /// The sum of all forces.
@@ -93,6 +109,7 @@ impl Forces {
         self.laplacian.resize(rings.len(), Vec3::ZERO);
         self.normal.resize(rings.len(), Vec3::ZERO);
         self.force.resize(rings.len(), Vec3::ZERO);
+        self.slope.resize(rings.len(), 0.0);
         self.cells.resize(rings.len(), KnownCell::default());
         for v in vertices.iter().map(|v| v.index()) {
             let ring = &rings[v];
@@ -125,7 +142,11 @@ impl Forces {
         for v in vertices.iter().map(|v| v.index()) {
             let ring = &rings[v];
             let x = positions[v];
-            let mut force = self.curvature(v, ring, velocities[v], scale.delta) * scale.rigidity;
+            if scale.needs_slope {
+                self.slope[v] = self.slope_along_normal(v, x, image, scale);
+            }
+            let hold = if scale.yields { self.hold_of_image(v, x, image, scale) } else { f32::INFINITY };
+            let mut force = self.curvature(v, ring, velocities[v], scale, hold);
             if scale.stiffness != 0.0 {
                 force += springs(ring, positions, x, rest) * scale.stiffness;
             }
@@ -141,15 +162,36 @@ impl Forces {
         }
     }
 
-    /// f_c / α_c = L(x) − mean of L over the neighbours (5), its part along the surface fading out at rest.
+    /// f_c = α_c (L(x) − mean of L over the neighbours) (5), its part along the surface fading out at rest, that across it no
+    /// stronger than `most`.
     #[inline]
-    fn curvature(&self, v: usize, ring: &Ring, velocity: Vec3, delta: f32) -> Vec3 {
+    fn curvature(&self, v: usize, ring: &Ring, velocity: Vec3, scale: &ForceScale, most: f32) -> Vec3 {
         let sum: Vec3 = ring.as_slice().iter().map(|w| self.laplacian[w.index()]).sum();
         let bending = self.laplacian[v] - sum * (1.0 / ring.valence() as f32);
         let normal = self.normal[v];
-        let across = normal * bending.dot(normal);
-        let speed = velocity.dot(normal).abs() / (SLIDE_SPEED * delta);
-        across + (bending - across) * if speed < 1.0 { speed } else { 1.0 }
+        let along_normal = bending.dot(normal);
+        let across = normal * along_normal;
+        let speed = velocity.dot(normal).abs() / (SLIDE_SPEED * scale.delta);
+        let along = (bending - across) * if speed < 1.0 { speed } else { 1.0 };
+        let strength = along_normal.abs() * scale.rigidity;
+        let yielding = if strength > most { across * (most / strength) } else { across };
+        (yielding + along) * scale.rigidity
+    }
+
+    /// By how much Π changes over a voxel along the normal.
+    #[inline]
+    fn slope_along_normal(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
+        let half = self.normal[v] * 0.5;
+        let at = |p| image.intensity(p, scale.background, &mut KnownCell::default());
+        (at(x + half) - at(x - half)).abs()
+    }
+
+    /// The strongest bending across the surface that the image holds against where it is, so that at rest no vertex is
+    /// further than 4/3 [`YIELD`] from the contour.
+    #[inline]
+    fn hold_of_image(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
+        let miss = scale.iso - image.intensity(x, scale.background, &mut self.cells[v]);
+        scale.delta * scale.iso_force.abs() * (YIELD * self.slope[v] + 0.25 * miss.abs())
     }
 
     /// A force whose part along the surface fades out at rest, faster than that of rigidity: it would draw the vertices around
@@ -164,7 +206,7 @@ impl Forces {
     /// f_I = δ α_I (π_I − Π(x)) n (7).
     #[inline]
     fn iso_attraction(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> Vec3 {
-        let intensity = image.intensity(x, &mut self.cells[v]);
+        let intensity = image.intensity(x, scale.background, &mut self.cells[v]);
         self.normal[v] * (scale.delta * scale.iso_force * (scale.iso - intensity))
     }
 

@@ -30,15 +30,15 @@ impl LevelImage {
     }
 
     #[inline]
-    fn index(&self, p: Vec3) -> Vec3 {
+    pub(super) fn index(&self, p: Vec3) -> Vec3 {
         p * self.scale + self.offset
     }
 
-    /// Π: trilinear intensity in 0..1, and 0 beyond the image, so that an enclosing surface comes in. `known` is what the last
-    /// call for the same vertex left there.
+    /// Π: trilinear intensity in 0..1, and `background` beyond the image, so that every object ends at its border. `known` is
+    /// what the last call for the same vertex left there.
     #[inline]
-    pub(super) fn intensity(&self, p: Vec3, known: &mut KnownCell) -> f32 {
-        self.grid.sample_padded(self.index(p), known)
+    pub(super) fn intensity(&self, p: Vec3, background: f32, known: &mut KnownCell) -> f32 {
+        self.grid.sample_padded(self.index(p), background, known)
     }
 
     /// ∇Π by the Sobel operator, per voxel of this level, no longer than `bound`; zero where none was prepared.

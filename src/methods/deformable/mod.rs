@@ -44,16 +44,22 @@
 
 mod awake;
 mod coarse;
+mod contact;
+mod contour;
+mod coverage;
 mod domain;
 mod forces;
 mod image;
 mod motion;
 mod params;
 mod schedule;
+mod seeds;
+mod sizes;
 mod start;
 mod state;
 
-pub use params::{DeformableParams, Integrator, RestLength, Topology, param_specs};
+pub use coverage::{Coverage, CoverageSurvey, Missing, Uncovered};
+pub use params::{DeformableParams, Integrator, RestLength, Seeding, Topology, param_specs};
 pub use start::Start;
 
 use super::{MethodError, StepReport, Times};
@@ -61,6 +67,7 @@ use crate::math::{DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, ScalarKey, TriangleMesh, VectorKey, VertexId};
 use crate::remesh::{Changes, Resolver, Sampling};
 use crate::volume::Volume;
+use contour::ObjectIs;
 use domain::Domain;
 use forces::{Field, ForceScale, Pull};
 use image::Pyramid;
@@ -88,7 +95,7 @@ pub struct DeformableOptions {
 
 impl Default for DeformableOptions {
     fn default() -> Self {
-        Self { frame: 0, start: Start::Enclosing, levels: 0, edge: None, params: None }
+        Self { frame: 0, start: Start::Contour, levels: 0, edge: None, params: None }
     }
 }
 
@@ -136,6 +143,8 @@ struct Keys {
     still: ScalarKey,
     /// Iterations since an edit made or displaced the vertex.
     calm: ScalarKey,
+    /// By how much the size of edges at the vertex differs from 1, in δ.
+    size: ScalarKey,
 }
 
 /// The deformable model.
@@ -148,6 +157,8 @@ pub struct DeformableModel {
     fingerprint: u64,
     params: DeformableParams,
     attractors: Vec<Attractor>,
+    /// Whether the run began on the contour.
+    from_contour: bool,
     finest_delta: f64,
     level: usize,
     /// π_I on this level, normalised.
@@ -181,18 +192,25 @@ impl DeformableModel {
         let frame = Frame {
             image: &pyramid.levels[options.levels],
             brighter_than: (params.iso_force < 0.0).then(|| coarse::iso(&pyramid, &params, options.levels)),
+            iso: pyramid.normalised(params.iso),
+            object: ObjectIs::by(&params),
+            smallest_part: params.smallest_part,
             dims: volume.dims(),
             domain,
             from_world: volume.inverse_affine(),
             spacing: volume.spacing(),
             sampling: Sampling::new(delta),
         };
-        let mut mesh = options.start.make(&frame, |value| pyramid.normalised(value))?;
+        let mut mesh = {
+            let guide = contact::guide(frame.image, frame.iso, &params);
+            options.start.make(&frame, |value| pyramid.normalised(value), &*guide)?
+        };
         let keys = Keys {
             velocity: mesh.add_vector(),
             checked: mesh.add_vector(),
             still: mesh.add_scalar(),
             calm: mesh.add_scalar(),
+            size: mesh.add_scalar(),
         };
         let mut model = Self {
             to_world: volume.affine(),
@@ -202,6 +220,7 @@ impl DeformableModel {
             voxel,
             params,
             attractors: Vec::new(),
+            from_contour: options.start == Start::Contour,
             finest_delta,
             level: options.levels,
             level_iso: 0.0,
@@ -299,8 +318,12 @@ impl DeformableModel {
     /// Restores the bounds around `active`, and memory order where it has suffered.
     fn restore_bounds(&mut self, active: &[VertexId], times: &mut Times) -> Changes {
         let begin = (self.clock)();
-        let sampling = Sampling::new(self.model_delta());
-        let changes = self.resolver.resolve(&mut self.mesh, sampling, active);
+        let sampling = self.sampling();
+        let changes = {
+            let image = &self.pyramid.levels[self.level];
+            let guide = contact::guide(image, self.level_iso, &self.params);
+            self.resolver.resolve_guided(&mut self.mesh, sampling, active, &*guide)
+        };
         let calm = self.mesh.scalar_mut(self.keys.calm);
         self.resolver.edited().iter().for_each(|v| calm[v.index()] = 0.0);
         let (rings, still) = self.mesh.rings_and_scalar_mut(self.keys.still);
@@ -313,6 +336,19 @@ impl DeformableModel {
         }
         times.add("topology", (self.clock)() - begin);
         changes
+    }
+
+    fn sampling(&self) -> Sampling {
+        Sampling::new(self.model_delta()).with_sizes(self.keys.size)
+    }
+
+    /// Whether levels are searched for what is missing.
+    fn seeds_levels(&self) -> bool {
+        match self.params.seeding {
+            Seeding::Auto => self.from_contour,
+            Seeding::On => true,
+            Seeding::Off => false,
+        }
     }
 
     fn reorder(&mut self) {
@@ -413,7 +449,11 @@ impl DeformableModel {
             self.pyramid.levels[self.level].prepare_gradient()?;
         }
         self.motion.forces.forget_image();
-        self.level_iso = coarse::iso(&self.pyramid, &self.params, self.level);
+        self.level_iso = if self.seeds_levels() {
+            self.pyramid.normalised(self.params.iso)
+        } else {
+            coarse::iso(&self.pyramid, &self.params, self.level)
+        };
         let here = [self.level_iso, self.model_delta()];
         self.gain = coarse::gain(&self.pyramid, &self.params, self.level, here);
         Ok(())
@@ -443,13 +483,15 @@ impl DeformableModel {
         self.mesh.to_triangles().transformed(&self.to_world)
     }
 
-    /// Speed of each vertex of [`Self::surface`] along its outward normal, in world units per unit of time; negative
-    /// inwards. A vertex that an edit made has what its neighbourhood had.
+    /// Speed of each vertex of [`Self::surface`] along its outward normal, in world units per unit of time (of Δt: an iteration
+    /// counts as one, however long a step the integrator takes); negative inwards. A vertex that an edit made has what its neighbourhood had.
     pub fn speeds(&self) -> Vec<f32> {
         let normals = self.surface().normals.unwrap_or_default();
         let velocities = self.mesh.vector(self.keys.velocity);
+        let steps = self.params.step_length() / self.params.time_step;
         let along = |(v, normal): (VertexId, Vec3)| {
-            (self.to_world.matrix3 * velocities[v.index()].as_dvec3()).dot(normal.as_dvec3()) as f32
+            let way = self.to_world.matrix3 * velocities[v.index()].as_dvec3();
+            (steps * way.dot(normal.as_dvec3())) as f32
         };
         self.mesh.vertices().zip(normals).map(along).collect()
     }

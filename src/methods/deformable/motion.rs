@@ -22,6 +22,10 @@ pub(super) struct Movement {
 /// Iterations after which a vertex has come back from an edit.
 const CALM: f32 = 6.0;
 
+/// By how much f_c and f_e fall off as a vertex of valence 6 moves away from its neighbours, in α_c and α_e.
+const BENDING_STIFFNESS: f32 = 1.3;
+const STRETCHING_STIFFNESS: f32 = 6.0;
+
 /// What pushes and what holds the vertices.
 pub(super) struct World<'a> {
     pub(super) field: Field<'a>,
@@ -63,6 +67,7 @@ impl Motion {
         match world.params.integrator {
             Integrator::Euler => self.euler(mesh, keys, world),
             Integrator::RungeKutta => self.runge_kutta(mesh, keys, world),
+            Integrator::Implicit => self.implicit(mesh, keys, world),
         }
         self.bound(mesh, keys, world);
         let held = carry(mesh, &self.awake.moving, &mut self.ways);
@@ -82,6 +87,23 @@ impl Motion {
         for i in self.awake.moving.iter().map(|v| v.index()) {
             velocities[i] += (self.forces.force[i] - velocities[i] * damping) * step;
             self.ways[i] = velocities[i] * time_step as f32;
+        }
+    }
+
+    /// Linearly implicit Euler with a long time step, v ← (m v + Δt f) / (m + Δt γ + Δt² k): each vertex by itself, with k by how
+    /// much the forces on it fall off as it moves along its normal.
+    fn implicit(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
+        self.act(mesh, mesh.positions(), mesh.vector(keys.velocity), world);
+        let &DeformableParams { mass, damping, rigidity, stiffness, iso_force, .. } = world.params;
+        let (step, mass, damping) = (world.params.step_length() as f32, mass as f32, damping as f32);
+        let internal = BENDING_STIFFNESS * rigidity as f32 + STRETCHING_STIFFNESS * stiffness as f32;
+        let pull = world.delta * iso_force.abs() as f32;
+        let velocities = mesh.vector_mut(keys.velocity);
+        for i in self.awake.moving.iter().map(|v| v.index()) {
+            let k = pull * self.forces.slope[i] + internal;
+            velocities[i] = (velocities[i] * mass + self.forces.force[i] * step)
+                * (1.0 / (mass + step * damping + step * step * k));
+            self.ways[i] = velocities[i] * step;
         }
     }
 
@@ -134,14 +156,14 @@ impl Motion {
             let from = mesh.positions()[i];
             if !domain.bounds.contains(from + *way) {
                 *way = domain.hold(from + *way) - from;
-                mesh.vector_mut(keys.velocity)[i] = *way * (1.0 / params.time_step as f32);
+                mesh.vector_mut(keys.velocity)[i] = *way * (1.0 / params.step_length() as f32);
             }
         }
     }
 
     /// How much the mesh moved; puts vertices to sleep and wakes others.
     fn measure(&self, mesh: &mut Mesh, keys: Keys, world: &World) -> Movement {
-        let per_time = 1.0 / (world.params.time_step as f32 * world.delta);
+        let per_time = 1.0 / (world.params.step_length() as f32 * world.delta);
         let stillness = stillness(world.params.mass, world.params.energy_tolerance);
         let mut movement = Movement::default();
         for &v in &self.awake.moving {

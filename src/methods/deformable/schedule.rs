@@ -1,6 +1,6 @@
 //! When a level is finished, and the way down to the next (section 5.1, figures 12 and 13).
 
-use super::{DeformableModel, DeformableParams, Topology};
+use super::{DeformableModel, DeformableParams, Topology, contact};
 use crate::mesh::VertexId;
 use crate::methods::{MethodError, Times};
 use crate::remesh::{Changes, Sampling};
@@ -16,6 +16,12 @@ const MOST_QUIET_ITERATIONS: f64 = 500.0;
 /// such as a front in a hole; with no bound the model stops before it has passed.
 const REST_SPEED: f32 = 0.03;
 
+/// Searches of the finest level for what is missing.
+const MOST_SEARCHES: u32 = 3;
+
+/// The longest move of a vertex of a surface at rest in one iteration, in δ.
+const REST_MOVE: f32 = 0.1;
+
 /// Where the model stands between moving and done.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Rest {
@@ -23,6 +29,10 @@ pub(super) struct Rest {
     /// Whether all vertices were awake when the quiet iterations began.
     woken: bool,
     done: bool,
+    /// Searches of the finest level for what is missing, after which something was found.
+    searches: u32,
+    /// Whether the sizes of edges fit the surface as it came to rest.
+    pub(super) sized: bool,
     /// The iteration at whose end this level began.
     pub(super) began: u32,
 }
@@ -38,8 +48,8 @@ impl DeformableModel {
         if self.rest.done {
             return 1.0;
         }
-        let DeformableParams { mass, max_move, time_step, energy_tolerance, .. } = self.params;
-        let speed = max_move / time_step;
+        let DeformableParams { mass, max_move, energy_tolerance, .. } = self.params;
+        let speed = max_move / self.params.step_length();
         let full = (0.5 * mass * speed * speed).max(2.0 * energy_tolerance);
         // Where a level begins, the energy is still that of the level before.
         let energy = if self.iteration == self.rest.began { full } else { self.movement.energy };
@@ -51,12 +61,18 @@ impl DeformableModel {
     /// Wakes all vertices: something changed that may move them.
     pub(super) fn wake_all(&mut self) {
         self.mesh.scalar_mut(self.keys.still).fill(0.0);
-        self.rest = Rest { began: self.rest.began, ..Rest::default() };
+        self.rest = Rest {
+            began: self.rest.began,
+            searches: self.rest.searches,
+            sized: self.rest.sized,
+            ..Rest::default()
+        };
     }
 
     /// Counts quiet iterations; after enough of them checks the whole mesh and goes one level down, or ends.
     pub(super) fn come_to_rest(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
-        let quiet = self.movement.energy < self.params.energy_tolerance && self.movement.fastest < REST_SPEED;
+        let quiet =
+            self.movement.energy < self.params.energy_tolerance && self.movement.fastest < self.rest_speed();
         self.rest.quiet = if quiet { self.rest.quiet + 1 } else { 0 };
         self.rest.woken &= quiet;
         if self.rest.quiet < self.quiet_iterations() {
@@ -68,19 +84,47 @@ impl DeformableModel {
             return Ok(Changes::default());
         }
         let mut changes = self.check_everything(times);
-        if self.level == 0 {
-            self.rest.done = true;
-        } else {
+        if self.level == 0 && self.set_sizes() {
+            changes += self.check_everything(times);
+            self.wake_all();
+            return Ok(changes);
+        }
+        if self.level > 0 {
             self.descend()?;
             changes += self.check_everything(times);
+            if self.seeds_levels() {
+                changes += self.seed_missing(times)?;
+            }
+            return Ok(changes);
         }
+        let found = if self.seeds_levels() && self.rest.searches < MOST_SEARCHES {
+            self.seed_missing(times)?
+        } else {
+            Changes::default()
+        };
+        if found.seeds > 0 {
+            let searches = self.rest.searches + 1;
+            self.wake_all();
+            self.rest.searches = searches;
+            self.rest.sized = false;
+        } else {
+            self.rest.done = true;
+        }
+        changes += found;
         Ok(changes)
+    }
+
+    /// The speed below which the fastest vertex has settled. A long step is an iteration, too: no vertex goes far in one.
+    fn rest_speed(&self) -> f32 {
+        let longest = REST_MOVE / self.params.step_length() as f32;
+        if longest < REST_SPEED { longest } else { REST_SPEED }
     }
 
     /// Iterations a surface takes to follow a force, m/γ: one that has just begun to move is slow too, and not at rest.
     fn quiet_iterations(&self) -> u32 {
-        let DeformableParams { mass, damping, time_step, .. } = self.params;
-        libm::ceil(mass / (damping * time_step)).clamp(QUIET_ITERATIONS, MOST_QUIET_ITERATIONS) as u32
+        let DeformableParams { mass, damping, .. } = self.params;
+        libm::ceil(mass / (damping * self.params.step_length()))
+            .clamp(QUIET_ITERATIONS, MOST_QUIET_ITERATIONS) as u32
     }
 
     /// Looks at every vertex whether it has moved or not, and removes specks.
@@ -90,8 +134,10 @@ impl DeformableModel {
         }
         let all: Vec<VertexId> = self.mesh.vertices().collect();
         let mut changes = self.restore_bounds(&all, times);
-        let sampling = Sampling::new(self.model_delta());
-        changes.vanished += self.resolver.sweep(&mut self.mesh, sampling);
+        let sampling = self.sampling();
+        let guide = contact::guide(&self.pyramid.levels[self.level], self.level_iso, &self.params);
+        changes.vanished += self.resolver.sweep(&mut self.mesh, sampling, &*guide);
+        drop(guide);
         self.settle_in();
         changes
     }

@@ -1,17 +1,21 @@
 //! The surface a run starts from (section 3.6), made in the space of the model and resolved before the first step.
 
+use super::contour::{ObjectIs, contour, placed};
 use super::domain::{Domain, rounded_axes};
 use super::image::LevelImage;
 use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings};
 use crate::methods::MethodError;
 use crate::methods::given::surface;
-use crate::remesh::{Resolver, Sampling};
+use crate::remesh::{Resolver, Sampling, TopologyGuide, Unguided};
 use crate::volume::marching_cubes;
 
 /// What a run starts from; lengths and points in world units.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Start {
+    /// The iso-surface at π_I of the coarsest level, outer and inner boundaries, less the parts that enclose less than
+    /// [`super::DeformableParams::smallest_part`]; the enclosing surface where there is none.
+    Contour,
     /// A refined icosahedron around all of the image that is brighter than π_I; around the whole image where nothing is, or
     /// where the surface does not look for what is brighter.
     Enclosing,
@@ -35,6 +39,11 @@ pub(super) struct Frame<'a> {
     pub(super) image: &'a LevelImage,
     /// The intensity, normalised, of what an enclosing surface looks for.
     pub(super) brighter_than: Option<f32>,
+    /// π_I, normalised, and on which side of it the object is.
+    pub(super) iso: f32,
+    pub(super) object: ObjectIs,
+    /// The least volume of a closed part of the contour, in voxels of the finest level.
+    pub(super) smallest_part: f64,
     /// Voxels of the finest level.
     pub(super) dims: [usize; 3],
     pub(super) domain: Domain,
@@ -70,15 +79,21 @@ impl Start {
     /// # Errors
     /// [`MethodError::InvalidArgument`] where a sphere is too small for the sampling or two overlap, or the iso-surface
     /// is empty; [`MethodError::Mesh`] where the caller's mesh is open, not manifold or crosses itself.
-    pub(super) fn make(&self, frame: &Frame, iso: impl Fn(f64) -> f32) -> Result<Mesh, MethodError> {
+    pub(super) fn make(
+        &self,
+        frame: &Frame,
+        iso: impl Fn(f64) -> f32,
+        guide: &dyn TopologyGuide,
+    ) -> Result<Mesh, MethodError> {
         let mut mesh = match self {
+            Self::Contour => on_contour(frame)?,
             Self::Enclosing => enclosing(frame)?,
             Self::Bubbles(n) => bubbles(frame, *n)?,
             Self::Seeds { points, radius } => seeds(frame, points, *radius)?,
             Self::MarchingCubes(value) => iso_surface(frame, iso(*value))?,
             Self::Mesh(mesh) => given(frame, mesh)?,
         };
-        let mut resolver = resolve_all(&mut mesh, frame, frame.sampling)?;
+        let mut resolver = resolve_all(&mut mesh, frame, frame.sampling, guide)?;
         if !resolver.is_embedded(&mesh) {
             return Err(MeshError::SelfIntersecting { pairs: count_crossings(&mesh.to_triangles()) }.into());
         }
@@ -86,19 +101,24 @@ impl Start {
     }
 }
 
-fn resolve_all(mesh: &mut Mesh, frame: &Frame, sampling: Sampling) -> Result<Resolver, MethodError> {
+fn resolve_all(
+    mesh: &mut Mesh,
+    frame: &Frame,
+    sampling: Sampling,
+    guide: &dyn TopologyGuide,
+) -> Result<Resolver, MethodError> {
     let mut resolver = Resolver::with_room_for(frame.domain.most_vertices(sampling.shortest()));
-    resolver.resolve(mesh, sampling, &mesh.vertices().collect::<Vec<_>>());
+    resolver.resolve_guided(mesh, sampling, &mesh.vertices().collect::<Vec<_>>(), guide);
     for _ in 0..MOST_CALLS {
         if !resolver.is_waiting() {
             break;
         }
-        resolver.resolve(mesh, sampling, &[]);
+        resolver.resolve_guided(mesh, sampling, &[], guide);
     }
     if let Some(most) = resolver.take_overflow() {
         return Err(MethodError::TooManyVertices { most });
     }
-    resolver.sweep(mesh, sampling);
+    resolver.sweep(mesh, sampling, guide);
     Ok(resolver)
 }
 
@@ -128,7 +148,7 @@ fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
         let slots: Vec<_> = mesh.vertices().collect();
         slots.into_iter().for_each(|v| mesh.set_position(v, onto_box(mesh.position(v))));
         if 3.0 * delta < axes.min_element() {
-            _ = resolve_all(&mut mesh, frame, Sampling::new(delta))?;
+            _ = resolve_all(&mut mesh, frame, Sampling::new(delta), &Unguided)?;
         }
     }
     Ok(mesh)
@@ -239,17 +259,22 @@ fn largest(spacing: [f64; 3]) -> f64 {
     spacing.into_iter().fold(0.0, f64::max)
 }
 
+/// The contour that the model looks for, of the level it starts on.
+fn on_contour(frame: &Frame) -> Result<Mesh, MethodError> {
+    let surface = contour(frame.image, frame.iso, frame.object, frame.smallest_part)?;
+    if surface.triangles.is_empty() { enclosing(frame) } else { Ok(Mesh::from_triangles(&surface)?) }
+}
+
 fn iso_surface(frame: &Frame, iso: f32) -> Result<Mesh, MethodError> {
     let (grid, position) = frame.image.grid();
-    let mut surface = marching_cubes(grid, iso)?;
+    let surface = marching_cubes(grid, iso)?;
     if surface.triangles.is_empty() {
         return Err(MethodError::invalid(
             "start.marchingCubes",
             "the image has no surface at this intensity",
         ));
     }
-    surface.positions.iter_mut().for_each(|p| *p = position(*p));
-    Ok(Mesh::from_triangles(&surface)?)
+    Ok(Mesh::from_triangles(&placed(surface, position))?)
 }
 
 fn given(frame: &Frame, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {

@@ -11,7 +11,7 @@ use crate::remesh::{Resolver, Waiting};
 use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
 
-const MARK: Mark = *b"VSCLDEF\x02";
+const MARK: Mark = *b"VSCLDEF\x03";
 
 /// Everything a run has beside its volume.
 #[derive(Serialize, Deserialize)]
@@ -19,6 +19,7 @@ struct State {
     fingerprint: u64,
     params: DeformableParams,
     attractors: Vec<Attractor>,
+    from_contour: bool,
     finest_delta: f64,
     level: usize,
     mesh: Mesh,
@@ -36,6 +37,7 @@ impl DeformableModel {
             fingerprint: self.fingerprint,
             params: self.params.clone(),
             attractors: self.attractors.clone(),
+            from_contour: self.from_contour,
             finest_delta: self.finest_delta,
             level: self.level,
             mesh: self.mesh.clone(),
@@ -98,6 +100,7 @@ impl DeformableModel {
         let mut next = self.clone();
         next.set_attractors(state.attractors)?;
         next.params = state.params;
+        next.from_contour = state.from_contour;
         next.finest_delta = state.finest_delta;
         next.level = state.level;
         next.domain = self.domain_for(state.finest_delta);

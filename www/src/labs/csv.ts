@@ -1,7 +1,7 @@
 import type { History } from '../ui/history';
 
 const PLAIN = ['iteration', 'phase', 'residual', 'tolerance', 'vertices', 'triangles', 'components', 'euler'] as const;
-const EVENTS = ['creations', 'deletions', 'inversions', 'axial', 'annular', 'vanished'] as const;
+const EVENTS = ['creations', 'deletions', 'inversions', 'axial', 'annular', 'vanished', 'seeds'] as const;
 
 /** One line an iteration: all that the plots, the list of events and the table of times show. Times in milliseconds; `residual` is what the method calls it. */
 export function toCsv({ reports }: History, residual = 'energy'): string {

@@ -147,7 +147,7 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
     const choice = this.#ui.start.value;
     const suits: StartChoice = example
       ? { ...choice, ...startOf(example), levels: example.levels, edge: example.edge }
-      : { ...choice, kind: choice.kind === 'sphere' ? 'enclosing' : choice.kind, edge: undefined };
+      : { ...choice, kind: choice.kind === 'sphere' ? 'contour' : choice.kind, edge: undefined };
     return linked ? withLink(suits, linked) : suits;
   }
 }

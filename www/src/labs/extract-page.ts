@@ -22,6 +22,7 @@ export interface Parts {
   slices: HTMLElement;
   drop: HTMLElement;
   measures: HTMLElement;
+  coverage: HTMLElement;
   exports: HTMLElement;
   sculpt: HTMLElement;
   link: HTMLElement;
@@ -62,6 +63,7 @@ export function layOut(root: HTMLElement, parts: Parts): void {
       'div',
       { class: 'column results' },
       section('Surface', parts.measures),
+      section('Coverage', parts.coverage),
       section('Save', parts.exports, parts.sculpt, parts.link),
       section('Progress', parts.plots, parts.csv),
       section('Events', parts.log),

@@ -1,9 +1,11 @@
 import { EXAMPLES, type Example } from '../examples';
+import { COVERAGE_GUIDE } from '../guides';
 import { isPreset, PRESETS, type Preset, type Variant, variantOf } from '../presets';
 import type { Attractor, MeshFormat, ParamSpec, ParamValues, Plane, VolumeView } from '../protocol';
 import type { LabState } from '../state';
 import { AttractorControls } from '../ui/attractors';
 import { ComparePanel } from '../ui/compare';
+import { CoveragePanel } from '../ui/coverage';
 import { h } from '../ui/dom';
 import { EXTRACT_EXERCISES, exercises } from '../ui/exercises';
 import { ExportButtons } from '../ui/exports';
@@ -40,6 +42,9 @@ export interface PartEvents extends TransportEvents {
   onPlanes: (planes: Plane[]) => void;
   onCompare: () => void;
   onCancelCompare: () => void;
+  onCoverage: () => void;
+  onCancelCoverage: () => void;
+  onSeed: () => void;
   onSculpt: () => void;
   onCancel: () => void;
   onDismiss: () => void;
@@ -68,6 +73,7 @@ export class ExtractParts {
   readonly options: ViewOptionControls;
   readonly transport: Transport;
   readonly compare: ComparePanel;
+  readonly coverage: CoveragePanel;
   readonly saving: Saving;
   readonly #root: HTMLElement;
   readonly #history: History;
@@ -117,6 +123,13 @@ export class ExtractParts {
     });
     this.transport = new Transport(events);
     this.compare = new ComparePanel({ onStart: events.onCompare, onCancel: events.onCancelCompare });
+    this.coverage = new CoveragePanel(COVERAGE_GUIDE, {
+      onStart: events.onCoverage,
+      onCancel: events.onCancelCoverage,
+      onSeed: events.onSeed,
+      onGoTo: (point) => this.stage.lookAt(point),
+      onMark: (parts) => this.stage.showUncovered(parts),
+    });
     this.#compareHolder = folded('Direct against coarse to fine', this.compare.element);
     this.saving = new Saving(fetchMesh, (text) => this.status.say(text));
     this.#exports = new ExportButtons((format, type) => {
@@ -162,6 +175,7 @@ export class ExtractParts {
       slices: this.#slices,
       drop,
       measures: this.measures.element,
+      coverage: this.coverage.element,
       exports: this.#exports.element,
       sculpt: this.#sculpt,
       link: h(
@@ -193,6 +207,8 @@ export class ExtractParts {
     this.data.show(volume, example);
     this.stage.setVolume(volume);
     this.compare.clear();
+    this.coverage.unit = this.stage.unit;
+    this.coverage.clear();
     if (isPreset(example) && example.compares) this.#compareHolder.open = true;
   }
 
@@ -239,6 +255,7 @@ export class ExtractParts {
     this.#exports.enabled = idle;
     this.#sculpt.disabled = !idle;
     this.compare.enabled = idle;
+    this.coverage.enabled = idle;
     this.#cancel.hidden = state !== 'loading' || !ready;
   }
 

@@ -1,6 +1,7 @@
 import { type Client, toFailure } from '../client';
 import type { Preset, Variant } from '../presets';
 import type { Attractor, ParamValues, SavedRun, Setup, StartShape, Vec3, VolumeView } from '../protocol';
+import { plural } from '../ui/format';
 import type { HistoryMark } from '../ui/history';
 import type { StartChoice } from '../ui/start';
 import type { ExtractParts } from './extract-parts';
@@ -114,6 +115,16 @@ export class ExtractSettings {
       if (startsOver) await this.#rebuild(this.#ui.start.inForce, params);
       else this.#take(await this.#client.request('setParams', params));
       await this.#client.request('play', undefined);
+    });
+  }
+
+  /** Adds what the surface leaves out, and runs on where there was something. */
+  seed(): Promise<void> {
+    const { coverage } = this.#ui;
+    return this.#change('seeding', 'Missing parts could not be seeded.', async () => {
+      const seeds = await this.#client.request('seed', undefined);
+      coverage.say(seeds === 0 ? 'Nothing to seed on this level.' : `${plural(seeds, 'part')} seeded.`);
+      if (seeds > 0) await this.#client.request('play', undefined);
     });
   }
 
@@ -231,6 +242,7 @@ export class ExtractSettings {
   }
 
   #adoptModel(choice: StartChoice, params: ParamValues): void {
+    this.#ui.coverage.clear();
     this.#ui.start.show(choice);
     this.#results.startOver();
     this.#take(params);

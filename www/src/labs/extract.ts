@@ -91,6 +91,9 @@ export class ExtractLab implements Lab {
       },
       onCompare: () => void this.#compare(),
       onCancelCompare: () => this.#ask(this.#client.request('cancelCompare', undefined)),
+      onCoverage: () => void this.#measureCoverage(),
+      onCancelCoverage: () => this.#ask(this.#client.request('cancelCoverage', undefined)),
+      onSeed: () => void this.#settings.seed(),
       onSculpt: () => this.#sharing.toSculpt(this.#passOn),
       onCancel: () => void this.#opening.cancel(),
       onToggle: () => this.#toggle(),
@@ -167,6 +170,16 @@ export class ExtractLab implements Lab {
     }
   }
 
+  async #measureCoverage(): Promise<void> {
+    const { coverage } = this.#ui;
+    coverage.begin();
+    try {
+      coverage.finish(await this.#client.request('coverage', undefined));
+    } catch (error) {
+      coverage.say(`Coverage could not be measured: ${toFailure(error).message}`);
+    }
+  }
+
   /** Waits for nothing; tells when it fails. */
   #ask(request: Promise<unknown>): void {
     request.catch((error) => this.#states.fail('That did not work.', error));
@@ -175,6 +188,7 @@ export class ExtractLab implements Lab {
   #onEvent(event: WorkerEvent): void {
     if (event.event === 'failure') this.#states.fail('The run has stopped.', new RequestError(event.failure));
     else if (event.event === 'comparing') this.#ui.compare.tell(event);
+    else if (event.event === 'covering') this.#ui.coverage.tell(event);
     else if (event.event !== 'state') this.#results.take(event);
     else if (this.#states.enter(event.state)) this.#results.showState(event.state);
   }

@@ -1,11 +1,17 @@
 /** The lab's settings as the part of an address after `#extract?`, and back. */
 import { EXAMPLES, type Example } from '../examples';
-import { startOf } from '../presets';
+import { exampleById, isPreset, PAPER, startOf } from '../presets';
 import type { Attractor, ParamValues, Vec3 } from '../protocol';
 import { isStartKind, type StartChoice } from '../ui/start';
 import type { ColorMode } from '../ui/view-options';
 
 export const ADDRESS = '#extract';
+
+/**
+ * Links say which defaults they count on. Those without a version were written when the lab started from an enclosing
+ * surface, with the method as in the paper.
+ */
+const VERSION = '2';
 
 export interface Linked {
   /** The example or figure that is open. */
@@ -42,7 +48,7 @@ export interface LabSettings {
 export function linkOf(settings: LabSettings): Linked {
   const { example, file, choice, sphere, params, defaults, attractors, color } = settings;
   const usual = { levels: 1, edge: undefined, ...example };
-  const start = example ? startOf(example) : ({ kind: 'enclosing' } as const);
+  const start = startOf(example);
   const bubbles = 'bubbles' in start ? start.bubbles : undefined;
   return {
     ...(!example && { file }),
@@ -83,6 +89,7 @@ export function toHash(linked: Linked): string {
   for (const [name, value] of Object.entries(params)) query.set(`p.${name}`, String(value));
   for (const { point, strength, radius } of attractors)
     query.append('attractor', numbers([...point, strength, radius]));
+  if (query.size > 0) query.set('v', VERSION);
   const text = query.toString().replaceAll('%2C', ',');
   return text ? `${ADDRESS}?${text}` : ADDRESS;
 }
@@ -108,7 +115,13 @@ export function fromHash(hash: string): Linked | undefined {
   for (const [name, value] of query) if (name.startsWith('p.')) linked.params[name.slice(2)] = readValue(value);
   const color = query.get('color');
   if (color) linked.color = color as ColorMode;
-  return linked;
+  return query.has('v') ? linked : asBefore(linked);
+}
+
+/** A link without a version, as it was meant. A figure brings all of that along. */
+function asBefore(linked: Linked): Linked {
+  if (isPreset(exampleById(linked.example ?? ''))) return linked;
+  return { start: 'enclosing', ...linked, params: { ...PAPER, ...linked.params } };
 }
 
 export function readValue(text: string): unknown {

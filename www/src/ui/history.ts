@@ -7,6 +7,7 @@ export interface Change {
   axial: number;
   annular: number;
   vanished: number;
+  seeds: number;
 }
 
 /** A place in a history to come back to. */
@@ -59,8 +60,8 @@ export class History {
     const { iteration, phase } = report;
     // Being done is no phase of its own.
     if (!report.done && this.phases.at(-1)?.phase !== phase) this.phases.push({ iteration, phase });
-    const { axial, annular, vanished } = report.events;
-    if (axial + annular + vanished > 0) this.changes.push({ iteration, axial, annular, vanished });
+    const { axial, annular, vanished, seeds } = report.events;
+    if (axial + annular + vanished + seeds > 0) this.changes.push({ iteration, axial, annular, vanished, seeds });
     const now = this.phases.at(-1)?.phase ?? phase;
     const times = this.times.get(now) ?? new Map<string, number>();
     this.times.set(now, times);

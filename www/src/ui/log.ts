@@ -5,7 +5,7 @@ import type { Change, History } from './history';
 /** How many entries are kept on the page; the totals above them count all. */
 const MOST_ENTRIES = 300;
 
-/** What happened, newest first: level changes, joins, cuts, parts that vanished. */
+/** What happened, newest first: level changes, joins, cuts, parts that vanished or were seeded. */
 export class EventLog {
   readonly element: HTMLElement;
   readonly #summary = h('p', { class: 'help' });
@@ -49,14 +49,15 @@ function entry(iteration: number, kind: string, text: string): { iteration: numb
 }
 
 function kindOf(change: Change): string {
-  return change.axial > 0 ? 'axial' : change.annular > 0 ? 'annular' : 'vanished';
+  return (['axial', 'annular', 'seeds', 'vanished'] as const).find((kind) => change[kind] > 0) ?? 'vanished';
 }
 
-export function describe({ axial, annular, vanished }: Change): string {
+export function describe({ axial, annular, vanished, seeds }: Change): string {
   const parts: string[] = [];
   if (axial > 0) parts.push(plural(axial, 'join'));
   if (annular > 0) parts.push(plural(annular, 'cut'));
   if (vanished > 0) parts.push(`${plural(vanished, 'part')} vanished`);
+  if (seeds > 0) parts.push(`${plural(seeds, 'part')} seeded`);
   return parts.join(', ');
 }
 
@@ -75,5 +76,6 @@ export function totals(changes: Change[]): string {
     sum((change) => change.vanished),
     'part',
   );
-  return `${joins}, ${cuts}, ${vanished} vanished.`;
+  const seeds = sum((change) => change.seeds);
+  return `${joins}, ${cuts}, ${vanished} vanished${seeds > 0 ? `, ${count(seeds)} seeded` : ''}.`;
 }

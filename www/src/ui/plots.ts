@@ -84,6 +84,7 @@ export class Plots {
       key('axial', 'axial: parts join'),
       key('annular', 'annular: a neck is cut'),
       key('vanished', 'a part vanishes'),
+      key('seeds', 'a part is seeded'),
     );
   }
 
@@ -245,12 +246,18 @@ function drawMarks(plot: uPlot, history: History): void {
   const foot = bbox.top + bbox.height;
   // A lane each, so that none hides another.
   const lane = MARK_LANE * devicePixelRatio;
-  const [join, cut, vanish] = [token('--join'), token('--cut'), token('--vanished')];
-  for (const { iteration, axial, annular, vanished } of history.changes) {
+  const [join, cut, vanish, seed] = ['--join', '--cut', '--vanished', '--seed'].map(token) as [
+    string,
+    string,
+    string,
+    string,
+  ];
+  for (const { iteration, axial, annular, vanished, seeds } of history.changes) {
     const x = plot.valToPos(iteration, 'x', true);
     if (axial > 0) upright(ctx, x, foot - lane, foot, join);
     if (annular > 0) upright(ctx, x, foot - 2 * lane, foot - lane, cut);
     if (vanished > 0) upright(ctx, x, foot - 3 * lane, foot - 2 * lane, vanish);
+    if (seeds > 0) upright(ctx, x, foot - 4 * lane, foot - 3 * lane, seed);
   }
   ctx.restore();
 }

@@ -9,6 +9,11 @@ export function isStartKind(text: string | undefined): text is Kind {
 
 const SHAPES: { kind: Kind; label: string; help: string }[] = [
   {
+    kind: 'contour',
+    label: 'Contour of the coarsest level',
+    help: 'The iso-surface of the coarsest level with its hollows: for real data.',
+  },
+  {
     kind: 'enclosing',
     label: 'Enclosing surface',
     help: 'One surface around all that is brighter than the iso value, shrinking onto it.',

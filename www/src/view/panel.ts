@@ -1,4 +1,4 @@
-import type { Attractor, LevelView, Vec3, VolumeView } from '../protocol';
+import type { Attractor, LevelView, UncoveredPart, Vec3, VolumeView } from '../protocol';
 import { h, pen, token, uniqueId } from '../ui/dom';
 import type { SliceFrame } from './anatomy';
 import { discOf, paintLevel, paintSlice, pictureSize, projectSegments } from './slicing';
@@ -44,6 +44,7 @@ export class SlicePanel {
   readonly #observer = new ResizeObserver(() => this.draw());
   #outline: Float32Array = new Float32Array(0);
   #attractors: Attractor[] = [];
+  #uncovered: readonly UncoveredPart[] = [];
   /** The coarser copy that is shown instead of the volume. */
   #level: LevelView | undefined;
   #crosshair: Vec3 = [0, 0, 0];
@@ -97,6 +98,11 @@ export class SlicePanel {
     this.draw();
   }
 
+  setUncovered(parts: readonly UncoveredPart[]): void {
+    this.#uncovered = parts;
+    this.draw();
+  }
+
   /** Brings everything together on the visible canvas, in its own resolution. */
   draw(): void {
     const { clientWidth, clientHeight } = this.#canvas;
@@ -116,6 +122,7 @@ export class SlicePanel {
     this.#drawCrosshair(context, scaleX, scaleY);
     this.#drawOutline(context, scaleX, scaleY);
     this.#drawAttractors(context, scaleX, scaleY);
+    this.#drawUncovered(context, scaleX, scaleY);
     this.overlay(context, scaleX, scaleY);
   }
 
@@ -214,6 +221,21 @@ export class SlicePanel {
       context.beginPath();
       context.arc(...at, disc.near ? 3.5 : 1.5, 0, 2 * Math.PI);
       context.fill();
+    }
+  }
+
+  /** A dot where matter is missing near this slice, a ring where a hollow is. */
+  #drawUncovered(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
+    context.lineWidth = 1.5;
+    for (const { position, kind } of this.#uncovered) {
+      const point = { point: position, radius: Math.max(...this.#volume.spacing) };
+      const disc = discOf(point, this.#crosshair[this.frame.axis], this.#inverse, this.#volume, this.frame);
+      if (!disc?.near) continue;
+      context.beginPath();
+      context.arc(disc.x * scaleX, disc.y * scaleY, 4, 0, 2 * Math.PI);
+      context.strokeStyle = context.fillStyle = token(kind === 'matter' ? '--matter' : '--hollow');
+      if (kind === 'matter') context.fill();
+      else context.stroke();
     }
   }
 

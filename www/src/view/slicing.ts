@@ -76,7 +76,7 @@ export function slicePicture(volume: Voxels, frame: SliceFrame, index: number): 
  * does not. `near`: the point itself lies within half a voxel of the slice.
  */
 export function discOf(
-  { point, radius }: Attractor,
+  { point, radius }: Pick<Attractor, 'point' | 'radius'>,
   slice: number,
   inverse: ArrayLike<number>,
   volume: Pick<VolumeView, 'dims' | 'spacing'>,

@@ -1,11 +1,11 @@
 import type { Raycaster, Vector3 } from 'three';
-import type { Attractor, LevelView, Plane, Surface, Vec3, VolumeView } from '../protocol';
+import type { Attractor, LevelView, Plane, Surface, UncoveredPart, Vec3, VolumeView } from '../protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import type { ViewOptions } from '../ui/view-options';
 import { invert, sliceFrames, slicePlane, toWorld } from './anatomy';
 import { VolumeFrame } from './frame';
-import { AttractorMarks } from './markers';
+import { AttractorMarks, UncoveredMarks } from './markers';
 import { AXIS_TOKENS, SlicePanel } from './panel';
 import { SlicePlane } from './planes';
 import { diverging, SHADES, shadeTitle } from './shading';
@@ -28,6 +28,7 @@ export class Stage {
   readonly #slices: HTMLElement;
   readonly #surface = new SurfaceObject();
   readonly #marks = new AttractorMarks();
+  readonly #uncoveredMarks = new UncoveredMarks();
   /** What the colours of the surface mean. */
   readonly legend = new Legend(diverging);
   /** Takes the place that is clicked, in a slice or on the surface, instead of the crosshair going there. */
@@ -56,6 +57,7 @@ export class Stage {
     this.#options = options;
     this.#viewport.add(this.#surface.object);
     this.#viewport.add(this.#marks.object);
+    this.#viewport.add(this.#uncoveredMarks.object);
     this.#viewport.onClick = (ray) => this.#placeOnSurface(ray);
     this.#viewport.onDraw = (viewer, hurried) => {
       this.#surface.coarse = hurried;
@@ -122,6 +124,20 @@ export class Stage {
     this.#marks.show(attractors);
     for (const panel of this.#scene?.panels ?? []) panel.setAttractors(attractors);
     this.#viewport.invalidate();
+  }
+
+  /** Marks what the surface leaves out. */
+  showUncovered(parts: readonly UncoveredPart[]): void {
+    const { dims = [1, 1, 1], spacing = [1, 1, 1] } = this.#scene?.volume ?? {};
+    this.#uncoveredMarks.show(parts, Math.min(...dims.map((n, axis) => n * (spacing[axis] ?? 1))));
+    for (const panel of this.#scene?.panels ?? []) panel.setUncovered(parts);
+    this.#viewport.invalidate();
+  }
+
+  /** Moves the slices to a world point, and the 3D view so that it is in its middle. */
+  lookAt(point: Vec3): void {
+    this.goTo(point);
+    this.#viewport.lookAt(point);
   }
 
   /** Shows a coarser copy of the volume in the slices, or the volume itself. */
@@ -215,6 +231,7 @@ export class Stage {
   #recolor(): void {
     this.#surface.edgeColor = token('--wire');
     this.#marks.color = token('--attractor');
+    this.#uncoveredMarks.colors = { matter: token('--matter'), hollow: token('--hollow') };
     for (const panel of this.#scene?.panels ?? []) panel.draw();
     this.#viewport.invalidate();
   }

@@ -14,6 +14,7 @@ import {
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
+import type { Vec3 } from '../protocol';
 import { anatomicalSigns, type Grid } from './anatomy';
 import { Drawing } from './drawing';
 import { type PinholeCamera, placeEye } from './eye';
@@ -176,6 +177,15 @@ export class Viewport {
     this.#camera.far = radius * 50;
     this.#camera.updateProjectionMatrix();
     this.goHome();
+  }
+
+  /** Turns and zooms around another point from now on, seen from the same side. */
+  lookAt(point: Vec3): void {
+    const target = new Vector3(...point).applyMatrix4(this.#world.matrixWorld);
+    this.#camera.position.sub(this.#controls.target).add(target);
+    this.#controls.target.copy(target);
+    this.#controls.update();
+    this.invalidate();
   }
 
   goHome(): void {

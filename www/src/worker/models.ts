@@ -8,8 +8,9 @@ type Options = ConstructorParameters<typeof DeformableModel>[0];
 
 function startOf({ start }: Setup, iso: number): Options['start'] {
   switch (start.kind) {
+    case 'contour':
     case 'enclosing':
-      return 'enclosing';
+      return start.kind;
     case 'bubbles':
       return { bubbles: start.count };
     case 'isosurface':

@@ -1,0 +1,74 @@
+//! Closed parts of a triangle list, by the volume they enclose.
+
+use super::TriangleMesh;
+use super::groups::Groups;
+use crate::math::DVec3;
+
+impl TriangleMesh {
+    /// The closed parts that enclose at least `volume`, whichever way they face; parts are joined through vertices.
+    ///
+    /// What lies inside a part counts as enclosed by it, so a small shell goes together with its hollow. Only positions and
+    /// triangles are kept.
+    pub fn without_parts_below(&self, volume: f64) -> Self {
+        let part_of = self.part_of_each_vertex();
+        let enclosed = self.enclosed_volumes(&part_of);
+        let keeps = |v: u32| enclosed[part_of[v as usize] as usize].abs() >= volume;
+        let mut slots = vec![u32::MAX; self.positions.len()];
+        let mut kept = Self::default();
+        for triangle in self.triangles.iter().filter(|t| keeps(t[0])) {
+            kept.triangles.push(triangle.map(|v| {
+                let slot = &mut slots[v as usize];
+                if *slot == u32::MAX {
+                    *slot = kept.positions.len() as u32;
+                    kept.positions.push(self.positions[v as usize]);
+                }
+                *slot
+            }));
+        }
+        kept
+    }
+
+    /// For each vertex, the lowest vertex of its part.
+    pub(crate) fn part_of_each_vertex(&self) -> Vec<u32> {
+        let mut groups = Groups::new(self.positions.len());
+        for [a, b, c] in &self.triangles {
+            groups.join(*a as usize, *b as usize);
+            groups.join(*b as usize, *c as usize);
+        }
+        (0..self.positions.len()).map(|v| groups.find(v) as u32).collect()
+    }
+
+    /// The signed volume of each part, at its lowest vertex; positive where triangles face outwards.
+    fn enclosed_volumes(&self, part_of: &[u32]) -> Vec<f64> {
+        let mut volumes = vec![0.0; self.positions.len()];
+        for triangle in &self.triangles {
+            let part = part_of[triangle[0] as usize] as usize;
+            let origin = self.positions[part].as_dvec3();
+            let [a, b, c]: [DVec3; 3] = triangle.map(|v| self.positions[v as usize].as_dvec3() - origin);
+            volumes[part] += a.dot(b.cross(c)) / 6.0;
+        }
+        volumes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::math::Vec3;
+    use crate::mesh::Mesh;
+    use crate::mesh::shapes::joined;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn small_parts_go_whichever_way_they_face() {
+        let ball = |at: Vec3, radius: f32| Mesh::icosphere(at, radius, 0.5).unwrap().to_triangles();
+        let mut hollow = ball(Vec3::ZERO, 0.9);
+        hollow.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        let all = joined(&[ball(Vec3::ZERO, 3.0), hollow, ball(Vec3::X * 9.0, 1.1)]);
+        assert_eq!(all.without_parts_below(1.0).components().len(), 3);
+        let kept = all.without_parts_below(3.5);
+        assert_eq!(kept.components().len(), 2);
+        assert!(kept.positions.iter().all(|p| p.length() > 2.9 || p.x > 5.0));
+        assert!(all.without_parts_below(1000.0).triangles.is_empty());
+    }
+}

@@ -1,0 +1,212 @@
+//! Seeding: parts of a level's iso-surface that are far from the mesh become new components of it.
+//!
+//! What vanished on a coarse level, or was never shown by one, is not reached by a surface that only moves. So the voxels of a level
+//! are compared with the mesh: object outside of it is missing matter, background inside is a missing hollow. Where that is
+//! further from the mesh than [`CLEARANCE`] its contour is added, closed and clear of the mesh by construction; forces and contact
+//! do the rest.
+
+use super::contour::{ObjectIs, contour, placed};
+use super::coverage::Missing;
+use super::image::LevelImage;
+use super::{DeformableModel, Topology};
+use crate::math::Vec3;
+use crate::mesh::{EditError, Mesh, TriangleMesh, VertexId};
+use crate::methods::{MethodError, StepReport, Times};
+use crate::remesh::Changes;
+use crate::spatial::TriangleTree;
+use crate::volume::{Grid, marching_cubes, voxels_inside};
+
+/// Voxels nearer to the mesh than this, in voxels of the level, are left to it. With less, seeds would touch it; with more, thin
+/// parts beside it are not found.
+const CLEARANCE: f64 = 0.9;
+
+/// The least volume of a seed, in that of the smallest part of its own: pieces of parts that the mesh has may be smaller.
+const SMALLEST_SEED: f64 = 1.0 / 32.0;
+
+impl DeformableModel {
+    /// Searches the level for parts that the mesh leaves out and adds them, whatever `seeding` says. The run goes on where it had
+    /// ended; the report counts the parts as `seeds`.
+    ///
+    /// # Errors
+    /// [`MethodError::TooManyVertices`]; out of memory.
+    pub fn seed(&mut self) -> Result<StepReport, MethodError> {
+        let mut times = Times::default();
+        let changes = self.seed_missing(&mut times)?;
+        if changes.seeds > 0 {
+            self.wake_all();
+            self.count_components(changes);
+        }
+        Ok(self.report(changes, times))
+    }
+
+    /// Adds to the mesh the closed contours of what this level shows and the mesh leaves out, and returns how many there were.
+    pub(super) fn seed_missing(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
+        if self.params.iso_force == 0.0 || self.params.topology == Topology::Fixed {
+            return Ok(Changes::default());
+        }
+        let begin = (self.clock)();
+        let seeds = self.missing_parts()?;
+        let sampling = self.sampling();
+        let mut changes = Changes::default();
+        let mut added = Vec::new();
+        for seed in seeds {
+            let part = Mesh::from_triangles(&seed)?;
+            let most = self.resolver.most_vertices();
+            if self.mesh.vertex_count() + part.vertex_count() > most {
+                return Err(MethodError::TooManyVertices { most });
+            }
+            let append = |mesh: &mut Mesh| mesh.append(&part).map_err(|_| EditError::Full);
+            // One that would cross something is too near to be told from it.
+            if let Ok(names) = self.resolver.guard(&self.mesh, sampling).attempt(&mut self.mesh, append) {
+                added.extend(names);
+                changes.seeds += 1;
+            }
+        }
+        self.welcome(&added);
+        times.add("seeding", (self.clock)() - begin);
+        if changes.seeds > 0 {
+            changes += self.restore_bounds(&added, times);
+        }
+        Ok(changes)
+    }
+
+    /// Makes new vertices known to the model.
+    fn welcome(&mut self, added: &[VertexId]) {
+        let keys = self.keys;
+        for v in added.iter().map(|v| v.index()) {
+            self.mesh.vector_mut(keys.velocity)[v] = Vec3::ZERO;
+            self.mesh.scalar_mut(keys.still)[v] = 0.0;
+            self.mesh.scalar_mut(keys.calm)[v] = 0.0;
+            let (positions, checked) = self.mesh.positions_and_vector_mut(keys.checked);
+            checked[v] = positions[v];
+        }
+    }
+
+    /// The contours of what is missing, one closed surface each, in the space of the model.
+    fn missing_parts(&self) -> Result<Vec<TriangleMesh>, MethodError> {
+        let image = &self.pyramid.levels[self.level];
+        let object = ObjectIs::by(&self.params);
+        let contour = contour(image, self.level_iso, object, self.params.smallest_part)?;
+        let [contour, surface] =
+            [contour, self.mesh.to_triangles()].map(|mesh| placed(mesh, |p| image.index(p)));
+        let dims = image.grid().0.dims;
+        let comparison = Comparison {
+            image,
+            iso: self.level_iso,
+            object,
+            in_contour: voxels_inside(&contour, dims)?,
+            in_mesh: voxels_inside(&surface, dims)?,
+            tree: TriangleTree::new(&surface)?,
+        };
+        let smallest = SMALLEST_SEED * self.params.smallest_part;
+        let mut parts = comparison.parts(Missing::Matter, smallest)?;
+        parts.extend(comparison.parts(Missing::Hollow, smallest)?);
+        Ok(parts)
+    }
+}
+
+/// The contour of a level and the mesh, voxel by voxel.
+struct Comparison<'a> {
+    image: &'a LevelImage,
+    iso: f32,
+    object: ObjectIs,
+    /// Whether each voxel is inside the contour; closed parts that are too small are no part of that.
+    in_contour: Vec<bool>,
+    /// Whether each voxel is inside the mesh.
+    in_mesh: Vec<bool>,
+    /// The mesh in voxels of the level.
+    tree: TriangleTree,
+}
+
+impl Comparison<'_> {
+    /// Closed surfaces around what is missing of one kind, each of at least a volume.
+    fn parts(&self, kind: Missing, smallest: f64) -> Result<Vec<TriangleMesh>, MethodError> {
+        let (grid, position) = self.image.grid();
+        let missing = self.missing_voxels(kind);
+        let Some((low, high)) = bounding_box(&missing, grid.dims) else { return Ok(Vec::new()) };
+        let field = self.field(kind, &missing, low, high);
+        let offset = Vec3::from(low.map(|k| k as f32));
+        let mut surface = placed(marching_cubes(&field, 0.0)?, |p| position(p + offset));
+        if kind == Missing::Hollow {
+            surface.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        }
+        Ok(surface.without_parts_below(smallest).components())
+    }
+
+    /// Whether the contour has a voxel on the side where something of this kind is.
+    fn is_of(&self, kind: Missing, voxel: usize) -> bool {
+        self.in_contour[voxel] == (kind == Missing::Matter)
+    }
+
+    /// Voxels on the wrong side of the mesh and clear of it.
+    fn missing_voxels(&self, kind: Missing) -> Vec<bool> {
+        let is_inside = kind == Missing::Hollow;
+        let dims = self.image.grid().0.dims;
+        let is_missing = |voxel: usize| {
+            self.in_mesh[voxel] == is_inside
+                && self.is_of(kind, voxel)
+                && faces(dims, voxel).all(|w| w.map_or(!is_inside, |w| self.in_mesh[w] == is_inside))
+                && !self.tree.is_within(coordinates(dims, voxel), CLEARANCE)
+        };
+        (0..self.in_mesh.len()).map(is_missing).collect()
+    }
+
+    /// A field around the missing voxels, 0 on their contour: the iso-surface where they end at it, else halfway to the next voxel.
+    fn field(&self, kind: Missing, missing: &[bool], low: [usize; 3], high: [usize; 3]) -> Grid {
+        let grid = self.image.grid().0;
+        let steep = self.image.steepness(self.iso).max(f32::MIN_POSITIVE);
+        let size = [0, 1, 2].map(|k| high[k] - low[k]);
+        let mut values = Vec::with_capacity(size.iter().product());
+        let value = |voxel: usize| {
+            let depth = self.object.depth(grid.values[voxel], self.iso)
+                * if kind == Missing::Matter { 1.0 } else { -1.0 };
+            match missing[voxel] {
+                // What belongs to a part that is too small has the other sign.
+                true if depth < 0.0 => 0.5 * steep,
+                true => depth.min(steep),
+                false if self.is_of(kind, voxel) || depth >= 0.0 => -steep,
+                false => depth,
+            }
+        };
+        for z in low[2]..high[2] {
+            for y in low[1]..high[1] {
+                let row = grid.dims[0] * (y + grid.dims[1] * z);
+                values.extend((row + low[0]..row + high[0]).map(value));
+            }
+        }
+        Grid { dims: size, values }
+    }
+}
+
+fn coordinates(dims: [usize; 3], voxel: usize) -> Vec3 {
+    Vec3::new(
+        (voxel % dims[0]) as f32,
+        (voxel / dims[0] % dims[1]) as f32,
+        (voxel / dims[0] / dims[1]) as f32,
+    )
+}
+
+/// The six voxels that share a face with one; `None` beyond the image.
+fn faces(dims: [usize; 3], voxel: usize) -> impl Iterator<Item = Option<usize>> {
+    let at = [voxel % dims[0], voxel / dims[0] % dims[1], voxel / dims[0] / dims[1]];
+    let step = [1, dims[0], dims[0] * dims[1]];
+    (0..3).flat_map(move |axis| {
+        [(at[axis] > 0).then(|| voxel - step[axis]), (at[axis] + 1 < dims[axis]).then(|| voxel + step[axis])]
+    })
+}
+
+/// The lowest voxel of a box around the marked ones and the one beyond its highest, with a voxel to spare where there is one.
+fn bounding_box(marked: &[bool], dims: [usize; 3]) -> Option<([usize; 3], [usize; 3])> {
+    let mut bounds: Option<([usize; 3], [usize; 3])> = None;
+    for (voxel, _) in marked.iter().enumerate().filter(|(_, marked)| **marked) {
+        let at = [voxel % dims[0], voxel / dims[0] % dims[1], voxel / dims[0] / dims[1]];
+        let (low, high) = bounds.get_or_insert((at, at));
+        for axis in 0..3 {
+            low[axis] = low[axis].min(at[axis]);
+            high[axis] = high[axis].max(at[axis]);
+        }
+    }
+    bounds.map(|(low, high)| {
+        (low.map(|k| k.saturating_sub(1)), [0, 1, 2].map(|axis| (high[axis] + 2).min(dims[axis])))
+    })
+}

@@ -1,0 +1,160 @@
+import type { CoveringEvent, MeasuredCoverage, UncoveredPart, Vec3 } from '../protocol';
+import { h } from './dom';
+import { count, figure, plural } from './format';
+
+/** How many uncovered parts are listed and marked; the sentence above them counts all. */
+const MOST_PARTS = 20;
+
+const KINDS: Record<UncoveredPart['kind'], string> = { matter: 'Missing matter', hollow: 'Missing hollow' };
+
+export interface CoverageEvents {
+  onStart: () => void;
+  onCancel: () => void;
+  onSeed: () => void;
+  /** Shows a position in the slices and in the 3D view. */
+  onGoTo: (point: Vec3) => void;
+  /** The parts to be marked in the views. */
+  onMark: (parts: readonly UncoveredPart[]) => void;
+}
+
+/** How much of the iso-surface the surface covers, and where it does not. */
+export class CoveragePanel {
+  readonly element: HTMLElement;
+  /** Of lengths in the volume's world. */
+  unit = '';
+  readonly #events: CoverageEvents;
+  readonly #start: HTMLButtonElement;
+  readonly #cancel: HTMLButtonElement;
+  readonly #seed: HTMLButtonElement;
+  readonly #progress = h('progress', { max: 1, value: 0, 'aria-label': 'Progress of the measurement', hidden: true });
+  readonly #status = h('p', { class: 'help', role: 'status' });
+  readonly #figures = h('dl', { class: 'facts', 'data-coverage': '{}' });
+  readonly #list = h('ol', { class: 'uncovered', 'aria-label': 'Uncovered parts, largest first' });
+
+  /** `guide`: where the documentation explains it. */
+  constructor(guide: string, events: CoverageEvents) {
+    this.#events = events;
+    this.#start = h(
+      'button',
+      { type: 'button', onclick: events.onStart, 'data-coverage-action': 'start' },
+      'Measure coverage',
+    );
+    this.#cancel = h(
+      'button',
+      { type: 'button', onclick: events.onCancel, 'data-coverage-action': 'cancel', hidden: true },
+      'Cancel',
+    );
+    this.#seed = h(
+      'button',
+      { type: 'button', onclick: events.onSeed, 'data-coverage-action': 'seed' },
+      'Seed missing parts',
+    );
+    const why = h('a', { href: guide, target: '_blank', rel: 'noopener' }, 'What can a surface miss, and why?');
+    this.element = h(
+      'div',
+      { class: 'coverage' },
+      h(
+        'p',
+        { class: 'help' },
+        'A surface loses walls and gaps thinner than its contact distance, and never reaches closed cavities by moving alone. ',
+        why,
+      ),
+      h('div', { class: 'buttons' }, this.#start, this.#cancel, this.#seed),
+      this.#progress,
+      this.#status,
+      this.#figures,
+      this.#list,
+    );
+  }
+
+  /** Whether there is a surface to measure. */
+  set enabled(enabled: boolean) {
+    this.#start.disabled = !enabled;
+    this.#seed.disabled = !enabled;
+  }
+
+  /** Nothing was measured yet. */
+  clear(): void {
+    this.#show(undefined);
+    this.#end('');
+  }
+
+  begin(): void {
+    this.clear();
+    this.#start.hidden = true;
+    this.#seed.hidden = true;
+    this.#cancel.hidden = false;
+    this.#cancel.focus();
+    this.#progress.hidden = false;
+    this.#progress.value = 0;
+    this.#status.textContent = 'Measuring.';
+  }
+
+  tell({ share }: CoveringEvent): void {
+    this.#progress.value = share;
+  }
+
+  /** Says something beside the buttons; figures that are shown stay. */
+  say(message: string): void {
+    this.#end(message);
+  }
+
+  finish(coverage: MeasuredCoverage | undefined): void {
+    if (!coverage) {
+      this.#end('Cancelled.');
+      return;
+    }
+    this.#show(coverage);
+    const { iteration, uncovered } = coverage;
+    const parts = uncovered.length === 0 ? 'No part is uncovered.' : `${plural(uncovered.length, 'part')} uncovered`;
+    const most = uncovered.length > MOST_PARTS ? `; the ${MOST_PARTS} largest are listed and marked.` : '.';
+    this.#end(`At iteration ${count(iteration)}: ${parts}${uncovered.length === 0 ? '' : most}`);
+  }
+
+  #show(coverage: MeasuredCoverage | undefined): void {
+    this.#figures.dataset.coverage = JSON.stringify(coverage ?? {});
+    const rows: [string, string, string][] = coverage
+      ? [
+          ['Recall', percent(coverage.recall), 'share of the iso-surface within one voxel of this surface'],
+          ['Precision', percent(coverage.precision), 'share of this surface within one voxel of the iso-surface'],
+        ]
+      : [];
+    this.#figures.replaceChildren(
+      ...rows.map(([name, value, meaning]) => h('div', { title: meaning }, h('dt', {}, name), h('dd', {}, value))),
+    );
+    const parts = coverage?.uncovered.slice(0, MOST_PARTS) ?? [];
+    this.#list.replaceChildren(...parts.map((part) => this.#item(part)));
+    this.#list.hidden = parts.length === 0;
+    this.#events.onMark(parts);
+  }
+
+  #item({ kind, area, position }: UncoveredPart): HTMLElement {
+    const where = position.map((x) => figure(Number(x.toPrecision(4)))).join(', ');
+    const size = `${figure(Number(area.toPrecision(3)))} ${this.unit ? `${this.unit}²` : ''}`.trim();
+    const label = `${KINDS[kind]}, area ${size}, at ${where}: show it in the views`;
+    const goTo = h(
+      'button',
+      { type: 'button', class: 'quiet', 'aria-label': label, onclick: () => this.#events.onGoTo(position) },
+      h('span', { class: `kind ${kind}`, 'aria-hidden': 'true' }),
+      h('span', {}, KINDS[kind]),
+      h('span', { class: 'area' }, size),
+      h('span', { class: 'where' }, where),
+    );
+    return h('li', {}, goTo);
+  }
+
+  #end(text: string): void {
+    const hadFocus = document.activeElement === this.#cancel;
+    this.#start.hidden = false;
+    this.#seed.hidden = false;
+    this.#cancel.hidden = true;
+    this.#progress.hidden = true;
+    this.#status.textContent = text;
+    if (hadFocus) this.#start.focus();
+  }
+}
+
+/** Rounded down, so that 100 % is all of it. */
+function percent(share: number): string {
+  return `${(Math.floor(share * 1000) / 10).toFixed(1)} %`;
+}
