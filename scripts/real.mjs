@@ -124,7 +124,7 @@ async function report(library, path, name) {
   const bytes = await readFile(path);
   let volume;
   try {
-    volume = library.Volume.parse(new Uint8Array(bytes), await dataBeside(path, bytes));
+    volume = library.Volume.parse(new Uint8Array(bytes), { data: await dataBeside(path, bytes) });
   } catch (error) {
     process.stdout.write(`${name.padEnd(LONGEST_NAME)} not read: ${error.message.slice(0, 80)}\n`);
     return [];

@@ -30,7 +30,7 @@ function ballOf(size: number, radius: number): Uint8Array {
 function restless(): worker.DeformableModel {
   const volume = new worker.Volume({ data, dims: DIMS });
   const start = { seeds: Float32Array.of(12, 12, 12), radius: 2 };
-  const params = { ...PARAMS, energyTolerance: 1e-12, maxMove: 0.01, timeStep: 0.01 };
+  const params = { ...PARAMS, integrator: 'euler', energyTolerance: 1e-12, maxMove: 0.01, timeStep: 0.01 } as const;
   return new worker.DeformableModel({ volume, start, params });
 }
 

@@ -19,7 +19,7 @@ const RAY: Vec3 = Vec3::new(0.846_3, 0.311_7, 0.432_1);
 /// How well the model's surface and the iso-surface of the volume itself agree.
 ///
 /// The iso-surface is that of the finest level by marching cubes, closed at the border, less the closed parts below
-/// [`super::DeformableOptions::smallest_part`].
+/// [`super::DeformableParams::smallest_part`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Coverage {
     /// Share of the iso-surface's area within a voxel of the model; 1 where there is no iso-surface.
