@@ -181,9 +181,9 @@ describe('the history', () => {
     history.add([report(1), report(2, { residual: 0.25 })]);
     const [head, first, second, end] = toCsv(history).split('\n');
     expect(head).toMatch(
-      /^iteration,phase,energy,tolerance,vertices,.*axial,annular,vanished,forces \(ms\),topology \(ms\)$/,
+      /^iteration,phase,energy,tolerance,vertices,.*axial,annular,vanished,seeds,forces \(ms\),topology \(ms\)$/,
     );
-    expect(first).toBe('1,level 1,0.5,0.000001,10,16,1,2,0,0,0,0,0,0,2,1');
+    expect(first).toBe('1,level 1,0.5,0.000001,10,16,1,2,0,0,0,0,0,0,0,2,1');
     expect(second).toContain('2,level 1,0.25,');
     expect(end).toBe('');
   });
@@ -219,7 +219,7 @@ describe('a link', () => {
   test('is the bare address where nothing differs', () => {
     const [first] = EXAMPLES;
     if (!first) throw new Error('no example');
-    const choice = { kind: 'enclosing', bubbles: 5, levels: first.levels, edge: first.edge } as const;
+    const choice = { kind: 'contour', bubbles: 5, levels: first.levels, edge: first.edge } as const;
     const plain = { ...settings, example: first, choice, attractors: [], color: 'plain' as const };
     expect(toHash(linkOf({ ...plain, params: { ...first.params, damping: 0.4 } }))).toBe('#extract');
   });
@@ -227,7 +227,7 @@ describe('a link', () => {
   test('of another lab, or with nonsense in it, does no harm', () => {
     expect(fromHash('#track?example=tooth')).toBeUndefined();
     expect(fromHash('#extract')).toBeUndefined();
-    expect(fromHash('#extract?levels=many&attractor=1,2&p.iso=&start=')).toEqual({
+    expect(fromHash('#extract?levels=many&attractor=1,2&p.iso=&start=&v=2')).toEqual({
       params: { iso: '' },
       attractors: [],
     });
