@@ -5,7 +5,7 @@
 export function watchPage() {
   /** Draws of fewer corners are letters, boxes and slices; copies of fewer bytes are no meshes. */
   const [MANY, LARGE] = [1000, 20_000];
-  const watched = { marks: {}, long: [], drawn: 0, frames: 0, triangles: 0, gpu: 0, copied: 0 };
+  const watched = { marks: {}, long: [], drawn: 0, frames: 0, triangles: 0, gpu: 0, copied: 0, largestCopy: 0 };
   watched.uploads = { bytes: 0, made: 0, refilled: 0 };
   window.watched = watched;
   const mark = (name) => {
@@ -74,6 +74,7 @@ export function watchPage() {
   const { set } = typed;
   typed.set = function (source, ...rest) {
     if (source.byteLength > LARGE) watched.copied += source.byteLength;
+    watched.largestCopy = Math.max(watched.largestCopy, source.byteLength ?? 0);
     return set.call(this, source, ...rest);
   };
 

@@ -3,7 +3,7 @@ import { invalid } from '../check.js';
 import type { MeshArrays } from '../mesh.js';
 import type { StepReport } from '../stepper.js';
 import init, { type Stepper, type Vec3 } from '../worker.js';
-import { fetched, json, type Made, MODELS } from './making.js';
+import { fetched, json, type Made, MODELS, startNamed } from './making.js';
 import { STYLE } from './style.js';
 import { View } from './view.js';
 
@@ -17,13 +17,14 @@ export type LabState = 'loading' | 'running' | 'paused' | 'done' | 'error';
 const SLICE = 60;
 const MOST_STEPS = 256;
 
-const ATTRIBUTES = ['src', 'method', 'levels', 'params', 'ellipsoids'];
+const ATTRIBUTES = ['src', 'method', 'start', 'levels', 'params', 'ellipsoids'];
 
 /**
  * `<vesicle-lab>`: loads `src`, runs a method on it, and shows the surface while it grows.
  *
  * Attributes: `src`, the file; `method`, `deformable` (a volume, the default), `implicit` (points), `tracking` (a volume
- * with frames) or `multires` (a mesh, with `ellipsoids` as JSON); `params` of the method as JSON; `levels` of the pyramid;
+ * with frames) or `multires` (a mesh, with `ellipsoids` as JSON); `params` of the method as JSON; `levels` of the pyramid
+ * and `start`, `contour` (the default) or `enclosing`, of the deformable model;
  * `paused`, not to begin by itself. A change of one of them, but `paused`, begins anew. Events: `vesicle-step` after one
  * step or a few, with a `StepReport` as `detail`, `vesicle-done`, `vesicle-error` with the error. The parts `view`, `controls` and `status` can be
  * styled.
@@ -94,6 +95,7 @@ export class VesicleLab extends HTMLElement {
     const src = this.getAttribute('src');
     if (!src) throw invalid('src', 'the address of a file is needed');
     const told = {
+      start: startNamed(this.getAttribute('start')),
       levels: Number(this.getAttribute('levels') ?? 0),
       params: json<Record<string, unknown>>('params', this.getAttribute('params'), {}),
       ellipsoids: json('ellipsoids', this.getAttribute('ellipsoids'), []),

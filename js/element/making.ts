@@ -14,9 +14,14 @@ import {
   Volume,
 } from '../worker.js';
 
+/** The starts of the deformable model that have a name. */
+const STARTS = ['contour', 'enclosing'] as const;
+type StartName = (typeof STARTS)[number];
+
 /** What the element is told. */
 export interface Told {
   bytes: Uint8Array;
+  start: StartName;
   levels: number;
   params: Record<string, unknown>;
   ellipsoids: ControlEllipsoid[];
@@ -33,8 +38,8 @@ const FRONT: Vec3 = [-0.5, -1, 0.35];
 
 /** From one method to its model; whatever else was made on the way is freed. */
 export const MODELS = {
-  deformable: ({ bytes, levels, params }: Told): Promise<Made> =>
-    ofVolume(bytes, (volume) => DeformableModel.create({ volume, levels, params })),
+  deformable: ({ bytes, start, levels, params }: Told): Promise<Made> =>
+    ofVolume(bytes, (volume) => DeformableModel.create({ volume, start, levels, params })),
   implicit: async ({ bytes, params }: Told): Promise<Made> => {
     const { points, normals } = await parsePoints(bytes);
     return { model: await ImplicitSurface.create({ points, ...(normals && { normals }), params }), from: FRONT };
@@ -69,6 +74,13 @@ export async function fetched(address: string): Promise<Uint8Array> {
   const response = await fetch(address);
   if (!response.ok) throw new VesicleError('bad-file', `src: ${address}: ${response.status} ${response.statusText}`);
   return new Uint8Array(await response.arrayBuffer());
+}
+
+/** The start that an attribute names; the contour when it is left out. */
+export function startNamed(name: string | null): StartName {
+  const start = STARTS.find((one) => one === (name ?? 'contour'));
+  if (!start) throw invalid('start', `'${name}'; accepted: ${STARTS.join(', ')}`);
+  return start;
 }
 
 /** JSON out of an attribute; what it is when it is left out. */

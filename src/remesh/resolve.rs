@@ -2,7 +2,7 @@
 
 use super::specks::SmallParts;
 use super::{Changes, Embedding, Sampling};
-use crate::math::Vec3;
+use crate::math::{Bounds, DAffine3, Vec3};
 use crate::mesh::{Mesh, MeshError, VertexId};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -134,6 +134,11 @@ impl Resolver {
     pub fn guard(&mut self, mesh: &Mesh, sampling: Sampling) -> &mut Embedding {
         self.embedding.follow_with(mesh, sampling.longest());
         &mut self.embedding
+    }
+
+    /// As [`Embedding::watch_output`].
+    pub fn watch_output(&mut self, map: DAffine3, bounds: &Bounds) {
+        self.embedding.watch_output(map, bounds);
     }
 
     /// The number of vertices from which on no edge is split.

@@ -57,6 +57,9 @@ async function open(body: string, before = ''): Promise<void> {
   await page.goto(server.address);
 }
 
+// From a box around everything the way is long enough to be watched; from the contour it is a few steps.
+const FROM_AFAR = `start="enclosing" params='{ "integrator": "euler" }'`;
+
 const state = (wanted: string) => page.waitForSelector(`vesicle-lab[data-state=${wanted}]`);
 const words = () => page.locator('vesicle-lab output').textContent();
 const press = (name: string) => page.getByRole('button', { name, exact: true }).click();
@@ -80,7 +83,7 @@ test('it grows the surface of its volume by itself, under a strict policy', asyn
 });
 
 test('paused it waits; step, play and reset do what they say, and it tells of every step', async () => {
-  await open('<vesicle-lab src="ring.mha" paused></vesicle-lab>');
+  await open(`<vesicle-lab src="ring.mha" ${FROM_AFAR} paused></vesicle-lab>`);
   await state('paused');
   await page.evaluate(() => {
     const lab = document.querySelector('vesicle-lab');
@@ -182,7 +185,7 @@ test('a volume with frames', async () => {
 });
 
 test('taken out of the page it ends, and put in again it begins anew', async () => {
-  await open('<vesicle-lab src="ring.mha"></vesicle-lab>');
+  await open(`<vesicle-lab src="ring.mha" ${FROM_AFAR}></vesicle-lab>`);
   await state('done');
   await page.evaluate(() => {
     const lab = document.querySelector('vesicle-lab');

@@ -44,7 +44,7 @@ describe('the built-in example', () => {
   test('says in words what the plots show', async () => {
     const captions = await app.page.locator('figcaption').allTextContents();
     expect(captions).toHaveLength(3);
-    expect(captions[0]).toMatch(/After \d+ iterations the energy is .* below the tolerance/);
+    expect(captions[0]).toMatch(/After [\d,]+ iterations the energy is .* below the tolerance/);
     expect(captions[1]).toMatch(/^Vertices: now [\d,]+; between/);
   });
 
@@ -198,7 +198,7 @@ describe('the mean edge', () => {
     await reach(app.page, 'running');
     await drop(app.page, [{ name: 'ball.nii', bytes: niftiOf(ball()) }]);
     await expect.poll(() => edge().inputValue()).toBe('');
-    expect(await app.page.inputValue('.start select')).toBe('enclosing');
+    expect(await app.page.inputValue('.start select')).toBe('contour');
     await reach(app.page, 'done');
     expect(await measures(app.page)).toMatchObject({ components: 1, genus: 0, closed: true });
   });
@@ -224,7 +224,7 @@ describe('Cancel', () => {
     await cancelAtOnce(app.page);
     await app.page.selectOption('.start select', 'bubbles');
     await expect.poll(() => app.page.textContent('.status')).toBe('Cancelled.');
-    expect(await app.page.inputValue('.start select')).toBe('enclosing');
+    expect(await app.page.inputValue('.start select')).toBe('contour');
     await expect.poll(() => app.page.getAttribute('.lab', 'data-state')).toMatch(/paused|done/);
   });
 });

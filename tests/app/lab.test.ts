@@ -36,7 +36,7 @@ describe('a figure of the paper', () => {
     await reach(app.page, 'done');
     expect(await measures(app.page)).toMatchObject({ components: 1, genus: 5, closed: true });
     expect(await text('.figure')).toMatch(/Paper: On the CT of a head.*Here both end/);
-    expect(await app.page.evaluate(() => location.hash)).toBe('#extract?example=figure-15-16');
+    expect(await app.page.evaluate(() => location.hash)).toBe('#extract?example=figure-15-16&v=2');
   });
 
   test('shows the levels of the pyramid, and marks where the model is', async () => {
@@ -351,7 +351,7 @@ describe('undo', () => {
 describe('a link', () => {
   test('restores example, start, parameters, attractors and colour', async () => {
     const hash =
-      '#extract?example=linked-rings&start=bubbles&bubbles=9&levels=0&edge=2&color=speed&p.iso=130&p.rigidity=0.15&attractor=10,31,31,0.02,6';
+      '#extract?example=linked-rings&start=bubbles&bubbles=9&levels=0&edge=2&color=speed&p.iso=130&p.rigidity=0.15&attractor=10,31,31,0.02,6&v=2';
     await app.page.goto('about:blank');
     await app.page.goto(app.address + hash);
     await reach(app.page, 'running', 'done');

@@ -153,7 +153,8 @@ test('a volume goes in, the surface of its two rings comes back, and both places
 test('it pauses, goes on, and with other parameters once more', async () => {
   await open('{ running: false }');
   await reach('paused');
-  expect((await mesh()).info()).toMatchObject({ components: 1, genus: 0 });
+  expect(await told('iteration')).toBe(0);
+  expect((await mesh()).check()).toMatchObject({ closed: true, selfIntersections: 0 });
   await tell('running', 'true');
   await reach('done');
   const [steps, before] = [await told('iteration'), (await mesh()).info().volume];

@@ -235,6 +235,7 @@ impl DeformableModel {
             components: 0,
             clock: || 0.0,
         };
+        model.watch_output();
         model.settle_in();
         model.prepare_level()?;
         Ok(model)
@@ -349,6 +350,11 @@ impl DeformableModel {
             Seeding::On => true,
             Seeding::Off => false,
         }
+    }
+
+    /// Keeps the surface from crossing itself in world space, too, where it is handed out in single precision.
+    fn watch_output(&mut self) {
+        self.resolver.watch_output(self.to_world, &self.domain.bounds);
     }
 
     fn reorder(&mut self) {

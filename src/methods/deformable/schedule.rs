@@ -29,7 +29,7 @@ pub(super) struct Rest {
     /// Whether all vertices were awake when the quiet iterations began.
     woken: bool,
     done: bool,
-    /// Searches of the finest level for what is missing, after which something was found.
+    /// Searches of the finest level for what is missing; all of them once nothing was found.
     searches: u32,
     /// Whether the sizes of edges fit the surface as it came to rest.
     pub(super) sized: bool,
@@ -61,12 +61,7 @@ impl DeformableModel {
     /// Wakes all vertices: something changed that may move them.
     pub(super) fn wake_all(&mut self) {
         self.mesh.scalar_mut(self.keys.still).fill(0.0);
-        self.rest = Rest {
-            began: self.rest.began,
-            searches: self.rest.searches,
-            sized: self.rest.sized,
-            ..Rest::default()
-        };
+        self.rest = Rest { began: self.rest.began, ..Rest::default() };
     }
 
     /// Counts quiet iterations; after enough of them checks the whole mesh and goes one level down, or ends.
@@ -78,40 +73,51 @@ impl DeformableModel {
         if self.rest.quiet < self.quiet_iterations() {
             return Ok(Changes::default());
         }
+        if self.level == 0 {
+            let changes = self.complete(times)?;
+            if self.rest.quiet == 0 {
+                return Ok(changes);
+            }
+        }
+        // What has gone to sleep may be pushed by what came to rest since.
         if !self.rest.woken {
-            self.wake_all();
+            self.mesh.scalar_mut(self.keys.still).fill(0.0);
+            self.rest.quiet = 0;
             self.rest.woken = true;
             return Ok(Changes::default());
         }
         let mut changes = self.check_everything(times);
-        if self.level == 0 && self.set_sizes() {
-            changes += self.check_everything(times);
-            self.wake_all();
+        if self.level == 0 {
+            self.rest.done = true;
             return Ok(changes);
         }
-        if self.level > 0 {
-            self.descend()?;
-            changes += self.check_everything(times);
-            if self.seeds_levels() {
-                changes += self.seed_missing(times)?;
-            }
-            return Ok(changes);
+        self.descend()?;
+        changes += self.check_everything(times);
+        if self.seeds_levels() {
+            changes += self.seed_missing(times)?;
         }
-        let found = if self.seeds_levels() && self.rest.searches < MOST_SEARCHES {
-            self.seed_missing(times)?
-        } else {
-            Changes::default()
-        };
+        Ok(changes)
+    }
+
+    /// Fits sizes to the finest level's surface, and adds what it leaves out; the surface is no longer quiet where that changed it.
+    /// Edits wake what they reach, and nothing else.
+    fn complete(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
+        if self.set_sizes() {
+            self.rest.quiet = 0;
+            return Ok(self.check_everything(times));
+        }
+        if !self.seeds_levels() || self.rest.searches == MOST_SEARCHES {
+            return Ok(Changes::default());
+        }
+        let found = self.seed_missing(times)?;
+        self.rest.searches += 1;
         if found.seeds > 0 {
-            let searches = self.rest.searches + 1;
-            self.wake_all();
-            self.rest.searches = searches;
+            self.rest.quiet = 0;
             self.rest.sized = false;
         } else {
-            self.rest.done = true;
+            self.rest.searches = MOST_SEARCHES;
         }
-        changes += found;
-        Ok(changes)
+        Ok(found)
     }
 
     /// The speed below which the fastest vertex has settled. A long step is an iteration, too: no vertex goes far in one.

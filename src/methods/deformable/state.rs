@@ -107,6 +107,7 @@ impl DeformableModel {
         next.mesh = state.mesh;
         next.mesh.count_on_from(&self.mesh);
         next.resolver = Resolver::with_room_for(next.domain.most_vertices(delta_at(state.finest_delta, 0)));
+        next.watch_output();
         next.resolver.set_waiting(state.waiting);
         next.iteration = state.iteration;
         next.rest = state.rest;

@@ -1,11 +1,11 @@
 //! Where the mesh is in doubt, looked at for crossings and for room to move.
 
+use super::Embedding;
 use super::room::{Concern, Concerns};
 use super::star::{
     crossings_around, crossings_between, divided_as_sheets, divided_at, divided_between, divided_through,
     flatness, spread_out,
 };
-use super::{Embedding, FINEST};
 use crate::mesh::{Mesh, VertexId};
 
 /// With less room than this, in the ordinary edge, a better plane is looked for.
@@ -55,7 +55,7 @@ impl Embedding {
     fn look_around(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
         let room = flatness(mesh, v, self.longest[v.index()]);
         if !self.settle(room, Concern::AtHand, [v, v]) {
-            crossings_around(mesh, v, crossing);
+            crossings_around(mesh, v, self.output.as_ref(), crossing);
         }
     }
 
@@ -72,7 +72,7 @@ impl Embedding {
                     room = if other > room { other } else { room };
                 }
                 if !self.settle(room, Concern::AtHand, [v, w]) {
-                    crossings_between(mesh, [v, w], crossing);
+                    crossings_between(mesh, [v, w], self.output.as_ref(), crossing);
                 }
             }
             right = w;
@@ -92,7 +92,7 @@ impl Embedding {
             }
             let room = self.room_across(mesh, [v, w]);
             if !self.settle(room, Concern::Across, [v, w]) {
-                crossings_between(mesh, [v, w], crossing);
+                crossings_between(mesh, [v, w], self.output.as_ref(), crossing);
             }
         }
     }
@@ -117,7 +117,7 @@ impl Embedding {
 
     /// Notes how much room two vertices have for each other, and says whether there is any.
     fn settle(&mut self, room: f32, concern: Concern, ends: [VertexId; 2]) -> bool {
-        let is_room = room > FINEST;
+        let is_room = room > self.finest();
         let room = if is_room { room } else { 0.0 };
         ends.into_iter().for_each(|v| self.room[v.index()].bound(concern, room));
         is_room

@@ -13,14 +13,16 @@
 mod look;
 mod motion;
 mod near;
+mod output;
 mod patch;
 mod refine;
 mod room;
 mod star;
 
-use crate::math::Vec3;
+use crate::math::{Bounds, DAffine3, Vec3};
 use crate::mesh::{EditError, Mesh, VertexId};
 use crate::spatial::StarGrid;
+use output::OutputSpace;
 use room::{Concerns, Room};
 use smallvec::SmallVec;
 use star::{higher, longest_edge};
@@ -77,9 +79,23 @@ pub struct Embedding {
     /// Since all of the mesh was looked at, something crossed at a vertex that did not move, or not any more.
     stuck: bool,
     effort: u64,
+    /// Where triangles must not cross, either.
+    output: Option<OutputSpace>,
 }
 
 impl Embedding {
+    /// From now on the mesh, which stays within `bounds`, is also kept from crossing itself where `map` leads, as its positions come
+    /// out rounded to single precision. Not where that is coarser than a hundredth of a unit of the mesh.
+    pub fn watch_output(&mut self, map: DAffine3, bounds: &Bounds) {
+        self.output = OutputSpace::new(map, bounds);
+        self.version = None;
+    }
+
+    /// Clearance up to which triangles are tested exactly.
+    fn finest(&self) -> f32 {
+        self.output.map_or(FINEST, |space| higher(FINEST, space.rounding()))
+    }
+
     /// As [`Self::follow`]. `edge` is longer than most of its edges. It makes a difference to speed, and bounds what
     /// [`Self::company`] can be asked for; not to what is found to cross.
     pub fn follow_with(&mut self, mesh: &Mesh, edge: f32) {

@@ -106,7 +106,7 @@ impl Embedding {
     /// Where a pair can be that crosses or is in contact before one of both searches again.
     fn nearness(&self) -> Nearness {
         // Two vertices come nearer, and their edges get longer, by twice the room at most.
-        let change = 2.0 * SEARCH_ROOM * self.edge;
+        let change = 2.0 * (SEARCH_ROOM * self.edge + self.finest());
         Nearness {
             least: NEAREST_CORNER * self.edge + change,
             margin: change * (1.0 + PIERCING),

@@ -1,9 +1,10 @@
 //! Whether the triangles that an edit made cross anything.
 
+use super::output::{OutputSpace, bounds, cross};
 use super::star::{crossings_around, flatness, longest_edge};
-use super::{Embedding, FINEST, NEAREST_CORNER};
+use super::{Embedding, NEAREST_CORNER};
 use crate::math::Bounds;
-use crate::mesh::{Facet, Mesh, VertexId, facets_cross};
+use crate::mesh::{Facet, Mesh, VertexId};
 
 /// Triangles that an edit changes, at the most where no vertex has very many neighbours.
 const ORDINARY_PATCH: usize = 24;
@@ -11,18 +12,35 @@ const ORDINARY_PATCH: usize = 24;
 /// A changed triangle and the box around it.
 type Changed = (Facet, Bounds);
 
-fn changed(facet: Facet) -> Changed {
-    (facet, Bounds::of(&facet.points))
+fn changed(facet: Facet, output: Option<&OutputSpace>) -> Changed {
+    (facet, bounds(&facet, output))
 }
 
 impl Embedding {
     /// Whether the triangles changed since [`Mesh::begin`], by their corners, cross each other or any other. The grid still
     /// holds the mesh as it was.
     pub(super) fn changes_cross(&mut self, mesh: &Mesh, names: &[[VertexId; 3]]) -> bool {
-        let fresh: Vec<Changed> = names.iter().map(|&names| changed(mesh.facet(names))).collect();
+        let fresh: Vec<Changed> =
+            names.iter().map(|&names| changed(mesh.facet(names), self.output.as_ref())).collect();
         // Refusals for what is close at hand are cheap, but not free.
         self.effort += 1;
-        stars_cross(mesh, names) || cross_each_other(&fresh) || self.cross_others(mesh, &fresh)
+        self.stars_cross(mesh, names)
+            || cross_each_other(&fresh, self.output.as_ref())
+            || self.cross_others(mesh, &fresh)
+    }
+
+    /// Whether two triangles with a corner in common cross, at the corners of the changed ones.
+    fn stars_cross(&self, mesh: &Mesh, changed: &[[VertexId; 3]]) -> bool {
+        let mut hubs: Vec<VertexId> = changed.iter().flatten().copied().collect();
+        hubs.sort_unstable();
+        hubs.dedup();
+        let mut crossing = Vec::new();
+        hubs.into_iter().any(|hub| {
+            if flatness(mesh, hub, longest_edge(mesh, hub)) <= self.finest() {
+                crossings_around(mesh, hub, self.output.as_ref(), &mut crossing);
+            }
+            !crossing.is_empty()
+        })
     }
 
     /// Whether a changed triangle crosses one that is not and has no corner in common with it.
@@ -33,12 +51,16 @@ impl Embedding {
         self.grid.near_box(&whole, NEAREST_CORNER, |v| near.push(v));
         self.effort += (near.len() * (1 + fresh.len() / ORDINARY_PATCH)) as u64;
         self.new_marks(mesh);
+        let output = self.output;
+        let output = output.as_ref();
         let crosses = near.iter().any(|&v| {
             self.mark(v);
             // Triangles of marked vertices have been looked at.
             let is_new = |&(a, b): &(VertexId, VertexId)| !self.is_marked(a) && !self.is_marked(b);
             let others = mesh.ring(v).pairs().filter(is_new).map(|(a, b)| mesh.facet([v, a, b]));
-            others.filter(|other| !is_beside(other, &whole)).any(|other| crosses_one(&changed(other), fresh))
+            others
+                .filter(|other| !is_beside(other, &whole))
+                .any(|other| crosses_one(&changed(other, output), fresh, output))
         });
         self.found = near;
         crosses
@@ -54,31 +76,17 @@ fn is_beside(facet: &Facet, bounds: &Bounds) -> bool {
     below.any() || above.any()
 }
 
-/// Whether two triangles with a corner in common cross, at the corners of the changed ones.
-fn stars_cross(mesh: &Mesh, changed: &[[VertexId; 3]]) -> bool {
-    let mut hubs: Vec<VertexId> = changed.iter().flatten().copied().collect();
-    hubs.sort_unstable();
-    hubs.dedup();
-    let mut crossing = Vec::new();
-    hubs.into_iter().any(|hub| {
-        if flatness(mesh, hub, longest_edge(mesh, hub)) <= FINEST {
-            crossings_around(mesh, hub, &mut crossing);
-        }
-        !crossing.is_empty()
-    })
-}
-
-fn cross_each_other(fresh: &[Changed]) -> bool {
-    fresh.iter().enumerate().any(|(k, s)| fresh[..k].iter().any(|t| apart_but_cross(s, t)))
+fn cross_each_other(fresh: &[Changed], output: Option<&OutputSpace>) -> bool {
+    fresh.iter().enumerate().any(|(k, s)| fresh[..k].iter().any(|t| apart_but_cross(s, t, output)))
 }
 
 /// Whether a triangle that is none of the changed ones crosses one of them.
-fn crosses_one(other: &Changed, fresh: &[Changed]) -> bool {
+fn crosses_one(other: &Changed, fresh: &[Changed], output: Option<&OutputSpace>) -> bool {
     let same = |(facet, _): &Changed| other.0.corners.iter().all(|v| facet.corners.contains(v));
-    !fresh.iter().any(same) && fresh.iter().any(|changed| apart_but_cross(other, changed))
+    !fresh.iter().any(same) && fresh.iter().any(|changed| apart_but_cross(other, changed, output))
 }
 
 /// Whether two triangles with no corner in common cross.
-fn apart_but_cross((s, around_s): &Changed, (t, around_t): &Changed) -> bool {
-    around_s.meets(around_t) && s.corners.iter().all(|v| !t.corners.contains(v)) && facets_cross(s, t)
+fn apart_but_cross((s, around_s): &Changed, (t, around_t): &Changed, output: Option<&OutputSpace>) -> bool {
+    around_s.meets(around_t) && s.corners.iter().all(|v| !t.corners.contains(v)) && cross(s, t, output)
 }

@@ -4,8 +4,9 @@
 //! cannot settle is worked out exactly. The quick tests allow for rounding by a wide margin.
 
 use super::FINEST;
+use super::output::{OutputSpace, bounds, cross};
 use crate::math::{Bounds, DVec3, Vec3};
-use crate::mesh::{Facet, Mesh, VertexId, facets_cross};
+use crate::mesh::{Facet, Mesh, VertexId};
 use smallvec::SmallVec;
 
 /// Triangles around a vertex for which there is room without a heap allocation.
@@ -210,10 +211,15 @@ pub(super) fn higher(a: f32, b: f32) -> f32 {
 }
 
 /// Puts the corners of all triangles around `v` that cross each other into `crossing`; exact.
-pub(super) fn crossings_around(mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
+pub(super) fn crossings_around(
+    mesh: &Mesh,
+    v: VertexId,
+    output: Option<&OutputSpace>,
+    crossing: &mut Vec<VertexId>,
+) {
     let facets: Vec<Facet> = star(mesh, v).collect();
     for (k, s) in facets.iter().enumerate() {
-        for t in facets[..k].iter().filter(|t| facets_cross(s, t)) {
+        for t in facets[..k].iter().filter(|t| cross(s, t, output)) {
             crossing.extend(s.corners.into_iter().chain(t.corners).map(VertexId));
         }
     }
@@ -221,18 +227,23 @@ pub(super) fn crossings_around(mesh: &Mesh, v: VertexId, crossing: &mut Vec<Vert
 
 /// Puts the corners of all pairs of triangles that cross into `crossing`, one at `u` and one at `v`, with no corner in
 /// common; exact.
-pub(super) fn crossings_between(mesh: &Mesh, [u, v]: [VertexId; 2], crossing: &mut Vec<VertexId>) {
+pub(super) fn crossings_between(
+    mesh: &Mesh,
+    [u, v]: [VertexId; 2],
+    output: Option<&OutputSpace>,
+    crossing: &mut Vec<VertexId>,
+) {
     let others: SmallVec<[(Facet, Bounds); ORDINARY_STAR]> =
-        star(mesh, v).map(|facet| (facet, Bounds::of(&facet.points))).collect();
+        star(mesh, v).map(|facet| (facet, bounds(&facet, output))).collect();
     let around_v = others.iter().fold(Bounds::EMPTY, |all, (_, bounds)| all.joined(bounds));
     for s in star(mesh, u).filter(|s| !s.corners.contains(&v.0)) {
-        let bounds = Bounds::of(&s.points);
+        let bounds = bounds(&s, output);
         if !bounds.meets(&around_v) {
             continue;
         }
         for (t, other) in &others {
             let apart = t.corners.iter().all(|w| !s.corners.contains(w));
-            if apart && bounds.meets(other) && facets_cross(&s, t) {
+            if apart && bounds.meets(other) && cross(&s, t, output) {
                 crossing.extend(s.corners.into_iter().chain(t.corners).map(VertexId));
             }
         }

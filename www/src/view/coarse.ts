@@ -4,6 +4,8 @@
 const SAMPLES = 1000;
 /** Triangles that are left for each area of a cell, so that their number comes near what was asked for. */
 const FILL = 1.5;
+/** Triangles for each that was asked for, beyond which larger cells are tried. */
+const MOST_EXCESS = 1.5;
 
 export interface Fine {
   positions: Float32Array;
@@ -19,8 +21,15 @@ export interface Fine {
  * thin sheet stay apart by where their normals point.
  */
 export function coarseCorners(fine: Fine, triangles: number): Uint32Array {
+  const cell = meanEdge(fine) * Math.sqrt((FILL * fine.corners) / 3 / triangles);
+  const list = clusteredCorners(fine, cell);
+  // Where sheets are thin and parts small, more is left: each has cells of its own.
+  const excess = list.length / 3 / triangles;
+  return excess > MOST_EXCESS ? clusteredCorners(fine, cell * Math.sqrt(excess)) : list;
+}
+
+function clusteredCorners(fine: Fine, cell: number): Uint32Array {
   const { indices, corners } = fine;
-  const cell = meanEdge(fine) * Math.sqrt((FILL * corners) / 3 / triangles);
   const leaders = leadersOf(fine, cell);
   const out = new Uint32Array(corners);
   let length = 0;
