@@ -3,7 +3,7 @@
 use super::edge_table::{EdgeUse, by_edge};
 
 /// Disjoint groups of the numbers below a limit.
-pub(super) struct Groups {
+pub(crate) struct Groups {
     parents: Vec<usize>,
     count: usize,
 }
@@ -31,7 +31,7 @@ impl Groups {
     }
 
     /// Makes one group of the triangles at each edge.
-    pub fn join_across_edges(&mut self, uses: &[EdgeUse]) {
+    pub(super) fn join_across_edges(&mut self, uses: &[EdgeUse]) {
         for pair in by_edge(uses).flat_map(|edge| edge.windows(2)) {
             self.join(pair[0].triangle as usize, pair[1].triangle as usize);
         }

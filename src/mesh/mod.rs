@@ -44,6 +44,7 @@ pub use curvature::{Curvature, curvature};
 pub use edits::Opposite;
 pub use error::{EditError, MeshError};
 pub use geodesic::geodesic;
+pub(crate) use groups::Groups;
 pub use ids::VertexId;
 pub use journal::Triangles;
 pub use measure::{Measures, measure};

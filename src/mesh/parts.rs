@@ -12,7 +12,11 @@ impl TriangleMesh {
     pub fn without_parts_below(&self, volume: f64) -> Self {
         let part_of = self.part_of_each_vertex();
         let enclosed = self.enclosed_volumes(&part_of);
-        let keeps = |v: u32| enclosed[part_of[v as usize] as usize].abs() >= volume;
+        self.parts_where(|v| enclosed[part_of[v as usize] as usize].abs() >= volume)
+    }
+
+    /// The triangles whose first vertex `keeps`, with the vertices they use; only positions and triangles are kept.
+    pub(crate) fn parts_where(&self, mut keeps: impl FnMut(u32) -> bool) -> Self {
         let mut slots = vec![u32::MAX; self.positions.len()];
         let mut kept = Self::default();
         for triangle in self.triangles.iter().filter(|t| keeps(t[0])) {

@@ -74,6 +74,23 @@ impl TriangleTree {
         found
     }
 
+    /// Puts the labels of all triangles that have a point at most `distance` from `p` into `found`, each once.
+    pub fn labels_within(&self, p: Vec3, distance: f64, label: impl Fn(u32) -> u32, found: &mut Vec<u32>) {
+        let reach = distance * distance;
+        found.clear();
+        self.boxes.within(p, reach, |item| {
+            let own = label(item);
+            if !found.contains(&own) {
+                let corners = self.corners[item as usize];
+                let closest = triangle::at(corners, triangle::closest(corners, p));
+                if closest.distance_squared(p.as_dvec3()) <= reach {
+                    found.push(own);
+                }
+            }
+            false
+        });
+    }
+
     /// Where the ray from `origin` along `direction` (of any length) first meets the surface, from either side;
     /// `None` where it does not, where `direction` is zero or where either is not finite.
     pub fn ray_hit(&self, origin: Vec3, direction: Vec3) -> Option<SurfacePoint> {

@@ -99,7 +99,12 @@ impl LevelImage {
             }
         }
         let mean = if count > 0 { sum / count as f64 } else { 0.0 };
-        mean.sqrt() as f32 * self.scale.max_element()
+        mean.sqrt() as f32 * self.voxels_per_unit()
+    }
+
+    /// Voxels of this level in a unit of the model, along the axis where they are smallest.
+    pub(super) fn voxels_per_unit(&self) -> f32 {
+        self.scale.max_element()
     }
 
     /// The grid of this level, and the way from its voxel indices to positions of the model.

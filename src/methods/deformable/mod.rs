@@ -52,6 +52,7 @@ mod forces;
 mod image;
 mod motion;
 mod params;
+mod renewal;
 mod schedule;
 mod seeds;
 mod sizes;

@@ -1,5 +1,6 @@
 //! When a level is finished, and the way down to the next (section 5.1, figures 12 and 13).
 
+use super::renewal::Renewal;
 use super::{DeformableModel, DeformableParams, Topology, contact};
 use crate::mesh::VertexId;
 use crate::methods::{MethodError, Times};
@@ -91,11 +92,7 @@ impl DeformableModel {
             self.rest.done = true;
             return Ok(changes);
         }
-        self.descend()?;
-        changes += self.check_everything(times);
-        if self.seeds_levels() {
-            changes += self.seed_missing(times)?;
-        }
+        changes += self.descend(times)?;
         Ok(changes)
     }
 
@@ -148,8 +145,36 @@ impl DeformableModel {
         changes
     }
 
-    /// Refines the mesh and takes the next finer image (figure 13).
-    fn descend(&mut self) -> Result<(), MethodError> {
+    /// Refines the mesh and takes the next finer image (figure 13); renews what leaves out part of that.
+    fn descend(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
+        let begin = (self.clock)();
+        let is_renewed = self.from_contour && self.seeds_levels();
+        let renewal = if is_renewed { self.renewal()? } else { Renewal::default() };
+        let whole = self.mesh.clone();
+        renewal.stale.iter().for_each(|&v| _ = self.mesh.remove_component(v));
+        self.refine()?;
+        let (mut changes, _) = self.add_components(&renewal.fresh)?;
+        let fits = changes.seeds == renewal.fresh.component_count() as u32;
+        if !fits {
+            let partly = std::mem::replace(&mut self.mesh, whole);
+            self.mesh.count_on_from(&partly);
+            self.refine()?;
+            changes = Changes::default();
+        }
+        times.add("renewal", (self.clock)() - begin);
+        self.level -= 1;
+        self.rest = Rest { began: self.iteration, ..Rest::default() };
+        self.settle_in();
+        self.wake_all();
+        self.prepare_level()?;
+        changes += self.check_everything(times);
+        if self.seeds_levels() && !(self.from_contour && fits) {
+            changes += self.seed_missing(times)?;
+        }
+        Ok(changes)
+    }
+
+    fn refine(&mut self) -> Result<(), MethodError> {
         if self.params.topology == Topology::Adaptive {
             let most = self.resolver.most_vertices();
             if self.mesh.vertex_count() + self.mesh.triangle_count() > most {
@@ -159,10 +184,6 @@ impl DeformableModel {
             let sampling = Sampling::new(self.model_delta());
             self.resolver.refine(&mut self.mesh, sampling)?;
         }
-        self.level -= 1;
-        self.rest = Rest { began: self.iteration, ..Rest::default() };
-        self.settle_in();
-        self.wake_all();
-        self.prepare_level()
+        Ok(())
     }
 }

@@ -10,7 +10,7 @@ use super::coverage::Missing;
 use super::image::LevelImage;
 use super::{DeformableModel, Topology};
 use crate::math::Vec3;
-use crate::mesh::{EditError, Mesh, TriangleMesh, VertexId};
+use crate::mesh::{Mesh, TriangleMesh, VertexId};
 use crate::methods::{MethodError, StepReport, Times};
 use crate::remesh::Changes;
 use crate::spatial::TriangleTree;
@@ -45,29 +45,42 @@ impl DeformableModel {
             return Ok(Changes::default());
         }
         let begin = (self.clock)();
-        let seeds = self.missing_parts()?;
-        let sampling = self.sampling();
-        let mut changes = Changes::default();
-        let mut added = Vec::new();
-        for seed in seeds {
-            let part = Mesh::from_triangles(&seed)?;
-            let most = self.resolver.most_vertices();
-            if self.mesh.vertex_count() + part.vertex_count() > most {
-                return Err(MethodError::TooManyVertices { most });
-            }
-            let append = |mesh: &mut Mesh| mesh.append(&part).map_err(|_| EditError::Full);
-            // One that would cross something is too near to be told from it.
-            if let Ok(names) = self.resolver.guard(&self.mesh, sampling).attempt(&mut self.mesh, append) {
-                added.extend(names);
-                changes.seeds += 1;
-            }
+        let mut seeds = Mesh::default();
+        for kind in self.missing_parts()?.iter().filter(|kind| !kind.triangles.is_empty()) {
+            seeds.append(&Mesh::from_triangles(kind)?)?;
         }
-        self.welcome(&added);
+        let (mut changes, added) = self.add_components(&seeds)?;
         times.add("seeding", (self.clock)() - begin);
         if changes.seeds > 0 {
             changes += self.restore_bounds(&added, times);
         }
         Ok(changes)
+    }
+
+    /// Adds components to the mesh, all but those that would cross something, and returns how many as `seeds`, and their vertices.
+    ///
+    /// # Errors
+    /// [`MethodError::TooManyVertices`]; nothing is added then.
+    pub(super) fn add_components(&mut self, parts: &Mesh) -> Result<(Changes, Vec<VertexId>), MethodError> {
+        let most = self.resolver.most_vertices();
+        if self.mesh.vertex_count() + parts.vertex_count() > most {
+            return Err(MethodError::TooManyVertices { most });
+        }
+        let mut added = self.mesh.append(parts)?;
+        self.welcome(&added);
+        let sampling = self.sampling();
+        let mut count = parts.component_count();
+        let mut is_new = vec![false; self.mesh.slots()];
+        added.iter().for_each(|v| is_new[v.index()] = true);
+        let guard = self.resolver.guard(&self.mesh, sampling);
+        for v in guard.crossing(&self.mesh) {
+            if is_new[v.index()] && self.mesh.is_live(v) {
+                guard.remove_component(&mut self.mesh, v);
+                count -= 1;
+            }
+        }
+        added.retain(|&v| self.mesh.is_live(v));
+        Ok((Changes { seeds: count as u32, ..Changes::default() }, added))
     }
 
     /// Makes new vertices known to the model.
@@ -77,13 +90,14 @@ impl DeformableModel {
             self.mesh.vector_mut(keys.velocity)[v] = Vec3::ZERO;
             self.mesh.scalar_mut(keys.still)[v] = 0.0;
             self.mesh.scalar_mut(keys.calm)[v] = 0.0;
+            self.mesh.scalar_mut(keys.size)[v] = 0.0;
             let (positions, checked) = self.mesh.positions_and_vector_mut(keys.checked);
             checked[v] = positions[v];
         }
     }
 
-    /// The contours of what is missing, one closed surface each, in the space of the model.
-    fn missing_parts(&self) -> Result<Vec<TriangleMesh>, MethodError> {
+    /// The contours of what is missing, closed surfaces in the space of the model: of matter, and of hollows.
+    fn missing_parts(&self) -> Result<[TriangleMesh; 2], MethodError> {
         let image = &self.pyramid.levels[self.level];
         let object = ObjectIs::by(&self.params);
         let contour = contour(image, self.level_iso, object, self.params.smallest_part)?;
@@ -99,9 +113,7 @@ impl DeformableModel {
             tree: TriangleTree::new(&surface)?,
         };
         let smallest = SMALLEST_SEED * self.params.smallest_part;
-        let mut parts = comparison.parts(Missing::Matter, smallest)?;
-        parts.extend(comparison.parts(Missing::Hollow, smallest)?);
-        Ok(parts)
+        Ok([comparison.parts(Missing::Matter, smallest)?, comparison.parts(Missing::Hollow, smallest)?])
     }
 }
 
@@ -120,17 +132,17 @@ struct Comparison<'a> {
 
 impl Comparison<'_> {
     /// Closed surfaces around what is missing of one kind, each of at least a volume.
-    fn parts(&self, kind: Missing, smallest: f64) -> Result<Vec<TriangleMesh>, MethodError> {
+    fn parts(&self, kind: Missing, smallest: f64) -> Result<TriangleMesh, MethodError> {
         let (grid, position) = self.image.grid();
         let missing = self.missing_voxels(kind);
-        let Some((low, high)) = bounding_box(&missing, grid.dims) else { return Ok(Vec::new()) };
+        let Some((low, high)) = bounding_box(&missing, grid.dims) else { return Ok(TriangleMesh::default()) };
         let field = self.field(kind, &missing, low, high);
         let offset = Vec3::from(low.map(|k| k as f32));
         let mut surface = placed(marching_cubes(&field, 0.0)?, |p| position(p + offset));
         if kind == Missing::Hollow {
             surface.triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
-        Ok(surface.without_parts_below(smallest).components())
+        Ok(surface.without_parts_below(smallest))
     }
 
     /// Whether the contour has a voxel on the side where something of this kind is.

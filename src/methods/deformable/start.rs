@@ -53,6 +53,12 @@ pub(super) struct Frame<'a> {
     pub(super) sampling: Sampling,
 }
 
+impl Frame<'_> {
+    fn most_vertices(&self) -> usize {
+        self.domain.most_vertices(self.sampling.shortest())
+    }
+}
+
 /// The smallest sphere in δ that has its edges within bounds as an icosahedron, with room for one that is hit.
 const SMALLEST_RADIUS: f32 = 1.2;
 
@@ -93,7 +99,7 @@ impl Start {
             Self::MarchingCubes(value) => iso_surface(frame, iso(*value))?,
             Self::Mesh(mesh) => given(frame, mesh)?,
         };
-        let mut resolver = resolve_all(&mut mesh, frame, frame.sampling, guide)?;
+        let mut resolver = resolve_all(&mut mesh, frame.most_vertices(), frame.sampling, guide)?;
         if !resolver.is_embedded(&mesh) {
             return Err(MeshError::SelfIntersecting { pairs: count_crossings(&mesh.to_triangles()) }.into());
         }
@@ -101,13 +107,14 @@ impl Start {
     }
 }
 
-fn resolve_all(
+/// Brings the edges of a mesh within bounds, and what is in contact together.
+pub(super) fn resolve_all(
     mesh: &mut Mesh,
-    frame: &Frame,
+    most_vertices: usize,
     sampling: Sampling,
     guide: &dyn TopologyGuide,
 ) -> Result<Resolver, MethodError> {
-    let mut resolver = Resolver::with_room_for(frame.domain.most_vertices(sampling.shortest()));
+    let mut resolver = Resolver::with_room_for(most_vertices);
     resolver.resolve_guided(mesh, sampling, &mesh.vertices().collect::<Vec<_>>(), guide);
     for _ in 0..MOST_CALLS {
         if !resolver.is_waiting() {
@@ -148,7 +155,7 @@ fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
         let slots: Vec<_> = mesh.vertices().collect();
         slots.into_iter().for_each(|v| mesh.set_position(v, onto_box(mesh.position(v))));
         if 3.0 * delta < axes.min_element() {
-            _ = resolve_all(&mut mesh, frame, Sampling::new(delta), &Unguided)?;
+            _ = resolve_all(&mut mesh, most, Sampling::new(delta), &Unguided)?;
         }
     }
     Ok(mesh)

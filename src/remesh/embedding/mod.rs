@@ -166,6 +166,11 @@ impl Embedding {
         self.look_everywhere(mesh).is_empty()
     }
 
+    /// The corners of all triangles that cross another, in order.
+    pub fn crossing(&mut self, mesh: &Mesh) -> Vec<VertexId> {
+        self.look_everywhere(mesh)
+    }
+
     /// The number of near vertices that were looked at for edits, over all time.
     pub fn effort(&self) -> u64 {
         self.effort
