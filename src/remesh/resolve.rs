@@ -179,7 +179,7 @@ impl Resolver {
         self.most_effort = self.embedding.effort() + effort;
         self.edited.clear();
         let stuck = std::mem::take(&mut self.stuck);
-        self.remove_crushed(mesh, sampling, &stuck);
+        self.remove_crushed(mesh, sampling, guide, &stuck);
         self.cut_crushed(mesh, sampling, guide, &stuck);
         for &v in active {
             self.touch(v);
@@ -197,7 +197,7 @@ impl Resolver {
         if self.contact == Contact::Leave {
             self.take_stirred();
         }
-        self.note_small_parts(mesh, sampling);
+        self.note_small_parts(mesh, sampling, guide);
         self.changes
     }
 

@@ -85,13 +85,20 @@ impl Resolver {
     /// Where two sides are pressed on each other, vertices are held, no edge gets short, and a part would stay for ever:
     /// so those go that are flat, or of which no vertex could move. And a part so small may turn inside out between two
     /// states of which neither crosses itself, as when the tip of a tetrahedron passes through its base.
-    pub(super) fn remove_crushed(&mut self, mesh: &mut Mesh, sampling: Sampling, stuck: &[VertexId]) {
+    pub(super) fn remove_crushed(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        guide: &dyn TopologyGuide,
+        stuck: &[VertexId],
+    ) {
         self.small.find(mesh);
         let is_stuck = |v: &VertexId| stuck.binary_search(v).is_ok();
         for (v, was_solid) in std::mem::take(&mut self.small.parts) {
             let members = mesh.component_of(v, LARGEST_SPECK + 1);
             let volume = volume(mesh, &members);
-            let is_flat = volume < SMALLEST_BALL * sampling.smallest_volume();
+            let is_flat =
+                kept_volume(mesh, &members, volume, guide) < SMALLEST_BALL * sampling.smallest_volume();
             let is_crushed = is_flat && members.iter().any(is_stuck) || members.iter().all(is_stuck);
             if is_crushed || (volume > 0.0) != was_solid {
                 self.remove_part(mesh, v);
@@ -103,11 +110,21 @@ impl Resolver {
 
     /// Notes which parts are small after the edits of a call. Cavities smaller than any ball are removed: such a one may
     /// be a part that an edit turned inside out, and would grow in empty space.
-    pub(super) fn note_small_parts(&mut self, mesh: &mut Mesh, sampling: Sampling) {
+    pub(super) fn note_small_parts(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        guide: &dyn TopologyGuide,
+    ) {
         self.small.find_again(mesh, &self.edited);
-        let least = -SMALLEST_BALL * sampling.smallest_volume();
+        let least = SMALLEST_BALL * sampling.smallest_volume();
         for (v, is_solid) in std::mem::take(&mut self.small.parts) {
-            if !is_solid && volume(mesh, &mesh.component_of(v, LARGEST_SPECK)) > least {
+            let is_left = || {
+                let members = mesh.component_of(v, LARGEST_SPECK);
+                let volume = volume(mesh, &members);
+                volume <= -least || kept_volume(mesh, &members, volume, guide) >= sampling.smallest_volume()
+            };
+            if !is_solid && !is_left() {
                 self.remove_part(mesh, v);
             } else {
                 self.small.parts.push((v, is_solid));
@@ -130,6 +147,11 @@ impl Resolver {
         }
         self.changes.vanished - before
     }
+}
+
+/// The volume of a part as it counts against being removed: that of a hollow which `guide` knows of is positive.
+fn kept_volume(mesh: &Mesh, members: &[VertexId], volume: f32, guide: &dyn TopologyGuide) -> f32 {
+    if volume < 0.0 && guide.is_hollow(mesh, members) { -volume } else { volume }
 }
 
 /// The signed volume of a whole component; positive where its triangles face outwards.

@@ -21,6 +21,9 @@ const FACING: f32 = 0.3;
 /// How far off the contour, in voxels, a surface at rest may be: what is no further beside it is no reason to join or cut.
 const BLUR: f32 = 0.15;
 
+/// How far before the front of a hollow's vertices the image is sampled, in voxels.
+const BEFORE: f32 = 0.35;
+
 /// Allows the topology changes that separate or unite what the image does.
 #[derive(Clone, Copy)]
 pub(super) struct ImageGuide<'a> {
@@ -52,7 +55,9 @@ impl<'a> ImageGuide<'a> {
     fn doubt(&self, mesh: &Mesh, vertices: &[VertexId]) -> f32 {
         vertices.iter().fold(0.0, |most, &v| {
             let (p, half) = (mesh.position(v), mesh.area_normal(v).normalize_or_zero() * 0.5);
-            let doubt = BLUR * (self.depth(p + half) - self.depth(p - half)).abs();
+            let [inside, here, outside] = [p - half, p, p + half].map(|p| self.depth(p));
+            // In a slit or a thin wall both sides are alike: each counts by itself.
+            let doubt = 2.0 * BLUR * (outside - here).abs().max((here - inside).abs());
             if doubt > most { doubt } else { most }
         })
     }
@@ -64,10 +69,7 @@ pub(super) fn guide<'a>(
     iso: f32,
     params: &DeformableParams,
 ) -> Box<dyn TopologyGuide + 'a> {
-    if params.iso_force == 0.0 || params.adaptivity == 0.0 {
-        return Box::new(Unguided);
-    }
-    Box::new(ImageGuide::new(image, iso, params))
+    if params.yields_to_image() { Box::new(ImageGuide::new(image, iso, params)) } else { Box::new(Unguided) }
 }
 
 impl TopologyGuide for ImageGuide<'_> {
@@ -107,7 +109,7 @@ impl TopologyGuide for ImageGuide<'_> {
     }
 
     fn is_hollow(&self, mesh: &Mesh, members: &[VertexId]) -> bool {
-        let sum: Vec3 = members.iter().map(|&w| mesh.position(w)).sum();
-        self.depth(sum * (1.0 / members.len() as f32)) < 0.0
+        let before = |&w: &VertexId| mesh.position(w) + mesh.area_normal(w).normalize_or_zero() * BEFORE;
+        members.iter().map(|w| self.depth(before(w))).sum::<f32>() < 0.0
     }
 }

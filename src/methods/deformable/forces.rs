@@ -54,7 +54,7 @@ pub(super) struct ForceScale {
 impl ForceScale {
     /// `iso` is normalised, `gain` by how much α_I is larger here, `voxel` the world length of a unit of the model.
     pub(super) fn new(params: &DeformableParams, [iso, gain]: [f32; 2], voxel: f64, delta: f32) -> Self {
-        let yields = params.iso_force != 0.0 && params.adaptivity > 0.0;
+        let yields = params.yields_to_image();
         Self {
             yields,
             needs_slope: yields || params.integrator == Integrator::Implicit,

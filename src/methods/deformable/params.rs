@@ -116,6 +116,11 @@ impl DeformableParams {
         }
     }
 
+    /// Whether sampling, topology and rigidity adapt to the image.
+    pub(super) fn yields_to_image(&self) -> bool {
+        self.iso_force != 0.0 && self.adaptivity > 0.0
+    }
+
     /// Tests every value against its range.
     ///
     /// # Errors

@@ -1,13 +1,15 @@
 //! Non-uniform sampling: how long edges are where, by the curvature that the image shows.
 //!
 //! The middle of an edge of length l on a contour of curvature κ is κ l²/8 away from it. So where the surface has settled, the image
-//! tells for each edge how long it may be to stay near. The paper has one δ everywhere and names this as
-//! future work; a wall needs no smaller size for being thin, since [`super::contact`] keeps it.
+//! tells for each edge how long it may be to stay near. Where a wall or a gap is thin, edges are no longer than with one δ everywhere:
+//! sheets with longer ones than their distance are cut. They need not be shorter, since [`super::contact`] keeps them. The paper has
+//! one δ everywhere and names this as future work.
 
 use super::DeformableModel;
 use super::contour::ObjectIs;
 use crate::math::Vec3;
 use crate::mesh::VertexId;
+use crate::remesh::Sampling;
 use crate::volume::KnownCell;
 
 /// How far the middle of an edge is from the contour, in voxels, where edges are made shorter. With 0.1 the surface of a rough image has
@@ -24,6 +26,9 @@ const LARGEST: f32 = 1.6;
 
 /// By how much the size may grow along an edge, as a share of its length: sampling then stays isotropic.
 const GRADATION: f32 = 0.3;
+
+/// Steps by which the opposite side of a wall or a gap is looked for, in voxels.
+const STRIDE: f32 = 0.5;
 
 /// Passes over the mesh that bound the gradation; each reaches one edge further.
 const PASSES: usize = 3;
@@ -60,8 +65,34 @@ impl DeformableModel {
                 sizes[w] = if size < sizes[w] { size } else { sizes[w] };
             }
         }
-        sizes.iter_mut().for_each(|size| *size = if *size > SMALLEST { *size } else { SMALLEST });
+        for v in self.mesh.vertices() {
+            let size = &mut sizes[v.index()];
+            if *size > 1.0 {
+                *size = size.min(self.size_by_thickness(v).max(1.0));
+            }
+            *size = size.max(SMALLEST);
+        }
         sizes
+    }
+
+    /// The size at which sheets are further apart than contact reaches.
+    fn size_by_thickness(&self, v: VertexId) -> f32 {
+        let normal = self.mesh.area_normal(v).normalize_or_zero();
+        let contact = Sampling::new(self.model_delta()).contact();
+        let is_opposite = |k: i32| {
+            let way = f32::from(k as i16) * STRIDE;
+            let p = self.mesh.position(v);
+            self.depth(p + normal * way) > 0.0 || self.depth(p - normal * way) < 0.0
+        };
+        let strides = (LARGEST * contact / STRIDE) as i32;
+        let thickness = (2..=strides).find(|&k| is_opposite(k)).map_or(f32::INFINITY, |k| k as f32 * STRIDE);
+        thickness / contact
+    }
+
+    /// How far the intensity at a point is on the object's side of the iso value.
+    fn depth(&self, p: Vec3) -> f32 {
+        let (image, object) = (&self.pyramid.levels[self.level], ObjectIs::by(&self.params));
+        object.depth(image.intensity(p, object.background(), &mut KnownCell::default()), self.level_iso)
     }
 
     fn bound_gradation(&self, sizes: &mut [f32]) {
@@ -95,12 +126,7 @@ impl DeformableModel {
 
     /// About how far the contour is from a point, along a direction and back, in voxels.
     fn distance_to_contour(&self, p: Vec3, direction: Vec3) -> f32 {
-        let (image, object) = (&self.pyramid.levels[self.level], ObjectIs::by(&self.params));
-        let depth = |p: Vec3| {
-            let intensity = image.intensity(p, object.background(), &mut KnownCell::default());
-            object.depth(intensity, self.level_iso)
-        };
-        let [here, ahead, behind] = [p, p + direction * 0.5, p - direction * 0.5].map(depth);
+        let [here, ahead, behind] = [p, p + direction * 0.5, p - direction * 0.5].map(|p| self.depth(p));
         let (miss, slope) = (here.abs(), (ahead - behind).abs());
         if miss < FURTHEST * slope { miss / slope } else { FURTHEST }
     }
