@@ -69,7 +69,8 @@ export interface Attractor {
  * The first surface.
  *
  * - `'contour'`, for real data: the iso-surface of the coarsest level at `iso`, with its hollows, less what encloses fewer
- *   voxels than `smallestPart`; the enclosing surface where there is none.
+ *   voxels than `smallestPart`. Where there is none: nothing (parts come with finer levels, or with another `iso`), or the
+ *   enclosing surface if `seeding` is 'off' or `adaptivity` 0.
  * - `'enclosing'`: around all that is brighter than `iso`, as it is when the model is made (around the whole volume where
  *   nothing is, or where `isoForce` is not negative). This, bubbles and seeds are for teaching, and for objects without a
  *   usable iso-surface.

@@ -72,6 +72,11 @@ impl ForceScale {
         }
     }
 
+    /// δ |α_I|: the force of the image where it differs by all of its range from π_I.
+    pub(super) fn pull(&self) -> f32 {
+        self.delta * self.iso_force.abs()
+    }
+
     fn uses_gradient(&self) -> bool {
         self.gradient_across != 0.0 || self.gradient_along != 0.0
     }
@@ -205,7 +210,7 @@ impl Forces {
     fn hold_of_image(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
         let miss =
             scale.iso - image.intensity(self.middle_of_star(v, x), scale.background, &mut self.cells[v]);
-        scale.delta * scale.iso_force.abs() * (YIELD * self.slope[v] + 0.25 * miss.abs())
+        scale.pull() * (YIELD * self.slope[v] + 0.25 * miss.abs())
     }
 
     /// A force whose part along the surface fades out at rest, faster than that of rigidity: it would draw the vertices around

@@ -201,6 +201,7 @@ impl DeformableModel {
             from_world: volume.inverse_affine(),
             spacing: volume.spacing(),
             sampling: Sampling::new(delta),
+            may_be_empty: params.yields_to_image() && params.seeding != Seeding::Off,
         };
         let mut mesh = {
             let guide = contact::guide(frame.image, frame.iso, &params);
@@ -274,7 +275,10 @@ impl DeformableModel {
         let normals = (self.clock)();
         let delta = self.model_delta();
         let pulls = self.pulls();
-        let gain = coarse::left_of(self.gain, self.iteration.saturating_sub(self.rest.began));
+        let gain = match self.params.integrator {
+            Integrator::Implicit => self.gain,
+            _ => coarse::left_of(self.gain, self.iteration.saturating_sub(self.rest.began)),
+        };
         let world = World {
             field: Field {
                 image: &self.pyramid.levels[self.level],

@@ -94,10 +94,10 @@ impl Motion {
     /// much the forces on it fall off as it moves along its normal.
     fn implicit(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
         self.act(mesh, mesh.positions(), mesh.vector(keys.velocity), world);
-        let &DeformableParams { mass, damping, rigidity, stiffness, iso_force, .. } = world.params;
+        let &DeformableParams { mass, damping, rigidity, stiffness, .. } = world.params;
         let (step, mass, damping) = (world.params.step_length() as f32, mass as f32, damping as f32);
         let internal = BENDING_STIFFNESS * rigidity as f32 + STRETCHING_STIFFNESS * stiffness as f32;
-        let pull = world.delta * iso_force.abs() as f32;
+        let pull = world.field.scale.pull();
         let velocities = mesh.vector_mut(keys.velocity);
         for i in self.awake.moving.iter().map(|v| v.index()) {
             let k = pull * self.forces.slope[i] + internal;

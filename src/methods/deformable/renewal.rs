@@ -70,15 +70,20 @@ impl DeformableModel {
             near.iter().for_each(|&other| groups.join(part as usize, first + other as usize));
         }
         let mut is_renewed = vec![false; first + surface.positions.len()];
-        for part in (0..first).filter(|&part| is_left_out[part]) {
-            is_renewed[groups.find(part)] = true;
+        let mut has_contour = is_renewed.clone();
+        for &part in &part_of_contour {
+            let group = groups.find(part as usize);
+            has_contour[group] = true;
+            is_renewed[group] |= is_left_out[part as usize];
         }
-        let mut goes = |part: usize| is_renewed[groups.find(part)];
-        let names: Vec<VertexId> = self.mesh.vertices().collect();
-        let is_first = |v: &usize| part_of_surface[*v] as usize == *v;
-        let stale =
-            (0..names.len()).filter(is_first).filter(|&v| goes(first + v)).map(|v| names[v]).collect();
-        let fresh = contour.parts_where(|v| goes(part_of_contour[v as usize] as usize));
+        let fresh = contour.parts_where(|v| is_renewed[groups.find(part_of_contour[v as usize] as usize)]);
+        // What is near no contour would be inside of what comes, or around it.
+        let mut is_stale = |v: usize| {
+            let group = groups.find(first + v);
+            part_of_surface[v] as usize == v && (is_renewed[group] || !has_contour[group])
+        };
+        let vertices = self.mesh.vertices().enumerate();
+        let stale = vertices.filter(|&(v, _)| is_stale(v)).map(|(_, name)| name).collect();
         Ok((stale, fresh))
     }
 }

@@ -14,7 +14,8 @@ use crate::volume::marching_cubes;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Start {
     /// The iso-surface at π_I of the coarsest level, outer and inner boundaries, less the parts that enclose less than
-    /// [`super::DeformableParams::smallest_part`]; the enclosing surface where there is none.
+    /// [`super::DeformableParams::smallest_part`]. Where there is none: nothing, if finer levels are searched for parts, else the
+    /// enclosing surface.
     Contour,
     /// A refined icosahedron around all of the image that is brighter than π_I; around the whole image where nothing is, or
     /// where the surface does not look for what is brighter.
@@ -51,6 +52,8 @@ pub(super) struct Frame<'a> {
     /// World lengths of the voxel edges.
     pub(super) spacing: [f64; 3],
     pub(super) sampling: Sampling,
+    /// Whether a contour without parts is the start: parts come with finer levels.
+    pub(super) may_be_empty: bool,
 }
 
 impl Frame<'_> {
@@ -269,7 +272,11 @@ fn largest(spacing: [f64; 3]) -> f64 {
 /// The contour that the model looks for, of the level it starts on.
 fn on_contour(frame: &Frame) -> Result<Mesh, MethodError> {
     let surface = contour(frame.image, frame.iso, frame.object, frame.smallest_part)?;
-    if surface.triangles.is_empty() { enclosing(frame) } else { Ok(Mesh::from_triangles(&surface)?) }
+    match (surface.triangles.is_empty(), frame.may_be_empty) {
+        (false, _) => Ok(Mesh::from_triangles(&surface)?),
+        (true, true) => Ok(Mesh::default()),
+        (true, false) => enclosing(frame),
+    }
 }
 
 fn iso_surface(frame: &Frame, iso: f32) -> Result<Mesh, MethodError> {
