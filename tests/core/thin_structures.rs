@@ -1,13 +1,13 @@
 //! Walls, gaps, strands and hollows that one δ everywhere would lose, at the default settings: right components and χ, and at most
 //! 0.15 voxels off in the mean.
 
-use crate::common::{euler_of_parts, scenes};
-use vesicle::math::Vec3;
-use vesicle::mesh::{TriangleMesh, count_crossings};
+use crate::common::{Random, euler_of_parts, scenes};
+use vesicle::math::{DAffine3, DMat3, DVec3, Vec3};
+use vesicle::mesh::{TriangleMesh, count_crossings, measure};
 use vesicle::methods::deformable::{
     Coverage, DeformableModel, DeformableOptions, DeformableParams, Missing, Seeding, Start,
 };
-use vesicle::volume::{Volume, marching_cubes_world};
+use vesicle::volume::{Volume, Voxels, marching_cubes_world};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -203,4 +203,89 @@ fn parts_that_are_too_small_are_left_out() {
         euler_of_parts(&run(&volume, options).0).len()
     };
     assert_eq!([20.0, 64.0, 300.0].map(parts), [3, 2, 1]);
+}
+
+/// Positions come out in world space in single precision: sheets pressed on each other must not cross there, either. Before,
+/// sheets nearer than rounding did.
+#[test]
+fn nothing_crosses_in_world_space() {
+    let dims = [26, 25, 24];
+    let mut random = Random(9);
+    let noise: Vec<f32> = (0..dims.iter().product()).map(|_| random.unit()).collect();
+    let affine = DAffine3::from_mat3_translation(
+        DMat3::from_cols(DVec3::new(1.58, 0.1, 0.0), DVec3::new(-0.1, -0.99, 0.02), DVec3::Z * 1.01),
+        DVec3::new(-930.0, 1240.0, 385.0),
+    );
+    let volume = scenes::placed(Voxels::F32(noise), dims, affine);
+    let params = DeformableParams { smallest_part: 8.0, ..DeformableParams::for_volume(&volume) };
+    let options = DeformableOptions { params: Some(params), ..Default::default() };
+    let mut model = DeformableModel::new(&volume, options).unwrap();
+    for iteration in 0..60 {
+        let report = model.step().unwrap();
+        assert_eq!(count_crossings(&model.surface()), 0, "iteration {iteration}");
+        assert!(report.vertices > 2000);
+    }
+}
+
+/// A voxel that is a thousand times as bright as the object makes it faint, and leaves its surface where it is.
+#[test]
+fn one_bright_voxel_does_not_move_the_surface() {
+    let ball = |bright: f32| {
+        let volume = scenes::volume([32; 3], |p| {
+            if p == Vec3::new(2.0, 2.0, 2.0) {
+                bright
+            } else {
+                (100.0 - 50.0 * (p.distance(Vec3::splat(15.4)) - 9.0)).clamp(0.0, 200.0)
+            }
+        });
+        let params = DeformableParams { iso: 100.0, ..DeformableParams::for_volume(&volume) };
+        run(&volume, DeformableOptions { params: Some(params), ..Default::default() }).0
+    };
+    let exact = 4.0 / 3.0 * std::f64::consts::PI * 9f64.powi(3);
+    for bright in [0.0, 200_000.0] {
+        let volume = measure(&ball(bright)).volume / exact;
+        assert!((volume - 1.0).abs() < 0.02, "{bright}: {volume}");
+    }
+}
+
+/// A slit a tenth of a voxel wide inside of a block, below the iso value by little: both of its sides are there at the end.
+#[test]
+fn slits_much_thinner_than_a_voxel_stay() {
+    let middle = Vec3::new(14.3, 14.2, 10.0);
+    let volume = scenes::volume([30, 30, 21], |p| {
+        let in_slit = (p.z - middle.z).abs() < 0.5 && (p - middle).truncate().abs().max_element() < 8.0;
+        let inside = -to_box(p, middle, Vec3::new(11.5, 11.5, 6.5));
+        if in_slit { 0.47 } else { (0.5 + 0.5 * inside).clamp(0.0, 1.0) }
+    });
+    let params = DeformableParams { iso: 0.5, smallest_part: 8.0, ..DeformableParams::for_volume(&volume) };
+    let (surface, coverage) = run(&volume, DeformableOptions { params: Some(params), ..Default::default() });
+    assert_eq!(euler_of_parts(&surface), [2, 2]);
+    assert!(coverage.recall > 0.995, "{coverage:?}");
+}
+
+/// On the way down, a component that a coarse level shows in part is taken anew; one that it shows whole stays, refined.
+#[test]
+fn what_a_level_leaves_out_is_renewed() {
+    let (plate, ball) = (Vec3::new(16.3, 15.8, 8.2), Vec3::new(16.0, 16.0, 29.0));
+    let volume = image([34, 33, 42], |p| {
+        // A thin plate on a thick rod, and a ball that any level shows.
+        let rod = scenes::to_segment(p, plate - Vec3::X * 9.0, plate + Vec3::X * 9.0) - 3.5;
+        to_box(p, plate, Vec3::new(12.0, 12.0, 0.6)).min(rod).min(p.distance(ball) - 8.0)
+    });
+    let params = DeformableParams { iso: 0.5, ..DeformableParams::for_volume(&volume) };
+    let options = DeformableOptions { levels: 2, params: Some(params), ..Default::default() };
+    let mut model = DeformableModel::new(&volume, options.clone()).unwrap();
+    let mut seeds = 0;
+    loop {
+        let report = model.step().unwrap();
+        seeds += report.events.seeds;
+        if report.done {
+            break;
+        }
+    }
+    // The plate, on each of two levels at most; never the ball.
+    assert!((1..=2).contains(&seeds), "{seeds}");
+    let (surface, coverage) = run(&volume, options);
+    assert_eq!(euler_of_parts(&surface), [2, 2]);
+    assert!(coverage.recall > 0.99 && coverage.precision > 0.99, "{coverage:?}");
 }

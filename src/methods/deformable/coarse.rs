@@ -34,7 +34,7 @@ const MOST_STIFFNESS: f32 = 1.0;
 /// How steep the image is at least where it passes π_I, in its range a voxel. A few voxels that are brighter than all others by far
 /// make the object faint; rigidity would then pull the surface off its contour, slowly. Computed tomographies have 0.1 to 0.6.
 const LEAST_STEEPNESS: f32 = 0.1;
-const MOST_AMPLIFIED: f32 = 1e3;
+const MOST_AMPLIFIED: f32 = 1e4;
 
 /// Iterations of a level with the full gain, and those after which half of it is taken each time from then on. A head takes
 /// 300. Where a vertex lies on an edge that is steeper than most, it swings for ever: a tooth did, at an intensity where the
@@ -58,7 +58,8 @@ pub(super) fn gain(
     [iso, delta]: [f32; 2],
 ) -> f32 {
     if params.yields_to_image() && params.integrator == Integrator::Implicit {
-        return (LEAST_STEEPNESS / pyramid.levels[level].steepness(iso)).clamp(1.0, MOST_AMPLIFIED);
+        let steepness = pyramid.levels[level].ordinary_steepness(iso);
+        return if steepness > 0.0 { (LEAST_STEEPNESS / steepness).clamp(1.0, MOST_AMPLIFIED) } else { 1.0 };
     }
     if level == 0 || params.iso_force == 0.0 || params.integrator == Integrator::Implicit {
         return 1.0;

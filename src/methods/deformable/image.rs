@@ -80,13 +80,32 @@ impl LevelImage {
     /// How steep the image is where it passes `iso`: the root mean square of the differences between neighbouring voxels on
     /// either side, per unit of the model. 0 where there are none.
     pub(super) fn steepness(&self, iso: f32) -> f32 {
-        let [nx, ny, nz] = self.grid.dims;
         let (mut sum, mut count) = (0.0f64, 0usize);
+        self.for_each_passage(iso, |difference| {
+            sum += f64::from(difference * difference);
+            count += 1;
+        });
+        let mean = if count > 0 { sum / count as f64 } else { 0.0 };
+        mean.sqrt() as f32 * self.voxels_per_unit()
+    }
+
+    /// As [`Self::steepness`], but the median: a few edges that are steeper than all others by far do not count.
+    pub(super) fn ordinary_steepness(&self, iso: f32) -> f32 {
+        let mut differences = Vec::new();
+        self.for_each_passage(iso, |difference| differences.push(difference.abs()));
+        let middle = differences.len() / 2;
+        if differences.is_empty() {
+            return 0.0;
+        }
+        *differences.select_nth_unstable_by(middle, f32::total_cmp).1 * self.voxels_per_unit()
+    }
+
+    /// Calls `visit` with the difference between neighbouring voxels on either side of `iso`.
+    fn for_each_passage(&self, iso: f32, mut visit: impl FnMut(f32)) {
+        let [nx, ny, nz] = self.grid.dims;
         let mut pass = |a: &[f32], b: &[f32]| {
-            for (&a, &b) in a.iter().zip(b).filter(|&(&a, &b)| (a < iso) != (b < iso)) {
-                sum += f64::from((a - b) * (a - b));
-                count += 1;
-            }
+            let passages = a.iter().zip(b).filter(|&(&a, &b)| (a < iso) != (b < iso));
+            passages.for_each(|(&a, &b)| visit(a - b));
         };
         let rows: Vec<&[f32]> = self.grid.values.chunks_exact(nx).collect();
         for (k, row) in rows.iter().enumerate() {
@@ -98,8 +117,6 @@ impl LevelImage {
                 pass(rows[k + ny], row);
             }
         }
-        let mean = if count > 0 { sum / count as f64 } else { 0.0 };
-        mean.sqrt() as f32 * self.voxels_per_unit()
     }
 
     /// Voxels of this level in a unit of the model, along the axis where they are smallest.
