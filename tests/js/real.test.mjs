@@ -1,0 +1,31 @@
+// The deformable model at its defaults on the real volumes that the project carries; `npm run real` takes any folder.
+import { readFile } from 'node:fs/promises';
+import { beforeAll, expect, test } from 'vitest';
+import init, * as library from '../../pkg/index.js';
+import { isComplete, measured, valleys } from '../../scripts/real.mjs';
+import { at } from '../../scripts/shell.mjs';
+
+beforeAll(() => init());
+
+const VOLUMES = ['ovule.nrrd', 'tooth.nrrd', 'visible-human-head.nii.gz', 'heart.nii.gz'];
+
+const volumeOf = async (name: string) =>
+  library.Volume.parse(new Uint8Array(await readFile(at('www/public/data', name))));
+
+test.each(VOLUMES)('all of the contour of %s is found, and nothing else', async (name) => {
+  const volume = await volumeOf(name);
+  for (const iso of valleys(volume.histogram(256), volume.range, 2)) {
+    const row = await measured(library, volume, iso, 0);
+    expect(row, `at ${iso}`).toSatisfy(isComplete);
+    expect(row).toMatchObject({ intersections: 0 });
+    expect(row.share, `vertices of marching cubes' at ${iso}`).toBeLessThan(0.6);
+  }
+  volume.free();
+});
+
+test('coarse to fine it is, too', async () => {
+  const volume = await volumeOf('tooth.nrrd');
+  const [iso = 0] = valleys(volume.histogram(256), volume.range, 1);
+  expect(await measured(library, volume, iso, 2)).toSatisfy(isComplete);
+  volume.free();
+});
