@@ -9,8 +9,7 @@ beforeAll(() => init());
 
 const VOLUMES = ['ovule.nrrd', 'tooth.nrrd', 'visible-human-head.nii.gz', 'heart.nii.gz'];
 
-const volumeOf = async (name: string) =>
-  library.Volume.parse(new Uint8Array(await readFile(at('www/public/data', name))));
+const volumeOf = async (name) => library.Volume.parse(new Uint8Array(await readFile(at('www/public/data', name))));
 
 test.each(VOLUMES)('all of the contour of %s is found, and nothing else', async (name) => {
   const volume = await volumeOf(name);
