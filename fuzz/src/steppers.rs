@@ -4,7 +4,7 @@ use super::bytes::Bytes;
 use vesicle::math::{DAffine3, DVec3, Vec3};
 use vesicle::mesh::{Mesh, TriangleMesh, count_crossings, measure, report};
 use vesicle::methods::deformable::{
-    Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Start,
+    Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Seeding, Start,
 };
 use vesicle::methods::implicit::{
     Camera, Cloud, Edits, ImplicitOptions, ImplicitParams, ImplicitSurface, KernelKind, Level,
@@ -98,13 +98,23 @@ pub fn deformable(data: &[u8]) {
             Err(error) => panic!("{error}"),
         }
         assert_sound(model.mesh());
-        match bytes.below(12) {
+        assert_eq!(count_crossings(&model.surface()), 0, "triangles cross in world space");
+        match bytes.below(16) {
+            3 => assert_covers(&model),
+            4 => _ = model.seed(),
             0 => _ = model.set_params(deformable_params(bytes, &volume)),
             1 => _ = model.set_attractors(vec![attractor(bytes)]),
             2 => restored(&mut model),
             _ => {}
         }
     }
+}
+
+/// Coverage consists of shares and places.
+fn assert_covers(model: &DeformableModel) {
+    let Ok(coverage) = model.coverage() else { return };
+    assert!([coverage.recall, coverage.precision].iter().all(|share| (0.0..=1.0 + 1e-9).contains(share)));
+    assert!(coverage.uncovered.iter().all(|part| part.position.is_finite() && part.area > 0.0));
 }
 
 /// Goes on from what it has saved.
@@ -115,7 +125,8 @@ fn restored(model: &mut DeformableModel) {
 }
 
 fn start(bytes: &mut Bytes, volume: &Volume) -> Start {
-    match bytes.below(6) {
+    match bytes.below(9) {
+        6.. => Start::Contour,
         0 => Start::Bubbles(1 + bytes.below(4) as u32),
         1 => Start::MarchingCubes(bytes.within(volume.range()[0], volume.range()[1])),
         2 => Start::Seeds {
@@ -146,7 +157,10 @@ fn deformable_params(bytes: &mut Bytes, volume: &Volume) -> DeformableParams {
         rest_length: bytes.one_of(&[RestLength::Zero, RestLength::Mean, RestLength::Given(1.0)]),
         damping: bytes.within(0.1, 1.0),
         max_move: bytes.within(0.05, 0.5),
-        integrator: bytes.one_of(&[Integrator::Euler, Integrator::Euler, Integrator::RungeKutta]),
+        integrator: bytes.one_of(&[Integrator::Implicit, Integrator::Euler, Integrator::RungeKutta]),
+        adaptivity: bytes.one_of(&[0.0, 0.5, 1.0, 1.0]),
+        seeding: bytes.one_of(&[Seeding::Auto, Seeding::On, Seeding::Off]),
+        smallest_part: bytes.one_of(&[0.0, 1.0, 8.0, 64.0]),
         topology: bytes.one_of(&[
             deformable::Topology::Adaptive,
             deformable::Topology::Adaptive,

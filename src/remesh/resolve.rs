@@ -28,6 +28,8 @@ pub struct Resolver {
     pub(super) most_effort: u64,
     queue: VecDeque<VertexId>,
     queued: Vec<bool>,
+    /// By vertex, the edits around it in this call.
+    pub(super) edits: Vec<u8>,
     /// Vertices that were moved or made since contact was last looked for.
     stirred: Vec<VertexId>,
     is_stirred: Vec<bool>,
@@ -115,6 +117,7 @@ impl Resolver {
             most_effort: 0,
             queue: VecDeque::new(),
             queued: Vec::new(),
+            edits: Vec::new(),
             stirred: Vec::new(),
             is_stirred: Vec::new(),
             stuck: Vec::new(),
@@ -178,6 +181,7 @@ impl Resolver {
         let effort = LEAST_EFFORT + EFFORT_PER_VERTEX * mesh.vertex_count() as u64;
         self.most_effort = self.embedding.effort() + effort;
         self.edited.clear();
+        self.edits.clear();
         let stuck = std::mem::take(&mut self.stuck);
         self.remove_crushed(mesh, sampling, guide, &stuck);
         self.cut_crushed(mesh, sampling, guide, &stuck);

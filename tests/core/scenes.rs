@@ -307,3 +307,15 @@ fn two_hundred_steps_end_in_the_same_bits_everywhere() {
     let found = fingerprint(&model.surface().positions);
     assert_eq!(format!("{found:016x}"), "b9c3798824176882");
 }
+
+/// The same at the default settings, coarse to fine, to the end.
+#[test]
+fn the_defaults_end_in_the_same_bits_everywhere() {
+    let volume = scenes::menger(2);
+    let params = DeformableParams { iso: 0.4, ..DeformableParams::for_volume(&volume) };
+    let options = DeformableOptions { levels: 2, params: Some(params), ..Default::default() };
+    let mut model = DeformableModel::new(&volume, options).unwrap();
+    while !model.step().unwrap().done {}
+    let found = fingerprint(&model.surface().positions);
+    assert_eq!(format!("{found:016x}"), "debf8cecab63a6eb");
+}

@@ -29,7 +29,7 @@ await page(async () => {
   const render = sliceAndSurface(vtkITKHelper.convertItkToVtkImage(image), actor);
   Object.assign(window, { image, model, surface, actor, render });
   for (;;) {
-    const report = model.step(2);
+    const report = model.step();
     if (surface.update(model.mesh)) render();
     await shown(report);
     if (report.done) return report;

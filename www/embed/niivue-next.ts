@@ -14,7 +14,7 @@ await page(async () => {
   const surface = new NiivueSurface(nv);
   Object.assign(window, { nv, model, surface });
   for (;;) {
-    const report = model.step(2);
+    const report = model.step();
     if (await surface.update(model.mesh)) nv.drawScene();
     await shown(report);
     if (report.done) return report;

@@ -28,7 +28,7 @@ await page(async () => {
   const render = sliceAndSurface(image, actor);
   Object.assign(window, { image, model, surface, actor, render });
   for (;;) {
-    const report = model.step(4);
+    const report = model.step();
     if (surface.update(model.mesh)) render();
     await shown(report);
     if (report.done) return report;
