@@ -1,4 +1,4 @@
-// Takes docs/*, the README's pictures, from the running app: the built-in example of each lab when it is done.
+// Takes docs/*, the pictures of README and docs, from the running app: examples of the labs when they are done.
 import { mkdir } from 'node:fs/promises';
 import { launchChromium } from './chromium.mjs';
 import { serve } from './serve.mjs';
@@ -11,14 +11,27 @@ const PICTURES = [
   { file: 'docs/reconstruct.jpg', hash: '#reconstruct', type: 'jpeg', quality: 85 },
   { file: 'docs/track.jpg', hash: '#track', type: 'jpeg', quality: 85 },
   { file: 'docs/sculpt.jpg', hash: '#sculpt', type: 'jpeg', quality: 85 },
+  // The 3D view alone, with what is left out marked: the model of the paper, and the defaults.
+  {
+    file: 'docs/coverage-paper.jpg',
+    hash: '#extract?start=enclosing&p.adaptivity=0&p.integrator=euler&v=2',
+    coverage: true,
+    type: 'jpeg',
+    quality: 85,
+  },
+  { file: 'docs/coverage-default.jpg', hash: '#extract', coverage: true, type: 'jpeg', quality: 85 },
 ];
 
 /** Waits for the example to be done, then for the frame that shows it. */
-async function shoot(page, address, { hash, file, ...format }) {
+async function shoot(page, address, { hash, file, coverage = false, ...format }) {
   await page.goto(address + hash);
   await page.waitForSelector('[data-state=done]', { timeout: 120_000 });
+  if (coverage) {
+    await page.getByRole('button', { name: 'Measure coverage' }).click();
+    await page.getByText('Recall').waitFor({ timeout: 120_000 });
+  }
   await page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
-  await page.screenshot({ path: at(file), ...format });
+  await (coverage ? page.locator('.view') : page).screenshot({ path: at(file), ...format });
   say('picture', at(file));
 }
 
@@ -27,7 +40,9 @@ await script(async () => {
   const server = await serve(at('dist'), 0);
   const browser = await launchChromium();
   try {
-    for (const picture of PICTURES) await shoot(await browser.newPage({ viewport: SIZE }), server.address, picture);
+    const [wanted = ''] = process.argv.slice(2);
+    for (const picture of PICTURES.filter(({ file }) => file.includes(wanted)))
+      await shoot(await browser.newPage({ viewport: SIZE }), server.address, picture);
   } finally {
     await browser.close();
     await server.close();

@@ -241,7 +241,7 @@ fn one_bright_voxel_does_not_move_the_surface() {
         let params = DeformableParams { iso: 100.0, ..DeformableParams::for_volume(&volume) };
         run(&volume, DeformableOptions { params: Some(params), ..Default::default() }).0
     };
-    let exact = 4.0 / 3.0 * std::f64::consts::PI * 9f64.powi(3);
+    let exact = 4.0 / 3.0 * std::f64::consts::PI * (9.0 * 9.0 * 9.0);
     for bright in [0.0, 200_000.0] {
         let volume = measure(&ball(bright)).volume / exact;
         assert!((volume - 1.0).abs() < 0.02, "{bright}: {volume}");
