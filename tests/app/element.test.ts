@@ -135,6 +135,7 @@ test.each([
     /^method: 'magic'; there are deformable, implicit, tracking, multires$/,
   ],
   ['<vesicle-lab src="ring.mha" params="iso 3"></vesicle-lab>', /^params: 'iso 3' is not JSON/],
+  ['<vesicle-lab src="ring.mha" start="above"></vesicle-lab>', /^start: 'above'; accepted: contour, enclosing/],
   ['<vesicle-lab src="ring.mha" params=\'{ "isoo": 3 }\'></vesicle-lab>', /isoo/],
   ['<vesicle-lab src="bust.ply"></vesicle-lab>', /NIfTI/],
   ['<vesicle-lab src="bust.ply" method="multires"></vesicle-lab>', /ellipsoids/],

@@ -56,7 +56,7 @@ export class CoveragePanel {
       h(
         'p',
         { class: 'help' },
-        'A surface loses walls and gaps thinner than its contact distance, and never reaches closed cavities by moving alone. ',
+        'How much of the iso-surface of the image the surface covers (recall), and how much of the surface lies on it (precision). ',
         why,
       ),
       h('div', { class: 'buttons' }, this.#start, this.#cancel, this.#seed),

@@ -10,7 +10,7 @@ export function isStartKind(text: string | undefined): text is Kind {
 const SHAPES: { kind: Kind; label: string; help: string }[] = [
   {
     kind: 'contour',
-    label: 'Contour of the coarsest level',
+    label: 'Contour',
     help: 'The iso-surface of the coarsest level with its hollows: for real data.',
   },
   {
