@@ -45,8 +45,8 @@ fn run(volume: &Volume, options: DeformableOptions) -> (TriangleMesh, Coverage) 
 /// image itself has holes.
 const BELOW_SAMPLING: [&str; 2] = ["shell 1", "ring of radius 0.8"];
 
-/// The object has these components, by their χ, and the mean error is small: 0.15 voxels, or what the contour of the image has. Coarse
-/// to fine it is covered, too; there, tiny handles may be left across gaps and walls of one edge's length.
+/// The object has these components, by their χ, direct and coarse to fine, and the mean error is small: 0.15 voxels, or what the contour
+/// of the image has.
 fn is_found(what: &str, dims: [usize; 3], euler: &[i64], distance: impl Fn(Vec3) -> f32) {
     let volume = image(dims, &distance);
     let error = |surface: &TriangleMesh| {
@@ -66,7 +66,7 @@ fn is_found(what: &str, dims: [usize; 3], euler: &[i64], distance: impl Fn(Vec3)
             "{what}: χ {found:?}, mean error {error:.3} ({of_contour:.3}), recall {:.4}",
             coverage.recall
         );
-        assert!(levels > 0 || !can_be_found || found == euler, "{what}: {found:?}");
+        assert!(!can_be_found || found == euler, "{what}: {found:?}");
         let is_near = error < MEAN_ERROR.max(of_contour + 0.02);
         assert!(is_near || !can_be_found, "{what}: {error}, {of_contour}");
         assert!(coverage.recall > 0.99 && coverage.precision > 0.99, "{what}: {coverage:?}");
@@ -209,7 +209,7 @@ fn parts_that_are_too_small_are_left_out() {
 /// sheets nearer than rounding did.
 #[test]
 fn nothing_crosses_in_world_space() {
-    let dims = [26, 25, 24];
+    let dims = [18, 17, 16];
     let mut random = Random(9);
     let noise: Vec<f32> = (0..dims.iter().product()).map(|_| random.unit()).collect();
     let affine = DAffine3::from_mat3_translation(
@@ -220,10 +220,10 @@ fn nothing_crosses_in_world_space() {
     let params = DeformableParams { smallest_part: 8.0, ..DeformableParams::for_volume(&volume) };
     let options = DeformableOptions { params: Some(params), ..Default::default() };
     let mut model = DeformableModel::new(&volume, options).unwrap();
-    for iteration in 0..60 {
+    for iteration in 0..25 {
         let report = model.step().unwrap();
         assert_eq!(count_crossings(&model.surface()), 0, "iteration {iteration}");
-        assert!(report.vertices > 2000);
+        assert!(report.vertices > 800);
     }
 }
 
