@@ -98,8 +98,8 @@ impl Resolver {
             let members = mesh.component_of(v, LARGEST_SPECK + 1);
             let volume = volume(mesh, &members);
             let is_flat =
-                kept_volume(mesh, &members, volume, guide) < SMALLEST_BALL * sampling.smallest_volume();
-            let is_crushed = is_flat && members.iter().any(is_stuck) || members.iter().all(is_stuck);
+                || kept_volume(mesh, &members, volume, guide) < SMALLEST_BALL * sampling.smallest_volume();
+            let is_crushed = members.iter().any(is_stuck) && (is_flat() || members.iter().all(is_stuck));
             if is_crushed || (volume > 0.0) != was_solid {
                 self.remove_part(mesh, v);
             } else {

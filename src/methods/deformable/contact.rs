@@ -43,22 +43,22 @@ impl<'a> ImageGuide<'a> {
     }
 
     /// Whether all points are object, or all are background, by more than what the surface may be off the contour at rest.
-    fn are_all(&self, is_object: bool, points: &[Vec3], doubt: f32) -> bool {
+    fn are_all(&self, is_object: bool, points: &[Vec3], tolerance: f32) -> bool {
         points.iter().all(|&p| {
             let depth = self.depth(p);
-            if is_object { depth >= doubt } else { depth < -doubt }
+            if is_object { depth >= tolerance } else { depth < -tolerance }
         })
     }
 
     /// By how much intensities change over [`BLUR`] along the normals of some vertices, at most. In the midst of matter or
     /// background that is nothing; on the contour it tells what is beside it.
-    fn doubt(&self, mesh: &Mesh, vertices: &[VertexId]) -> f32 {
+    fn tolerance(&self, mesh: &Mesh, vertices: &[VertexId]) -> f32 {
         vertices.iter().fold(0.0, |most, &v| {
             let (p, half) = (mesh.position(v), mesh.area_normal(v).normalize_or_zero() * 0.5);
             let [inside, here, outside] = [p - half, p, p + half].map(|p| self.depth(p));
             // In a slit or a thin wall both sides are alike: each counts by itself.
-            let doubt = 2.0 * BLUR * (outside - here).abs().max((here - inside).abs());
-            if doubt > most { doubt } else { most }
+            let tolerance = 2.0 * BLUR * (outside - here).abs().max((here - inside).abs());
+            if tolerance > most { tolerance } else { most }
         })
     }
 }
@@ -83,7 +83,7 @@ impl TopologyGuide for ImageGuide<'_> {
             (m, n) if m < -FACING && n > FACING => false,
             _ => return false,
         };
-        self.are_all(is_gap, &SAMPLES.map(|share| p + way * share), self.doubt(mesh, &[u, v]))
+        self.are_all(is_gap, &SAMPLES.map(|share| p + way * share), self.tolerance(mesh, &[u, v]))
     }
 
     /// A strand if its middle is background, a tunnel if its middle is object.
@@ -93,7 +93,7 @@ impl TopologyGuide for ImageGuide<'_> {
         let outwards: f32 =
             (0..3).map(|k| mesh.area_normal(ring[k]).normalize_or_zero().dot(corners[k] - middle)).sum();
         let is_strand = outwards > 0.0;
-        self.are_all(!is_strand, &[middle], self.doubt(mesh, &ring))
+        self.are_all(!is_strand, &[middle], self.tolerance(mesh, &ring))
     }
 
     /// Not if the edge leads through a wall or across a gap, between sides that face away from each other or each other: the two would
@@ -105,7 +105,7 @@ impl TopologyGuide for ImageGuide<'_> {
         }
         let (p, q) = (mesh.position(u), mesh.position(v));
         let is_wall = (q - p).dot(n - m) > 0.0;
-        !self.are_all(is_wall, &[(p + q) * 0.5], self.doubt(mesh, &[u, v]))
+        !self.are_all(is_wall, &[(p + q) * 0.5], self.tolerance(mesh, &[u, v]))
     }
 
     fn is_hollow(&self, mesh: &Mesh, members: &[VertexId]) -> bool {

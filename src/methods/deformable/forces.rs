@@ -153,12 +153,13 @@ impl Forces {
             if scale.needs_slope {
                 self.slope[v] = self.slope_along_normal(v, x, image, scale);
             }
-            let hold = if scale.yields { self.hold_of_image(v, x, image, scale) } else { f32::INFINITY };
+            let miss = self.miss(v, x, image, scale);
+            let hold = if scale.yields { self.hold_of_image(v, miss, scale) } else { f32::INFINITY };
             let mut force = self.curvature(v, ring, velocities[v], scale, hold);
             if scale.stiffness != 0.0 {
                 force += springs(ring, positions, x, rest) * scale.stiffness;
             }
-            force += self.iso_attraction(v, x, image, scale);
+            force += self.iso_attraction(v, miss, scale);
             if scale.uses_gradient() {
                 force += self.ridge_attraction(v, x, image, scale);
             }
@@ -207,9 +208,7 @@ impl Forces {
     /// The strongest bending across the surface that the image holds against where it is, so that at rest no vertex is
     /// further than 4/3 [`YIELD`] from the contour.
     #[inline]
-    fn hold_of_image(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
-        let miss =
-            scale.iso - image.intensity(self.middle_of_star(v, x), scale.background, &mut self.cells[v]);
+    fn hold_of_image(&self, v: usize, miss: f32, scale: &ForceScale) -> f32 {
         scale.pull() * (YIELD * self.slope[v] + 0.25 * miss.abs())
     }
 
@@ -222,12 +221,17 @@ impl Forces {
         across + (force - across) * (speed * speed).min(1.0)
     }
 
+    /// π_I − Π(x), with x in the middle of the star where the surface yields to the image.
+    #[inline]
+    fn miss(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
+        let p = if scale.yields { self.middle_of_star(v, x) } else { x };
+        scale.iso - image.intensity(p, scale.background, &mut self.cells[v])
+    }
+
     /// f_I = δ α_I (π_I − Π(x)) n (7).
     #[inline]
-    fn iso_attraction(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> Vec3 {
-        let p = if scale.yields { self.middle_of_star(v, x) } else { x };
-        let intensity = image.intensity(p, scale.background, &mut self.cells[v]);
-        self.normal[v] * (scale.delta * scale.iso_force * (scale.iso - intensity))
+    fn iso_attraction(&self, v: usize, miss: f32, scale: &ForceScale) -> Vec3 {
+        self.normal[v] * (scale.delta * scale.iso_force * miss)
     }
 
     /// f_∇I = δ ((α_g − β_g)(∇Π·n) n + β_g ∇Π) (8).

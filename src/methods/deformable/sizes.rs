@@ -27,7 +27,7 @@ const LARGEST: f32 = 1.6;
 /// By how much the size may grow along an edge, as a share of its length: sampling then stays isotropic.
 const GRADATION: f32 = 0.3;
 
-/// Steps by which the opposite side of a wall or a gap is looked for, in voxels.
+/// Step of the search for the opposite side of a wall or a gap, in voxels.
 const STRIDE: f32 = 0.5;
 
 /// Passes over the mesh that bound the gradation; each reaches one edge further.

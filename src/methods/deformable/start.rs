@@ -138,7 +138,7 @@ pub(super) fn resolve_all(
 /// a flat box would have triangles that no edit can mend.
 fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
     let delta = frame.sampling.shortest();
-    let most = frame.domain.most_vertices(delta);
+    let most = frame.most_vertices();
     if frame.domain.enclosing_vertices(delta) > most {
         return Err(MethodError::TooManyVertices { most });
     }
