@@ -18,8 +18,7 @@ const CUT_PUSH_LIMIT: f32 = 0.6;
 const LENGTHENED: f32 = 1.6;
 
 /// Edits around one vertex in a call, after which it is left as it is until it is touched again. Where splits, flips and collapses of
-/// edges with different bounds undo each other, they went on until the effort of the whole call was spent, 20 s on a head. A start three
-/// times as fine as its bounds takes fewer than 20.
+/// edges with different bounds undo each other, they went on until the effort of the whole call was spent, 20 s on a head.
 const MOST_EDITS: u8 = 40;
 
 impl Resolver {
