@@ -32,6 +32,20 @@ impl Resolver {
         }
     }
 
+    /// Makes an edit at a vertex that changes nothing but the sampling, unless it makes the mesh cross itself.
+    fn edit<T>(
+        &mut self,
+        mesh: &mut Mesh,
+        at: VertexId,
+        edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
+    ) -> Result<T, EditError> {
+        if self.suspects.as_ref().is_some_and(|suspects| !suspects.contains(mesh.position(at))) {
+            self.embedding.attempt_trusting(mesh, edit)
+        } else {
+            self.embedding.attempt(mesh, edit)
+        }
+    }
+
     /// Whether edges around `u` are mended in this call.
     fn may_edit(&self, u: VertexId) -> bool {
         self.edits.get(u.index()).is_none_or(|&edits| edits < MOST_EDITS)
@@ -79,12 +93,12 @@ impl Resolver {
         let shortest = sampling.between(mesh, u, v).shortest();
         let crowded = [a, b].iter().any(|p| p.distance_squared(middle) < square(shortest));
         let flat = a.distance_squared(b) < mesh.position(u).distance_squared(mesh.position(v));
-        if crowded && flat && self.embedding.attempt(mesh, |mesh| mesh.flip(u, v)).is_ok() {
+        if crowded && flat && self.edit(mesh, u, |mesh| mesh.flip(u, v)).is_ok() {
             self.changes.inversions += 1;
         } else if !self.has_room(mesh) {
             return Ok(false);
         } else {
-            let w = self.embedding.attempt(mesh, |mesh| mesh.split(u, v, middle))?;
+            let w = self.edit(mesh, u, |mesh| mesh.split(u, v, middle))?;
             self.changes.creations += 1;
             self.touch_edited(w);
         }
@@ -125,7 +139,7 @@ impl Resolver {
             if lengthens(mesh, [u, v], place, longest) {
                 continue;
             }
-            match self.embedding.attempt(mesh, |mesh| mesh.collapse(u, v, place)) {
+            match self.edit(mesh, u, |mesh| mesh.collapse(u, v, place)) {
                 Ok(()) => {
                     self.changes.deletions += 1;
                     // At the end of the queue: trying the survivor again at once piles up valence.

@@ -4,6 +4,7 @@ use super::specks::SmallParts;
 use super::{Changes, Embedding, Sampling};
 use crate::math::{Bounds, DAffine3, Vec3};
 use crate::mesh::{Mesh, MeshError, VertexId};
+use crate::spatial::CellSet;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -23,6 +24,7 @@ const LEAST_EFFORT: u64 = 100_000;
 pub struct Resolver {
     most_vertices: usize,
     contact: Contact,
+    pub(super) suspects: Option<CellSet>,
     full: bool,
     /// [`Embedding::effort`] at which this call ends.
     pub(super) most_effort: u64,
@@ -64,8 +66,9 @@ pub trait TopologyGuide {
     /// Whether a short edge may be drawn together.
     fn may_collapse(&self, mesh: &Mesh, edge: [VertexId; 2]) -> bool;
 
-    /// Whether a small component is a hollow that is to stay; else it would grow in empty space and is removed.
-    fn is_hollow(&self, mesh: &Mesh, members: &[VertexId]) -> bool;
+    /// Whether a small component encloses what it should, as a solid or a hollow. Else it is removed earlier: a solid that is pressed
+    /// on itself was to vanish, and a hollow would grow in empty space.
+    fn has_content(&self, mesh: &Mesh, members: &[VertexId], is_solid: bool) -> bool;
 }
 
 /// Makes every topology change that the sampling calls for, as in the paper.
@@ -85,7 +88,7 @@ impl TopologyGuide for Unguided {
         true
     }
 
-    fn is_hollow(&self, _: &Mesh, _: &[VertexId]) -> bool {
+    fn has_content(&self, _: &Mesh, _: &[VertexId], _: bool) -> bool {
         false
     }
 }
@@ -113,6 +116,7 @@ impl Resolver {
         Self {
             most_vertices,
             contact: Contact::Join,
+            suspects: None,
             full: false,
             most_effort: 0,
             queue: VecDeque::new(),
@@ -131,6 +135,12 @@ impl Resolver {
     /// What becomes of vertices in contact from now on.
     pub fn set_contact(&mut self, contact: Contact) {
         self.contact = contact;
+    }
+
+    /// From now on splits, flips and collapses are tested as a whole only where `suspects` are, elsewhere with
+    /// [`Embedding::attempt_trusting`]: in half the time, on a mesh that is to be looked at at the end.
+    pub fn trust_but(&mut self, suspects: CellSet) {
+        self.suspects = Some(suspects);
     }
 
     /// What keeps the mesh from crossing itself, for edits beside these.

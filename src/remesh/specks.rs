@@ -1,6 +1,8 @@
 //! Small parts that vanish: specks without volume, parts crushed, parts turned inside out.
 
 use super::{Resolver, Sampling, TopologyGuide};
+use crate::math::triangle::solid_angle;
+use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, VertexId};
 
 /// Components of more vertices are never removed, whatever their volume: a cavity has a negative one.
@@ -73,7 +75,7 @@ impl Resolver {
             return false;
         }
         let (volume, least) = (volume(mesh, &members), sampling.smallest_volume());
-        if volume >= least || volume <= -least && guide.is_hollow(mesh, &members) {
+        if volume >= least || volume <= -least && guide.has_content(mesh, &members, false) {
             return false;
         }
         self.remove_part(mesh, v);
@@ -97,9 +99,8 @@ impl Resolver {
         for (v, was_solid) in std::mem::take(&mut self.small.parts) {
             let members = mesh.component_of(v, LARGEST_SPECK + 1);
             let volume = volume(mesh, &members);
-            let is_flat =
-                || kept_volume(mesh, &members, volume, guide) < SMALLEST_BALL * sampling.smallest_volume();
-            let is_crushed = members.iter().any(is_stuck) && (is_flat() || members.iter().all(is_stuck));
+            let stuck = members.iter().filter(|v| is_stuck(v)).count();
+            let is_crushed = stuck > 0 && is_crushed(mesh, &members, stuck, volume, sampling, guide);
             if is_crushed || (volume > 0.0) != was_solid {
                 self.remove_part(mesh, v);
             } else {
@@ -133,10 +134,25 @@ impl Resolver {
         self.small.topology_version = Some(mesh.topology_version());
     }
 
-    /// Removes the component of `v`.
+    /// Removes the component of `v`, and what is within it if it is small: around that there is nothing left that it could be in.
     pub(super) fn remove_part(&mut self, mesh: &mut Mesh, v: VertexId) {
-        self.embedding.remove_component(mesh, v);
-        self.changes.vanished += 1;
+        let members = mesh.component_of(v, LARGEST_SPECK + 1);
+        let within =
+            if members.len() <= LARGEST_SPECK { self.vertices_within(mesh, &members) } else { Vec::new() };
+        for part in [v].into_iter().chain(within) {
+            if mesh.is_live(part) {
+                self.embedding.remove_component(mesh, part);
+                self.changes.vanished += 1;
+            }
+        }
+    }
+
+    /// Vertices of other components that a component goes around.
+    fn vertices_within(&mut self, mesh: &Mesh, members: &[VertexId]) -> Vec<VertexId> {
+        let positions: Vec<Vec3> = members.iter().map(|&v| mesh.position(v)).collect();
+        let mut found = self.embedding.vertices_in(mesh, &Bounds::of(&positions));
+        found.retain(|v| !members.contains(v) && is_within(mesh, members, mesh.position(*v)));
+        found
     }
 
     /// Removes every speck of the mesh and returns how many there were.
@@ -149,9 +165,34 @@ impl Resolver {
     }
 }
 
+/// Whether a part of which some vertices are stuck is as small as it can get: flat, or all stuck; half of them will do for one that has
+/// nothing in it and was to vanish.
+fn is_crushed(
+    mesh: &Mesh,
+    members: &[VertexId],
+    stuck: usize,
+    volume: f32,
+    sampling: Sampling,
+    guide: &dyn TopologyGuide,
+) -> bool {
+    let is_flat = kept_volume(mesh, members, volume, guide) < SMALLEST_BALL * sampling.smallest_volume();
+    let is_empty = || volume > 0.0 && !guide.has_content(mesh, members, true);
+    is_flat || stuck == members.len() || 2 * stuck > members.len() && is_empty()
+}
+
 /// The volume of a part as it counts against being removed: that of a hollow which `guide` knows of is positive.
 fn kept_volume(mesh: &Mesh, members: &[VertexId], volume: f32, guide: &dyn TopologyGuide) -> f32 {
-    if volume < 0.0 && guide.is_hollow(mesh, members) { -volume } else { volume }
+    if volume < 0.0 && guide.has_content(mesh, members, false) { -volume } else { volume }
+}
+
+/// Whether a whole component goes around a point.
+fn is_within(mesh: &Mesh, members: &[VertexId], p: Vec3) -> bool {
+    let triangles = members.iter().flat_map(|&u| {
+        let first = mesh.ring(u).pairs().filter(move |&(a, b)| u < a && u < b);
+        first.map(move |(a, b)| [u, a, b].map(|w| mesh.position(w)))
+    });
+    // 4π from within, 0 from outside.
+    triangles.map(|corners| solid_angle(corners, p)).sum::<f64>().abs() > std::f64::consts::TAU
 }
 
 /// The signed volume of a whole component; positive where its triangles face outwards.
@@ -170,7 +211,6 @@ fn volume(mesh: &Mesh, members: &[VertexId]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Vec3;
     use crate::mesh::TriangleMesh;
     use crate::remesh::Changes;
     use std::f32::consts::TAU;
@@ -213,7 +253,7 @@ mod tests {
     /// All edges are within bounds, and any move inwards makes it cross: merge and split, seed 404.
     #[test]
     fn a_part_that_cannot_shrink_vanishes() {
-        let mut part = mesh(
+        let part = mesh(
             &[
                 [22.015448, 21.224213, 21.005508],
                 [21.30414, 23.457825, 21.515993],
@@ -245,10 +285,82 @@ mod tests {
                 [6, 9, 4],
             ],
         );
-        let sampling = Sampling::new(1.4);
+        assert_shrinks_away(part, Sampling::new(1.4), 0.3);
+    }
+
+    /// More than half of its vertices are held, though it is larger than the smallest ball: merge and split, seed 10529.
+    #[test]
+    fn a_crumpled_part_vanishes() {
+        let part = mesh(
+            &[
+                [30.879736, 22.268867, 22.252005],
+                [30.429016, 20.206413, 21.476469],
+                [30.530571, 21.64207, 20.33488],
+                [30.883303, 21.424736, 23.669962],
+                [30.533237, 20.08431, 24.180342],
+                [28.321115, 20.20514, 20.53849],
+                [30.634886, 19.893284, 19.654705],
+                [27.517422, 21.187292, 21.147432],
+                [29.380932, 20.855356, 22.083912],
+                [29.200743, 19.398195, 19.878986],
+                [28.139534, 22.066616, 23.512575],
+                [30.304714, 22.374613, 23.882977],
+                [29.245834, 19.686317, 23.77984],
+                [29.109978, 23.35765, 24.055906],
+                [28.26234, 20.225344, 23.041227],
+            ],
+            &[
+                [0, 1, 8],
+                [0, 3, 4],
+                [0, 4, 1],
+                [0, 8, 10],
+                [0, 10, 11],
+                [0, 11, 3],
+                [1, 2, 8],
+                [1, 4, 14],
+                [1, 5, 6],
+                [1, 6, 2],
+                [1, 14, 5],
+                [2, 6, 9],
+                [2, 7, 8],
+                [2, 9, 7],
+                [3, 10, 12],
+                [3, 11, 13],
+                [3, 12, 4],
+                [3, 13, 10],
+                [4, 12, 14],
+                [5, 7, 9],
+                [5, 9, 6],
+                [5, 14, 7],
+                [7, 14, 8],
+                [8, 14, 10],
+                [10, 13, 11],
+                [10, 14, 12],
+            ],
+        );
+        assert_shrinks_away(part, Sampling::new(1.324), 0.02);
+    }
+
+    /// A solid in a small hollow came to lie in matter when that was removed: deformable fuzz, seed 21981.
+    #[test]
+    fn what_is_within_a_part_vanishes_with_it() {
+        let mut hollow = Mesh::icosahedron(Vec3::ZERO, 1.0).to_triangles();
+        hollow.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        let mut both = Mesh::from_triangles(&hollow).unwrap();
+        both.append(&Mesh::icosahedron(Vec3::ZERO, 0.5)).unwrap();
+        both.append(&Mesh::icosahedron(Vec3::X * 1.5, 0.3)).unwrap();
+        let mut resolver = Resolver::with_room_for(1000);
+        let first = both.vertices().next().unwrap();
+        resolver.remove_part(&mut both, first);
+        assert_eq!(both.vertex_count(), 12);
+        assert!(both.vertices().all(|v| both.position(v).x > 1.0));
+    }
+
+    /// In steps of a share of δ.
+    fn assert_shrinks_away(mut part: Mesh, sampling: Sampling, share: f32) {
         for _ in 0..20 {
             let normals = part.to_triangles().vertex_normals();
-            let ways = normals.iter().map(|n| *n * (-0.3 * sampling.shortest())).collect();
+            let ways = normals.iter().map(|n| *n * (-share * sampling.shortest())).collect();
             step(&mut part, sampling, ways);
             if part.vertex_count() == 0 {
                 return;

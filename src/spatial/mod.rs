@@ -1,5 +1,6 @@
 //! Finding what is near: points by points, triangles by points, rays and planes, surfaces by surfaces.
 
+mod cells;
 mod distance;
 mod march;
 mod points;
@@ -8,6 +9,7 @@ mod stars;
 mod sweep;
 mod tree;
 
+pub use cells::CellSet;
 pub use distance::{SurfaceDistance, surface_distance};
 pub use march::Terrain;
 pub use points::PointGrid;

@@ -21,8 +21,8 @@ const FACING: f32 = 0.3;
 /// How far off the contour, in voxels, a surface at rest may be: what is no further beside it is no reason to join or cut.
 const BLUR: f32 = 0.15;
 
-/// How far before the front of a hollow's vertices the image is sampled, in voxels.
-const BEFORE: f32 = 0.35;
+/// How far within a small component, from its vertices, the image is sampled, in voxels.
+const WITHIN: f32 = 0.35;
 
 /// Allows the topology changes that separate or unite what the image does.
 #[derive(Clone, Copy)]
@@ -108,8 +108,10 @@ impl TopologyGuide for ImageGuide<'_> {
         !self.are_all(is_wall, &[(p + q) * 0.5], self.tolerance(mesh, &[u, v]))
     }
 
-    fn is_hollow(&self, mesh: &Mesh, members: &[VertexId]) -> bool {
-        let before = |&w: &VertexId| mesh.position(w) + mesh.area_normal(w).normalize_or_zero() * BEFORE;
-        members.iter().map(|w| self.depth(before(w))).sum::<f32>() < 0.0
+    fn has_content(&self, mesh: &Mesh, members: &[VertexId], is_solid: bool) -> bool {
+        let side = if is_solid { -WITHIN } else { WITHIN };
+        let within = |&w: &VertexId| mesh.position(w) + mesh.area_normal(w).normalize_or_zero() * side;
+        let depth: f32 = members.iter().map(|w| self.depth(within(w))).sum();
+        if is_solid { depth > 0.0 } else { depth < 0.0 }
     }
 }

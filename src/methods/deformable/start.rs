@@ -8,6 +8,7 @@ use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings};
 use crate::methods::MethodError;
 use crate::methods::given::surface;
 use crate::remesh::{Resolver, Sampling, TopologyGuide, Unguided};
+use crate::spatial::CellSet;
 use crate::volume::marching_cubes;
 
 /// What a run starts from; lengths and points in world units.
@@ -79,6 +80,12 @@ const SPHERE_EDGE: f32 = 2.2;
 const MOST_BUBBLES: u32 = 100;
 const MOST_SEEDS: usize = 10_000;
 
+/// Side of the cells around places where a contour came out crossing itself, in the longest edge.
+const SUSPECT: f32 = 2.5;
+
+/// Times that a contour is resolved with edits that are not all tested, before all are.
+const MOST_RUNS: usize = 2;
+
 /// Calls until the edges of a start mesh are within bounds; each refines a coarse mesh several times.
 const MOST_CALLS: usize = 20;
 
@@ -102,12 +109,39 @@ impl Start {
             Self::MarchingCubes(value) => iso_surface(frame, iso(*value))?,
             Self::Mesh(mesh) => given(frame, mesh)?,
         };
+        if matches!(self, Self::Contour)
+            && let Some(resolved) = resolve_contour(&mesh, frame, guide)?
+        {
+            return Ok(resolved);
+        }
         let mut resolver = resolve_all(&mut mesh, frame.most_vertices(), frame.sampling, guide)?;
         if !resolver.is_embedded(&mesh) {
             return Err(MeshError::SelfIntersecting { pairs: count_crossings(&mesh.to_triangles()) }.into());
         }
         Ok(mesh)
     }
+}
+
+/// A contour with its edges within bounds. Hardly ever does an edit make it cross itself, so it is looked at as a whole at the end, and
+/// where it does, made again with edits that are tested there. `None` where it still crosses itself then.
+fn resolve_contour(
+    contour: &Mesh,
+    frame: &Frame,
+    guide: &dyn TopologyGuide,
+) -> Result<Option<Mesh>, MethodError> {
+    let mut suspects = CellSet::new(SUSPECT * frame.sampling.longest());
+    for _ in 0..MOST_RUNS {
+        let mut mesh = contour.clone();
+        let mut resolver = Resolver::with_room_for(frame.most_vertices());
+        resolver.trust_but(suspects.clone());
+        resolve_with(&mut resolver, &mut mesh, frame.sampling, guide)?;
+        let crossing = resolver.guard(&mesh, frame.sampling).crossing(&mesh);
+        if crossing.is_empty() {
+            return Ok(Some(mesh));
+        }
+        crossing.into_iter().for_each(|v| suspects.add(mesh.position(v)));
+    }
+    Ok(None)
 }
 
 /// Brings the edges of a mesh within bounds, and what is in contact together.
@@ -118,6 +152,16 @@ pub(super) fn resolve_all(
     guide: &dyn TopologyGuide,
 ) -> Result<Resolver, MethodError> {
     let mut resolver = Resolver::with_room_for(most_vertices);
+    resolve_with(&mut resolver, mesh, sampling, guide)?;
+    Ok(resolver)
+}
+
+fn resolve_with(
+    resolver: &mut Resolver,
+    mesh: &mut Mesh,
+    sampling: Sampling,
+    guide: &dyn TopologyGuide,
+) -> Result<(), MethodError> {
     resolver.resolve_guided(mesh, sampling, &mesh.vertices().collect::<Vec<_>>(), guide);
     for _ in 0..MOST_CALLS {
         if !resolver.is_waiting() {
@@ -129,7 +173,7 @@ pub(super) fn resolve_all(
         return Err(MethodError::TooManyVertices { most });
     }
     resolver.sweep(mesh, sampling, guide);
-    Ok(resolver)
+    Ok(())
 }
 
 /// A rounded box around the object, |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1, or around the whole image.

@@ -1,6 +1,7 @@
 //! Where the mesh is in doubt, looked at for crossings and for room to move.
 
 use super::Embedding;
+use super::clearance::{clear_around, clear_between};
 use super::room::{Concern, Concerns};
 use super::star::{
     crossings_around, crossings_between, divided_as_sheets, divided_at, divided_between, divided_through,
@@ -53,7 +54,12 @@ impl Embedding {
     }
 
     fn look_around(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
-        let room = flatness(mesh, v, self.longest[v.index()]);
+        let longest = self.longest[v.index()];
+        let mut room = flatness(mesh, v, longest);
+        if !self.suffices(room) {
+            let other = clear_around(mesh, v, longest);
+            room = if other > room { other } else { room };
+        }
         if !self.settle(room, Concern::AtHand, [v, v]) {
             crossings_around(mesh, v, self.output.as_ref(), crossing);
         }
@@ -71,6 +77,7 @@ impl Embedding {
                     let other = spread_out(mesh, [v, w], [left, right], longest);
                     room = if other > room { other } else { room };
                 }
+                let room = self.or_clearance(mesh, [v, w], room);
                 if !self.settle(room, Concern::AtHand, [v, w]) {
                     crossings_between(mesh, [v, w], self.output.as_ref(), crossing);
                 }
@@ -90,7 +97,7 @@ impl Embedding {
             {
                 continue;
             }
-            let room = self.room_across(mesh, [v, w]);
+            let room = self.or_clearance(mesh, [v, w], self.room_across(mesh, [v, w]));
             if !self.settle(room, Concern::Across, [v, w]) {
                 crossings_between(mesh, [v, w], self.output.as_ref(), crossing);
             }
@@ -113,6 +120,15 @@ impl Embedding {
             [c, d] => divided_through(mesh, [v, w], [c, d], longest),
             _ => 0.0,
         }
+    }
+
+    /// The room of two stars that planes between them leave; where that is little, what is between their triangles.
+    fn or_clearance(&self, mesh: &Mesh, [v, w]: [VertexId; 2], room: f32) -> f32 {
+        if self.suffices(room) {
+            return room;
+        }
+        let other = clear_between(mesh, [v, w], self.longest_of(v, w), ENOUGH * self.edge);
+        if other > room { other } else { room }
     }
 
     /// Notes how much room two vertices have for each other, and says whether there is any.

@@ -10,6 +10,7 @@
 //!   triangle with edges up to `b` and that corner A of the triangle which is nearest to the meeting point have
 //!   |PA|² ≤ a²/4 + b²/3 for one of the two ends (`look`).
 
+mod clearance;
 mod look;
 mod motion;
 mod near;
@@ -142,11 +143,33 @@ impl Embedding {
         mesh: &mut Mesh,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
     ) -> Result<T, EditError> {
+        self.attempt_if(mesh, edit, |own, mesh, changed| !own.changes_cross(mesh, changed))
+    }
+
+    /// As [`Self::attempt`], but only triangles with a corner in common are tested. What else crosses has to be found by
+    /// [`Self::crossing`].
+    ///
+    /// # Errors
+    /// As [`Self::attempt`].
+    pub fn attempt_trusting<T>(
+        &mut self,
+        mesh: &mut Mesh,
+        edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
+    ) -> Result<T, EditError> {
+        self.attempt_if(mesh, edit, |own, mesh, changed| !own.fold(mesh, changed))
+    }
+
+    fn attempt_if<T>(
+        &mut self,
+        mesh: &mut Mesh,
+        edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
+        is_sound: impl FnOnce(&mut Self, &Mesh, &[[VertexId; 3]]) -> bool,
+    ) -> Result<T, EditError> {
         self.follow(mesh);
         mesh.begin();
         let done = edit(mesh).and_then(|done| {
             let changed = mesh.changed_triangles();
-            if self.changes_cross(mesh, &changed) {
+            if !is_sound(self, mesh, &changed) {
                 return Err(EditError::WouldCross);
             }
             self.follow_changes(mesh, &changed);

@@ -6,8 +6,8 @@ use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use std::collections::BTreeMap;
 
-/// A way is halved down to this share; then its vertex is held where it was.
-const LEAST_SHARE: f32 = 0.125;
+/// A vertex that would cross goes this share of its way; where it still would, it is held where it was.
+const LESS: f32 = 0.25;
 
 impl Embedding {
     /// Whether the mesh crosses itself after it was moved: only where it did before.
@@ -21,8 +21,8 @@ impl Embedding {
         self.carry_some(mesh, &all, ways)
     }
 
-    /// Moves some vertices by their ways, and those with triangles that would cross by less: by half of it, a quarter, an
-    /// eighth, or not at all. `ways`, by slot, becomes what was gone. Returns the vertices that were held back, in order,
+    /// Moves some vertices by their ways, and those with triangles that would cross by less: by a quarter of it, or
+    /// not at all. `ways`, by slot, becomes what was gone. Returns the vertices that were held back, in order,
     /// and their shares.
     ///
     /// A mesh that did not cross itself does not afterwards: with every vertex held it would be where it was.
@@ -43,6 +43,7 @@ impl Embedding {
         self.doubt_fresh(mesh);
         self.spend_room(mesh, moving);
         let mut shares = BTreeMap::new();
+        let mut origins = Vec::new();
         loop {
             let mut held = self.look(mesh);
             let crossing = held.len();
@@ -51,13 +52,19 @@ impl Embedding {
             if held.is_empty() {
                 break;
             }
-            for v in held {
+            for &v in &held {
                 let i = v.index();
                 let share = shares.entry(v).or_insert(1.0);
-                let less = if *share > LEAST_SHARE { 0.5 } else { 0.0 };
+                let less = if *share == 1.0 { LESS } else { 0.0 };
+                let origin = std::mem::replace(&mut self.from[i], mesh.position(v));
                 (*share, ways[i]) = (*share * less, ways[i] * less);
-                mesh.set_position(v, self.from[i] + ways[i]);
-                self.doubt_star(mesh, v);
+                mesh.set_position(v, origin + ways[i]);
+                origins.push(origin);
+            }
+            // Where the way back uses up what room is left, too, it is looked again.
+            self.spend_room(mesh, &held);
+            for (&v, origin) in held.iter().zip(origins.drain(..)) {
+                self.from[v.index()] = origin;
             }
         }
         self.version = Some(mesh.geometry_version());

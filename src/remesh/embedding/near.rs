@@ -114,6 +114,16 @@ impl Embedding {
         }
     }
 
+    /// The vertices in a box, in order.
+    pub fn vertices_in(&mut self, mesh: &Mesh, bounds: &Bounds) -> Vec<VertexId> {
+        self.follow(mesh);
+        let mut found = Vec::new();
+        self.grid.near_box(bounds, 0.0, |v| found.push(v));
+        found.retain(|&v| bounds.contains(mesh.position(v)));
+        found.sort_unstable();
+        found
+    }
+
     /// Whether [`Self::company`] of `v` may find any.
     pub fn may_have_company(&self, v: VertexId) -> bool {
         self.close[v.index()]

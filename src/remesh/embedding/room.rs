@@ -70,7 +70,7 @@ impl Room {
 }
 
 impl Embedding {
-    /// Takes the ways of `moving` from the room of all stars they are in, and doubts where it is used up.
+    /// Takes the ways of `moving` since [`Self::from`] from the room of all stars they are in, and doubts where it is used up.
     pub(super) fn spend_room(&mut self, mesh: &Mesh, moving: &[VertexId]) {
         self.gone.resize(mesh.slots(), 0.0);
         let mut touched = std::mem::take(&mut self.touched);
@@ -105,12 +105,6 @@ impl Embedding {
             self.doubt(v, self.room[v.index()].used_up());
         }
         self.fresh = fresh;
-    }
-
-    pub(super) fn doubt_star(&mut self, mesh: &Mesh, v: VertexId) {
-        for &w in mesh.ring(v).as_slice().iter().chain([&v]) {
-            self.doubt(w, Concerns::ALL);
-        }
     }
 
     pub(super) fn doubt(&mut self, v: VertexId, what: Concerns) {

@@ -10,10 +10,10 @@ use crate::mesh::{Facet, Mesh, VertexId};
 use smallvec::SmallVec;
 
 /// Triangles around a vertex for which there is room without a heap allocation.
-const ORDINARY_STAR: usize = 16;
+pub(super) const ORDINARY_STAR: usize = 16;
 
 /// What rounding may do to lengths and areas, in the longest edge and its square; a hundred times what it does.
-const ROUNDING: f32 = 1e-4;
+pub(super) const ROUNDING: f32 = 1e-4;
 
 /// The bounds on movement below hold for movements of less than this share of the lengths they were derived from.
 const SMALL: f32 = 0.125;
@@ -34,7 +34,7 @@ pub(super) fn longest_edge(mesh: &Mesh, v: VertexId) -> f32 {
 }
 
 /// Its direction; 0 where it has no length. Where its square is beyond what single precision holds, in double.
-fn unit(way: Vec3) -> Vec3 {
+pub(super) fn unit(way: Vec3) -> Vec3 {
     let square = way.length_squared();
     if (1e-30..1e30).contains(&square) {
         way * (1.0 / square.sqrt())
@@ -150,6 +150,13 @@ pub(super) fn divided_through(
     meet(v, 1.0);
     mesh.ring(u).as_slice().iter().filter(|&&w| is_beside(w) && w != v).for_each(|&w| meet(w, -1.0));
     mesh.ring(v).as_slice().iter().filter(|&&w| is_beside(w) && w != u).for_each(|&w| meet(w, 1.0));
+    room_beside_line(gap, reach, square, longest)
+}
+
+/// By how much every vertex may move and stay on its side of a plane through two of them: with `gap` from it at least, beside points
+/// of the line through these two with |t| + |1 − t| up to `reach`, the square of their distance being `square`. See
+/// [`divided_through`].
+pub(super) fn room_beside_line(gap: f32, reach: f32, square: f32, longest: f32) -> f32 {
     let room = (LEFT_BY_TURN * gap - ROUNDING * longest) / (1.0 + reach);
     lower(room, TURN * square.sqrt())
 }
@@ -200,7 +207,7 @@ fn gap(mesh: &Mesh, [u, v]: [VertexId; 2], in_plane: [VertexId; 2], origin: Vec3
 
 /// The lower one; the first where one is NaN.
 #[inline]
-fn lower(a: f32, b: f32) -> f32 {
+pub(super) fn lower(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
 }
 

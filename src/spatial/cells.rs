@@ -1,0 +1,61 @@
+//! What is near some points, by the cell.
+
+use crate::math::Vec3;
+use std::collections::BTreeSet;
+
+/// Cells of a grid around points: those with a point, and their neighbours.
+#[derive(Clone, Debug)]
+pub struct CellSet {
+    side: f32,
+    cells: BTreeSet<[i32; 3]>,
+}
+
+impl CellSet {
+    /// An empty set of cells with sides of a length.
+    pub fn new(side: f32) -> Self {
+        Self { side, cells: BTreeSet::new() }
+    }
+
+    /// Adds the cell of a point and the 26 around it.
+    pub fn add(&mut self, p: Vec3) {
+        let at: [i32; 3] = self.cell(p);
+        for k in 0..27 {
+            let shift = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
+            self.cells.insert([0, 1, 2].map(|axis| at[axis].saturating_add(shift[axis])));
+        }
+    }
+
+    /// Whether a point is in one of the cells: so are all that are no further than a side from a point that was added.
+    pub fn contains(&self, p: Vec3) -> bool {
+        self.cells.contains(&self.cell(p))
+    }
+
+    fn cell(&self, p: Vec3) -> [i32; 3] {
+        (p / self.side).floor().as_ivec3().into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn what_is_no_further_than_a_side_is_in_it() {
+        let mut random = Random::new(1);
+        let mut any = |size: f32| Vec3::from([(); 3].map(|()| (random.unit() as f32 - 0.5) * size));
+        let points: Vec<Vec3> = (0..20).map(|_| any(60.0)).collect();
+        let mut cells = CellSet::new(2.5);
+        points.iter().for_each(|&p| cells.add(p));
+        let mut beyond = 0;
+        for _ in 0..5000 {
+            let p = any(70.0);
+            let distance = points.iter().fold(f32::INFINITY, |least, q| least.min(p.distance(*q)));
+            assert!(cells.contains(p) || distance > 2.5, "{p}");
+            beyond += u32::from(!cells.contains(p));
+        }
+        assert!(beyond > 1000, "{beyond} points are in no cell");
+    }
+}
