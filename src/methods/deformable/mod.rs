@@ -238,8 +238,17 @@ impl DeformableModel {
             clock: || 0.0,
         };
         model.watch_output();
+        model.reorder();
         model.settle_in();
         model.prepare_level()?;
+        // A contour is where the surface will come to rest; else that is waited for.
+        if model.from_contour && model.level == 0 && model.set_sizes() {
+            model.check_everything(&mut Times::default());
+            model.reorder();
+            model.settle_in();
+        }
+        // No edit has displaced them lately.
+        model.mesh.scalar_mut(keys.calm).fill(motion::CALM);
         Ok(model)
     }
 
@@ -376,7 +385,6 @@ impl DeformableModel {
 
     /// Marks every vertex as just looked at.
     fn settle_in(&mut self) {
-        self.reorder();
         let positions = self.mesh.positions().to_vec();
         self.mesh.vector_mut(self.keys.checked).copy_from_slice(&positions);
         self.components = self.mesh.component_count() as u32;

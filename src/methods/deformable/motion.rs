@@ -20,7 +20,14 @@ pub(super) struct Movement {
 }
 
 /// Iterations after which a vertex has come back from an edit.
-const CALM: f32 = 6.0;
+pub(super) const CALM: f32 = 6.0;
+
+/// The iterations for which one counts that a vertex was held in all of it: pressed on each other, vertices would be held in the next
+/// one, too.
+const STUCK: f32 = 2.0;
+
+/// The iterations for which one counts that a vertex has hardly moved in a long step.
+const LONG_STEP: f32 = 2.0;
 
 /// By how much f_c and f_e fall off as a vertex of valence 6 moves away from its neighbours, in α_c and α_e.
 const BENDING_STIFFNESS: f32 = 1.3;
@@ -72,7 +79,10 @@ impl Motion {
         self.bound(mesh, keys, world);
         let held = carry(mesh, &self.awake.moving, &mut self.ways);
         let velocities = mesh.vector_mut(keys.velocity);
-        held.into_iter().for_each(|(v, share)| velocities[v.index()] *= share);
+        held.iter().for_each(|&(v, share)| velocities[v.index()] *= share);
+        let stuck = held.iter().filter(|(_, share)| *share == 0.0);
+        let still = mesh.scalar_mut(keys.still);
+        stuck.for_each(|(v, _)| still[v.index()] += STUCK);
         let movement = self.measure(mesh, keys, world);
         self.awake.moving.iter().for_each(|v| self.ways[v.index()] = Vec3::ZERO);
         movement
@@ -165,6 +175,7 @@ impl Motion {
     fn measure(&self, mesh: &mut Mesh, keys: Keys, world: &World) -> Movement {
         let per_time = 1.0 / (world.params.step_length() as f32 * world.delta);
         let stillness = stillness(world.params.mass, world.params.energy_tolerance);
+        let count = if world.params.integrator == Integrator::Implicit { LONG_STEP } else { 1.0 };
         let mut movement = Movement::default();
         for &v in &self.awake.moving {
             let i = v.index();
@@ -175,23 +186,23 @@ impl Motion {
                 movement.fastest = along;
             }
             *calm += 1.0;
-            rouse(mesh, keys, v, along > stillness);
+            rouse(mesh, keys, v, if along > stillness { None } else { Some(count) });
         }
         movement.energy *= 0.5 * world.params.mass / mesh.vertex_count().max(1) as f64;
         movement
     }
 }
 
-/// Counts the iterations that a vertex has hardly moved, or wakes it and its neighbours.
-fn rouse(mesh: &mut Mesh, keys: Keys, v: VertexId, moves: bool) {
+/// Adds to the iterations that a vertex has hardly moved, or wakes it and its neighbours.
+fn rouse(mesh: &mut Mesh, keys: Keys, v: VertexId, quiet: Option<f32>) {
     let (rings, still) = mesh.rings_and_scalar_mut(keys.still);
-    if moves {
+    let Some(iterations) = quiet else {
         still[v.index()] = 0.0;
         rings[v.index()].as_slice().iter().for_each(|w| still[w.index()] = 0.0);
         return;
-    }
+    };
     let still = &mut still[v.index()];
-    *still += 1.0;
+    *still += iterations;
     if *still >= PATIENCE {
         mesh.vector_mut(keys.velocity)[v.index()] = Vec3::ZERO;
     }

@@ -1,7 +1,7 @@
 //! When a level is finished, and the way down to the next (section 5.1, figures 12 and 13).
 
 use super::renewal::Renewal;
-use super::{DeformableModel, DeformableParams, Topology, contact};
+use super::{DeformableModel, DeformableParams, Integrator, Topology, contact};
 use crate::mesh::VertexId;
 use crate::methods::{MethodError, Times};
 use crate::remesh::{Changes, Sampling};
@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 
 /// Iterations running that must be quiet: one alone may be a turning point of a swing.
 const QUIET_ITERATIONS: f64 = 3.0;
+
+/// A long step that damps each vertex by the slope of its forces has none.
+const QUIET_LONG_STEPS: f64 = 2.0;
 
 /// They need never be more, however small time step and damping are.
 const MOST_QUIET_ITERATIONS: f64 = 500.0;
@@ -125,13 +128,13 @@ impl DeformableModel {
 
     /// Iterations a surface takes to follow a force, m/γ: one that has just begun to move is slow too, and not at rest.
     fn quiet_iterations(&self) -> u32 {
-        let DeformableParams { mass, damping, .. } = self.params;
-        libm::ceil(mass / (damping * self.params.step_length()))
-            .clamp(QUIET_ITERATIONS, MOST_QUIET_ITERATIONS) as u32
+        let DeformableParams { mass, damping, integrator, .. } = self.params;
+        let least = if integrator == Integrator::Implicit { QUIET_LONG_STEPS } else { QUIET_ITERATIONS };
+        libm::ceil(mass / (damping * self.params.step_length())).clamp(least, MOST_QUIET_ITERATIONS) as u32
     }
 
     /// Looks at every vertex whether it has moved or not, and removes specks.
-    fn check_everything(&mut self, times: &mut Times) -> Changes {
+    pub(super) fn check_everything(&mut self, times: &mut Times) -> Changes {
         if self.params.topology == Topology::Fixed {
             return Changes::default();
         }
@@ -164,6 +167,7 @@ impl DeformableModel {
         times.add("renewal", (self.clock)() - begin);
         self.level -= 1;
         self.rest = Rest { began: self.iteration, ..Rest::default() };
+        self.reorder();
         self.settle_in();
         self.wake_all();
         self.prepare_level()?;

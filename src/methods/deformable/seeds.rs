@@ -13,7 +13,7 @@ use crate::math::Vec3;
 use crate::mesh::{Mesh, TriangleMesh, VertexId};
 use crate::methods::{MethodError, StepReport, Times};
 use crate::remesh::Changes;
-use crate::spatial::TriangleTree;
+use crate::spatial::{CellSet, TriangleTree};
 use crate::volume::{Grid, marching_cubes, voxels_inside};
 
 /// Voxels nearer to the mesh than this, in voxels of the level, are left to it. With less, seeds would touch it; with more, thin
@@ -49,7 +49,10 @@ impl DeformableModel {
         for kind in self.missing_parts()?.iter().filter(|kind| !kind.triangles.is_empty()) {
             seeds.append(&Mesh::from_triangles(kind)?)?;
         }
-        let (mut changes, added) = self.add_components(&seeds)?;
+        let (mut changes, mut added) = (Changes::default(), Vec::new());
+        if seeds.vertex_count() > 0 {
+            (changes, added) = self.add_components(&seeds)?;
+        }
         times.add("seeding", (self.clock)() - begin);
         if changes.seeds > 0 {
             changes += self.restore_bounds(&added, times);
@@ -110,7 +113,7 @@ impl DeformableModel {
             object,
             in_contour: voxels_inside(&contour, dims)?,
             in_mesh: voxels_inside(&surface, dims)?,
-            tree: TriangleTree::new(&surface)?,
+            surface,
         };
         let smallest = SMALLEST_SEED * self.params.smallest_part;
         Ok([comparison.parts(Missing::Matter, smallest)?, comparison.parts(Missing::Hollow, smallest)?])
@@ -127,14 +130,14 @@ struct Comparison<'a> {
     /// Whether each voxel is inside the mesh.
     in_mesh: Vec<bool>,
     /// The mesh in voxels of the level.
-    tree: TriangleTree,
+    surface: TriangleMesh,
 }
 
 impl Comparison<'_> {
     /// Closed surfaces around what is missing of one kind, each of at least a volume.
     fn parts(&self, kind: Missing, smallest: f64) -> Result<TriangleMesh, MethodError> {
         let (grid, position) = self.image.grid();
-        let missing = self.missing_voxels(kind);
+        let missing = self.missing_voxels(kind)?;
         let Some((low, high)) = bounding_box(&missing, grid.dims) else { return Ok(TriangleMesh::default()) };
         let field = self.field(kind, &missing, low, high);
         let offset = Vec3::from(low.map(|k| k as f32));
@@ -151,16 +154,39 @@ impl Comparison<'_> {
     }
 
     /// Voxels on the wrong side of the mesh and clear of it.
-    fn missing_voxels(&self, kind: Missing) -> Vec<bool> {
+    fn missing_voxels(&self, kind: Missing) -> Result<Vec<bool>, MethodError> {
+        let mut missing = self.misplaced_voxels(kind);
+        let dims = self.image.grid().0.dims;
+        let mut places = CellSet::new(CLEARANCE as f32 + longest_edge(&self.surface));
+        let misplaced = missing.iter().enumerate().filter(|(_, missing)| **missing);
+        misplaced.for_each(|(voxel, _)| places.add(coordinates(dims, voxel)));
+        let tree = TriangleTree::new(&self.surface_near(&places))?;
+        let far = |voxel| !tree.is_within(coordinates(dims, voxel), CLEARANCE);
+        missing.iter_mut().enumerate().for_each(|(voxel, missing)| *missing = *missing && far(voxel));
+        Ok(missing)
+    }
+
+    /// Voxels on the wrong side of the mesh, whose neighbours are on that side, too.
+    fn misplaced_voxels(&self, kind: Missing) -> Vec<bool> {
         let is_inside = kind == Missing::Hollow;
         let dims = self.image.grid().0.dims;
-        let is_missing = |voxel: usize| {
+        let is_misplaced = |voxel: usize| {
             self.in_mesh[voxel] == is_inside
                 && self.is_of(kind, voxel)
                 && faces(dims, voxel).all(|w| w.map_or(!is_inside, |w| self.in_mesh[w] == is_inside))
-                && !self.tree.is_within(coordinates(dims, voxel), CLEARANCE)
         };
-        (0..self.in_mesh.len()).map(is_missing).collect()
+        (0..self.in_mesh.len()).map(is_misplaced).collect()
+    }
+
+    /// The triangles that may be within [`CLEARANCE`] of some places.
+    fn surface_near(&self, places: &CellSet) -> TriangleMesh {
+        let corner = |v: &u32| places.contains(self.surface.positions[*v as usize]);
+        let near = self.surface.triangles.iter().filter(|triangle| triangle.iter().any(corner));
+        TriangleMesh {
+            positions: self.surface.positions.clone(),
+            triangles: near.copied().collect(),
+            ..TriangleMesh::default()
+        }
     }
 
     /// A field around the missing voxels, 0 on their contour: the iso-surface where they end at it, else halfway to the next voxel.
@@ -188,6 +214,15 @@ impl Comparison<'_> {
         }
         Grid { dims: size, values }
     }
+}
+
+/// The longest edge of a surface.
+fn longest_edge(surface: &TriangleMesh) -> f32 {
+    let longest = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|v| surface.positions[v as usize]);
+        a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a))
+    };
+    surface.triangles.iter().map(longest).fold(0.0, f32::max).sqrt()
 }
 
 fn coordinates(dims: [usize; 3], voxel: usize) -> Vec3 {
