@@ -59,6 +59,10 @@ impl Embedding {
                 let origin = std::mem::replace(&mut self.from[i], mesh.position(v));
                 (*share, ways[i]) = (*share * less, ways[i] * less);
                 mesh.set_position(v, origin + ways[i]);
+                if mesh.position(v) == self.from[i] {
+                    // A way that was lost in rounding uses up no room.
+                    self.doubt(v, Concerns::ALL);
+                }
                 origins.push(origin);
             }
             // Where the way back uses up what room is left, too, it is looked again.
