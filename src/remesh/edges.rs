@@ -39,11 +39,8 @@ impl Resolver {
         at: VertexId,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
     ) -> Result<T, EditError> {
-        if self.suspects.as_ref().is_some_and(|suspects| !suspects.contains(mesh.position(at))) {
-            self.embedding.attempt_trusting(mesh, edit)
-        } else {
-            self.embedding.attempt(mesh, edit)
-        }
+        let trusting = self.suspects.as_ref().is_some_and(|suspects| !suspects.contains(mesh.position(at)));
+        self.embedding.attempt_trusting(mesh, trusting, edit)
     }
 
     /// Whether edges around `u` are mended in this call.

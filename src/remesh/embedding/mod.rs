@@ -143,10 +143,10 @@ impl Embedding {
         mesh: &mut Mesh,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
     ) -> Result<T, EditError> {
-        self.attempt_if(mesh, edit, |own, mesh, changed| !own.changes_cross(mesh, changed))
+        self.attempt_trusting(mesh, false, edit)
     }
 
-    /// As [`Self::attempt`], but only triangles with a corner in common are tested. What else crosses has to be found by
+    /// As [`Self::attempt`]; with `trusting`, only triangles with a corner in common are tested. What else crosses has to be found by
     /// [`Self::crossing`].
     ///
     /// # Errors
@@ -154,27 +154,12 @@ impl Embedding {
     pub fn attempt_trusting<T>(
         &mut self,
         mesh: &mut Mesh,
+        trusting: bool,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
-    ) -> Result<T, EditError> {
-        self.attempt_if(mesh, edit, |own, mesh, changed| !own.fold(mesh, changed))
-    }
-
-    fn attempt_if<T>(
-        &mut self,
-        mesh: &mut Mesh,
-        edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
-        is_sound: impl FnOnce(&mut Self, &Mesh, &[[VertexId; 3]]) -> bool,
     ) -> Result<T, EditError> {
         self.follow(mesh);
         mesh.begin();
-        let done = edit(mesh).and_then(|done| {
-            let changed = mesh.changed_triangles();
-            if !is_sound(self, mesh, &changed) {
-                return Err(EditError::WouldCross);
-            }
-            self.follow_changes(mesh, &changed);
-            Ok(done)
-        });
+        let done = edit(mesh).and_then(|done| self.accept_changes(mesh, trusting).map(|()| done));
         if done.is_ok() {
             mesh.commit();
         } else {
@@ -182,6 +167,17 @@ impl Embedding {
         }
         self.version = Some(mesh.geometry_version());
         done
+    }
+
+    /// Follows the changes since [`Mesh::begin`], unless they make triangles cross.
+    fn accept_changes(&mut self, mesh: &Mesh, trusting: bool) -> Result<(), EditError> {
+        let changed = mesh.changed_triangles();
+        let crosses = if trusting { self.fold(mesh, &changed) } else { self.changes_cross(mesh, &changed) };
+        if crosses {
+            return Err(EditError::WouldCross);
+        }
+        self.follow_changes(mesh, &changed);
+        Ok(())
     }
 
     /// Whether no two triangles share more than their common corners and edges.
