@@ -97,6 +97,10 @@ impl Resolver {
         self.small.find(mesh);
         let is_stuck = |v: &VertexId| stuck.binary_search(v).is_ok();
         for (v, was_solid) in std::mem::take(&mut self.small.parts) {
+            // It may have been within a part that was removed.
+            if !mesh.is_live(v) {
+                continue;
+            }
             let members = mesh.component_of(v, LARGEST_SPECK + 1);
             let volume = volume(mesh, &members);
             let stuck = members.iter().filter(|v| is_stuck(v)).count();
@@ -120,6 +124,9 @@ impl Resolver {
         self.small.find_again(mesh, &self.edited);
         let least = SMALLEST_BALL * sampling.smallest_volume();
         for (v, is_solid) in std::mem::take(&mut self.small.parts) {
+            if !mesh.is_live(v) {
+                continue;
+            }
             let is_left = || {
                 let members = mesh.component_of(v, LARGEST_SPECK);
                 let volume = volume(mesh, &members);
@@ -134,7 +141,7 @@ impl Resolver {
         self.small.topology_version = Some(mesh.topology_version());
     }
 
-    /// Removes the component of `v`, and what is within it if it is small: around that there is nothing left that it could be in.
+    /// Removes the component of `v` and, if that is small, all components inside it: they would be on the wrong side of what is left.
     pub(super) fn remove_part(&mut self, mesh: &mut Mesh, v: VertexId) {
         let members = mesh.component_of(v, LARGEST_SPECK + 1);
         let within =
@@ -147,7 +154,7 @@ impl Resolver {
         }
     }
 
-    /// Vertices of other components that a component goes around.
+    /// Vertices of other components inside a component.
     fn vertices_within(&mut self, mesh: &Mesh, members: &[VertexId]) -> Vec<VertexId> {
         let positions: Vec<Vec3> = members.iter().map(|&v| mesh.position(v)).collect();
         let mut found = self.embedding.vertices_in(mesh, &Bounds::of(&positions));
@@ -185,34 +192,36 @@ fn kept_volume(mesh: &Mesh, members: &[VertexId], volume: f32, guide: &dyn Topol
     if volume < 0.0 && guide.has_content(mesh, members, false) { -volume } else { volume }
 }
 
-/// Whether a whole component goes around a point.
+/// Whether a point is inside a whole component.
 fn is_within(mesh: &Mesh, members: &[VertexId], p: Vec3) -> bool {
-    let triangles = members.iter().flat_map(|&u| {
-        let first = mesh.ring(u).pairs().filter(move |&(a, b)| u < a && u < b);
-        first.map(move |(a, b)| [u, a, b].map(|w| mesh.position(w)))
-    });
-    // 4π from within, 0 from outside.
-    triangles.map(|corners| solid_angle(corners, p)).sum::<f64>().abs() > std::f64::consts::TAU
+    // 4π from inside, 0 from outside.
+    let angle: f64 = triangles(mesh, members).map(|corners| solid_angle(corners, p)).sum();
+    angle.abs() > std::f64::consts::TAU
+}
+
+/// The triangles of a whole component, each once, by the positions of their corners.
+fn triangles(mesh: &Mesh, members: &[VertexId]) -> impl Iterator<Item = [Vec3; 3]> {
+    members.iter().flat_map(move |&u| {
+        let counted_here = mesh.ring(u).pairs().filter(move |&(a, b)| u < a && u < b);
+        counted_here.map(move |(a, b)| [u, a, b].map(|w| mesh.position(w)))
+    })
 }
 
 /// The signed volume of a whole component; positive where its triangles face outwards.
 fn volume(mesh: &Mesh, members: &[VertexId]) -> f32 {
     let origin = mesh.position(members[0]);
-    let triangle = |u: VertexId, (a, b): (VertexId, VertexId)| {
-        if u > a || u > b {
-            return 0.0;
-        }
-        let [p, q, r] = [u, a, b].map(|w| mesh.position(w) - origin);
+    let below = |corners: [Vec3; 3]| {
+        let [p, q, r] = corners.map(|corner| corner - origin);
         p.dot(q.cross(r)) / 6.0
     };
-    members.iter().flat_map(|&u| mesh.ring(u).pairs().map(move |pair| triangle(u, pair))).sum()
+    triangles(mesh, members).map(below).sum()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::mesh::TriangleMesh;
-    use crate::remesh::Changes;
+    use crate::remesh::{Changes, Unguided};
     use std::f32::consts::TAU;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -344,16 +353,33 @@ mod tests {
     /// A solid in a small hollow came to lie in matter when that was removed: deformable fuzz, seed 21981.
     #[test]
     fn what_is_within_a_part_vanishes_with_it() {
+        let (mut both, hollow) = nested();
+        let mut resolver = Resolver::with_room_for(1000);
+        resolver.remove_part(&mut both, hollow[0]);
+        assert_eq!(both.vertex_count(), 12);
+        assert!(both.vertices().all(|v| both.position(v).x > 1.0));
+    }
+
+    /// The component inside is in the list of small parts, too, after the one that it vanishes with.
+    #[test]
+    fn parts_that_vanished_with_others_are_not_asked_for_again() {
+        let (mut both, hollow) = nested();
+        let mut resolver = Resolver::with_room_for(1000);
+        resolver.remove_crushed(&mut both, Sampling::new(0.2), &Unguided, &hollow);
+        assert_eq!(both.vertex_count(), 12);
+        resolver.note_small_parts(&mut both, Sampling::new(0.2), &Unguided);
+        assert_eq!(both.vertex_count(), 12);
+    }
+
+    /// A solid in a hollow, and another solid beside them; with the vertices of the hollow.
+    fn nested() -> (Mesh, Vec<VertexId>) {
         let mut hollow = Mesh::icosahedron(Vec3::ZERO, 1.0).to_triangles();
         hollow.triangles.iter_mut().for_each(|t| t.swap(1, 2));
         let mut both = Mesh::from_triangles(&hollow).unwrap();
+        let members = both.vertices().collect();
         both.append(&Mesh::icosahedron(Vec3::ZERO, 0.5)).unwrap();
         both.append(&Mesh::icosahedron(Vec3::X * 1.5, 0.3)).unwrap();
-        let mut resolver = Resolver::with_room_for(1000);
-        let first = both.vertices().next().unwrap();
-        resolver.remove_part(&mut both, first);
-        assert_eq!(both.vertex_count(), 12);
-        assert!(both.vertices().all(|v| both.position(v).x > 1.0));
+        (both, members)
     }
 
     /// In steps of a share of δ.
