@@ -32,15 +32,18 @@ impl Resolver {
         }
     }
 
-    /// Makes an edit at a vertex that changes nothing but the sampling, unless it makes the mesh cross itself.
+    /// Makes an edit at a vertex that changes the sampling and not the topology, unless the mesh would intersect itself.
     fn edit<T>(
         &mut self,
         mesh: &mut Mesh,
         at: VertexId,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
     ) -> Result<T, EditError> {
-        let trusting = self.suspects.as_ref().is_some_and(|suspects| !suspects.contains(mesh.position(at)));
-        self.embedding.attempt_trusting(mesh, trusting, edit)
+        if self.tested.as_ref().is_none_or(|cells| cells.contains(mesh.position(at))) {
+            self.embedding.attempt(mesh, edit)
+        } else {
+            self.embedding.attempt_in_one_rings(mesh, edit)
+        }
     }
 
     /// Whether edges around `u` are mended in this call.

@@ -24,7 +24,8 @@ const LEAST_EFFORT: u64 = 100_000;
 pub struct Resolver {
     most_vertices: usize,
     contact: Contact,
-    pub(super) suspects: Option<CellSet>,
+    /// Where splits, flips and collapses are tested for all self-intersections, if not everywhere.
+    pub(super) tested: Option<CellSet>,
     full: bool,
     /// [`Embedding::effort`] at which this call ends.
     pub(super) most_effort: u64,
@@ -66,8 +67,8 @@ pub trait TopologyGuide {
     /// Whether a short edge may be drawn together.
     fn may_collapse(&self, mesh: &Mesh, edge: [VertexId; 2]) -> bool;
 
-    /// Whether a small component encloses what it should, as a solid or a hollow. Else it is removed earlier: a solid that is pressed
-    /// on itself was to vanish, and a hollow would grow in empty space.
+    /// Whether there is matter inside a small solid component, or background inside a small hollow. Without, a solid that is pressed
+    /// on itself is removed, and so is a hollow, which would grow in matter.
     fn has_content(&self, mesh: &Mesh, members: &[VertexId], is_solid: bool) -> bool;
 }
 
@@ -116,7 +117,7 @@ impl Resolver {
         Self {
             most_vertices,
             contact: Contact::Join,
-            suspects: None,
+            tested: None,
             full: false,
             most_effort: 0,
             queue: VecDeque::new(),
@@ -137,10 +138,10 @@ impl Resolver {
         self.contact = contact;
     }
 
-    /// From now on splits, flips and collapses are tested as a whole only where `suspects` are, elsewhere with
-    /// [`Embedding::attempt_trusting`]: in half the time, on a mesh that is to be looked at at the end.
-    pub fn trust_but(&mut self, suspects: CellSet) {
-        self.suspects = Some(suspects);
+    /// From now on splits, flips and collapses are tested for all self-intersections only in `cells`, elsewhere as by
+    /// [`Embedding::attempt_in_one_rings`]. That takes half the time, and the mesh has to be tested as a whole afterwards.
+    pub fn test_only_in(&mut self, cells: CellSet) {
+        self.tested = Some(cells);
     }
 
     /// What keeps the mesh from crossing itself, for edits beside these.

@@ -241,11 +241,10 @@ impl DeformableModel {
         model.reorder();
         model.settle_in();
         model.prepare_level()?;
-        // A contour is where the surface will come to rest; else that is waited for.
+        // The contour of the finest level is nearly what the surface converges to. Other starts are sized when it has settled.
         if model.from_contour && model.level == 0 && model.set_sizes() {
             model.check_everything(&mut Times::default());
             model.reorder();
-            model.settle_in();
         }
         // No edit has displaced them lately.
         model.mesh.scalar_mut(keys.calm).fill(motion::CALM);

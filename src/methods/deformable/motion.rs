@@ -22,11 +22,11 @@ pub(super) struct Movement {
 /// Iterations after which a vertex has come back from an edit.
 pub(super) const CALM: f32 = 6.0;
 
-/// The iterations for which one counts that a vertex was held in all of it: pressed on each other, vertices would be held in the next
-/// one, too.
+/// Still iterations that are counted extra for a vertex that could not move at all: pressed against others, it could not in the next
+/// iteration, either.
 const STUCK: f32 = 2.0;
 
-/// The iterations for which one counts that a vertex has hardly moved in a long step.
+/// Still iterations that are counted for one with a long step.
 const LONG_STEP: f32 = 2.0;
 
 /// By how much f_c and f_e fall off as a vertex of valence 6 moves away from its neighbours, in α_c and α_e.
@@ -175,7 +175,7 @@ impl Motion {
     fn measure(&self, mesh: &mut Mesh, keys: Keys, world: &World) -> Movement {
         let per_time = 1.0 / (world.params.step_length() as f32 * world.delta);
         let stillness = stillness(world.params.mass, world.params.energy_tolerance);
-        let count = if world.params.integrator == Integrator::Implicit { LONG_STEP } else { 1.0 };
+        let counted = if world.params.integrator == Integrator::Implicit { LONG_STEP } else { 1.0 };
         let mut movement = Movement::default();
         for &v in &self.awake.moving {
             let i = v.index();
@@ -186,22 +186,27 @@ impl Motion {
                 movement.fastest = along;
             }
             *calm += 1.0;
-            rouse(mesh, keys, v, if along > stillness { None } else { Some(count) });
+            if along > stillness {
+                rouse(mesh, keys, v);
+            } else {
+                count_still(mesh, keys, v, counted);
+            }
         }
         movement.energy *= 0.5 * world.params.mass / mesh.vertex_count().max(1) as f64;
         movement
     }
 }
 
-/// Adds to the iterations that a vertex has hardly moved, or wakes it and its neighbours.
-fn rouse(mesh: &mut Mesh, keys: Keys, v: VertexId, quiet: Option<f32>) {
+/// Wakes a vertex that moved, and its neighbours.
+fn rouse(mesh: &mut Mesh, keys: Keys, v: VertexId) {
     let (rings, still) = mesh.rings_and_scalar_mut(keys.still);
-    let Some(iterations) = quiet else {
-        still[v.index()] = 0.0;
-        rings[v.index()].as_slice().iter().for_each(|w| still[w.index()] = 0.0);
-        return;
-    };
-    let still = &mut still[v.index()];
+    still[v.index()] = 0.0;
+    rings[v.index()].as_slice().iter().for_each(|w| still[w.index()] = 0.0);
+}
+
+/// Adds to the iterations in which a vertex has hardly moved; after enough of them it sleeps.
+fn count_still(mesh: &mut Mesh, keys: Keys, v: VertexId, iterations: f32) {
+    let still = &mut mesh.scalar_mut(keys.still)[v.index()];
     *still += iterations;
     if *still >= PATIENCE {
         mesh.vector_mut(keys.velocity)[v.index()] = Vec3::ZERO;

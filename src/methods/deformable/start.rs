@@ -80,10 +80,10 @@ const SPHERE_EDGE: f32 = 2.2;
 const MOST_BUBBLES: u32 = 100;
 const MOST_SEEDS: usize = 10_000;
 
-/// Side of the cells around places where a contour came out crossing itself, in the longest edge.
-const SUSPECT: f32 = 2.5;
+/// Side of the cells around self-intersections of a resolved contour in which edits are tested in full, in longest edges.
+const TESTED_CELL: f32 = 2.5;
 
-/// Times that a contour is resolved with edits that are not all tested, before all are.
+/// Times that a contour is resolved with edits that are not all tested in full, before all are.
 const MOST_RUNS: usize = 2;
 
 /// Calls until the edges of a start mesh are within bounds; each refines a coarse mesh several times.
@@ -122,24 +122,24 @@ impl Start {
     }
 }
 
-/// A contour with its edges within bounds. Hardly ever does an edit make it cross itself, so it is looked at as a whole at the end, and
-/// where it does, made again with edits that are tested there. `None` where it still crosses itself then.
+/// A contour with its edges within bounds. Edits hardly ever make it intersect itself, so most are not tested for that. All of it is at the
+/// end; where it does, it is resolved again with edits that are tested there. `None` if it still intersects itself then.
 fn resolve_contour(
     contour: &Mesh,
     frame: &Frame,
     guide: &dyn TopologyGuide,
 ) -> Result<Option<Mesh>, MethodError> {
-    let mut suspects = CellSet::new(SUSPECT * frame.sampling.longest());
+    let mut tested = CellSet::new(TESTED_CELL * frame.sampling.longest());
     for _ in 0..MOST_RUNS {
         let mut mesh = contour.clone();
         let mut resolver = Resolver::with_room_for(frame.most_vertices());
-        resolver.trust_but(suspects.clone());
+        resolver.test_only_in(tested.clone());
         resolve_with(&mut resolver, &mut mesh, frame.sampling, guide)?;
         let crossing = resolver.guard(&mesh, frame.sampling).crossing(&mesh);
         if crossing.is_empty() {
             return Ok(Some(mesh));
         }
-        crossing.into_iter().for_each(|v| suspects.add(mesh.position(v)));
+        crossing.into_iter().for_each(|v| tested.add(mesh.position(v)));
     }
     Ok(None)
 }

@@ -5,7 +5,7 @@ use super::clearance::{clear_around, clear_between};
 use super::room::{Concern, Concerns};
 use super::star::{
     crossings_around, crossings_between, divided_as_sheets, divided_at, divided_between, divided_through,
-    flatness, spread_out,
+    flatness, higher, spread_out,
 };
 use crate::mesh::{Mesh, VertexId};
 
@@ -57,8 +57,7 @@ impl Embedding {
         let longest = self.longest[v.index()];
         let mut room = flatness(mesh, v, longest);
         if !self.suffices(room) {
-            let other = clear_around(mesh, v, longest);
-            room = if other > room { other } else { room };
+            room = higher(room, clear_around(mesh, v, longest));
         }
         if !self.settle(room, Concern::AtHand, [v, v]) {
             crossings_around(mesh, v, self.output.as_ref(), crossing);
@@ -74,8 +73,7 @@ impl Embedding {
                 let longest = self.longest_of(v, w);
                 let mut room = divided_through(mesh, [v, w], [left, right], longest);
                 if !self.suffices(room) {
-                    let other = spread_out(mesh, [v, w], [left, right], longest);
-                    room = if other > room { other } else { room };
+                    room = higher(room, spread_out(mesh, [v, w], [left, right], longest));
                 }
                 let room = self.or_clearance(mesh, [v, w], room);
                 if !self.settle(room, Concern::AtHand, [v, w]) {
@@ -113,8 +111,11 @@ impl Embedding {
         match *mesh.common_neighbours(v, w) {
             [] => {
                 let room = divided_between(mesh, [v, w], longest);
-                let other = if self.suffices(room) { room } else { divided_as_sheets(mesh, [v, w], longest) };
-                if other > room { other } else { room }
+                if self.suffices(room) {
+                    room
+                } else {
+                    higher(room, divided_as_sheets(mesh, [v, w], longest))
+                }
             }
             [c] => divided_at(mesh, [v, w], c, longest),
             [c, d] => divided_through(mesh, [v, w], [c, d], longest),
@@ -122,13 +123,12 @@ impl Embedding {
         }
     }
 
-    /// The room of two stars that planes between them leave; where that is little, what is between their triangles.
+    /// The motion bound that planes between two stars give or, where that is small, the one between their triangles.
     fn or_clearance(&self, mesh: &Mesh, [v, w]: [VertexId; 2], room: f32) -> f32 {
         if self.suffices(room) {
             return room;
         }
-        let other = clear_between(mesh, [v, w], self.longest_of(v, w), ENOUGH * self.edge);
-        if other > room { other } else { room }
+        higher(room, clear_between(mesh, [v, w], self.longest_of(v, w), ENOUGH * self.edge))
     }
 
     /// Notes how much room two vertices have for each other, and says whether there is any.

@@ -143,23 +143,30 @@ impl Embedding {
         mesh: &mut Mesh,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
     ) -> Result<T, EditError> {
-        self.attempt_trusting(mesh, false, edit)
+        self.attempt_with(mesh, edit, Self::changes_cross)
     }
 
-    /// As [`Self::attempt`]; with `trusting`, only triangles with a corner in common are tested. What else crosses has to be found by
-    /// [`Self::crossing`].
+    /// As [`Self::attempt`], but tests only pairs of triangles with a common corner. [`Self::crossing`] finds what else intersects.
     ///
     /// # Errors
     /// As [`Self::attempt`].
-    pub fn attempt_trusting<T>(
+    pub fn attempt_in_one_rings<T>(
         &mut self,
         mesh: &mut Mesh,
-        trusting: bool,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
+    ) -> Result<T, EditError> {
+        self.attempt_with(mesh, edit, Self::one_rings_cross)
+    }
+
+    fn attempt_with<T>(
+        &mut self,
+        mesh: &mut Mesh,
+        edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
+        crosses: fn(&mut Self, &Mesh, &[[VertexId; 3]]) -> bool,
     ) -> Result<T, EditError> {
         self.follow(mesh);
         mesh.begin();
-        let done = edit(mesh).and_then(|done| self.accept_changes(mesh, trusting).map(|()| done));
+        let done = edit(mesh).and_then(|done| self.accept_changes(mesh, crosses).map(|()| done));
         if done.is_ok() {
             mesh.commit();
         } else {
@@ -170,10 +177,13 @@ impl Embedding {
     }
 
     /// Follows the changes since [`Mesh::begin`], unless they make triangles cross.
-    fn accept_changes(&mut self, mesh: &Mesh, trusting: bool) -> Result<(), EditError> {
+    fn accept_changes(
+        &mut self,
+        mesh: &Mesh,
+        crosses: fn(&mut Self, &Mesh, &[[VertexId; 3]]) -> bool,
+    ) -> Result<(), EditError> {
         let changed = mesh.changed_triangles();
-        let crosses = if trusting { self.fold(mesh, &changed) } else { self.changes_cross(mesh, &changed) };
-        if crosses {
+        if crosses(self, mesh, &changed) {
             return Err(EditError::WouldCross);
         }
         self.follow_changes(mesh, &changed);

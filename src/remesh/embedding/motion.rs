@@ -33,17 +33,17 @@ impl Embedding {
         ways: &mut [Vec3],
     ) -> Vec<(VertexId, f32)> {
         self.know(mesh);
-        self.from.resize(mesh.slots(), Vec3::ZERO);
+        let mut from = std::mem::take(&mut self.from);
+        from.resize(mesh.slots(), Vec3::ZERO);
         let positions = mesh.positions_mut();
         for i in moving.iter().map(|v| v.index()) {
-            self.from[i] = positions[i];
+            from[i] = positions[i];
             positions[i] += ways[i];
         }
         self.doubts.resize(mesh.slots(), Concerns::default());
         self.doubt_fresh(mesh);
-        self.spend_room(mesh, moving);
+        self.spend_room(mesh, moving.iter().map(|&v| (v, from[v.index()])));
         let mut shares = BTreeMap::new();
-        let mut origins = Vec::new();
         loop {
             let mut held = self.look(mesh);
             let crossing = held.len();
@@ -52,25 +52,21 @@ impl Embedding {
             if held.is_empty() {
                 break;
             }
-            for &v in &held {
+            let before: Vec<Vec3> = held.iter().map(|&v| mesh.position(v)).collect();
+            for (&v, &before) in held.iter().zip(&before) {
                 let i = v.index();
                 let share = shares.entry(v).or_insert(1.0);
                 let less = if *share == 1.0 { LESS } else { 0.0 };
-                let origin = std::mem::replace(&mut self.from[i], mesh.position(v));
                 (*share, ways[i]) = (*share * less, ways[i] * less);
-                mesh.set_position(v, origin + ways[i]);
-                if mesh.position(v) == self.from[i] {
-                    // A way that was lost in rounding uses up no room.
+                mesh.set_position(v, from[i] + ways[i]);
+                if mesh.position(v) == before {
+                    // A displacement lost in rounding uses up no motion bound.
                     self.doubt(v, Concerns::ALL);
                 }
-                origins.push(origin);
             }
-            // Where the way back uses up what room is left, too, it is looked again.
-            self.spend_room(mesh, &held);
-            for (&v, origin) in held.iter().zip(origins.drain(..)) {
-                self.from[v.index()] = origin;
-            }
+            self.spend_room(mesh, held.into_iter().zip(before));
         }
+        self.from = from;
         self.version = Some(mesh.geometry_version());
         shares.into_iter().collect()
     }

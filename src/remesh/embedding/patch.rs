@@ -62,8 +62,8 @@ impl Embedding {
             || self.cross_others(mesh, &fresh, &hubs, output)
     }
 
-    /// Whether two triangles with a corner in common cross, one of them among those changed.
-    pub(super) fn fold(&mut self, mesh: &Mesh, names: &[[VertexId; 3]]) -> bool {
+    /// Whether two triangles with a corner in common cross, at the corners of the changed ones.
+    pub(super) fn one_rings_cross(&mut self, mesh: &Mesh, names: &[[VertexId; 3]]) -> bool {
         self.effort += ORDINARY_EFFORT;
         self.stars_cross(mesh, &corners(names))
     }

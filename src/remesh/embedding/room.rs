@@ -5,6 +5,7 @@
 
 use super::star::higher;
 use super::{Embedding, FINEST};
+use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 
 /// What a vertex is looked at for: pairs of triangles that are both at the vertex, or one at a neighbour of it; pairs with
@@ -70,13 +71,14 @@ impl Room {
 }
 
 impl Embedding {
-    /// Takes the ways of `moving` since [`Self::from`] from the room of all stars they are in, and doubts where it is used up.
-    pub(super) fn spend_room(&mut self, mesh: &Mesh, moving: &[VertexId]) {
+    /// Subtracts displacements from the motion bounds of all stars that the moved vertices are in, and marks for a test those that are
+    /// used up. `moved`: the vertices, and their positions before.
+    pub(super) fn spend_room(&mut self, mesh: &Mesh, moved: impl IntoIterator<Item = (VertexId, Vec3)>) {
         self.gone.resize(mesh.slots(), 0.0);
         let mut touched = std::mem::take(&mut self.touched);
-        for &v in moving {
+        for (v, from) in moved {
             // As it came out rounded, not as it was meant to be.
-            let (from, to) = (self.from[v.index()], mesh.position(v));
+            let to = mesh.position(v);
             if from != to {
                 let way = higher(FINEST, to.distance(from));
                 for &w in mesh.ring(v).as_slice().iter().chain([&v]) {
