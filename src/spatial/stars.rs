@@ -227,13 +227,7 @@ impl StarGrid {
     /// triangle to its nearest corner in its longest edge.
     pub fn near_box(&self, bounds: &Bounds, share: f32, mut found: impl FnMut(VertexId)) {
         let radius = |reach| share * (reach + 2.0 * self.blur);
-        self.search(bounds, radius, &mut |star: &Star| {
-            // The search goes by the longest star of the level.
-            let beside = (star.position - star.position.clamp(bounds.min, bounds.max)).abs().max_element();
-            if beside <= radius(star.longest) + self.blur {
-                found(star.vertex);
-            }
-        });
+        self.search(bounds, radius, &mut |entry: &Star| found(entry.vertex));
     }
 
     /// Calls `found` with every vertex within `radius` of the point, and some that are a little further away.
