@@ -40,13 +40,12 @@ const ORDINARY: f32 = super::MEAN_EDGE as f32;
 const FURTHEST: f32 = 0.5;
 
 impl DeformableModel {
-    /// Sets the size of every vertex, unless that was done since the last seeds; says whether it did.
-    pub(super) fn set_sizes(&mut self) -> bool {
-        if self.rest.sized || self.params.adaptivity == 0.0 || self.params.iso_force == 0.0 {
+    /// Sets the size of every vertex, at least `least` of the ordinary one; says whether there are sizes.
+    fn set_sizes_from(&mut self, least: f32) -> bool {
+        if self.params.adaptivity == 0.0 || self.params.iso_force == 0.0 {
             return false;
         }
-        self.rest.sized = true;
-        let mut sizes = self.sizes_by_curvature();
+        let mut sizes = self.sizes_by_curvature(least);
         for _ in 0..PASSES {
             self.bound_gradation(&mut sizes);
         }
@@ -56,8 +55,18 @@ impl DeformableModel {
         true
     }
 
+    /// Lets edges grow where the surface has just been made: an edge that has not settled yet shows more misfit than it will have.
+    pub(super) fn set_first_sizes(&mut self) -> bool {
+        self.set_sizes_from(1.0)
+    }
+
+    /// Sets the size of every vertex, unless that was done since the last seeds; says whether it did.
+    pub(super) fn set_sizes(&mut self) -> bool {
+        !std::mem::replace(&mut self.rest.sized, true) && self.set_sizes_from(SMALLEST)
+    }
+
     /// For each vertex, the smallest size that one of its edges asks for.
-    fn sizes_by_curvature(&self) -> Vec<f32> {
+    fn sizes_by_curvature(&self, least: f32) -> Vec<f32> {
         let mut sizes = vec![LARGEST; self.mesh.slots()];
         for (u, v) in self.mesh.edges() {
             let size = self.size_of_edge(u, v);
@@ -70,7 +79,7 @@ impl DeformableModel {
             if *size > 1.0 {
                 *size = size.min(self.size_by_thickness(v).max(1.0));
             }
-            *size = size.max(SMALLEST);
+            *size = size.max(least);
         }
         sizes
     }
