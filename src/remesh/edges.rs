@@ -1,16 +1,9 @@
-//! Edges out of bounds: equations (1) and (2), figure 1, and the annular change of figure 5.
+//! Edges out of bounds: equations (1) and (2), figure 1.
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::Vec3;
-use crate::math::order::{rank, sort_by_rank};
-use crate::mesh::{Cut, EditError, Mesh, Opposite, VertexId};
-
-/// How far the two sides of a cut neck are moved apart, in δ: the first that makes nothing cross. With less they are soon
-/// in contact again.
-const CUT_PUSHES: [f32; 4] = [0.75, 0.4, 0.2, 0.05];
-
-/// The share of the way to its own side's neighbours that a side is pushed at most, so that no triangle turns over.
-const CUT_PUSH_LIMIT: f32 = 0.6;
+use crate::math::order::sort_by_rank;
+use crate::mesh::{EditError, Mesh, Opposite, VertexId};
 
 /// The longest edge that a collapse may make, in the upper bound of edges. Where all are within bounds it makes none longer
 /// than 1.4; in a surface much finer than δ and too crowded for splits, one collapse after the other would draw needles
@@ -152,67 +145,6 @@ impl Resolver {
         }
         Err(EditError::WouldCross)
     }
-
-    /// Annular change through the edge `uv` and a common neighbour: the one that makes the shortest ring, where nothing
-    /// crosses then.
-    fn cut_neck(
-        &mut self,
-        mesh: &mut Mesh,
-        sampling: Sampling,
-        guide: &dyn TopologyGuide,
-        [u, v]: [VertexId; 2],
-    ) -> Result<bool, EditError> {
-        let opposite = mesh.opposite(u, v)?;
-        let around = |o: &VertexId| {
-            let p = mesh.position(*o);
-            p.distance(mesh.position(u)) + p.distance(mesh.position(v))
-        };
-        let mut thirds = mesh.common_neighbours(u, v);
-        thirds.retain(|&mut o| o != opposite.left && o != opposite.right && guide.may_cut(mesh, [u, v, o]));
-        sort_by_rank(&mut thirds, |o| rank(around(o)).into());
-        if thirds.is_empty() {
-            return Ok(false);
-        }
-        let cut = thirds.into_iter().find_map(|o| self.cut_apart(mesh, sampling, [u, v, o]));
-        let cut = cut.ok_or(EditError::WouldCross)?;
-        self.changes.annular += 1;
-        for side in [cut.kept, cut.copies] {
-            if !self.remove_speck(mesh, sampling, guide, side[0]) {
-                side.into_iter().for_each(|w| self.touch_edited(w));
-            }
-        }
-        Ok(true)
-    }
-
-    /// Cuts the mesh along a ring and moves the two sides apart as far as nothing crosses.
-    fn cut_apart(&mut self, mesh: &mut Mesh, sampling: Sampling, [u, v, o]: [VertexId; 3]) -> Option<Cut> {
-        let mut apart = |push: f32| {
-            self.embedding.attempt(mesh, |mesh| {
-                let cut = mesh.cut(u, v, o)?;
-                part(mesh, cut, push * sampling.shortest());
-                Ok(cut)
-            })
-        };
-        CUT_PUSHES.into_iter().find_map(|push| apart(push).ok())
-    }
-
-    /// Cuts necks through vertices that could not move: pressed together until its vertices are held, a neck would stay
-    /// for ever where no edge gets short.
-    pub(super) fn cut_crushed(
-        &mut self,
-        mesh: &mut Mesh,
-        sampling: Sampling,
-        guide: &dyn TopologyGuide,
-        stuck: &[VertexId],
-    ) {
-        for &u in stuck {
-            if !mesh.is_live(u) || self.embedding.effort() >= self.most_effort {
-                continue;
-            }
-            let ring = mesh.ring(u).as_slice().to_vec();
-            ring.into_iter().any(|v| self.cut_neck(mesh, sampling, guide, [u, v]) == Ok(true));
-        }
-    }
 }
 
 /// The middle of the edge and its ends, in this order, those first at which no triangle turns over.
@@ -241,29 +173,6 @@ fn turns_over(mesh: &Mesh, u: VertexId, v: VertexId, to: Vec3) -> bool {
         let (a, b) = (mesh.position(a), mesh.position(b));
         (a - from).cross(b - from).dot((a - to).cross(b - to)) <= 0.0
     })
-}
-
-/// Moves the two sides of a cut apart along the axis of the neck.
-fn part(mesh: &mut Mesh, cut: Cut, push: f32) {
-    let [a, b, c] = cut.kept.map(|v| mesh.position(v));
-    let centre = (a + b + c) * (1.0 / 3.0);
-    let axis = (b - a).cross(c - a).normalize_or_zero();
-    for side in [cut.kept, cut.copies] {
-        let away = (side_centre(mesh, side) - centre).dot(axis);
-        let limit = CUT_PUSH_LIMIT * away.abs();
-        let shift = axis * (if limit < push { limit } else { push }).copysign(away);
-        for v in side {
-            mesh.set_position(v, mesh.position(v) + shift);
-        }
-    }
-}
-
-/// The mean of the neighbours of a cut's side, its own corners left out.
-fn side_centre(mesh: &Mesh, side: [VertexId; 3]) -> Vec3 {
-    let outer = side.iter().flat_map(|&v| mesh.ring(v).as_slice()).filter(|w| !side.contains(w));
-    let (sum, count) =
-        outer.fold((Vec3::ZERO, 0.0), |(sum, count), &w| (sum + mesh.position(w), count + 1.0));
-    sum * (1.0 / count)
 }
 
 fn square(x: f32) -> f32 {

@@ -154,6 +154,15 @@ fn run(seed: u64) -> [u32; 2] {
     changes
 }
 
+/// Seeds start from balls that merge, on a coarse level: handles smaller than an edge, just below the surface, whose sides could not be
+/// moved apart, stayed for ever.
+#[test]
+fn handles_pressed_on_themselves_are_cut() {
+    for seed in [10574, 10696, 11538] {
+        run(seed);
+    }
+}
+
 #[test]
 fn every_part_of_a_random_shape_is_found_with_its_holes() {
     let mut all = [0, 0];

@@ -305,7 +305,7 @@ fn two_hundred_steps_end_in_the_same_bits_everywhere() {
         model.step().unwrap();
     }
     let found = fingerprint(&model.surface().positions);
-    assert_eq!(format!("{found:016x}"), "606a660472c4fba9");
+    assert_eq!(format!("{found:016x}"), "bab6c577ee139a09");
 }
 
 /// The same at the default settings, coarse to fine, to the end.
@@ -317,5 +317,5 @@ fn the_defaults_end_in_the_same_bits_everywhere() {
     let mut model = DeformableModel::new(&volume, options).unwrap();
     while !model.step().unwrap().done {}
     let found = fingerprint(&model.surface().positions);
-    assert_eq!(format!("{found:016x}"), "7e4c5d58ebcc77d6");
+    assert_eq!(format!("{found:016x}"), "ddb0537372a53473");
 }

@@ -242,7 +242,7 @@ impl DeformableModel {
         model.settle_in();
         model.prepare_level()?;
         // The contour of the finest level is nearly what the surface converges to. Other starts are sized when it has settled.
-        if model.from_contour && model.level == 0 && model.set_first_sizes() {
+        if model.from_contour && model.level == 0 && model.set_sizes() {
             model.check_everything(&mut Times::default());
             model.reorder();
         }

@@ -1,9 +1,9 @@
 //! Non-uniform sampling: how long edges are where, by the curvature that the image shows.
 //!
-//! The middle of an edge of length l on a contour of curvature κ is κ l²/8 away from it. So where the surface has settled, the image
-//! tells for each edge how long it may be to stay near. Where a wall or a gap is thin, edges are no longer than with one δ everywhere:
-//! sheets with longer ones than their distance are cut. They need not be shorter, since [`super::contact`] keeps them. The paper has
-//! one δ everywhere and names this as future work.
+//! The middle of an edge of length l with its ends on a contour of curvature κ is κ l²/8 away from it, its sagitta. The image shows it
+//! where the ends have not settled, too: their own offsets are taken off. So it tells how long each edge may be to stay near. Where a
+//! wall or a gap is thin, edges are no longer than with one δ everywhere: sheets with longer ones than their distance are cut. They
+//! need not be shorter, since [`super::contact`] keeps them. The paper has one δ everywhere and names this as future work.
 
 use super::DeformableModel;
 use super::contour::ObjectIs;
@@ -12,11 +12,11 @@ use crate::mesh::VertexId;
 use crate::remesh::Sampling;
 use crate::volume::KnownCell;
 
-/// How far the middle of an edge is from the contour, in voxels, where edges are made shorter. With 0.1 the surface of a rough image has
-/// as many vertices as marching cubes; with 0.5, small features are sampled no better than without sizes.
+/// The sagitta, in voxels, above which edges are made shorter. With 0.1 the surface of a rough image has as many vertices as marching
+/// cubes; with 0.5, small features are sampled no better than without sizes.
 const COARSE: f32 = 0.25;
 
-/// How far it may be where edges are made longer. The surface is inside its contour by two thirds of it: with 0.25, a ball of 7 voxels
+/// The sagitta below which edges are made longer. The surface is inside its contour by two thirds of it: with 0.25, a ball of 7 voxels
 /// has 7 % less volume.
 const FINE: f32 = 0.05;
 
@@ -40,12 +40,13 @@ const ORDINARY: f32 = super::MEAN_EDGE as f32;
 const FURTHEST: f32 = 0.5;
 
 impl DeformableModel {
-    /// Sets the size of every vertex, at least `least` of the ordinary one; says whether there are sizes.
-    fn set_sizes_from(&mut self, least: f32) -> bool {
-        if self.params.adaptivity == 0.0 || self.params.iso_force == 0.0 {
+    /// Sets the size of every vertex, unless that was done since the last seeds; says whether it did.
+    pub(super) fn set_sizes(&mut self) -> bool {
+        if self.rest.sized || self.params.adaptivity == 0.0 || self.params.iso_force == 0.0 {
             return false;
         }
-        let mut sizes = self.sizes_by_curvature(least);
+        self.rest.sized = true;
+        let mut sizes = self.sizes_by_curvature();
         for _ in 0..PASSES {
             self.bound_gradation(&mut sizes);
         }
@@ -55,21 +56,12 @@ impl DeformableModel {
         true
     }
 
-    /// Lets edges grow where the surface has just been made: an edge that has not settled yet shows more misfit than it will have.
-    pub(super) fn set_first_sizes(&mut self) -> bool {
-        self.set_sizes_from(1.0)
-    }
-
-    /// Sets the size of every vertex, unless that was done since the last seeds; says whether it did.
-    pub(super) fn set_sizes(&mut self) -> bool {
-        !std::mem::replace(&mut self.rest.sized, true) && self.set_sizes_from(SMALLEST)
-    }
-
     /// For each vertex, the smallest size that one of its edges asks for.
-    fn sizes_by_curvature(&self, least: f32) -> Vec<f32> {
+    fn sizes_by_curvature(&self) -> Vec<f32> {
         let mut sizes = vec![LARGEST; self.mesh.slots()];
+        let offsets = self.offsets_from_contour();
         for (u, v) in self.mesh.edges() {
-            let size = self.size_of_edge(u, v);
+            let size = self.size_of_edge([u, v], [u, v].map(|w| offsets[w.index()]));
             for w in [u, v].map(|w| w.index()) {
                 sizes[w] = if size < sizes[w] { size } else { sizes[w] };
             }
@@ -79,7 +71,7 @@ impl DeformableModel {
             if *size > 1.0 {
                 *size = size.min(self.size_by_thickness(v).max(1.0));
             }
-            *size = size.max(least);
+            *size = size.max(SMALLEST);
         }
         sizes
     }
@@ -116,13 +108,24 @@ impl DeformableModel {
         }
     }
 
-    /// The size at which an edge here would be as far from the contour as it may be.
-    fn size_of_edge(&self, u: VertexId, v: VertexId) -> f32 {
-        let [p, q] = [u, v].map(|w| self.mesh.position(w));
-        let [m, n] = [u, v].map(|w| self.mesh.area_normal(w).normalize_or_zero());
-        let misfit = self.distance_to_contour((p + q) * 0.5, (m + n).normalize_or_zero());
+    /// How far each vertex is from the contour.
+    fn offsets_from_contour(&self) -> Vec<f32> {
+        let mut offsets = vec![0.0; self.mesh.slots()];
+        for v in self.mesh.vertices() {
+            let normal = self.mesh.area_normal(v).normalize_or_zero();
+            offsets[v.index()] = self.offset_from_contour(self.mesh.position(v), normal);
+        }
+        offsets
+    }
+
+    /// The size at which the sagitta of an edge whose ends are that far from the contour would be as large as it may be.
+    fn size_of_edge(&self, ends: [VertexId; 2], offsets: [f32; 2]) -> f32 {
+        let [p, q] = ends.map(|w| self.mesh.position(w));
+        let [m, n] = ends.map(|w| self.mesh.area_normal(w).normalize_or_zero());
+        let middle = self.offset_from_contour((p + q) * 0.5, (m + n).normalize_or_zero());
+        let sagitta = (middle - (offsets[0] + offsets[1]) * 0.5).abs();
         let length = p.distance(q) / (ORDINARY * self.model_delta());
-        let [shortened, lengthened] = [COARSE, FINE].map(|within| length * (within / misfit).sqrt());
+        let [shortened, lengthened] = [COARSE, FINE].map(|within| length * (within / sagitta).sqrt());
         // A straight edge gives infinity, which is the largest size.
         if shortened < 1.0 {
             shortened
@@ -133,10 +136,60 @@ impl DeformableModel {
         }
     }
 
-    /// About how far the contour is from a point, along a direction and back, in voxels.
-    fn distance_to_contour(&self, p: Vec3, direction: Vec3) -> f32 {
+    /// About how far within the contour a point is, along a direction and back, in voxels; negative outside.
+    fn offset_from_contour(&self, p: Vec3, direction: Vec3) -> f32 {
         let [here, ahead, behind] = [p, p + direction * 0.5, p - direction * 0.5].map(|p| self.depth(p));
-        let (miss, slope) = (here.abs(), (ahead - behind).abs());
-        if miss < FURTHEST * slope { miss / slope } else { FURTHEST }
+        let slope = (ahead - behind).abs();
+        if here.abs() < FURTHEST * slope { here / slope } else { FURTHEST.copysign(here) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DAffine3;
+    use crate::methods::deformable::{DeformableOptions, DeformableParams};
+    use crate::volume::{Space, Volume, VolumeInit, Voxels};
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// A bean: flat below, curved above.
+    fn model() -> DeformableModel {
+        let n = 24;
+        let at = |k: usize| Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32) - 11.5;
+        let distance = |p: Vec3| (p.length() - 9.0).max((p - Vec3::Z * 14.0).length() - 12.0);
+        let voxels = (0..n * n * n).map(|k| (0.5 - 0.25 * distance(at(k))).clamp(0.0, 1.0)).collect();
+        let volume = Volume::new(VolumeInit {
+            voxels: Voxels::F32(voxels),
+            dims: [n, n, n, 1],
+            affine: DAffine3::IDENTITY,
+            slope: 1.0,
+            intercept: 0.0,
+            frame_seconds: 0.0,
+            space: Space::Ras,
+        })
+        .unwrap();
+        let params = DeformableParams { iso: 0.5, ..DeformableParams::for_volume(&volume) };
+        let options = DeformableOptions { levels: 0, params: Some(params), ..Default::default() };
+        DeformableModel::new(&volume, options).unwrap()
+    }
+
+    /// With the distance of the middle alone, edges of a surface 0.3 voxels off its contour were a quarter shorter than those of one at rest.
+    #[test]
+    fn sizes_are_those_of_the_contour_where_the_surface_is_beside_it() {
+        let mut model = model();
+        let mean = |model: &DeformableModel| {
+            let sizes = model.sizes_by_curvature();
+            model.mesh.vertices().map(|v| sizes[v.index()]).sum::<f32>() / model.mesh.vertex_count() as f32
+        };
+        let on_contour = mean(&model);
+        let moved: Vec<(VertexId, Vec3)> = model
+            .mesh
+            .vertices()
+            .map(|v| (v, model.mesh.position(v) + model.mesh.area_normal(v).normalize_or_zero() * 0.3))
+            .collect();
+        moved.into_iter().for_each(|(v, p)| model.mesh.set_position(v, p));
+        let beside_it = mean(&model);
+        assert!((beside_it / on_contour - 1.0).abs() < 0.1, "{on_contour} and {beside_it}");
     }
 }

@@ -102,6 +102,24 @@ fn gap_between(s: &Triangle, t: &Triangle) -> f32 {
     gap
 }
 
+/// Whether two triangles are known to be further apart than `margin`, from beside their edges. Most that are near each other lie on one
+/// sheet, where exact predicates are slowest. Lengths in `reach` are the longest between corners of the two.
+pub(super) fn are_beside(s: &Triangle, t: &Triangle, reach: f32, margin: f32) -> bool {
+    let gap = margin + ROUNDING * reach;
+    is_beside_edge(s, t, gap) || is_beside_edge(t, s, gap)
+}
+
+/// Whether `t` is beyond an edge of `s` by more than `gap`, seen along the normal of `s`.
+fn is_beside_edge(s: &Triangle, t: &Triangle, gap: f32) -> bool {
+    let normal = (s[1] - s[0]).cross(s[2] - s[0]);
+    [[0, 1, 2], [1, 2, 0], [2, 0, 1]].into_iter().any(|[from, to, tip]| {
+        let outwards = unit((s[to] - s[from]).cross(normal));
+        let along = |p: Vec3| (p - s[from]).dot(outwards);
+        let own = higher(higher(0.0, along(s[to])), along(s[tip]));
+        t.iter().all(|&p| along(p) - own > gap)
+    })
+}
+
 fn gap_along(direction: Vec3, s: &Triangle, t: &Triangle) -> f32 {
     let extent = |triangle: &Triangle| {
         let [a, b, c] = triangle.map(|p| p.dot(direction));
@@ -142,6 +160,7 @@ mod tests {
     use super::super::star::{crossings_around, crossings_between, longest_edge};
     use super::*;
     use crate::math::Random;
+    use crate::math::predicates::triangles_cross;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -184,6 +203,32 @@ mod tests {
             crossings(&shaken(mesh, room, random), &mut crossing);
         }
         assert!(crossing.is_empty(), "with room for {room}");
+    }
+
+    /// Two triangles of a sheet, side by side or one on the other, perhaps exactly in one plane.
+    fn two_triangles(random: &mut Random) -> [Triangle; 2] {
+        let flat = [0.0, 0.0, 0.02, 1.0][random.below(4) as usize];
+        let apart = Vec3::X * (2.0 * random.unit() as f32);
+        let mut triangle = |at: Vec3| [(); 3].map(|()| any(random) * Vec3::new(1.0, 1.0, flat) + at);
+        [triangle(Vec3::ZERO), triangle(apart)]
+    }
+
+    #[test]
+    fn triangles_beside_each_other_do_not_cross_before_they_have_moved_by_the_margin() {
+        let mut found = [0; 2];
+        for seed in 0..4000 {
+            let random = &mut Random::new(seed);
+            let [s, t] = two_triangles(random);
+            let margin = 0.2 * random.unit() as f32;
+            let beside = are_beside(&s, &t, 4.0, margin);
+            found[usize::from(beside)] += 1;
+            for _ in 0..if beside { 4 } else { 0 } {
+                let mut moved =
+                    |t: Triangle| t.map(|p| p + any(random).normalize_or_zero() * (0.499 * margin));
+                assert!(!triangles_cross(moved(s), moved(t)), "seed {seed}");
+            }
+        }
+        assert!(found.iter().all(|&count| count > 800), "{found:?}");
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! Whether the triangles that an edit made cross anything.
 
+use super::clearance::are_beside;
 use super::output::{OutputSpace, bounds, cross};
-use super::star::{crossings_around, flatness, longest_edge};
-use super::{Embedding, NEAREST_CORNER};
+use super::star::{crossings_around, flatness, higher, longest_edge};
+use super::{Embedding, FINEST, NEAREST_CORNER};
 use crate::math::Bounds;
 use crate::mesh::{Facet, Mesh, VertexId};
 
@@ -96,6 +97,21 @@ fn crosses_one(other: &Changed, fresh: &[Changed], output: Option<&OutputSpace>)
 }
 
 /// Whether two triangles with no corner in common cross.
-fn apart_but_cross((s, around_s): &Changed, (t, around_t): &Changed, output: Option<&OutputSpace>) -> bool {
-    around_s.meets(around_t) && s.corners.iter().all(|v| !t.corners.contains(v)) && cross(s, t, output)
+fn apart_but_cross(s: &Changed, t: &Changed, output: Option<&OutputSpace>) -> bool {
+    s.1.meets(&t.1)
+        && s.0.corners.iter().all(|v| !t.0.corners.contains(v))
+        && !are_beside_each_other(s, t, output)
+        && cross(&s.0, &t.0, output)
+}
+
+/// Whether two triangles are known to be apart, also where positions come out rounded.
+fn are_beside_each_other(
+    (s, around_s): &Changed,
+    (t, around_t): &Changed,
+    output: Option<&OutputSpace>,
+) -> bool {
+    let whole = around_s.joined(around_t);
+    let reach = (whole.max - whole.min).max_element();
+    let margin = 2.0 * output.map_or(FINEST, |space| higher(FINEST, space.rounding()));
+    are_beside(&s.points, &t.points, reach, margin)
 }
