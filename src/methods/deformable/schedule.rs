@@ -113,7 +113,6 @@ impl DeformableModel {
         self.rest.searches += 1;
         if found.seeds > 0 {
             self.rest.quiet = 0;
-            self.rest.sized = false;
         } else {
             self.rest.searches = MOST_SEARCHES;
         }

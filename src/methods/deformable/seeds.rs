@@ -55,6 +55,9 @@ impl DeformableModel {
         }
         times.add("seeding", (self.clock)() - begin);
         if changes.seeds > 0 {
+            if self.rest.sized {
+                self.set_sizes_of(&added);
+            }
             changes += self.restore_bounds(&added, times);
         }
         Ok(changes)

@@ -46,27 +46,33 @@ impl DeformableModel {
             return false;
         }
         self.rest.sized = true;
-        let mut sizes = self.sizes_by_curvature();
-        for _ in 0..PASSES {
-            self.bound_gradation(&mut sizes);
-        }
-        let share = self.params.adaptivity as f32;
-        let of = self.mesh.scalar_mut(self.keys.size);
-        of.iter_mut().zip(&sizes).for_each(|(of, size)| *of = share * (size - 1.0));
+        let all: Vec<VertexId> = self.mesh.vertices().collect();
+        self.set_sizes_of(&all);
         true
     }
 
+    /// Sets the sizes of whole components.
+    pub(super) fn set_sizes_of(&mut self, members: &[VertexId]) {
+        let mut sizes = self.sizes_by_curvature(members);
+        for _ in 0..PASSES {
+            self.bound_gradation(members, &mut sizes);
+        }
+        let share = self.params.adaptivity as f32;
+        let of = self.mesh.scalar_mut(self.keys.size);
+        members.iter().map(|v| v.index()).for_each(|v| of[v] = share * (sizes[v] - 1.0));
+    }
+
     /// For each vertex, the smallest size that one of its edges asks for.
-    fn sizes_by_curvature(&self) -> Vec<f32> {
+    fn sizes_by_curvature(&self, members: &[VertexId]) -> Vec<f32> {
         let mut sizes = vec![LARGEST; self.mesh.slots()];
-        let offsets = self.offsets_from_contour();
-        for (u, v) in self.mesh.edges() {
+        let offsets = self.offsets_from_contour(members);
+        for (u, v) in self.edges_of(members) {
             let size = self.size_of_edge([u, v], [u, v].map(|w| offsets[w.index()]));
             for w in [u, v].map(|w| w.index()) {
                 sizes[w] = if size < sizes[w] { size } else { sizes[w] };
             }
         }
-        for v in self.mesh.vertices() {
+        for &v in members {
             let size = &mut sizes[v.index()];
             if *size > 1.0 {
                 *size = size.min(self.size_by_thickness(v).max(1.0));
@@ -74,6 +80,14 @@ impl DeformableModel {
             *size = size.max(SMALLEST);
         }
         sizes
+    }
+
+    /// Each edge of whole components once.
+    fn edges_of(&self, members: &[VertexId]) -> impl Iterator<Item = (VertexId, VertexId)> {
+        members.iter().flat_map(|&u| {
+            let ring = self.mesh.ring(u).as_slice().iter();
+            ring.filter(move |&&v| u < v).map(move |&v| (u, v))
+        })
     }
 
     /// The size at which sheets are further apart than contact reaches.
@@ -96,10 +110,10 @@ impl DeformableModel {
         object.depth(image.intensity(p, object.background(), &mut KnownCell::default()), self.level_iso)
     }
 
-    fn bound_gradation(&self, sizes: &mut [f32]) {
+    fn bound_gradation(&self, members: &[VertexId], sizes: &mut [f32]) {
         let before = sizes.to_vec();
         let per_length = GRADATION / (ORDINARY * self.model_delta());
-        for (u, v) in self.mesh.edges() {
+        for (u, v) in self.edges_of(members) {
             let growth = per_length * self.mesh.position(u).distance(self.mesh.position(v));
             for (a, b) in [(u.index(), v.index()), (v.index(), u.index())] {
                 let most = before[b] + growth;
@@ -109,9 +123,9 @@ impl DeformableModel {
     }
 
     /// How far each vertex is from the contour.
-    fn offsets_from_contour(&self) -> Vec<f32> {
+    fn offsets_from_contour(&self, members: &[VertexId]) -> Vec<f32> {
         let mut offsets = vec![0.0; self.mesh.slots()];
-        for v in self.mesh.vertices() {
+        for &v in members {
             let normal = self.mesh.area_normal(v).normalize_or_zero();
             offsets[v.index()] = self.offset_from_contour(self.mesh.position(v), normal);
         }
@@ -179,7 +193,8 @@ mod tests {
     fn sizes_are_those_of_the_contour_where_the_surface_is_beside_it() {
         let mut model = model();
         let mean = |model: &DeformableModel| {
-            let sizes = model.sizes_by_curvature();
+            let all: Vec<VertexId> = model.mesh.vertices().collect();
+            let sizes = model.sizes_by_curvature(&all);
             model.mesh.vertices().map(|v| sizes[v.index()]).sum::<f32>() / model.mesh.vertex_count() as f32
         };
         let on_contour = mean(&model);
