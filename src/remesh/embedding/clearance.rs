@@ -24,6 +24,7 @@ pub(super) fn clear_between(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32, en
         .collect();
     let rounding = ROUNDING * longest;
     let mut room = f32::INFINITY;
+    let mut axis = Vec3::ZERO;
     for names in triangles_at(u, v) {
         let triangle = names.map(at);
         let bounds = Bounds::of(&triangle);
@@ -32,11 +33,12 @@ pub(super) fn clear_between(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32, en
             if names[1..].iter().any(|w| other_names[1..].contains(w)) {
                 continue;
             }
+            let wanted = 2.0 * (lower(enough, room) + rounding);
             let boxes = gap_between_boxes(&bounds, other_bounds);
-            let gap = if boxes > 2.0 * (enough + rounding) {
+            let gap = if boxes > wanted {
                 boxes
             } else {
-                higher(boxes, gap_between(&triangle, other))
+                higher(boxes, gap_between(&triangle, other, wanted, &mut axis))
             };
             let clear = 0.5 * gap - rounding;
             if clear.is_nan() || clear <= 0.0 {
@@ -85,18 +87,25 @@ fn clear_of_fold(edge: Vec3, tips: [Vec3; 2], longest: f32) -> f32 {
     room_beside_line(gap, reach, square, longest)
 }
 
-/// The largest gap between the extents of two triangles along the normal of one of them or across an edge of each; negative where they
-/// overlap in all of these.
-fn gap_between(s: &Triangle, t: &Triangle) -> f32 {
+/// The largest gap between the extents of two triangles along the normal of one of them or across an edge of each, or the first that is
+/// `wanted`; negative where they overlap in all of these. `axis` is tried first, and becomes the one that was found: what lies between
+/// two triangles often lies between their neighbours, too.
+fn gap_between(s: &Triangle, t: &Triangle, wanted: f32, axis: &mut Vec3) -> f32 {
     let origin = s[0];
     let (s, t) = (s.map(|p| p - origin), t.map(|p| p - origin));
     let edges = |[a, b, c]: Triangle| [b - a, c - b, a - c];
     let (own, others) = (edges(s), edges(t));
-    let along = |direction: Vec3| gap_along(unit(direction), &s, &t);
-    let mut gap = higher(along(own[0].cross(own[1])), along(others[0].cross(others[1])));
-    for edge in own {
-        for other in others {
-            gap = higher(gap, along(edge.cross(other)));
+    let normals = [own[0].cross(own[1]), others[0].cross(others[1])];
+    let across = own.into_iter().flat_map(|edge| others.map(|other| edge.cross(other)));
+    let mut gap = gap_along(*axis, &s, &t);
+    for direction in normals.into_iter().chain(across) {
+        if gap > wanted {
+            return gap;
+        }
+        let direction = unit(direction);
+        let along = gap_along(direction, &s, &t);
+        if along > gap {
+            (gap, *axis) = (along, direction);
         }
     }
     gap
