@@ -24,7 +24,6 @@ pub use changes::Changes;
 pub use decimate::decimate;
 pub use embedding::Embedding;
 pub use isotropic::remesh;
-pub use necks::is_strand;
 pub use resolve::{Contact, Resolver, TopologyGuide, Unguided, Waiting};
 pub use restructure::{
     EdgeBounds, Edits, Trusting, collapse_short, flip_for_valence, restructure, split_long,

@@ -67,8 +67,8 @@ pub trait TopologyGuide {
     /// Whether a short edge may be drawn together.
     fn may_collapse(&self, mesh: &Mesh, edge: [VertexId; 2]) -> bool;
 
-    /// Whether there is matter inside a small solid component or a strand, or background inside a small hollow or a tunnel. Without, a
-    /// solid that is pressed on itself is removed, and so is a hollow, which would grow in matter.
+    /// Whether there is matter inside a small solid component, or background inside a small hollow. Without, a solid that is pressed
+    /// on itself is removed, and so is a hollow, which would grow in matter.
     fn has_content(&self, mesh: &Mesh, members: &[VertexId], is_solid: bool) -> bool;
 }
 

@@ -9,7 +9,7 @@ use super::contour::ObjectIs;
 use super::image::LevelImage;
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
-use crate::remesh::{TopologyGuide, Unguided, is_strand};
+use crate::remesh::{TopologyGuide, Unguided};
 use crate::volume::KnownCell;
 
 /// Where between two vertices in contact the image is sampled, as shares of the way.
@@ -90,7 +90,10 @@ impl TopologyGuide for ImageGuide<'_> {
     fn may_cut(&self, mesh: &Mesh, ring: [VertexId; 3]) -> bool {
         let corners = ring.map(|w| mesh.position(w));
         let middle = (corners[0] + corners[1] + corners[2]) * (1.0 / 3.0);
-        self.are_all(!is_strand(mesh, ring), &[middle], self.tolerance(mesh, &ring))
+        let outwards: f32 =
+            (0..3).map(|k| mesh.area_normal(ring[k]).normalize_or_zero().dot(corners[k] - middle)).sum();
+        let is_strand = outwards > 0.0;
+        self.are_all(!is_strand, &[middle], self.tolerance(mesh, &ring))
     }
 
     /// Not if the edge leads through a wall or across a gap, between sides that face away from each other or each other: the two would

@@ -30,7 +30,7 @@ const REST_MOVE: f32 = 0.1;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Rest {
     quiet: u32,
-    /// Whether all vertices were awake when the quiet iterations began.
+    /// Whether all vertices have been woken since the surface first came to rest, or something was seeded.
     woken: bool,
     done: bool,
     /// Searches of the finest level for what is missing; all of them once nothing was found.
@@ -73,7 +73,6 @@ impl DeformableModel {
         let quiet =
             self.movement.energy < self.params.energy_tolerance && self.movement.fastest < self.rest_speed();
         self.rest.quiet = if quiet { self.rest.quiet + 1 } else { 0 };
-        self.rest.woken &= quiet;
         if self.rest.quiet < self.quiet_iterations() {
             return Ok(Changes::default());
         }
@@ -113,6 +112,7 @@ impl DeformableModel {
         self.rest.searches += 1;
         if found.seeds > 0 {
             self.rest.quiet = 0;
+            self.rest.woken = false;
         } else {
             self.rest.searches = MOST_SEARCHES;
         }
@@ -150,8 +150,7 @@ impl DeformableModel {
     /// Refines the mesh and takes the next finer image (figure 13); renews what leaves out part of that.
     fn descend(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let begin = (self.clock)();
-        let is_renewed = self.from_contour && self.seeds_levels();
-        let renewal = if is_renewed { self.renewal()? } else { Renewal::default() };
+        let renewal = if self.seeds_levels() { self.renewal()? } else { Renewal::default() };
         let whole = self.mesh.clone();
         renewal.stale.iter().for_each(|&v| _ = self.mesh.remove_component(v));
         self.refine()?;
@@ -171,7 +170,7 @@ impl DeformableModel {
         self.wake_all();
         self.prepare_level()?;
         changes += self.check_everything(times);
-        if self.seeds_levels() && !(self.from_contour && fits) {
+        if self.seeds_levels() && !fits {
             changes += self.seed_missing(times)?;
         }
         Ok(changes)
