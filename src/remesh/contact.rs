@@ -66,12 +66,12 @@ impl Resolver {
         let mut is_stirred = vec![false; mesh.slots()];
         stirred.iter().for_each(|v| is_stirred[v.index()] = true);
         for &u in &stirred {
-            self.embedding.company(mesh, u, sampling.contact(), |v, square| {
+            self.embedding.for_each_contact(mesh, u, sampling.contact(), |v, square| {
                 let contact = sampling.between(mesh, u, v).contact();
                 if square >= contact * contact {
                     return;
                 }
-                let counted_from_v = v < u && is_stirred[v.index()] && self.embedding.may_have_company(v);
+                let counted_from_v = v < u && is_stirred[v.index()] && self.embedding.may_have_contacts(v);
                 if !counted_from_v {
                     contacts.push(Contact { square, u: u.min(v), v: u.max(v) });
                 }

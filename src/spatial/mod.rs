@@ -5,15 +5,15 @@ mod distance;
 mod march;
 mod points;
 mod section;
-mod stars;
 mod sweep;
 mod tree;
+mod vertex_grid;
 
 pub use cells::CellSet;
 pub use distance::{SurfaceDistance, surface_distance};
 pub use march::Terrain;
 pub use points::PointGrid;
 pub use section::cross_section;
-pub use stars::{Nearness, Star, StarGrid};
 pub use sweep::near_pairs;
 pub use tree::{FirstHit, SurfacePoint, TriangleTree};
+pub use vertex_grid::{Proximity, VertexBall, VertexGrid};

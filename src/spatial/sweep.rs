@@ -1,43 +1,43 @@
-//! All pairs of stars that are near each other, found in one sweep.
+//! Sweep and prune: all pairs of vertex balls that are near each other.
 //!
-//! Stars are put into classes by size. Those of a class are swept over each other, then over the smaller ones around them:
-//! so tiny stars beside a huge one are not compared with each other in cells made for it. In a class space is cut into
-//! columns as wide as its reach; stars are sorted by column and height, and of two columns side by side each star meets
-//! the few that are at its height. All of it lies in flat arrays, and each pair is met once.
+//! Balls are classed by size. Those of a class are swept over each other, then over the smaller ones around them: so many tiny balls
+//! beside a huge one are not compared with each other in cells of its size. In a class, space is cut into columns as wide as its reach.
+//! Balls are sorted by column and height, and each is compared with those of neighbouring columns at its height. All of it lies in flat
+//! arrays, and each pair is visited once.
 
-use super::stars::{Nearness, Star};
+use super::vertex_grid::{Proximity, VertexBall};
 use crate::math::order::{by_both, rank, sort_by_rank};
 
-/// The largest stars of the first class, in the star in the middle. With less, the few long edges of an ordinary mesh need
+/// The largest balls of the first class, in the ball in the middle. With less, the few long edges of an ordinary mesh need
 /// a class of their own; with more, all of its columns are wide because of them.
 const FIRST: f32 = 1.6;
 
-/// From class to class, the largest stars in those of the class before. With less there are more classes to look through,
-/// with more the smallest stars of a class meet many in vain.
+/// From class to class, the largest balls in those of the class before. With less there are more classes to look through,
+/// with more the smallest balls of a class meet many in vain.
 const FACTOR: f32 = 4.0;
 
-/// Columns are so much wider than the reach of their class: stars further apart than one column are further apart than it,
+/// Columns are so much wider than the reach of their class: balls further apart than one column are further apart than it,
 /// whatever rounding does to their places in columns.
 const WIDER: f64 = 1.001;
 
 /// Columns end here in both directions, so that all have neighbours. They are counted from the origin: at this distance a
-/// column is finer than the steps of single precision, unless its stars are smaller than them.
+/// column is finer than the steps of single precision, unless its balls are smaller than them.
 const LAST: f64 = 1_073_741_824.0;
 
-/// Columns without a star for each star, up to which they are counted one by one.
+/// Columns without a ball for each ball, up to which they are counted one by one.
 const MOST_EMPTY: usize = 8;
 
-/// Bits for each column around a large star, in the filter of small ones: fewer let more of the others through.
+/// Bits for each column around a large ball, in the filter of small ones: fewer let more of the others through.
 const BITS: usize = 8;
 
-/// Calls `found` once with every pair of `stars` that are no further apart than [`Nearness::between`], in an order that
+/// Calls `found` once with every pair of `balls` that are no further apart than [`Proximity::between`], in an order that
 /// follows from theirs, but says nothing.
-pub fn near_pairs(stars: Vec<Star>, near: Nearness, mut found: impl FnMut(&Star, &Star)) {
-    let mut bound = FIRST * middle(&stars);
-    let (mut smaller, mut left) = (Vec::new(), stars);
+pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut(&VertexBall, &VertexBall)) {
+    let mut bound = FIRST * middle(&balls);
+    let (mut smaller, mut left) = (Vec::new(), balls);
     while !left.is_empty() {
-        let (class, larger): (Vec<Star>, Vec<Star>) =
-            left.into_iter().partition(|star| star.longest <= bound);
+        let (class, larger): (Vec<VertexBall>, Vec<VertexBall>) =
+            left.into_iter().partition(|ball| ball.longest <= bound);
         left = larger;
         // An edge may be endless, where its square is more than single precision holds.
         bound = if bound < f32::MAX / FACTOR { bound * FACTOR } else { f32::INFINITY };
@@ -48,9 +48,9 @@ pub fn near_pairs(stars: Vec<Star>, near: Nearness, mut found: impl FnMut(&Star,
     }
 }
 
-/// The longest edge of the star in the middle by size; some length above 0 where it has none.
-fn middle(stars: &[Star]) -> f32 {
-    let mut sizes: Vec<f32> = stars.iter().map(|star| star.longest).collect();
+/// The longest edge of the ball in the middle by size; some length above 0 where it has none.
+fn middle(balls: &[VertexBall]) -> f32 {
+    let mut sizes: Vec<f32> = balls.iter().map(|ball| ball.longest).collect();
     let half = sizes.len() / 2;
     if sizes.is_empty() {
         return 1.0;
@@ -59,12 +59,17 @@ fn middle(stars: &[Star]) -> f32 {
     if middle > f32::MIN_POSITIVE { middle } else { f32::MIN_POSITIVE }
 }
 
-/// Finds the pairs of a class, and those of one of it and one of the smaller stars.
-fn sweep_class(class: &[Star], smaller: &[Star], near: Nearness, found: &mut impl FnMut(&Star, &Star)) {
-    let largest = class.iter().fold(0.0, |most, star| if star.longest > most { star.longest } else { most });
+/// Finds the pairs of a class, and those of one of it and one of the smaller balls.
+fn sweep_class(
+    class: &[VertexBall],
+    smaller: &[VertexBall],
+    near: Proximity,
+    found: &mut impl FnMut(&VertexBall, &VertexBall),
+) {
+    let largest = class.iter().fold(0.0, |most, ball| if ball.longest > most { ball.longest } else { most });
     let reach = near.between(largest, largest);
     let width = Width(1.0 / (WIDER * f64::from(reach)));
-    let mut test = |a: &Star, b: &Star| {
+    let mut test = |a: &VertexBall, b: &VertexBall| {
         let reach = near.between(a.longest, b.longest);
         if a.position.distance_squared(b.position) <= reach * reach {
             found(a, b);
@@ -74,7 +79,7 @@ fn sweep_class(class: &[Star], smaller: &[Star], near: Nearness, found: &mut imp
     large.pairs(reach, &mut test);
     if !smaller.is_empty() {
         let filter = Filter::around(&large);
-        let around = smaller.iter().filter(|star| filter.lets_through(width.column(star)));
+        let around = smaller.iter().filter(|ball| filter.lets_through(width.column(ball)));
         large.pairs_with(&Columns::new(width, around), reach, &mut test);
     }
 }
@@ -85,8 +90,8 @@ struct Width(f64);
 
 impl Width {
     #[inline]
-    fn column(self, star: &Star) -> [i32; 2] {
-        [star.position.x, star.position.y].map(|x| {
+    fn column(self, ball: &VertexBall) -> [i32; 2] {
+        [ball.position.x, ball.position.y].map(|x| {
             let scaled = f64::from(x) * self.0;
             let clamped = if scaled > LAST { LAST } else { scaled };
             floor(if clamped < -LAST { -LAST } else { clamped })
@@ -135,22 +140,22 @@ fn in_order_of_columns(places: &[[i32; 2]]) -> Vec<u32> {
     order
 }
 
-/// Stars sorted by column, and by height in each.
+/// Balls sorted by column, and by height in each.
 struct Columns {
-    stars: Vec<Star>,
-    /// Where each column lies, sorted, and the first of its stars; one more at the end.
+    balls: Vec<VertexBall>,
+    /// Where each column lies, sorted, and the first of its balls; one more at the end.
     columns: Vec<([i32; 2], usize)>,
 }
 
 impl Columns {
-    fn new<'a>(width: Width, stars: impl Iterator<Item = &'a Star>) -> Self {
-        let stars: Vec<&Star> = stars.collect();
-        let places: Vec<[i32; 2]> = stars.iter().map(|star| width.column(star)).collect();
+    fn new<'a>(width: Width, balls: impl Iterator<Item = &'a VertexBall>) -> Self {
+        let balls: Vec<&VertexBall> = balls.collect();
+        let places: Vec<[i32; 2]> = balls.iter().map(|ball| width.column(ball)).collect();
         let mut order = in_order_of_columns(&places);
         let mut by_height = Vec::new();
         for column in order.chunk_by_mut(|&a, &b| places[a as usize] == places[b as usize]) {
             by_height.clear();
-            by_height.extend(column.iter().map(|&i| by_both(rank(stars[i as usize].position.z), i)));
+            by_height.extend(column.iter().map(|&i| by_both(rank(balls[i as usize].position.z), i)));
             by_height.sort_unstable();
             column.iter_mut().zip(&by_height).for_each(|(i, &ranked)| *i = ranked as u32);
         }
@@ -163,7 +168,7 @@ impl Columns {
             }
         }
         columns.push(([i32::MAX; 2], order.len()));
-        Self { stars: order.iter().map(|&i| *stars[i as usize]).collect(), columns }
+        Self { balls: order.iter().map(|&i| *balls[i as usize]).collect(), columns }
     }
 
     fn count(&self) -> usize {
@@ -176,64 +181,69 @@ impl Columns {
     }
 
     #[inline]
-    fn stars(&self, k: usize) -> &[Star] {
-        &self.stars[self.columns[k].1..self.columns[k + 1].1]
+    fn balls(&self, k: usize) -> &[VertexBall] {
+        &self.balls[self.columns[k].1..self.columns[k + 1].1]
     }
 
     /// Meets every pair within a column and of columns side by side, as far as their heights differ by `reach` at most.
-    fn pairs(&self, reach: f32, test: &mut impl FnMut(&Star, &Star)) {
+    fn pairs(&self, reach: f32, test: &mut impl FnMut(&VertexBall, &VertexBall)) {
         let mut row = 0;
         for k in 0..self.count() {
             let [x, y] = self.place(k);
-            let own = self.stars(k);
+            let own = self.balls(k);
             for (i, a) in own.iter().enumerate() {
                 let top = a.position.z + reach;
                 own[i + 1..].iter().take_while(|b| b.position.z <= top).for_each(|b| test(a, b));
             }
             if self.place(k + 1) == [x, y + 1] {
-                meet(own, self.stars(k + 1), reach, test);
+                meet(own, self.balls(k + 1), reach, test);
             }
             self.meet_row(own, [x + 1, y], &mut row, reach, test);
         }
     }
 
-    /// Meets every star of the columns with every one of those at `other`, in the same column or side by side.
-    fn pairs_with(&self, other: &Self, reach: f32, test: &mut impl FnMut(&Star, &Star)) {
+    /// Meets every ball of the columns with every one of those at `other`, in the same column or side by side.
+    fn pairs_with(&self, other: &Self, reach: f32, test: &mut impl FnMut(&VertexBall, &VertexBall)) {
         let mut rows = [0; 3];
         for k in 0..self.count() {
             let [x, y] = self.place(k);
             for (row, x) in rows.iter_mut().zip(x - 1..=x + 1) {
-                other.meet_row(self.stars(k), [x, y], row, reach, test);
+                other.meet_row(self.balls(k), [x, y], row, reach, test);
             }
         }
     }
 
-    /// Meets `stars` with those of the column at `[x, y]` and of the ones before and behind it. `row` is at or before the
+    /// Meets `balls` with those of the column at `[x, y]` and of the ones before and behind it. `row` is at or before the
     /// first of the three, and is moved there: columns are gone through in order.
     fn meet_row(
         &self,
-        stars: &[Star],
+        balls: &[VertexBall],
         [x, y]: [i32; 2],
         row: &mut usize,
         reach: f32,
-        test: &mut impl FnMut(&Star, &Star),
+        test: &mut impl FnMut(&VertexBall, &VertexBall),
     ) {
         while self.place(*row) < [x, y - 1] {
             *row += 1;
         }
         let mut k = *row;
         while self.place(k) <= [x, y + 1] {
-            meet(stars, self.stars(k), reach, test);
+            meet(balls, self.balls(k), reach, test);
             k += 1;
         }
     }
 }
 
-/// Meets stars of one column with those of another, both sorted by height.
+/// Meets balls of one column with those of another, both sorted by height.
 #[inline]
-fn meet(stars: &[Star], others: &[Star], reach: f32, test: &mut impl FnMut(&Star, &Star)) {
+fn meet(
+    balls: &[VertexBall],
+    others: &[VertexBall],
+    reach: f32,
+    test: &mut impl FnMut(&VertexBall, &VertexBall),
+) {
     let mut low = 0;
-    for a in stars {
+    for a in balls {
         let (bottom, top) = (a.position.z - reach, a.position.z + reach);
         while low < others.len() && others[low].position.z < bottom {
             low += 1;
@@ -284,8 +294,8 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Stars in a box or on a sheet, some far from the rest, some at the same place; ordinary ones, tiny ones, huge ones.
-    fn stars(random: &mut Random) -> Vec<Star> {
+    /// Balls in a box or on a sheet, some far from the rest, some at the same place; ordinary ones, tiny ones, huge ones.
+    fn balls(random: &mut Random) -> Vec<VertexBall> {
         let middle = Vec3::splat([0.0, 5.0, 3e3, -2e6][random.below(4) as usize]);
         let flat = [Vec3::ONE, Vec3::new(1.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)][random.below(3) as usize];
         let sizes: &[f32] =
@@ -293,16 +303,16 @@ mod tests {
                 [random.below(5) as usize];
         let spread = [0.0, 3.0, 10.0][random.below(3) as usize];
         let count = random.below(120);
-        let mut star = |i| {
+        let mut ball = |i| {
             let mut unit = || random.unit() as f32;
             let mut position = middle + Vec3::new(unit(), unit(), unit()) * flat * spread;
             let longest = sizes[(unit() * sizes.len() as f32) as usize] * (1.0 - 0.4 * unit());
             if unit() < 0.02 {
                 position *= 1e12;
             }
-            Star { position, longest, vertex: VertexId(i) }
+            VertexBall { position, longest, vertex: VertexId(i) }
         };
-        (0..count).map(&mut star).collect()
+        (0..count).map(&mut ball).collect()
     }
 
     #[test]
@@ -310,25 +320,25 @@ mod tests {
         let mut pairs = 0;
         for seed in 0..2000 {
             let random = &mut Random::new(seed);
-            let stars = stars(random);
-            let near = Nearness {
+            let balls = balls(random);
+            let near = Proximity {
                 least: [0.0, 0.7][random.below(2) as usize],
                 margin: [0.0, 0.1][random.below(2) as usize],
                 share: 0.8,
             };
             let mut found = Vec::new();
-            near_pairs(stars.clone(), near, |a, b| {
+            near_pairs(balls.clone(), near, |a, b| {
                 found.push([a.vertex.min(b.vertex).0, a.vertex.max(b.vertex).0]);
             });
             found.sort_unstable();
-            let is_near = |a: &Star, b: &Star| {
+            let is_near = |a: &VertexBall, b: &VertexBall| {
                 let reach = near.between(a.longest, b.longest);
                 a.position.distance_squared(b.position) <= reach * reach
             };
             let mut expected = Vec::new();
-            for (i, a) in stars.iter().enumerate() {
+            for (i, a) in balls.iter().enumerate() {
                 expected.extend(
-                    stars[i + 1..].iter().filter(|b| is_near(a, b)).map(|b| [a.vertex.0, b.vertex.0]),
+                    balls[i + 1..].iter().filter(|b| is_near(a, b)).map(|b| [a.vertex.0, b.vertex.0]),
                 );
             }
             expected.sort_unstable();

@@ -1,39 +1,38 @@
-//! By how much vertices may move before triangles meet, pair by pair: where no plane lies between whole stars.
+//! Clearances pair by pair of triangles, for one-rings that no plane separates as a whole.
 //!
-//! Two triangles are apart as long as their extents along some direction are (separating axes: Gottschalk, Lin, Manocha, OBBTree,
-//! SIGGRAPH 1996). The gap there, halved, is what the vertices of both may move.
+//! Two triangles do not intersect if their projections onto some axis are disjoint (separating axes: Gottschalk, Lin, Manocha, OBBTree,
+//! SIGGRAPH 1996). Half the gap there is the clearance of the pair.
 
-use super::star::{ORDINARY_STAR, ROUNDING, higher, lower, room_beside_line, unit};
+use super::one_ring::{ORDINARY_RING, ROUNDING, clearance_beside_line, higher, lower, unit};
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, VertexId};
 use smallvec::SmallVec;
 
 type Triangle = [Vec3; 3];
 
-/// Where the triangles at `u` and at `v` that have no corner in common are apart: by how much every vertex may move and they still
-/// are. Not positive where some are not known to be. More than `enough` is not searched for. `longest` is the longest edge at `u` and
-/// `v`.
-pub(super) fn clear_between(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32, enough: f32) -> f32 {
+/// The clearance between the triangles at `u` and those at `v` without a common corner; not positive where some pair is not known to be
+/// disjoint. The search ends at `enough`. `longest` is the longest edge at `u` and `v`.
+pub(super) fn triangle_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32, enough: f32) -> f32 {
     let at = |w: VertexId| mesh.position(w);
     let triangles_at = |hub: VertexId, not: VertexId| {
         mesh.ring(hub).pairs().filter(move |&(a, b)| a != not && b != not).map(move |(a, b)| [hub, a, b])
     };
-    let others: SmallVec<[([VertexId; 3], Triangle, Bounds); ORDINARY_STAR]> = triangles_at(v, u)
+    let others: SmallVec<[([VertexId; 3], Triangle, Bounds); ORDINARY_RING]> = triangles_at(v, u)
         .map(|names| (names, names.map(at)))
         .map(|(names, points)| (names, points, Bounds::of(&points)))
         .collect();
     let rounding = ROUNDING * longest;
-    let mut room = f32::INFINITY;
+    let mut clearance = f32::INFINITY;
     let mut axis = Vec3::ZERO;
     for names in triangles_at(u, v) {
         let triangle = names.map(at);
         let bounds = Bounds::of(&triangle);
         for (other_names, other, other_bounds) in &others {
-            // The hubs are in one of the two only.
+            // `u` and `v` themselves are corners of one of the two only.
             if names[1..].iter().any(|w| other_names[1..].contains(w)) {
                 continue;
             }
-            let wanted = 2.0 * (lower(enough, room) + rounding);
+            let wanted = 2.0 * (lower(enough, clearance) + rounding);
             let boxes = gap_between_boxes(&bounds, other_bounds);
             let gap = if boxes > wanted {
                 boxes
@@ -44,24 +43,24 @@ pub(super) fn clear_between(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32, en
             if clear.is_nan() || clear <= 0.0 {
                 return 0.0;
             }
-            room = lower(room, clear);
+            clearance = lower(clearance, clear);
         }
     }
-    room
+    clearance
 }
 
-/// Where the triangles at `v` have no more than their corners and edges in common: by how much every vertex may move and they still
-/// have not. Not positive where that is not known. `longest` is the longest edge at `v`.
-pub(super) fn clear_around(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
+/// The clearance between the triangles at `v`, beyond their common corners and edges; not positive where some pair may intersect.
+/// `longest` is the longest edge at `v`.
+pub(super) fn fan_clearance(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
     let ring = mesh.ring(v).as_slice();
     let origin = mesh.position(v);
-    let spokes: SmallVec<[Vec3; ORDINARY_STAR]> = ring.iter().map(|&w| mesh.position(w) - origin).collect();
+    let spokes: SmallVec<[Vec3; ORDINARY_RING]> = ring.iter().map(|&w| mesh.position(w) - origin).collect();
     let count = spokes.len();
     let spoke = |k: usize| spokes[if k < count { k } else { k - count }];
-    let mut room = f32::INFINITY;
+    let mut clearance = f32::INFINITY;
     for k in 0..count {
-        let mut clear = clear_of_fold(spoke(k + 1), [spoke(k), spoke(k + 2)], longest);
-        // Triangle k and each that is no neighbour of it.
+        let mut clear = fold_clearance(spoke(k + 1), [spoke(k), spoke(k + 2)], longest);
+        // Triangle k and each that shares no edge with it.
         for other in (k + 2..count).filter(|other| other + 1 - k < count) {
             let gap = gap_between_corners([spoke(k), spoke(k + 1)], [spoke(other), spoke(other + 1)]);
             clear = lower(0.5 * gap - ROUNDING * longest, clear);
@@ -69,27 +68,27 @@ pub(super) fn clear_around(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
         if clear.is_nan() || clear <= 0.0 {
             return 0.0;
         }
-        room = lower(room, clear);
+        clearance = lower(clearance, clear);
     }
-    room
+    clearance
 }
 
-/// Two triangles on the edge from the origin to `edge`, with these tips: by how much vertices may move before they lie on each other.
-fn clear_of_fold(edge: Vec3, tips: [Vec3; 2], longest: f32) -> f32 {
+/// The clearance of two triangles on the edge from the origin to `edge`, with these tips, from being folded onto each other.
+fn fold_clearance(edge: Vec3, tips: [Vec3; 2], longest: f32) -> f32 {
     let square = edge.length_squared();
     let per_length = edge * (1.0 / square);
     let [own, other] = tips.map(|tip| unit(tip - edge * tip.dot(per_length)));
-    let way = other - own;
-    let normal = unit(way - edge * way.dot(per_length));
+    let displacement = other - own;
+    let normal = unit(displacement - edge * displacement.dot(per_length));
     let gap = lower(-tips[0].dot(normal), tips[1].dot(normal));
     let reach =
         tips.into_iter().fold(1.0, |reach, tip| higher(reach, (2.0 * tip.dot(per_length) - 1.0).abs()));
-    room_beside_line(gap, reach, square, longest)
+    clearance_beside_line(gap, reach, square, longest)
 }
 
-/// The largest gap between the extents of two triangles along the normal of one of them or across an edge of each, or the first that is
-/// `wanted`; negative where they overlap in all of these. `axis` is tried first, and becomes the one that was found: what lies between
-/// two triangles often lies between their neighbours, too.
+/// The largest gap between the projections of two triangles onto their normals and the cross products of their edges, or the first above
+/// `wanted`; negative where all overlap. `axis` is tried first and becomes the one found: an axis that separates two triangles often
+/// separates their neighbours.
 fn gap_between(s: &Triangle, t: &Triangle, wanted: f32, axis: &mut Vec3) -> f32 {
     let origin = s[0];
     let (s, t) = (s.map(|p| p - origin), t.map(|p| p - origin));
@@ -111,14 +110,15 @@ fn gap_between(s: &Triangle, t: &Triangle, wanted: f32, axis: &mut Vec3) -> f32 
     gap
 }
 
-/// Whether two triangles are known to be further apart than `margin`, from beside their edges. Most that are near each other lie on one
-/// sheet, where exact predicates are slowest. Lengths in `reach` are the longest between corners of the two.
+/// Whether two triangles are known to be further apart than `margin`, by axes in the plane of either and normal to one of its edges. Most
+/// triangles near each other lie on one sheet, where exact predicates are slowest. `reach` is the longest distance between two of their
+/// corners.
 pub(super) fn are_beside(s: &Triangle, t: &Triangle, reach: f32, margin: f32) -> bool {
     let gap = margin + ROUNDING * reach;
     is_beside_edge(s, t, gap) || is_beside_edge(t, s, gap)
 }
 
-/// Whether `t` is beyond an edge of `s` by more than `gap`, seen along the normal of `s`.
+/// Whether `t` is beyond an edge of `s` by more than `gap`.
 fn is_beside_edge(s: &Triangle, t: &Triangle, gap: f32) -> bool {
     let normal = (s[1] - s[0]).cross(s[2] - s[0]);
     [[0, 1, 2], [1, 2, 0], [2, 0, 1]].into_iter().any(|[from, to, tip]| {
@@ -143,11 +143,11 @@ fn gap_between_boxes(a: &Bounds, b: &Bounds) -> f32 {
     (b.min - a.max).max(a.min - b.max).max_element()
 }
 
-/// How far the tips of two triangles with the origin as their common corner are from a plane through it that lies between them; not
-/// positive where no such plane was found.
+/// The distance of the tips of two triangles, whose common corner is the origin, from a separating plane through it; not positive where
+/// none was found.
 ///
-/// With the tips of one of them turned about the origin, the plane has all four on one side. Its normal is a mean of those of the faces
-/// of the cone around them.
+/// With the tips of one of them mirrored at the origin, all four are on one side of the plane. Its normal is the mean of those of the
+/// faces of the cone around them.
 fn gap_between_corners([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> f32 {
     let rays = [a, b, -c, -d];
     let mut normal = Vec3::ZERO;
@@ -166,7 +166,7 @@ fn gap_between_corners([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::star::{crossings_around, crossings_between, longest_edge};
+    use super::super::one_ring::{intersections_around, intersections_between, longest_edge};
     use super::*;
     use crate::math::Random;
     use crate::math::predicates::triangles_cross;
@@ -177,7 +177,7 @@ mod tests {
         Vec3::from([(); 3].map(|()| 2.0 * random.unit() as f32 - 1.0))
     }
 
-    /// A sphere, more or less rough, perhaps pressed flat.
+    /// A sphere with some noise, sometimes flattened.
     fn rough(random: &mut Random) -> Mesh {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.8).unwrap();
         let (rough, flat) = (0.6 * random.unit() as f32, [1.0, 0.1][random.below(2) as usize]);
@@ -189,32 +189,32 @@ mod tests {
         mesh
     }
 
-    /// The mesh with each vertex moved by at most `way`, and nearly that far.
-    fn shaken(mesh: &Mesh, way: f32, random: &mut Random) -> Mesh {
+    /// The mesh with each vertex moved by nearly `displacement`.
+    fn shaken(mesh: &Mesh, displacement: f32, random: &mut Random) -> Mesh {
         let mut mesh = mesh.clone();
         let names: Vec<VertexId> = mesh.vertices().collect();
         for v in names {
-            mesh.set_position(v, mesh.position(v) + any(random).normalize_or_zero() * (0.999 * way));
+            mesh.set_position(v, mesh.position(v) + any(random).normalize_or_zero() * (0.999 * displacement));
         }
         mesh
     }
 
-    /// `room` says by how much all may move; `crossings` finds what crosses, exactly.
+    /// Nothing intersects, by the exact test `intersections`, as long as no vertex moves further than `clearance`.
     fn assert_holds(
         mesh: &Mesh,
-        room: f32,
+        clearance: f32,
         random: &mut Random,
-        mut crossings: impl FnMut(&Mesh, &mut Vec<VertexId>),
+        mut intersections: impl FnMut(&Mesh, &mut Vec<VertexId>),
     ) {
         let mut crossing = Vec::new();
-        crossings(mesh, &mut crossing);
+        intersections(mesh, &mut crossing);
         for _ in 0..3 {
-            crossings(&shaken(mesh, room, random), &mut crossing);
+            intersections(&shaken(mesh, clearance, random), &mut crossing);
         }
-        assert!(crossing.is_empty(), "with room for {room}");
+        assert!(crossing.is_empty(), "with clearance for {clearance}");
     }
 
-    /// Two triangles of a sheet, side by side or one on the other, perhaps exactly in one plane.
+    /// Two triangles side by side or overlapping, sometimes exactly in one plane.
     fn two_triangles(random: &mut Random) -> [Triangle; 2] {
         let flat = [0.0, 0.0, 0.02, 1.0][random.below(4) as usize];
         let apart = Vec3::X * (2.0 * random.unit() as f32);
@@ -249,21 +249,23 @@ mod tests {
             let longest = mesh.vertices().map(|v| longest_edge(&mesh, v)).fold(0.0, higher);
             let names: Vec<VertexId> = mesh.vertices().collect();
             for &v in &names {
-                let room = clear_around(&mesh, v, longest);
-                if room > 0.0 {
+                let clearance = fan_clearance(&mesh, v, longest);
+                if clearance > 0.0 {
                     clear[0] += 1;
-                    assert_holds(&mesh, room, random, |mesh, found| crossings_around(mesh, v, None, found));
+                    assert_holds(&mesh, clearance, random, |mesh, found| {
+                        intersections_around(mesh, v, None, found)
+                    });
                 } else {
                     unclear[0] += 1;
                 }
                 let w = names[random.below(names.len() as u32) as usize];
-                let room = if v == w { 0.0 } else { clear_between(&mesh, [v, w], longest, 0.01) };
-                if room > 0.0 && room < f32::INFINITY {
+                let clearance = if v == w { 0.0 } else { triangle_clearance(&mesh, [v, w], longest, 0.01) };
+                if clearance > 0.0 && clearance < f32::INFINITY {
                     clear[1] += 1;
                     let between = |mesh: &Mesh, found: &mut Vec<VertexId>| {
-                        crossings_between(mesh, [v, w], None, found);
+                        intersections_between(mesh, [v, w], None, found);
                     };
-                    assert_holds(&mesh, room, random, between);
+                    assert_holds(&mesh, clearance, random, between);
                 } else {
                     unclear[1] += 1;
                 }

@@ -1,140 +1,141 @@
-//! Keeps a mesh from crossing itself: moves are held back, edits taken back, before anything crosses.
+//! Collision handling: keeps a mesh free of self-intersections by rejecting edits and shortening displacements.
 //!
-//! The mesh did not cross itself before; so there is always a way back to a mesh that does not. What is near is found
-//! through a grid that follows the mesh ([`StarGrid`]); whether it crosses is decided exactly.
+//! The mesh had none before, so a state without is always at hand. Detection has three parts:
+//! - [`broad_phase`]: pairs of non-adjacent vertices whose triangles may intersect, from a grid that follows the mesh ([`VertexGrid`]);
+//! - [`narrow_phase`]: conservative filters (`one_ring`, `clearance`), then exact predicates on pairs of triangles;
+//! - [`motion_bound`]: each filter returns a displacement below which its pair cannot intersect; the pair is not tested again before
+//!   the displacements of its vertices add up to that.
 //!
-//! Two triangles cross in one of three ways, each looked for where it can be:
-//! - they have a corner in common: around each vertex (`star`);
-//! - a corner of one is a neighbour of a corner of the other: around each edge (`star`);
-//! - else two corners that are no neighbours are near each other: the end P of an edge of length `a` that meets a
-//!   triangle with edges up to `b` and that corner A of the triangle which is nearest to the meeting point have
-//!   |PA|² ≤ a²/4 + b²/3 for one of the two ends (`look`).
+//! Two triangles intersect in one of three configurations, each tested where it can occur:
+//! - they share a corner: in the one-ring of a vertex;
+//! - a corner of one is adjacent to a corner of the other: across an edge;
+//! - otherwise two non-adjacent corners are near each other. If an edge of length `a` with end P meets a triangle with edges up to `b`,
+//!   and A is the corner nearest to the intersection, then |PA|² ≤ a²/4 + b²/3 for one of the two ends.
 
+mod broad_phase;
 mod clearance;
-mod look;
 mod motion;
-mod near;
+mod motion_bound;
+mod narrow_phase;
+mod one_ring;
 mod output;
 mod patch;
 mod refine;
-mod room;
-mod star;
 
 use crate::math::{Bounds, DAffine3, Vec3};
 use crate::mesh::{EditError, Mesh, VertexId};
-use crate::spatial::StarGrid;
+use crate::spatial::VertexGrid;
+use motion_bound::{Checks, MotionBounds};
+use one_ring::{higher, longest_edge};
 use output::OutputSpace;
-use room::{Concerns, Room};
 use smallvec::SmallVec;
-use star::{higher, longest_edge};
 
 /// 1/√3, rounded up: the distance of a point of a triangle from its nearest corner, in the triangle's longest edge.
 const NEAREST_CORNER: f32 = 0.577_351;
 
-/// √(1/4 + 1/3), rounded up: the distance between corners of two triangles that cross, in the longest edge of both.
+/// √(1/4 + 1/3), rounded up: the distance between corners of two intersecting triangles, in the longest edge of both.
 const PIERCING: f32 = 0.763_763;
 
-/// How far a star may move before its vertex looks again for what is near, in the ordinary edge. With more, more is near;
-/// with less, they look more often. Few vertices of an ordinary mesh have anything near.
-const SEARCH_ROOM: f32 = 0.04;
+/// The skin of the broad phase: how far a one-ring may move before its vertex is searched for neighbours again, in the ordinary edge.
+/// A wider skin gives more pairs, a narrower one more searches. Few vertices of an ordinary mesh have any pair.
+const SEARCH_SKIN: f32 = 0.04;
 
-/// Squares of lengths below this are rounded to few digits, or to 0: an edge counts as that long at least, a way as that
-/// far, and less room than that is none.
+/// Squares of shorter lengths lose their digits to rounding. Edges and displacements count as at least this long, and a smaller clearance
+/// as none.
 const FINEST: f32 = 1e-17;
 
 /// Keeps one mesh embedded.
 ///
-/// A vertex that was looked at has some room: it is not looked at again before the vertices of its star have used it up.
-/// How much room is found has no influence on what is found to cross.
+/// Motion bounds decide when a pair is tested, never the result of a test.
 #[derive(Clone, Debug, Default)]
 pub struct Embedding {
-    grid: StarGrid,
+    grid: VertexGrid,
     /// An edge that is longer than most of the mesh.
     edge: f32,
-    /// By vertex, its longest edge when it was looked at.
+    /// By vertex, its longest edge when it was last measured.
     longest: Vec<f32>,
-    /// By vertex, the others that were near when it or they searched for them.
-    near: Vec<SmallVec<[VertexId; 4]>>,
-    /// By vertex, whether one that is no neighbour may be within the contact distance.
-    close: Vec<bool>,
-    /// By vertex, how far its star may still go before it is looked at again.
-    room: Vec<Room>,
-    /// By vertex, the longest way in its star, while the mesh moves, and the vertices where it is not 0.
-    gone: Vec<f32>,
+    /// By vertex, the non-adjacent vertices found near it by the broad phase.
+    nearby: Vec<SmallVec<[VertexId; 4]>>,
+    /// By vertex, whether a non-adjacent one may be within the contact distance.
+    may_touch: Vec<bool>,
+    /// By vertex, how far its one-ring may still move before it is tested again.
+    motion_bounds: Vec<MotionBounds>,
+    /// By vertex, the largest displacement in its one-ring during a move, and the vertices where it is not 0.
+    travelled: Vec<f32>,
     touched: Vec<VertexId>,
-    /// Vertices that edits made or changed since the last move: those near them do not know yet.
-    fresh: Vec<VertexId>,
-    /// By vertex, what it is to be looked at for now, and the vertices that have any.
-    doubts: Vec<Concerns>,
-    doubtful: Vec<VertexId>,
-    /// The version of the mesh's geometry that is known here.
+    /// Vertices that edits made or changed since the last move; the pairs of their neighbours do not include them yet.
+    edited: Vec<VertexId>,
+    /// By vertex, the pending checks, and the vertices that have any.
+    pending: Vec<Checks>,
+    dirty: Vec<VertexId>,
+    /// The geometry version of the mesh that this is in sync with.
     version: Option<u32>,
-    /// The version at which all of it was entered in the grid.
+    /// The geometry version at which the whole mesh was entered in the grid.
     entered: Option<u32>,
     /// A vertex is marked where its entry is the newest mark.
     marks: Vec<u32>,
     newest: u32,
     found: Vec<VertexId>,
-    /// Where vertices were before they moved.
+    /// Positions before the current move.
     from: Vec<Vec3>,
-    /// Since all of the mesh was looked at, something crossed at a vertex that did not move, or not any more.
+    /// Whether, since the whole mesh was last checked, a self-intersection was found at a vertex without displacement.
     stuck: bool,
     effort: u64,
-    /// Where triangles must not cross, either.
+    /// The space of the output, where triangles must not intersect either.
     output: Option<OutputSpace>,
 }
 
 impl Embedding {
-    /// From now on the mesh, which stays within `bounds`, is also kept from crossing itself where `map` leads, as its positions come
-    /// out rounded to single precision. Not where that is coarser than a hundredth of a unit of the mesh.
+    /// Also keeps the mesh, which stays within `bounds`, free of self-intersections after `map` and rounding to single precision. Has no
+    /// effect where that rounding is coarser than a hundredth of a unit of the mesh.
     pub fn watch_output(&mut self, map: DAffine3, bounds: &Bounds) {
         self.output = OutputSpace::new(map, bounds);
         self.version = None;
     }
 
-    /// Clearance up to which triangles are tested exactly.
+    /// The clearance up to which triangles are tested exactly.
     fn finest(&self) -> f32 {
         self.output.map_or(FINEST, |space| higher(FINEST, space.rounding()))
     }
 
-    /// As [`Self::follow`]. `edge` is longer than most of its edges. It makes a difference to speed, and bounds what
-    /// [`Self::company`] can be asked for; not to what is found to cross.
+    /// As [`Self::follow`], for a mesh most of whose edges are shorter than `edge`. That affects speed and the largest distance of
+    /// [`Self::for_each_contact`], not which intersections are found.
     pub fn follow_with(&mut self, mesh: &Mesh, edge: f32) {
         let edge = higher(FINEST, edge);
         if self.edge != edge {
             self.edge = edge;
             self.version = None;
         }
-        self.know(mesh);
+        self.sync(mesh);
     }
 
-    /// Follows `mesh`, whatever was done to it since the last time.
+    /// Synchronises with `mesh` after any changes.
     pub fn follow(&mut self, mesh: &Mesh) {
-        self.know(mesh);
+        self.sync(mesh);
         self.grid.fill_cells();
     }
 
-    /// Follows `mesh`, without the cells of the grid, which a look at all of it does not need.
-    fn know(&mut self, mesh: &Mesh) {
+    /// As [`Self::follow`], without filling the cells of the grid: a check of the whole mesh does not need them.
+    fn sync(&mut self, mesh: &Mesh) {
         if self.version == Some(mesh.geometry_version()) {
             return;
         }
-        self.grid = StarGrid::new(self.edge, SEARCH_ROOM * self.edge, mesh.slots());
+        self.grid = VertexGrid::new(self.edge, SEARCH_SKIN * self.edge, mesh.slots());
         self.stuck = false;
-        self.room.clear();
-        self.near.clear();
-        self.close.clear();
-        self.make_room(mesh.slots());
-        self.fresh.clear();
+        self.motion_bounds.clear();
+        self.nearby.clear();
+        self.may_touch.clear();
+        self.resize_for(mesh.slots());
+        self.edited.clear();
         for v in mesh.vertices() {
-            self.see(mesh, v);
+            self.measure(mesh, v);
             self.enter(mesh, v);
         }
         self.version = Some(mesh.geometry_version());
         self.entered = self.version;
     }
 
-    /// Makes an edit, or several as one, and takes it back where triangles would cross.
+    /// Makes one or more edits as a transaction, and rolls it back if triangles would intersect.
     ///
     /// # Errors
     /// That of the edit; [`EditError::WouldCross`]. The mesh is then as it was.
@@ -143,10 +144,10 @@ impl Embedding {
         mesh: &mut Mesh,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
     ) -> Result<T, EditError> {
-        self.attempt_with(mesh, edit, Self::changes_cross)
+        self.attempt_with(mesh, edit, Self::changes_intersect)
     }
 
-    /// As [`Self::attempt`], but tests only pairs of triangles with a common corner. [`Self::crossing`] finds what else intersects.
+    /// As [`Self::attempt`], testing only pairs of triangles that share a corner. [`Self::crossing`] finds the other intersections.
     ///
     /// # Errors
     /// As [`Self::attempt`].
@@ -155,18 +156,18 @@ impl Embedding {
         mesh: &mut Mesh,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
     ) -> Result<T, EditError> {
-        self.attempt_with(mesh, edit, Self::one_rings_cross)
+        self.attempt_with(mesh, edit, Self::one_rings_intersect)
     }
 
     fn attempt_with<T>(
         &mut self,
         mesh: &mut Mesh,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
-        crosses: fn(&mut Self, &Mesh, &[[VertexId; 3]]) -> bool,
+        intersects: fn(&mut Self, &Mesh, &[[VertexId; 3]]) -> bool,
     ) -> Result<T, EditError> {
         self.follow(mesh);
         mesh.begin();
-        let done = edit(mesh).and_then(|done| self.accept_changes(mesh, crosses).map(|()| done));
+        let done = edit(mesh).and_then(|done| self.accept_changes(mesh, intersects).map(|()| done));
         if done.is_ok() {
             mesh.commit();
         } else {
@@ -176,31 +177,31 @@ impl Embedding {
         done
     }
 
-    /// Follows the changes since [`Mesh::begin`], unless they make triangles cross.
+    /// Takes over the changes since [`Mesh::begin`], unless they make triangles intersect.
     fn accept_changes(
         &mut self,
         mesh: &Mesh,
-        crosses: fn(&mut Self, &Mesh, &[[VertexId; 3]]) -> bool,
+        intersects: fn(&mut Self, &Mesh, &[[VertexId; 3]]) -> bool,
     ) -> Result<(), EditError> {
         let changed = mesh.changed_triangles();
-        if crosses(self, mesh, &changed) {
+        if intersects(self, mesh, &changed) {
             return Err(EditError::WouldCross);
         }
         self.follow_changes(mesh, &changed);
         Ok(())
     }
 
-    /// Whether no two triangles share more than their common corners and edges.
+    /// Whether no two triangles share more than their common corners and edges; exact.
     pub fn is_embedded(&mut self, mesh: &Mesh) -> bool {
-        self.look_everywhere(mesh).is_empty()
+        self.check_all(mesh).is_empty()
     }
 
-    /// The corners of all triangles that cross another, in order.
+    /// The corners of all triangles that intersect another, sorted.
     pub fn crossing(&mut self, mesh: &Mesh) -> Vec<VertexId> {
-        self.look_everywhere(mesh)
+        self.check_all(mesh)
     }
 
-    /// The number of near vertices that were looked at for edits, over all time.
+    /// The number of nearby vertices visited for edits since the beginning: a measure of work.
     pub fn effort(&self) -> u64 {
         self.effort
     }
@@ -215,38 +216,38 @@ impl Embedding {
         count
     }
 
-    /// Has room for what is known of so many vertices; of new ones nothing is.
-    fn make_room(&mut self, slots: usize) {
+    /// Resizes the arrays by vertex; nothing is known of new vertices.
+    fn resize_for(&mut self, slots: usize) {
         self.longest.resize(slots, 0.0);
-        self.near.resize(slots, SmallVec::new());
-        self.close.resize(slots, true);
-        self.room.resize(slots, Room::NONE);
+        self.nearby.resize(slots, SmallVec::new());
+        self.may_touch.resize(slots, true);
+        self.motion_bounds.resize(slots, MotionBounds::NONE);
     }
 
-    /// Notes the longest edge at `v`.
-    fn see(&mut self, mesh: &Mesh, v: VertexId) {
+    /// Measures the longest edge at `v`.
+    fn measure(&mut self, mesh: &Mesh, v: VertexId) {
         self.longest[v.index()] = longest_edge(mesh, v);
     }
 
-    /// Enters `v` in the grid as it is, and as it was seen.
+    /// Enters `v` in the grid, with its longest edge as last measured.
     fn enter(&mut self, mesh: &Mesh, v: VertexId) {
         self.grid.set(v, mesh.position(v), self.longest[v.index()]);
     }
 
-    /// Takes the changes since [`Mesh::begin`] into the grid.
+    /// Updates grid and motion bounds by the changes since [`Mesh::begin`].
     fn follow_changes(&mut self, mesh: &Mesh, changed: &[[VertexId; 3]]) {
-        self.make_room(mesh.slots());
+        self.resize_for(mesh.slots());
         for v in mesh.touched() {
-            self.fresh.push(v);
+            self.edited.push(v);
             self.forget(v);
             if mesh.is_live(v) {
-                self.see(mesh, v);
+                self.measure(mesh, v);
                 self.enter(mesh, v);
             } else {
                 self.grid.remove(v);
             }
         }
-        // Neighbours of what moved have longer edges, too.
+        // Edges of the neighbours of moved vertices may have become longer.
         for names in changed {
             let [a, b, c] = names.map(|v| mesh.position(v));
             let square = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
@@ -260,15 +261,15 @@ impl Embedding {
         }
     }
 
-    /// Nothing is known any more of `v`, which an edit made or changed.
+    /// Discards what is known of `v`, which an edit made or changed.
     fn forget(&mut self, v: VertexId) {
-        self.close[v.index()] = true;
-        if std::mem::replace(&mut self.room[v.index()], Room::NONE) != Room::NONE {
-            self.fresh.push(v);
+        self.may_touch[v.index()] = true;
+        if std::mem::replace(&mut self.motion_bounds[v.index()], MotionBounds::NONE) != MotionBounds::NONE {
+            self.edited.push(v);
         }
     }
 
-    /// Takes all marks away.
+    /// Clears all marks.
     fn new_marks(&mut self, mesh: &Mesh) {
         self.marks.resize(mesh.slots(), 0);
         self.newest = self.newest.wrapping_add(1);
@@ -278,7 +279,7 @@ impl Embedding {
         }
     }
 
-    /// Marks `v` and says whether it was not.
+    /// Marks `v`; returns whether it was unmarked.
     fn mark(&mut self, v: VertexId) -> bool {
         std::mem::replace(&mut self.marks[v.index()], self.newest) != self.newest
     }

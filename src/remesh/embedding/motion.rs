@@ -1,53 +1,53 @@
-//! Vertices moved as far as nothing crosses.
+//! Moves vertices as far as no triangles intersect.
 
 use super::Embedding;
-use super::room::Concerns;
+use super::motion_bound::Checks;
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use std::collections::BTreeMap;
 
-/// A vertex that would cross goes this share of its way; where it still would, it is held where it was.
+/// Vertices of intersecting triangles move by this share of their displacement; where triangles still intersect, they stay.
 const LESS: f32 = 0.25;
 
 impl Embedding {
-    /// Whether the mesh crosses itself after it was moved: only where it did before.
+    /// Whether the mesh intersects itself after it was moved: only where it did before.
     pub fn left_crossing(&mut self, mesh: &Mesh) -> bool {
         self.stuck && !self.is_embedded(mesh)
     }
 
     /// As [`Self::carry_some`], of all vertices.
-    pub fn carry(&mut self, mesh: &mut Mesh, ways: &mut [Vec3]) -> Vec<(VertexId, f32)> {
+    pub fn carry(&mut self, mesh: &mut Mesh, displacements: &mut [Vec3]) -> Vec<(VertexId, f32)> {
         let all: Vec<VertexId> = mesh.vertices().collect();
-        self.carry_some(mesh, &all, ways)
+        self.carry_some(mesh, &all, displacements)
     }
 
-    /// Moves some vertices by their ways, and those with triangles that would cross by less: by a quarter of it, or
-    /// not at all. `ways`, by slot, becomes what was gone. Returns the vertices that were held back, in order,
-    /// and their shares.
+    /// Moves some vertices by `displacements`, by slot; those whose triangles would intersect by a quarter of it, or not at all.
+    /// `displacements` becomes what was applied. Returns the vertices that were held back, sorted, and the share of its displacement
+    /// that each moved by.
     ///
-    /// A mesh that did not cross itself does not afterwards: with every vertex held it would be where it was.
+    /// A mesh without self-intersections has none afterwards: in the worst case no vertex moves.
     pub fn carry_some(
         &mut self,
         mesh: &mut Mesh,
         moving: &[VertexId],
-        ways: &mut [Vec3],
+        displacements: &mut [Vec3],
     ) -> Vec<(VertexId, f32)> {
-        self.know(mesh);
+        self.sync(mesh);
         let mut from = std::mem::take(&mut self.from);
         from.resize(mesh.slots(), Vec3::ZERO);
         let positions = mesh.positions_mut();
         for i in moving.iter().map(|v| v.index()) {
             from[i] = positions[i];
-            positions[i] += ways[i];
+            positions[i] += displacements[i];
         }
-        self.doubts.resize(mesh.slots(), Concerns::default());
-        self.doubt_fresh(mesh);
-        self.spend_room(mesh, moving.iter().map(|&v| (v, from[v.index()])));
+        self.pending.resize(mesh.slots(), Checks::default());
+        self.mark_edited_dirty(mesh);
+        self.spend_motion(mesh, moving.iter().map(|&v| (v, from[v.index()])));
         let mut shares = BTreeMap::new();
         loop {
-            let mut held = self.look(mesh);
+            let mut held = self.check_dirty(mesh);
             let crossing = held.len();
-            held.retain(|v| ways[v.index()] != Vec3::ZERO);
+            held.retain(|v| displacements[v.index()] != Vec3::ZERO);
             self.stuck |= held.len() < crossing;
             if held.is_empty() {
                 break;
@@ -57,14 +57,14 @@ impl Embedding {
                 let i = v.index();
                 let share = shares.entry(v).or_insert(1.0);
                 let less = if *share == 1.0 { LESS } else { 0.0 };
-                (*share, ways[i]) = (*share * less, ways[i] * less);
-                mesh.set_position(v, from[i] + ways[i]);
+                (*share, displacements[i]) = (*share * less, displacements[i] * less);
+                mesh.set_position(v, from[i] + displacements[i]);
                 if mesh.position(v) == before {
                     // A displacement lost in rounding uses up no motion bound.
-                    self.doubt(v, Concerns::ALL);
+                    self.mark_dirty(v, Checks::ALL);
                 }
             }
-            self.spend_room(mesh, held.into_iter().zip(before));
+            self.spend_motion(mesh, held.into_iter().zip(before));
         }
         self.from = from;
         self.version = Some(mesh.geometry_version());
@@ -80,10 +80,9 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// What an edit puts near a vertex that has looked around itself before is seen by that vertex, though it does not move
-    /// so far that it would look again.
+    /// An edit may put triangles near a vertex whose skin is not used up.
     #[test]
-    fn what_an_edit_puts_near_is_seen() {
+    fn triangles_that_an_edit_puts_near_are_detected() {
         let mut mesh = Mesh::icosahedron(Vec3::ZERO, 1.0);
         let top = mesh.vertices().max_by(|&a, &b| mesh.position(a).z.total_cmp(&mesh.position(b).z)).unwrap();
         let tip = mesh.position(top);
@@ -94,25 +93,25 @@ mod tests {
         mesh.append(&small).unwrap();
         let mut embedding = Embedding::default();
         embedding.follow_with(&mesh, 1.2);
-        // All are looked at, and nothing is near.
-        let mut ways = vec![Vec3::X * 0.02; mesh.slots()];
-        assert!(embedding.carry(&mut mesh, &mut ways).is_empty());
+        // The first move finds nothing near.
+        let mut displacements = vec![Vec3::X * 0.02; mesh.slots()];
+        assert!(embedding.carry(&mut mesh, &mut displacements).is_empty());
         let moved: Vec<VertexId> = (first..mesh.slots()).map(VertexId::from_index).collect();
         let edit = |mesh: &mut Mesh| {
             moved.iter().for_each(|&v| mesh.set_position(v, mesh.position(v) - Vec3::Z * down));
             Ok(())
         };
         embedding.attempt(&mut mesh, edit).unwrap();
-        let mut ways = vec![Vec3::ZERO; mesh.slots()];
-        ways[top.index()] = Vec3::Z * 0.03;
-        let held = embedding.carry_some(&mut mesh, &[top], &mut ways);
+        let mut displacements = vec![Vec3::ZERO; mesh.slots()];
+        displacements[top.index()] = Vec3::Z * 0.03;
+        let held = embedding.carry_some(&mut mesh, &[top], &mut displacements);
         assert_eq!(count_crossings(&mesh.to_triangles()), 0);
         assert_eq!(held.len(), 1);
     }
 
-    /// What is known from before saves looks and changes nothing: it holds back what all looked at anew would.
+    /// Motion bounds save tests and change no result: the same vertices are held back as by a check of the whole mesh.
     #[test]
-    fn what_was_found_before_makes_no_difference() {
+    fn motion_bounds_change_no_result() {
         let mut all_held = 0;
         for seed in 0..30 {
             let random = &mut Random::new(seed);
@@ -122,7 +121,7 @@ mod tests {
             let speed = 0.1 * unit() * unit();
             // Neighbours go similar ways, each at its own speed; some stand still.
             let swirl = [(); 3].map(|()| Vec3::new(unit(), unit(), unit()));
-            let ways: Vec<Vec3> = (0..mesh.slots())
+            let displacements: Vec<Vec3> = (0..mesh.slots())
                 .map(|i| {
                     let p = mesh.position(VertexId::from_index(i));
                     let common = Vec3::from(swirl.map(|row| row.dot(p))) - p.normalize_or_zero();
@@ -135,8 +134,8 @@ mod tests {
             for step in 0..25 {
                 let (mut same, mut anew) = (mesh.clone(), Embedding::default());
                 anew.follow_with(&same, 0.9);
-                let expected = anew.carry(&mut same, &mut ways.clone());
-                let held = kept.carry(&mut mesh, &mut ways.clone());
+                let expected = anew.carry(&mut same, &mut displacements.clone());
+                let held = kept.carry(&mut mesh, &mut displacements.clone());
                 assert_eq!(held, expected, "seed {seed}, step {step}");
                 assert_eq!(mesh.positions(), same.positions(), "seed {seed}, step {step}");
                 all_held += held.len();
@@ -157,7 +156,7 @@ mod tests {
 
     /// Squares of small lengths are rounded to few digits or to 0, those of large ones are infinite.
     #[test]
-    fn nothing_crosses_in_any_unit() {
+    fn no_triangles_intersect_in_any_unit() {
         for power in (-44..=36).step_by(2) {
             let scale = libm::pow(10.0, f64::from(power)) as f32;
             let mut random = Random::new(5);
@@ -168,14 +167,14 @@ mod tests {
             let mut held = 0;
             for step in 0..40 {
                 let unit = |random: &mut Random| random.unit() as f32 - 0.5;
-                let mut ways = vec![Vec3::ZERO; mesh.slots()];
+                let mut displacements = vec![Vec3::ZERO; mesh.slots()];
                 for v in mesh.vertices() {
                     let together = Vec3::X * if v.index() < 12 { 0.1 } else { -0.1 };
-                    let way =
+                    let displacement =
                         together + Vec3::new(unit(&mut random), unit(&mut random), unit(&mut random)) * 0.8;
-                    ways[v.index()] = way * scale;
+                    displacements[v.index()] = displacement * scale;
                 }
-                held += embedding.carry(&mut mesh, &mut ways).len();
+                held += embedding.carry(&mut mesh, &mut displacements).len();
                 assert_eq!(count_crossings(&mesh.to_triangles()), 0, "10^{power}, step {step}");
             }
             assert!(held > 0, "10^{power}");

@@ -1,8 +1,7 @@
-//! The space a surface is handed out in: it must not cross itself there, either.
+//! The output space, where the mesh must not intersect itself either.
 //!
-//! A mesh that does not cross itself where it moves may do so after its positions are mapped to world space and rounded to single
-//! precision: sheets pressed on each other are nearer than that. So triangles that rounding could bring together are tested there,
-//! too, as they come out rounded.
+//! Sheets pressed on each other are nearer than the rounding of positions in world space, so that a mesh without self-intersections may
+//! have some after it was mapped there. Triangles that rounding can bring together are tested in that space, too, after rounding.
 
 use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Facet, facets_cross};
@@ -10,11 +9,11 @@ use crate::mesh::{Facet, facets_cross};
 /// Half a unit in the last place of single precision, relative to the number, times √3 for three axes and 2 to be safe.
 const ROUNDING: f64 = 2.1e-7;
 
-/// Coarser rounding than this, in lengths where the mesh moves, is no rounding: the space is too far away to hold the surface, and
-/// holding it back there would stop it.
+/// The coarsest rounding, in lengths of the mesh, that is respected. Beyond that the output space cannot represent the surface, and
+/// respecting it would stop all motion.
 const COARSEST: f64 = 0.01;
 
-/// A map to the output space, and how far rounding may move a vertex there.
+/// The map to the output space, and the largest displacement of a vertex by rounding there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OutputSpace {
     map: DAffine3,
@@ -40,7 +39,7 @@ impl OutputSpace {
         (rounding < COARSEST).then_some(Self { map, rounding: rounding as f32 })
     }
 
-    /// How far rounding in the output space may move a vertex, in lengths where the mesh moves.
+    /// The largest displacement of a vertex by rounding in the output space, in lengths of the mesh.
     pub(super) fn rounding(&self) -> f32 {
         self.rounding
     }
@@ -51,12 +50,12 @@ impl OutputSpace {
     }
 }
 
-/// Whether two triangles cross, where the mesh moves or in its output space.
-pub(super) fn cross(s: &Facet, t: &Facet, output: Option<&OutputSpace>) -> bool {
+/// Whether two triangles intersect, in the space of the mesh or in its output space.
+pub(super) fn intersect(s: &Facet, t: &Facet, output: Option<&OutputSpace>) -> bool {
     facets_cross(s, t) || output.is_some_and(|space| facets_cross(&space.facet(s), &space.facet(t)))
 }
 
-/// The box around a triangle and what rounding may add to it.
+/// The bounding box of a triangle, widened by the rounding of the output space.
 pub(super) fn bounds(facet: &Facet, output: Option<&OutputSpace>) -> Bounds {
     let Bounds { min, max } = Bounds::of(&facet.points);
     let margin = Vec3::splat(output.map_or(0.0, OutputSpace::rounding));

@@ -1,14 +1,14 @@
-//! √3 refinement without crossings.
+//! √3 refinement without self-intersections.
 
 use super::Embedding;
 use crate::mesh::{Mesh, MeshError, VertexId};
 
 impl Embedding {
-    /// Refines the mesh as [`Mesh::refine`] does, and puts old edges back where triangles across them would cross others.
+    /// Refines the mesh as [`Mesh::refine`] does, and flips new edges back where triangles would intersect others.
     ///
-    /// A point in the middle of each triangle leaves the surface as it is; only the new edges across the old ones change
-    /// it, as much as two triangles of a thin fold or of facing sheets may be apart. Where not even old edges help,
-    /// because triangles are as near as rounding, the mesh stays as it was. Returns whether it was refined.
+    /// Centre points do not change the surface; edges flipped across old ones do, by as much as the triangles of a thin fold or of facing
+    /// sheets are apart. Where flipping back does not help either, since triangles are as near as rounding, the mesh stays unrefined.
+    /// Returns whether it was refined.
     ///
     /// # Errors
     /// As [`Mesh::refine`].
@@ -17,7 +17,7 @@ impl Embedding {
         mesh.refine()?;
         let is_new = |v: &VertexId| v.index() >= before.slots();
         loop {
-            let crossing = self.look_everywhere(mesh);
+            let crossing = self.check_all(mesh);
             if crossing.is_empty() {
                 return Ok(true);
             }

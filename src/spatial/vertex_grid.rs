@@ -1,18 +1,17 @@
-//! The vertices of a mesh that moves, found by where their triangles may be.
+//! A hashed grid of the vertices of a moving mesh, each with the ball that holds its triangles.
 
 use crate::math::{Bounds, Vec3};
 use crate::mesh::VertexId;
 
-/// Levels of cells, a factor of four apart. All stars up to the size the grid was made for are on the first; one that is
-/// larger than those of the last is kept there, where it is found by looking further.
+/// Levels of cells, a factor of four apart. Balls up to the size the grid was made for are on the first; those too large for the last
+/// are kept there, and queries reach further for them.
 const LEVELS: usize = 10;
 const FACTOR: f32 = 4.0;
 
-/// Side of a cell in the longest edge of the stars it holds: twice the usual radius of a search, which so meets eight
-/// cells.
+/// Side of a cell in the largest radius on its level: twice the usual radius of a query, which then visits eight cells.
 const CELL: f32 = 1.5;
 
-/// Vertices in a bucket for which there is room, in the mean.
+/// Mean number of vertices in a bucket.
 const LOAD: usize = 2;
 
 /// The level of a vertex that is not in the grid.
@@ -21,66 +20,66 @@ const ABSENT: u32 = u32::MAX;
 /// No vertex.
 const NONE: u32 = u32::MAX;
 
-/// Vertices in a hashed grid, each on a level of cells as coarse as its star: the longest edge at the vertex.
+/// Vertices in a hashed grid, each on the level of cells that fits its longest edge.
 ///
-/// A vertex is entered, moved and removed one at a time, so that the grid follows a mesh of which little changes. It may
-/// also lag behind: searches find what they should as long as no vertex is further than `blur` from where it was entered.
-/// What they find comes in an order that depends on what happened before; nobody may rely on it.
+/// Vertices are entered, moved and removed one by one, so that the grid follows a mesh of which little changes. Queries are complete as
+/// long as no vertex is further than `blur` from where it was entered. The order of their results depends on earlier changes and must
+/// not be relied on.
 ///
-/// Where the whole mesh changes, cells are emptied first and filled when something is searched for, if ever.
+/// When most of the mesh changes, cells are emptied first, and filled again by the next query.
 #[derive(Clone, Debug, Default)]
-pub struct StarGrid {
+pub struct VertexGrid {
     blur: f32,
-    /// Bound of the longest edges on each level, and the longest one that has been there.
+    /// By level, the bound of its longest edges, and the longest one entered.
     bound: [f32; LEVELS],
     reach: [f32; LEVELS],
     inverse_cell: [f32; LEVELS],
-    /// How many vertices are on each level.
+    /// By level, the number of vertices.
     population: [u32; LEVELS],
     mask: u32,
-    /// By bucket, the vertex entered last.
+    /// By bucket, the head of its list: the vertex entered last.
     heads: Vec<u32>,
-    /// Whether vertices are in their buckets.
+    /// Whether vertices are linked into buckets.
     filled: bool,
     /// By vertex slot.
-    places: Vec<Place>,
+    entries: Vec<Entry>,
 }
 
-/// A vertex as it was entered.
+/// The ball around a vertex that holds its one-ring, as entered.
 #[derive(Clone, Copy, Debug)]
-pub struct Star {
-    /// Where it was.
+pub struct VertexBall {
+    /// The centre.
     pub position: Vec3,
-    /// Its longest edge.
+    /// The radius: the longest edge at the vertex.
     pub longest: f32,
-    /// Its name.
+    /// The vertex.
     pub vertex: VertexId,
 }
 
-/// The cell of a vertex: its level and the hash of its coordinates, of which the last bits name the bucket.
+/// The entry of a vertex: its level, and the hash of its cell, whose last bits are the bucket.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Place {
+struct Entry {
     level: u32,
     key: u32,
     position: Vec3,
     longest: f32,
-    /// The vertex entered before it into the same bucket.
+    /// The next vertex in the list of the bucket.
     next: u32,
 }
 
-/// How near two stars are that are said to be near each other.
+/// The distance up to which two vertices count as near each other, by their longest edges.
 #[derive(Clone, Copy, Debug)]
-pub struct Nearness {
-    /// At least so far apart, …
+pub struct Proximity {
+    /// The least distance.
     pub least: f32,
-    /// … and so far beyond …
+    /// Added to …
     pub margin: f32,
-    /// … this share of the longest edge of both.
+    /// … this share of the longer of both edges.
     pub share: f32,
 }
 
-impl Nearness {
-    /// The distance below which two stars with these longest edges are near each other.
+impl Proximity {
+    /// The distance for two vertices with these longest edges.
     #[inline]
     pub fn between(self, longest: f32, other: f32) -> f32 {
         let reach = self.margin + self.share * if other > longest { other } else { longest };
@@ -88,11 +87,10 @@ impl Nearness {
     }
 }
 
-const NOWHERE: Place = Place { level: ABSENT, key: 0, position: Vec3::ZERO, longest: 0.0, next: NONE };
+const ABSENT_ENTRY: Entry = Entry { level: ABSENT, key: 0, position: Vec3::ZERO, longest: 0.0, next: NONE };
 
-impl StarGrid {
-    /// An empty grid, fastest for stars whose longest edge is somewhat below `edge` (positive), with room for
-    /// `vertices`; more may come.
+impl VertexGrid {
+    /// An empty grid for about `vertices` vertices, fastest if most longest edges are a little below `edge`, which is positive.
     pub fn new(edge: f32, blur: f32, vertices: usize) -> Self {
         let mut grid = Self { blur, ..Self::default() };
         let mut bound = edge;
@@ -101,54 +99,53 @@ impl StarGrid {
             grid.inverse_cell[level] = 1.0 / (CELL * bound);
             bound *= FACTOR;
         }
-        grid.places = vec![NOWHERE; vertices];
+        grid.entries = vec![ABSENT_ENTRY; vertices];
         grid
     }
 
-    /// Enters `v` or moves it: it is at `position`, its longest edge `longest`.
+    /// Enters or moves `v`.
     pub fn set(&mut self, v: VertexId, position: Vec3, longest: f32) {
-        if v.index() >= self.places.len() {
-            self.places.resize(v.index() + 1, NOWHERE);
-            // Chains got long: they are made anew when next needed.
-            self.filled &= self.places.len() <= 2 * LOAD * self.heads.len();
+        if v.index() >= self.entries.len() {
+            self.entries.resize(v.index() + 1, ABSENT_ENTRY);
+            // Lists have become long: they are rebuilt by the next query.
+            self.filled &= self.entries.len() <= 2 * LOAD * self.heads.len();
         }
         let level = self.level_of(longest);
-        let old = self.places[v.index()];
-        let mut place = Place { level: level as u32, position, longest, ..old };
+        let old = self.entries[v.index()];
+        let mut entry = Entry { level: level as u32, position, longest, ..old };
         if self.filled {
             if longest > self.reach[level] {
                 self.reach[level] = longest;
             }
-            place.key = self.key(self.cell(position, level), level);
-            if (old.level, old.key) != (place.level, place.key) {
+            entry.key = self.key(self.cell(position, level), level);
+            if (old.level, old.key) != (entry.level, entry.key) {
                 self.leave(v, old);
                 self.population[level] += 1;
-                let head = self.head_mut(place.key);
-                place.next = std::mem::replace(head, v.0);
+                let head = self.head_mut(entry.key);
+                entry.next = std::mem::replace(head, v.0);
             }
         }
-        self.places[v.index()] = place;
+        self.entries[v.index()] = entry;
     }
 
-    /// Takes all vertices out of their cells, until [`Self::fill_cells`]. So long they are entered and moved in no time, and
-    /// searches look at all of them.
+    /// Unlinks all vertices from their cells until [`Self::fill_cells`]. Until then changes cost nothing, and queries visit all vertices.
     pub fn empty_cells(&mut self) {
         self.filled = false;
     }
 
-    /// Puts all vertices into their cells, if they are not there.
+    /// Links all vertices into their cells, unless they are.
     pub fn fill_cells(&mut self) {
         if self.filled {
             return;
         }
-        let count = (self.places.len() / LOAD).max(64).next_power_of_two();
+        let count = (self.entries.len() / LOAD).max(64).next_power_of_two();
         self.mask = count as u32 - 1;
         self.heads.clear();
         self.heads.resize(count, NONE);
         (self.population, self.reach) = ([0; LEVELS], [0.0; LEVELS]);
-        // Backwards, so that chains go on in the order of memory.
-        for i in (0..self.places.len()).rev() {
-            let Place { level, position, longest, .. } = self.places[i];
+        // Backwards, so that lists follow the order of memory.
+        for i in (0..self.entries.len()).rev() {
+            let Entry { level, position, longest, .. } = self.entries[i];
             if level == ABSENT {
                 continue;
             }
@@ -159,48 +156,48 @@ impl StarGrid {
             }
             let key = self.key(self.cell(position, level), level);
             let next = std::mem::replace(self.head_mut(key), i as u32);
-            self.places[i] = Place { key, next, ..self.places[i] };
+            self.entries[i] = Entry { key, next, ..self.entries[i] };
         }
         self.filled = true;
     }
 
-    /// Tells that `v`, which is in the grid, has an edge as long as `edge`.
+    /// Raises the longest edge of `v`, which is in the grid, to `edge` if it is shorter.
     pub fn stretch(&mut self, v: VertexId, edge: f32) {
-        let Place { position, longest, .. } = self.places[v.index()];
+        let Entry { position, longest, .. } = self.entries[v.index()];
         if edge > longest {
             self.set(v, position, edge);
         }
     }
 
-    /// Where `v`, which is in the grid, was entered.
+    /// The position with which `v`, which is in the grid, was entered.
     #[inline]
     pub fn position(&self, v: VertexId) -> Vec3 {
-        self.places[v.index()].position
+        self.entries[v.index()].position
     }
 
-    /// The longest edge that `v`, which is in the grid, was entered with.
+    /// The longest edge with which `v`, which is in the grid, was entered.
     #[inline]
     pub fn longest(&self, v: VertexId) -> f32 {
-        self.places[v.index()].longest
+        self.entries[v.index()].longest
     }
 
-    /// `v`, which is in the grid, as it was entered.
+    /// The ball of `v`, which is in the grid.
     #[inline]
-    pub fn star(&self, v: VertexId) -> Star {
-        let Place { position, longest, .. } = self.places[v.index()];
-        Star { position, longest, vertex: v }
+    pub fn ball(&self, v: VertexId) -> VertexBall {
+        let Entry { position, longest, .. } = self.entries[v.index()];
+        VertexBall { position, longest, vertex: v }
     }
 
-    /// Takes `v` out, if it is in.
+    /// Removes `v` if it is in the grid.
     pub fn remove(&mut self, v: VertexId) {
-        if let Some(place) = self.places.get_mut(v.index()) {
-            let old = std::mem::replace(place, NOWHERE);
+        if let Some(entry) = self.entries.get_mut(v.index()) {
+            let old = std::mem::replace(entry, ABSENT_ENTRY);
             self.leave(v, old);
         }
     }
 
-    /// Takes `v` out of the bucket of `old`, its place there.
-    fn leave(&mut self, v: VertexId, old: Place) {
+    /// Unlinks `v` from the bucket of `old`, its entry there.
+    fn leave(&mut self, v: VertexId, old: Entry) {
         if old.level == ABSENT || !self.filled {
             return;
         }
@@ -211,7 +208,7 @@ impl StarGrid {
             return;
         }
         while at != NONE {
-            let entry = &mut self.places[at as usize];
+            let entry = &mut self.entries[at as usize];
             if entry.next == v.0 {
                 entry.next = old.next;
                 return;
@@ -220,39 +217,38 @@ impl StarGrid {
         }
     }
 
-    /// Calls `found` with every vertex that is within `share` × its longest edge of the box, axis by axis, and some that
-    /// are a little further away.
+    /// Calls `found` with every vertex within `share` × its longest edge of the box, axis by axis, and with some a little further away.
     ///
-    /// Every triangle that meets the box has a corner among those found for 1/√3, the largest distance from a point of a
-    /// triangle to its nearest corner in its longest edge.
+    /// With a share of 1/√3 every triangle that meets the box has a corner among them: no point of a triangle is further from its
+    /// nearest corner, in its longest edge.
     pub fn near_box(&self, bounds: &Bounds, share: f32, mut found: impl FnMut(VertexId)) {
         let radius = |reach| share * (reach + 2.0 * self.blur);
-        self.search(bounds, radius, &mut |entry: &Star| found(entry.vertex));
+        self.search(bounds, radius, &mut |ball: &VertexBall| found(ball.vertex));
     }
 
-    /// Calls `found` with every vertex within `radius` of the point, and some that are a little further away.
+    /// Calls `found` with every vertex within `radius` of the point, and with some a little further away.
     pub fn near_point(&self, p: Vec3, radius: f32, mut found: impl FnMut(VertexId)) {
         let point = Bounds { min: p, max: p };
-        self.search(&point, |_| radius, &mut |star: &Star| found(star.vertex));
+        self.search(&point, |_| radius, &mut |ball: &VertexBall| found(ball.vertex));
     }
 
-    /// Puts into `found` every vertex within [`Nearness::between`] some star of the box that has edges up to `longest`,
-    /// axis by axis, and some that are a little further away.
-    pub fn near_stars(&self, bounds: &Bounds, longest: f32, near: Nearness, found: &mut Vec<Star>) {
+    /// Puts into `found` every vertex near a box of vertices with edges up to `longest`, by [`Proximity::between`] and axis by axis, and
+    /// some a little further away.
+    pub fn near_balls(&self, bounds: &Bounds, longest: f32, near: Proximity, found: &mut Vec<VertexBall>) {
         found.clear();
         let radius = |other: f32| near.between(longest, other + 2.0 * self.blur) + self.blur;
-        self.search(bounds, radius, &mut |star: &Star| found.push(*star));
+        self.search(bounds, radius, &mut |ball: &VertexBall| found.push(*ball));
     }
 
-    /// Names the cell of `v`, which is in the grid with its cells filled; others may have the same name.
+    /// The hash of the cell of `v`, which is in the grid with its cells filled.
     #[inline]
-    pub fn cell_name(&self, v: VertexId) -> u32 {
-        self.places[v.index()].key
+    pub fn cell_key(&self, v: VertexId) -> u32 {
+        self.entries[v.index()].key
     }
 
-    /// Calls `found` with every vertex that may be within `radius(longest edge of its level)` of the box, axis by axis.
+    /// Calls `found` with every vertex that may be within `radius` of the box, axis by axis; that is by the longest edge of its level.
     #[inline]
-    fn search(&self, bounds: &Bounds, radius: impl Fn(f32) -> f32, found: &mut impl FnMut(&Star)) {
+    fn search(&self, bounds: &Bounds, radius: impl Fn(f32) -> f32, found: &mut impl FnMut(&VertexBall)) {
         if !self.filled {
             return self.search_unfilled(bounds, radius, found);
         }
@@ -263,18 +259,23 @@ impl StarGrid {
         }
     }
 
-    fn search_unfilled(&self, bounds: &Bounds, radius: impl Fn(f32) -> f32, found: &mut impl FnMut(&Star)) {
-        for (i, place) in self.places.iter().enumerate().filter(|(_, place)| place.level != ABSENT) {
-            let around = Vec3::splat(radius(place.longest) + self.blur);
+    fn search_unfilled(
+        &self,
+        bounds: &Bounds,
+        radius: impl Fn(f32) -> f32,
+        found: &mut impl FnMut(&VertexBall),
+    ) {
+        for (i, entry) in self.entries.iter().enumerate().filter(|(_, entry)| entry.level != ABSENT) {
+            let around = Vec3::splat(radius(entry.longest) + self.blur);
             let wide = Bounds { min: bounds.min - around, max: bounds.max + around };
-            if wide.contains(place.position) {
-                found(&self.star(VertexId::from_index(i)));
+            if wide.contains(entry.position) {
+                found(&self.ball(VertexId::from_index(i)));
             }
         }
     }
 
     #[inline]
-    fn search_level(&self, level: usize, wide: &Bounds, found: &mut impl FnMut(&Star)) {
+    fn search_level(&self, level: usize, wide: &Bounds, found: &mut impl FnMut(&VertexBall)) {
         let (low, high) = (self.cell(wide.min, level), self.cell(wide.max, level));
         let counts = [0, 1, 2].map(|k| i64::from(high[k]) - i64::from(low[k]) + 1);
         let cells = counts[0] as f64 * counts[1] as f64 * counts[2] as f64;
@@ -290,23 +291,23 @@ impl StarGrid {
         }
     }
 
-    /// Vertices of other cells in the same bucket are passed over, so that none is found twice.
+    /// Skips vertices of other cells in the same bucket, so that none is found twice.
     #[inline]
-    fn search_cell(&self, key: u32, wide: &Bounds, found: &mut impl FnMut(&Star)) {
+    fn search_cell(&self, key: u32, wide: &Bounds, found: &mut impl FnMut(&VertexBall)) {
         let mut at = self.heads[(key & self.mask) as usize];
         while at != NONE {
-            let &Place { position, longest, next, .. } = &self.places[at as usize];
-            if self.places[at as usize].key == key && wide.contains(position) {
-                found(&Star { position, longest, vertex: VertexId(at) });
+            let &Entry { position, longest, next, .. } = &self.entries[at as usize];
+            if self.entries[at as usize].key == key && wide.contains(position) {
+                found(&VertexBall { position, longest, vertex: VertexId(at) });
             }
             at = next;
         }
     }
 
-    fn search_all(&self, level: usize, wide: &Bounds, found: &mut impl FnMut(&Star)) {
-        for (i, place) in self.places.iter().enumerate() {
-            if place.level as usize == level && wide.contains(place.position) {
-                found(&self.star(VertexId::from_index(i)));
+    fn search_all(&self, level: usize, wide: &Bounds, found: &mut impl FnMut(&VertexBall)) {
+        for (i, entry) in self.entries.iter().enumerate() {
+            if entry.level as usize == level && wide.contains(entry.position) {
+                found(&self.ball(VertexId::from_index(i)));
             }
         }
     }
@@ -321,7 +322,7 @@ impl StarGrid {
         [floor(scaled.x), floor(scaled.y), floor(scaled.z)]
     }
 
-    /// Hash of a cell; those above each other lie side by side, columns and levels far apart.
+    /// The hash of a cell: consecutive along z, scattered over columns and levels.
     #[inline]
     fn key(&self, [x, y, z]: [i32; 3], level: usize) -> u32 {
         let column = (x as u32).wrapping_mul(73_856_093) ^ (y as u32).wrapping_mul(19_349_663);
@@ -354,12 +355,11 @@ mod tests {
         }
     }
 
-    /// Where vertices are now, with their longest edges; `None` for those taken out.
+    /// Positions and longest edges; `None` for removed vertices.
     type Known = Vec<Option<(Vec3, f32)>>;
 
-    /// Enters, moves and takes out vertices at random, with cells filled and empty; most stars are ordinary, some tiny, some
-    /// huge.
-    fn shuffled(grid: &mut StarGrid, next: &mut impl FnMut() -> f32) -> Known {
+    /// Enters, moves and removes vertices at random, with cells filled and empty; most edges are ordinary, some tiny, some huge.
+    fn shuffled(grid: &mut VertexGrid, next: &mut impl FnMut() -> f32) -> Known {
         let mut known: Known = vec![None; 600];
         for _ in 0..3000 {
             let v = (next() * 600.0) as usize;
@@ -396,7 +396,7 @@ mod tests {
     fn searches_find_what_brute_force_finds() {
         let mut next = numbers(3);
         for edge in [0.01, 1.0, 30.0] {
-            let mut grid = StarGrid::new(edge, 0.0, 10);
+            let mut grid = VertexGrid::new(edge, 0.0, 10);
             let known = shuffled(&mut grid, &mut next);
             for turn in 0..100 {
                 if turn == 20 {
@@ -413,12 +413,12 @@ mod tests {
                 let in_box = |q, longest| bounds.distance_squared(q).sqrt() < 0.5 * f64::from(longest);
                 assert_complete(found, &expected(&known, in_box));
 
-                let near = Nearness { least: 0.7, margin: 0.1, share: 0.8 };
+                let near = Proximity { least: 0.7, margin: 0.1, share: 0.8 };
                 let mut found = Vec::new();
-                grid.near_stars(&bounds, 1.1, near, &mut found);
+                grid.near_balls(&bounds, 1.1, near, &mut found);
                 let in_reach =
                     |q, longest| bounds.distance_squared(q).sqrt() < f64::from(near.between(1.1, longest));
-                let found = found.into_iter().map(|star| star.vertex.index()).collect();
+                let found = found.into_iter().map(|ball| ball.vertex.index()).collect();
                 assert_complete(found, &expected(&known, in_reach));
             }
         }
@@ -427,7 +427,7 @@ mod tests {
     #[test]
     fn searches_allow_for_positions_that_are_a_blur_old() {
         let mut next = numbers(4);
-        let mut grid = StarGrid::new(1.0, 0.25, 10);
+        let mut grid = VertexGrid::new(1.0, 0.25, 10);
         let mut known = shuffled(&mut grid, &mut next);
         grid.fill_cells();
         for entry in known.iter_mut().flatten() {

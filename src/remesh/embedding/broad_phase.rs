@@ -1,0 +1,151 @@
+//! Broad phase: pairs of non-adjacent vertices that are near each other, so that their triangles may intersect soon.
+
+use super::motion_bound::Check;
+use super::{Embedding, NEAREST_CORNER, PIERCING, SEARCH_SKIN};
+use crate::math::Bounds;
+use crate::mesh::{Mesh, VertexId};
+use crate::spatial::{Proximity, VertexBall, near_pairs};
+
+/// The whole mesh is swept if at least one in this many vertices has to be searched around; else only those are. Found by timing.
+const MANY: usize = 8;
+
+impl Embedding {
+    /// Updates the positions of dirty vertices in the grid, and the pairs of those whose skin is used up.
+    pub(super) fn update_pairs(&mut self, mesh: &Mesh, dirty: &[VertexId]) {
+        let is_entered = self.entered == Some(mesh.geometry_version());
+        let count = dirty.iter().filter(|&&v| self.is_searched_around(v)).count();
+        let many = MANY * count >= mesh.vertex_count();
+        if many {
+            self.grid.empty_cells();
+        } else if count > 0 {
+            self.grid.fill_cells();
+        }
+        for &v in dirty {
+            if !is_entered {
+                self.measure(mesh, v);
+            }
+            if self.is_searched_around(v) {
+                self.nearby[v.index()].clear();
+                self.may_touch[v.index()] = false;
+                self.motion_bounds[v.index()].set(Check::Search, SEARCH_SKIN * self.edge);
+                if !is_entered {
+                    self.enter(mesh, v);
+                }
+            }
+        }
+        if many {
+            self.sweep(mesh);
+        } else if count > 0 {
+            self.search(mesh, dirty);
+        }
+    }
+
+    fn is_searched_around(&self, v: VertexId) -> bool {
+        self.pending[v.index()].has(Check::Search)
+    }
+
+    /// Finds pairs by a sweep over the whole mesh.
+    pub(super) fn sweep(&mut self, mesh: &Mesh) {
+        let proximity = self.proximity();
+        let balls = mesh.vertices().map(|v| self.grid.ball(v)).collect();
+        near_pairs(balls, proximity, |a, b| {
+            if self.is_searched_around(a.vertex) || self.is_searched_around(b.vertex) {
+                self.add_pair(mesh, a, b, proximity);
+            }
+        });
+    }
+
+    /// Finds pairs by grid queries around vertices, those of one cell together.
+    pub(super) fn search(&mut self, mesh: &Mesh, dirty: &[VertexId]) {
+        let proximity = self.proximity();
+        let searched = dirty.iter().filter(|&&v| self.is_searched_around(v));
+        let mut searched: Vec<(u32, VertexId)> = searched.map(|&v| (self.grid.cell_key(v), v)).collect();
+        searched.sort_unstable();
+        let mut near = Vec::new();
+        for cell in searched.chunk_by(|a, b| a.0 == b.0) {
+            let mut bounds = Bounds::EMPTY;
+            let mut longest = 0.0f32;
+            for ball in cell.iter().map(|&(_, v)| self.grid.ball(v)) {
+                bounds = bounds.joined(&Bounds::of(&[ball.position]));
+                longest = if ball.longest > longest { ball.longest } else { longest };
+            }
+            self.grid.near_balls(&bounds, longest, proximity, &mut near);
+            for &(_, v) in cell {
+                self.add_pairs_of(mesh, &self.grid.ball(v), &near, proximity);
+            }
+        }
+    }
+
+    fn add_pairs_of(&mut self, mesh: &Mesh, own: &VertexBall, near: &[VertexBall], proximity: Proximity) {
+        for ball in near {
+            let reach = proximity.between(own.longest, ball.longest);
+            let square = ball.position.distance_squared(own.position);
+            if square <= reach * reach && !self.is_checked_from(ball.vertex, own.vertex, Check::Search) {
+                self.add_pair(mesh, own, ball, proximity);
+            }
+        }
+    }
+
+    /// Stores a pair, unless the two are the same or adjacent.
+    fn add_pair(&mut self, mesh: &Mesh, a: &VertexBall, b: &VertexBall, proximity: Proximity) {
+        if a.vertex == b.vertex || mesh.ring(a.vertex).contains(b.vertex) {
+            return;
+        }
+        let is_close = a.position.distance_squared(b.position) < proximity.least * proximity.least;
+        for (v, w) in [(a.vertex, b.vertex), (b.vertex, a.vertex)] {
+            if !self.nearby[v.index()].contains(&w) {
+                self.nearby[v.index()].push(w);
+            }
+            if is_close {
+                self.may_touch[v.index()] = true;
+            }
+        }
+    }
+
+    /// How near two vertices are that can intersect or touch before either is searched around again.
+    fn proximity(&self) -> Proximity {
+        // Distance and edges change by twice the skin at most.
+        let change = 2.0 * (SEARCH_SKIN * self.edge + self.finest());
+        Proximity {
+            least: NEAREST_CORNER * self.edge + change,
+            margin: change * (1.0 + PIERCING),
+            share: PIERCING,
+        }
+    }
+
+    /// The vertices in a box, sorted.
+    pub fn vertices_in(&mut self, mesh: &Mesh, bounds: &Bounds) -> Vec<VertexId> {
+        self.follow(mesh);
+        let mut found = Vec::new();
+        self.grid.near_box(bounds, 0.0, |v| found.push(v));
+        found.retain(|&v| bounds.contains(mesh.position(v)));
+        found.sort_unstable();
+        found
+    }
+
+    /// Whether [`Self::for_each_contact`] may find any for `v`.
+    pub fn may_have_contacts(&self, v: VertexId) -> bool {
+        self.may_touch[v.index()]
+    }
+
+    /// Calls `found` with every vertex that is not adjacent to `v` and nearer than `distance`, and with the squared distance. `distance`
+    /// is at most the contact distance of the sampling that belongs to the ordinary edge.
+    pub fn for_each_contact(
+        &self,
+        mesh: &Mesh,
+        v: VertexId,
+        distance: f32,
+        mut found: impl FnMut(VertexId, f32),
+    ) {
+        if !self.may_have_contacts(v) {
+            return;
+        }
+        let (p, ring) = (mesh.position(v), mesh.ring(v));
+        self.grid.near_point(p, distance, |w| {
+            let square = mesh.position(w).distance_squared(p);
+            if square < distance * distance && w != v && !ring.contains(w) {
+                found(w, square);
+            }
+        });
+    }
+}

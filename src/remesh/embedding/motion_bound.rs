@@ -1,0 +1,125 @@
+//! Motion bounds: how far the one-ring of each vertex may move before the vertex must be tested again.
+//!
+//! A test of the triangles at two vertices returns a clearance: they cannot intersect before some vertex of both one-rings has moved
+//! that far. So they are tested again when the largest displacements in one of the two one-rings add up to the clearance.
+
+use super::one_ring::higher;
+use super::{Embedding, FINEST};
+use crate::math::Vec3;
+use crate::mesh::{Mesh, VertexId};
+
+/// A kind of check with a motion bound of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Check {
+    /// Pairs of triangles that are both at the vertex, or one at the vertex and one at an adjacent one.
+    OneRing,
+    /// Pairs of triangles at the vertex and at a non-adjacent one near it.
+    Nearby,
+    /// The search for non-adjacent vertices near it.
+    Search,
+}
+
+const CHECKS: [Check; 3] = [Check::OneRing, Check::Nearby, Check::Search];
+
+/// A set of checks.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Checks(u8);
+
+impl Checks {
+    pub(super) const ALL: Self = Self(7);
+
+    #[inline]
+    pub(super) fn has(self, one: Check) -> bool {
+        self.0 & (1 << one as u8) != 0
+    }
+
+    #[inline]
+    fn with(self, one: Check) -> Self {
+        Self(self.0 | (1 << one as u8))
+    }
+
+    pub(super) fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+}
+
+/// How far a one-ring may still move, by check; used up where it is not positive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct MotionBounds([f32; 3]);
+
+impl MotionBounds {
+    /// Of a vertex that was never tested.
+    pub(super) const NONE: Self = Self([0.0; 3]);
+
+    pub(super) fn set(&mut self, check: Check, clearance: f32) {
+        self.0[check as usize] = clearance;
+    }
+
+    /// Lowers a bound to `clearance` if it is higher.
+    pub(super) fn lower(&mut self, check: Check, clearance: f32) {
+        let own = &mut self.0[check as usize];
+        *own = if *own < clearance { *own } else { clearance };
+    }
+
+    /// Subtracts a displacement; an infinite one uses up all bounds.
+    fn spend(&mut self, displacement: f32) {
+        self.0.iter_mut().for_each(|bound| {
+            *bound = if displacement < f32::INFINITY { *bound - displacement } else { 0.0 }
+        });
+    }
+
+    fn used_up(self) -> Checks {
+        let used = CHECKS.into_iter().filter(|&check| self.0[check as usize] <= 0.0);
+        used.fold(Checks::default(), Checks::with)
+    }
+}
+
+impl Embedding {
+    /// Subtracts displacements from the motion bounds of all one-rings that the moved vertices are in, and marks those dirty whose bounds
+    /// are used up. `moved`: the vertices, and their positions before.
+    pub(super) fn spend_motion(&mut self, mesh: &Mesh, moved: impl IntoIterator<Item = (VertexId, Vec3)>) {
+        self.travelled.resize(mesh.slots(), 0.0);
+        let mut touched = std::mem::take(&mut self.touched);
+        for (v, from) in moved {
+            // The displacement after rounding.
+            let to = mesh.position(v);
+            if from != to {
+                let displacement = higher(FINEST, to.distance(from));
+                for &w in mesh.ring(v).as_slice().iter().chain([&v]) {
+                    let travelled = &mut self.travelled[w.index()];
+                    if *travelled == 0.0 {
+                        touched.push(w);
+                    }
+                    *travelled = higher(*travelled, displacement);
+                }
+            }
+        }
+        for v in touched.drain(..) {
+            let travelled = std::mem::take(&mut self.travelled[v.index()]);
+            let bounds = &mut self.motion_bounds[v.index()];
+            bounds.spend(travelled);
+            let used_up = bounds.used_up();
+            self.mark_dirty(v, used_up);
+        }
+        self.touched = touched;
+    }
+
+    /// Marks vertices dirty that edits made or changed.
+    pub(super) fn mark_edited_dirty(&mut self, mesh: &Mesh) {
+        let mut edited = std::mem::take(&mut self.edited);
+        for v in edited.drain(..).filter(|&v| mesh.is_live(v)) {
+            self.mark_dirty(v, self.motion_bounds[v.index()].used_up());
+        }
+        self.edited = edited;
+    }
+
+    pub(super) fn mark_dirty(&mut self, v: VertexId, what: Checks) {
+        let pending = &mut self.pending[v.index()];
+        if pending.is_empty() && !what.is_empty() {
+            self.dirty.push(v);
+        }
+        // New pairs have to be tested, too.
+        let what = if what.has(Check::Search) { what.with(Check::Nearby) } else { what };
+        pending.0 |= what.0;
+    }
+}

@@ -1,0 +1,262 @@
+//! Narrow phase: tests the triangles at dirty vertices for intersections, and derives new motion bounds.
+
+use super::Embedding;
+use super::clearance::{fan_clearance, triangle_clearance};
+use super::motion_bound::{Check, Checks};
+use super::one_ring::{
+    corner_plane_clearance, flat_clearance, higher, intersections_around, intersections_between,
+    mid_plane_clearance, plane_clearance, sheet_clearance, spread_clearance,
+};
+use crate::mesh::{Mesh, VertexId};
+
+/// With a smaller clearance, in the ordinary edge, the next filter is tried, too.
+const AMPLE: f32 = 0.03;
+
+/// Checks of pairs of triangles.
+const PAIRS: [Check; 2] = [Check::OneRing, Check::Nearby];
+
+impl Embedding {
+    /// As [`Self::check_dirty`], for every vertex.
+    pub(super) fn check_all(&mut self, mesh: &Mesh) -> Vec<VertexId> {
+        self.sync(mesh);
+        self.pending.resize(mesh.slots(), Checks::default());
+        mesh.vertices().for_each(|v| self.mark_dirty(v, Checks::ALL));
+        self.check_dirty(mesh)
+    }
+
+    /// Runs the pending checks of dirty vertices and stores the clearances found as motion bounds. Returns the corners of all triangles
+    /// that intersect another, sorted.
+    pub(super) fn check_dirty(&mut self, mesh: &Mesh) -> Vec<VertexId> {
+        let dirty = std::mem::take(&mut self.dirty);
+        self.update_pairs(mesh, &dirty);
+        for (&v, check) in dirty.iter().flat_map(|v| PAIRS.map(|check| (v, check))) {
+            if self.pending[v.index()].has(check) {
+                self.motion_bounds[v.index()].set(check, f32::INFINITY);
+            }
+        }
+        let mut crossing = Vec::new();
+        for &v in &dirty {
+            let pending = self.pending[v.index()];
+            if pending.has(Check::OneRing) {
+                self.check_one_ring(mesh, v, &mut crossing);
+                self.check_along_edges(mesh, v, &mut crossing);
+            }
+            if pending.has(Check::Nearby) {
+                self.check_nearby(mesh, v, &mut crossing);
+            }
+        }
+        dirty.iter().for_each(|v| self.pending[v.index()] = Checks::default());
+        self.dirty = dirty;
+        self.dirty.clear();
+        crossing.sort_unstable();
+        crossing.dedup();
+        crossing
+    }
+
+    fn check_one_ring(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
+        let longest = self.longest[v.index()];
+        let mut clearance = flat_clearance(mesh, v, longest);
+        if !self.is_ample(clearance) {
+            clearance = higher(clearance, fan_clearance(mesh, v, longest));
+        }
+        if !self.store_clearance(clearance, Check::OneRing, [v, v]) {
+            intersections_around(mesh, v, self.output.as_ref(), crossing);
+        }
+    }
+
+    fn check_along_edges(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
+        let ring = mesh.ring(v).as_slice();
+        let mut right = ring[ring.len() - 1];
+        for (k, &w) in ring.iter().enumerate() {
+            let left = ring[if k + 1 == ring.len() { 0 } else { k + 1 }];
+            if !self.is_checked_from(w, v, Check::OneRing) {
+                let longest = self.longest_of(v, w);
+                let mut clearance = plane_clearance(mesh, [v, w], [left, right], longest);
+                if !self.is_ample(clearance) {
+                    clearance = higher(clearance, spread_clearance(mesh, [v, w], [left, right], longest));
+                }
+                let clearance = self.or_triangle_clearance(mesh, [v, w], clearance);
+                if !self.store_clearance(clearance, Check::OneRing, [v, w]) {
+                    intersections_between(mesh, [v, w], self.output.as_ref(), crossing);
+                }
+            }
+            right = w;
+        }
+    }
+
+    fn check_nearby(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
+        for k in 0..self.nearby[v.index()].len() {
+            let w = self.nearby[v.index()][k];
+            // Edits may have changed either since the pair was found.
+            if self.is_checked_from(w, v, Check::Nearby)
+                || !mesh.is_live(w)
+                || w == v
+                || mesh.ring(v).contains(w)
+            {
+                continue;
+            }
+            let clearance = self.or_triangle_clearance(mesh, [v, w], self.nearby_clearance(mesh, [v, w]));
+            if !self.store_clearance(clearance, Check::Nearby, [v, w]) {
+                intersections_between(mesh, [v, w], self.output.as_ref(), crossing);
+            }
+        }
+    }
+
+    /// The clearance between the one-rings of two non-adjacent vertices; not positive where exact tests have to decide.
+    fn nearby_clearance(&self, mesh: &Mesh, [v, w]: [VertexId; 2]) -> f32 {
+        let longest = self.longest_of(v, w);
+        if let Some(edge) = common_edge(mesh, v, w) {
+            return plane_clearance(mesh, [v, w], edge, longest);
+        }
+        match *mesh.common_neighbours(v, w) {
+            [] => {
+                let clearance = mid_plane_clearance(mesh, [v, w], longest);
+                if self.is_ample(clearance) {
+                    clearance
+                } else {
+                    higher(clearance, sheet_clearance(mesh, [v, w], longest))
+                }
+            }
+            [c] => corner_plane_clearance(mesh, [v, w], c, longest),
+            [c, d] => plane_clearance(mesh, [v, w], [c, d], longest),
+            _ => 0.0,
+        }
+    }
+
+    /// `clearance`, found by planes between two one-rings, or the one between their triangles where that is larger and needed.
+    fn or_triangle_clearance(&self, mesh: &Mesh, [v, w]: [VertexId; 2], clearance: f32) -> f32 {
+        if self.is_ample(clearance) {
+            return clearance;
+        }
+        higher(clearance, triangle_clearance(mesh, [v, w], self.longest_of(v, w), AMPLE * self.edge))
+    }
+
+    /// Stores the clearance of two vertices from each other as motion bounds; returns whether it is positive.
+    fn store_clearance(&mut self, clearance: f32, check: Check, ends: [VertexId; 2]) -> bool {
+        let is_clear = clearance > self.finest();
+        let clearance = if is_clear { clearance } else { 0.0 };
+        ends.into_iter().for_each(|v| self.motion_bounds[v.index()].lower(check, clearance));
+        is_clear
+    }
+
+    fn is_ample(&self, clearance: f32) -> bool {
+        clearance > AMPLE * self.edge
+    }
+
+    /// Whether the pair `w`, `v` is tested from `w`, so that `v` can skip it.
+    pub(super) fn is_checked_from(&self, w: VertexId, v: VertexId, check: Check) -> bool {
+        w < v && self.pending[w.index()].has(check)
+    }
+
+    fn longest_of(&self, v: VertexId, w: VertexId) -> f32 {
+        let (a, b) = (self.longest[v.index()], self.longest[w.index()]);
+        if a > b { a } else { b }
+    }
+}
+
+/// The edge that `v` and `w` are opposite to each other across.
+fn common_edge(mesh: &Mesh, v: VertexId, w: VertexId) -> Option<[VertexId; 2]> {
+    mesh.ring(v).pairs().find(|&(a, b)| mesh.ring(a).before(b) == Some(w)).map(|(a, b)| [a, b])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Random, Vec3};
+    use crate::mesh::{crossing_pairs, shapes};
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn any(random: &mut Random) -> Vec3 {
+        Vec3::new(random.unit() as f32, random.unit() as f32, random.unit() as f32) * 2.0 - 1.0
+    }
+
+    fn one_of<const N: usize>(random: &mut Random, values: [f32; N]) -> f32 {
+        values[random.below(N as u32) as usize]
+    }
+
+    /// A closed part of some size: smooth, rough or crumpled, perhaps flat or with a needle or with vertices on each other.
+    fn part(random: &mut Random) -> Mesh {
+        let mut mesh = match random.below(8) {
+            0 => Mesh::icosphere(Vec3::ZERO, 1.0, 1.0).unwrap(),
+            1..4 => Mesh::from_triangles(&shapes::torus(0.7, 0.3, 5, 4)).unwrap(),
+            _ => Mesh::icosahedron(Vec3::ZERO, 1.0),
+        };
+        let rough = one_of(random, [0.0, 1e-6, 0.05, 0.2, 1.0]);
+        let squash = Vec3::new(1.0, 1.0, one_of(random, [1.0, 1.0, 1.0, 0.5, 1e-3, 1e-9, 0.0]));
+        let size = one_of(random, [1.0, 1.0, 1.0, 0.1, 1e-4, 50.0]);
+        let place = any(random) * one_of(random, [0.0, 1.0, 3.0]);
+        for p in mesh.positions_mut() {
+            *p = (*p + any(random) * rough) * squash * size + place;
+        }
+        let count = mesh.slots() as u32;
+        let [v, w] = [(); 2].map(|()| VertexId(random.below(count)));
+        match random.below(6) {
+            0 => mesh.set_position(v, mesh.position(w)),
+            1 => mesh.set_position(v, any(random) * 5.0),
+            2 => mesh.set_position(v, any(random) * 1e4),
+            _ => {}
+        }
+        mesh
+    }
+
+    fn crumpled(random: &mut Random) -> Mesh {
+        let mut mesh = part(random);
+        for _ in 0..random.below(3) {
+            mesh.append(&part(random)).unwrap();
+        }
+        let offset = any(random) * one_of(random, [0.0, 0.0, 10.0, 1e4, 1e7]);
+        mesh.positions_mut().iter_mut().for_each(|p| *p += offset);
+        mesh
+    }
+
+    /// The corners of the triangles that intersect, by testing all pairs.
+    fn expected(mesh: &Mesh) -> Vec<VertexId> {
+        let triangles = mesh.to_triangles();
+        let names: Vec<VertexId> = mesh.vertices().collect();
+        let corners = |t: u32| triangles.triangles[t as usize].map(|v| names[v as usize]);
+        let mut crossing: Vec<VertexId> =
+            crossing_pairs(&triangles).into_iter().flatten().flat_map(corners).collect();
+        crossing.sort_unstable();
+        crossing.dedup();
+        crossing
+    }
+
+    #[test]
+    fn intersections_are_those_found_by_testing_all_pairs() {
+        let (mut sound, mut crossing) = (0, 0);
+        for seed in 0..2000 {
+            let random = &mut Random::new(seed);
+            let mesh = crumpled(random);
+            let mut embedding = Embedding::default();
+            embedding.follow_with(&mesh, one_of(random, [1.0, 0.3, 5.0, 1e-3]));
+            let found = embedding.check_all(&mesh);
+            assert_eq!(found, expected(&mesh), "seed {seed}");
+            if found.is_empty() { sound += 1 } else { crossing += 1 }
+        }
+        assert!(sound > 200 && crossing > 200, "{sound} sound, {crossing} crossing");
+    }
+
+    #[test]
+    fn a_sweep_and_a_search_around_each_vertex_find_the_same() {
+        for seed in 0..1000 {
+            let random = &mut Random::new(seed);
+            let mesh = crumpled(random);
+            let mut embedding = Embedding::default();
+            embedding.follow_with(&mesh, one_of(random, [1.0, 0.3, 5.0]));
+            let dirty: Vec<VertexId> = mesh.vertices().filter(|_| random.below(3) > 0).collect();
+            embedding.pending.resize(mesh.slots(), Checks::default());
+            dirty.iter().for_each(|&v| embedding.mark_dirty(v, Checks::ALL));
+            embedding.may_touch.fill(false);
+            let (mut swept, mut searched) = (embedding.clone(), embedding);
+            swept.sweep(&mesh);
+            searched.grid.fill_cells();
+            searched.search(&mesh, &dirty);
+            for v in mesh.vertices() {
+                [&mut swept, &mut searched].into_iter().for_each(|e| e.nearby[v.index()].sort_unstable());
+            }
+            assert_eq!(swept.nearby, searched.nearby, "seed {seed}");
+            assert_eq!(swept.may_touch, searched.may_touch, "seed {seed}");
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! Tests of the triangles in one one-ring, or in two.
+//!
+//! Exact predicates decide intersections. Conservative filters run first; each returns a clearance: a displacement of all vertices below
+//! which no pair of triangles can intersect, not positive where the filter does not apply. Filters allow for rounding by a wide margin.
+
+use super::FINEST;
+use super::output::{OutputSpace, bounds, intersect};
+use crate::math::{Bounds, DVec3, Vec3};
+use crate::mesh::{Facet, Mesh, VertexId};
+use smallvec::SmallVec;
+
+/// The valence up to which nothing is allocated on the heap.
+pub(super) const ORDINARY_RING: usize = 16;
+
+/// The rounding error of lengths and areas, in the longest edge and its square: a hundred times the actual one.
+pub(super) const ROUNDING: f32 = 1e-4;
+
+/// Clearances hold for displacements below this share of the lengths they were derived from.
+const SMALL: f32 = 0.125;
+
+/// The share of the distance from a plane that is left after the plane was turned by the displacements of two vertices in it that are at
+/// least six times as far apart: the cosine of the angle, √(1 − (1/3)²), rounded down.
+const LEFT_BY_TURN: f32 = 0.94;
+const TURN: f32 = 1.0 / 6.0;
+
+/// The longest edge at `v`; not less than [`FINEST`].
+pub(super) fn longest_edge(mesh: &Mesh, v: VertexId) -> f32 {
+    let p = mesh.position(v);
+    let square = mesh.ring(v).as_slice().iter().fold(0.0f32, |longest, &w| {
+        let square = p.distance_squared(mesh.position(w));
+        if square > longest { square } else { longest }
+    });
+    higher(FINEST, square.sqrt())
+}
+
+/// The unit vector, or 0 for the null vector. In double precision where the squared length over- or underflows.
+pub(super) fn unit(offset: Vec3) -> Vec3 {
+    let square = offset.length_squared();
+    if (1e-30..1e30).contains(&square) {
+        offset * (1.0 / square.sqrt())
+    } else {
+        offset.as_dvec3().try_normalize().unwrap_or(DVec3::ZERO).as_vec3()
+    }
+}
+
+/// The clearance of a one-ring whose triangles all face a direction and wind about it once: projected along the direction they do not
+/// overlap. `longest` is the longest edge at `v`.
+///
+/// If vertices move by f, twice the projected area of a triangle with perimeter P changes by less than f·P + 3·f².
+fn facing_clearance(mesh: &Mesh, v: VertexId, direction: Vec3, longest: f32) -> f32 {
+    let ring = mesh.ring(v).as_slice();
+    let [Some(&first), Some(&last)] = [ring.first(), ring.last()] else { return 0.0 };
+    let centre = mesh.position(v);
+    let across = direction.cross(mesh.position(first) - centre);
+    let mut previous = mesh.position(last) - centre;
+    let mut previous_length = previous.length();
+    let mut clearance = SMALL * longest;
+    let (rounding, spare) = (ROUNDING * longest * longest, 3.0 * SMALL * longest);
+    // Spokes that turn one way by less than half a turn each complete a turn whenever they leave the half plane behind the first.
+    let (mut turns, mut before) = (0, false);
+    for (k, &w) in ring.iter().enumerate() {
+        let offset = mesh.position(w) - centre;
+        let length = offset.length();
+        let shown = previous.cross(offset).dot(direction) - rounding;
+        clearance = lower(clearance, shown / (previous_length + length + offset.distance(previous) + spare));
+        let behind = k > 0 && across.dot(offset) < 0.0;
+        turns += u32::from(before && !behind);
+        before = behind;
+        (previous, previous_length) = (offset, length);
+    }
+    // With fewer than five spokes there is no second turn.
+    let once = ring.len() < 5 || turns + u32::from(before) == 1;
+    // Where squares overflow nothing is known.
+    if once && longest < f32::INFINITY { clearance } else { 0.0 }
+}
+
+/// The clearance of a one-ring that is a height field along its normal: its triangles do not intersect. `longest` is the longest edge at
+/// `v`.
+pub(super) fn flat_clearance(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
+    facing_clearance(mesh, v, unit(mesh.area_normal(v)), longest)
+}
+
+/// The clearance between the one-rings of two adjacent vertices that both face one direction, where neither reaches into the corners
+/// behind the two vertices opposite their edge. `longest` is the longest edge at `u` and `v`.
+///
+/// ```text
+///        . behind .
+///         .      .        Seen from that side, a point that triangles S at u and T at v have in common is not in the
+///          .    .         triangle u v p; from u it is beyond p, and from v it is, so it is behind p. No triangle at u
+///            p            comes there if none crosses the line through v and p; nor does one at v, if none crosses
+///          /   \          the line through u and p. On the other side of u v it is the same with q.
+///         u-----v
+/// ```
+pub(super) fn spread_clearance(
+    mesh: &Mesh,
+    [u, v]: [VertexId; 2],
+    [left, right]: [VertexId; 2],
+    longest: f32,
+) -> f32 {
+    let at = |w: VertexId| mesh.position(w);
+    let normal = unit((at(v) - at(u)).cross(at(left) - at(right)));
+    let shown = lower(facing_clearance(mesh, u, normal, longest), facing_clearance(mesh, v, normal, longest));
+    if shown <= 0.0 {
+        return 0.0;
+    }
+    // Twice the smallest area of the triangles between a line and the neighbours of a vertex on its side.
+    let before_line = |hub: VertexId, [from, to]: [VertexId; 2]| {
+        let across = normal.cross(at(to) - at(from));
+        let others = mesh.ring(hub).as_slice().iter().filter(|&&w| w != from && w != to);
+        let areas = others.map(|&w| (at(w) - at(from)).dot(across));
+        areas.fold((at(hub) - at(from)).dot(across), lower)
+    };
+    let at_left = higher(before_line(u, [v, left]), before_line(v, [left, u]));
+    let at_right = higher(before_line(u, [right, v]), before_line(v, [u, right]));
+    let rounding = ROUNDING * longest * longest;
+    lower(shown, (lower(at_left, at_right) - rounding) / (6.5 * longest))
+}
+
+/// The clearance between the triangles at `u` and those at `v` without a common corner, by a separating plane through two common
+/// neighbours `p` and `q`. `longest` is the longest edge at `u` and `v`.
+///
+/// The plane follows `p` and `q`, turning about the direction in it across the line through them. If all vertices move by f, a corner at
+/// distance g from the plane, beside the point p + t·(q − p) of that line, keeps at least [`LEFT_BY_TURN`]·g − f·(1 + |t| + |1 − t|).
+pub(super) fn plane_clearance(
+    mesh: &Mesh,
+    [u, v]: [VertexId; 2],
+    [p, q]: [VertexId; 2],
+    longest: f32,
+) -> f32 {
+    let origin = mesh.position(p);
+    let divider = mesh.position(q) - origin;
+    let square = divider.length_squared();
+    let per_length = divider * (1.0 / square);
+    let offset = mesh.position(v) - mesh.position(u);
+    // Without length there is no plane and no clearance: distances are NaN or 0.
+    let normal = unit(offset - divider * offset.dot(per_length));
+    let (mut gap, mut reach) = (f32::INFINITY, 1.0);
+    let mut meet = |w: VertexId, side: f32| {
+        let from_origin = mesh.position(w) - origin;
+        gap = lower(gap, side * from_origin.dot(normal));
+        // |t| + |1 − t|
+        reach = higher(reach, (2.0 * from_origin.dot(per_length) - 1.0).abs());
+    };
+    let is_beside = |w: VertexId| w != p && w != q;
+    meet(u, -1.0);
+    meet(v, 1.0);
+    mesh.ring(u).as_slice().iter().filter(|&&w| is_beside(w) && w != v).for_each(|&w| meet(w, -1.0));
+    mesh.ring(v).as_slice().iter().filter(|&&w| is_beside(w) && w != u).for_each(|&w| meet(w, 1.0));
+    clearance_beside_line(gap, reach, square, longest)
+}
+
+/// The clearance of vertices from a plane through two of them: `gap` is the least distance from it, beside points of the line through the
+/// two with |t| + |1 − t| up to `reach`, and `square` their squared distance. See [`plane_clearance`].
+pub(super) fn clearance_beside_line(gap: f32, reach: f32, square: f32, longest: f32) -> f32 {
+    let clearance = (LEFT_BY_TURN * gap - ROUNDING * longest) / (1.0 + reach);
+    lower(clearance, TURN * square.sqrt())
+}
+
+/// As [`plane_clearance`], by the plane through the common neighbour `p` that is normal to `v` − `u`.
+pub(super) fn corner_plane_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], p: VertexId, longest: f32) -> f32 {
+    let normal = unit(mesh.position(v) - mesh.position(u));
+    // The plane follows p and keeps its normal.
+    0.5 * (gap(mesh, [u, v], [p, p], mesh.position(p), normal) - ROUNDING * longest)
+}
+
+/// As [`plane_clearance`], by the bisecting plane of `u` and `v`.
+pub(super) fn mid_plane_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) -> f32 {
+    let (p, q) = (mesh.position(u), mesh.position(v));
+    gap(mesh, [u, v], [u, v], (p + q) * 0.5, unit(q - p)) - ROUNDING * longest
+}
+
+/// As [`plane_clearance`], by a plane between two sheets that face each other or away from each other.
+pub(super) fn sheet_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) -> f32 {
+    let normal = unit(mesh.area_normal(u) - mesh.area_normal(v));
+    let (p, q) = (mesh.position(u), mesh.position(v));
+    let normal = if normal.dot(q - p) < 0.0 { -normal } else { normal };
+    let height = |w: &VertexId| (mesh.position(*w) - p).dot(normal);
+    let own = mesh.ring(u).as_slice().iter().map(height).fold(0.0, |top, h| if h > top { h } else { top });
+    let other = mesh.ring(v).as_slice().iter().map(height).fold(height(&v), lower);
+    // The plane does not move.
+    0.5 * (other - own) - ROUNDING * longest
+}
+
+/// The least distance from a plane of `u` and its neighbours on the back, and of `v` and its neighbours on the front; those `in_plane` are
+/// left out. Not positive where one is on the wrong side.
+fn gap(mesh: &Mesh, [u, v]: [VertexId; 2], in_plane: [VertexId; 2], origin: Vec3, normal: Vec3) -> f32 {
+    let height = |w: VertexId| (mesh.position(w) - origin).dot(normal);
+    let mut least = lower(-height(u), height(v));
+    let counts = |w: VertexId| w != in_plane[0] && w != in_plane[1];
+    for &w in mesh.ring(u).as_slice() {
+        if counts(w) && w != v {
+            least = lower(least, -height(w));
+        }
+    }
+    for &w in mesh.ring(v).as_slice() {
+        if counts(w) && w != u {
+            least = lower(least, height(w));
+        }
+    }
+    least
+}
+
+/// The lower of two numbers; the first if either is NaN.
+#[inline]
+pub(super) fn lower(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
+
+/// The higher of two numbers; the first if either is NaN.
+#[inline]
+pub(super) fn higher(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
+}
+
+/// Adds the corners of all pairs of triangles at `v` that intersect beyond their common corners; exact.
+pub(super) fn intersections_around(
+    mesh: &Mesh,
+    v: VertexId,
+    output: Option<&OutputSpace>,
+    crossing: &mut Vec<VertexId>,
+) {
+    let facets: Vec<Facet> = facets_at(mesh, v).collect();
+    for (k, s) in facets.iter().enumerate() {
+        for t in facets[..k].iter().filter(|t| intersect(s, t, output)) {
+            crossing.extend(s.corners.into_iter().chain(t.corners).map(VertexId));
+        }
+    }
+}
+
+/// Adds the corners of all pairs of intersecting triangles without a common corner, one at `u` and one at `v`; exact.
+pub(super) fn intersections_between(
+    mesh: &Mesh,
+    [u, v]: [VertexId; 2],
+    output: Option<&OutputSpace>,
+    crossing: &mut Vec<VertexId>,
+) {
+    let others: SmallVec<[(Facet, Bounds); ORDINARY_RING]> =
+        facets_at(mesh, v).map(|facet| (facet, bounds(&facet, output))).collect();
+    let around_v = others.iter().fold(Bounds::EMPTY, |all, (_, bounds)| all.joined(bounds));
+    for s in facets_at(mesh, u).filter(|s| !s.corners.contains(&v.0)) {
+        let bounds = bounds(&s, output);
+        if !bounds.meets(&around_v) {
+            continue;
+        }
+        for (t, other) in &others {
+            let apart = t.corners.iter().all(|w| !s.corners.contains(w));
+            if apart && bounds.meets(other) && intersect(&s, t, output) {
+                crossing.extend(s.corners.into_iter().chain(t.corners).map(VertexId));
+            }
+        }
+    }
+}
+
+fn facets_at(mesh: &Mesh, v: VertexId) -> impl Iterator<Item = Facet> + '_ {
+    mesh.ring(v).pairs().map(move |(a, b)| mesh.facet([v, a, b]))
+}
