@@ -1,9 +1,9 @@
-//! What passes did to a mesh.
+//! Counts of the edits made to a mesh.
 
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
-/// Counts of edits, by the papers' names.
+/// Numbers of edits, by the papers' names.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Changes {
     /// Edges split.
@@ -12,18 +12,18 @@ pub struct Changes {
     pub deletions: u32,
     /// Edges flipped.
     pub inversions: u32,
-    /// Tubes made between parts in contact.
+    /// Contacts joined by a tube.
     pub axial: u32,
     /// Necks cut.
     pub annular: u32,
-    /// Components added for what the mesh left out.
+    /// Components added for parts that the mesh left out.
     pub seeds: u32,
-    /// Components removed because nothing was left of them.
+    /// Components that vanished.
     pub vanished: u32,
 }
 
 impl Changes {
-    /// Whether connectivity between distant parts changed, not only the sampling.
+    /// Whether topology changed, not only sampling.
     pub fn changed_topology(self) -> bool {
         self.axial + self.annular + self.seeds + self.vanished > 0
     }

@@ -1,12 +1,11 @@
-//! Vertices in contact that are no neighbours: equation (3) and the axial change of figures 3 and 4.
+//! Contacts between non-adjacent vertices: equation (3) and the axial change of figures 3 and 4.
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::order::{by_both, rank, sort_by_rank};
 use crate::mesh::{Mesh, VertexId};
 
-/// Where the intermediary points of a joint lie on the spokes, from the centre. Nearer to the centre the tube is thin
-/// and is cut again at once; further out the strip around it is thinner than δ and collapses. The others are for where
-/// the first would cross something.
+/// Positions of the rim of a joint along the spokes, from the centre. Nearer to the centre the tube is thin and is cut again at once;
+/// further out the strip around it is thinner than δ and collapses. The others are tried if the first would intersect something.
 const JOINT_REACHES: [f32; 4] = [0.7, 0.5, 0.35, 0.85];
 
 /// Two vertices in contact, the lower one first.
@@ -18,7 +17,7 @@ struct Contact {
 }
 
 impl Resolver {
-    /// Joins the stirred vertices with what they touch; says whether anything was changed.
+    /// Resolves the contacts of the marked vertices; returns whether anything changed.
     pub(super) fn join_contacts(
         &mut self,
         mesh: &mut Mesh,
@@ -27,8 +26,8 @@ impl Resolver {
     ) -> bool {
         let contacts = self.find_contacts(mesh, sampling);
         let mut changed = false;
-        // Contact next to a fresh tube waits until the tube is settled: joined at once, neighbouring pairs of two
-        // facing sheets would make a handle each.
+        // Contacts next to a new tube wait until its edges are within bounds: joined at once, neighbouring pairs of two facing sheets
+        // would make a handle each.
         let mut busy = vec![false; mesh.slots()];
         for Contact { square, u, v } in contacts {
             if !free(mesh, &busy, u) || !free(mesh, &busy, v) || mesh.ring(u).contains(v) {
@@ -37,7 +36,7 @@ impl Resolver {
             }
             let reached: Vec<VertexId> =
                 [u, v].iter().flat_map(|&w| mesh.ring(w).as_slice()).copied().collect();
-            let Some(done) = self.mend_contact(mesh, square, [u, v], guide) else { continue };
+            let Some(done) = self.resolve_contact(mesh, square, [u, v], guide) else { continue };
             changed |= done;
             busy.resize(mesh.slots(), true);
             for w in reached.into_iter().chain([u, v]) {
@@ -54,7 +53,7 @@ impl Resolver {
         }
     }
 
-    /// Pairs nearer than the contact distance with at least one stirred vertex, nearest first.
+    /// The pairs in contact with at least one marked vertex, nearest first.
     fn find_contacts(&mut self, mesh: &Mesh, sampling: Sampling) -> Vec<Contact> {
         let mut stirred = self.take_stirred();
         stirred.retain(|&v| mesh.is_live(v));
@@ -82,8 +81,8 @@ impl Resolver {
         contacts
     }
 
-    /// Mends one contact: a flip where the two lie across an edge, else a tube. `None` where nothing need be done.
-    fn mend_contact(
+    /// Resolves one contact: by a flip if the two are opposite each other across an edge, else by a tube. `None` if nothing was to be done.
+    fn resolve_contact(
         &mut self,
         mesh: &mut Mesh,
         square: f32,
@@ -92,7 +91,7 @@ impl Resolver {
     ) -> Option<bool> {
         if let Some(across) = longest_edge_between(mesh, u, v) {
             let (a, b, length) = across;
-            // The fold at a short edge is no contact: its two wings cannot meet before one of them is collapsed.
+            // A fold at a short edge is no contact: that edge is collapsed before its two triangles can meet.
             if length <= square || self.embedding.attempt(mesh, |mesh| mesh.flip(a, b)).is_err() {
                 return None;
             }
@@ -114,7 +113,7 @@ fn free(mesh: &Mesh, busy: &[bool], v: VertexId) -> bool {
     mesh.is_live(v) && busy.get(v.index()) == Some(&false)
 }
 
-/// The longest edge that `u` and `v` are opposite to each other across, and its squared length.
+/// The longest edge across which `u` and `v` are opposite each other, and its squared length.
 fn longest_edge_between(mesh: &Mesh, u: VertexId, v: VertexId) -> Option<(VertexId, VertexId, f32)> {
     let across = mesh.ring(u).pairs().filter(|&(a, b)| mesh.ring(a).before(b) == Some(v));
     across

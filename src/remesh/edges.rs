@@ -1,21 +1,20 @@
-//! Edges out of bounds: equations (1) and (2), figure 1.
+//! Edge bounds: equations (1) and (2), figure 1.
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::Vec3;
 use crate::math::order::sort_by_rank;
 use crate::mesh::{EditError, Mesh, Opposite, VertexId};
 
-/// The longest edge that a collapse may make, in the upper bound of edges. Where all are within bounds it makes none longer
-/// than 1.4; in a surface much finer than δ and too crowded for splits, one collapse after the other would draw needles
-/// through all of it.
+/// The longest edge that a collapse may produce, in the upper bound. While all edges are within bounds none exceeds 1.4; in a surface much
+/// finer than δ and too crowded for splits, repeated collapses would produce needles.
 const LENGTHENED: f32 = 1.6;
 
-/// Edits around one vertex in a call, after which it is left as it is until it is touched again. Where splits, flips and collapses of
-/// edges with different bounds undo each other, they went on until the effort of the whole call was spent, 20 s on a head.
+/// Edits around one vertex in a call, after which it is skipped until it is marked again. Edits of edges with different bounds may undo
+/// each other; on a head that used up the work of a whole call, 20 s.
 const MOST_EDITS: u8 = 40;
 
 impl Resolver {
-    /// Works through the queue until every edge around its vertices is within bounds.
+    /// Processes the queue until all edges around its vertices are within bounds.
     pub(super) fn settle_edges(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide) {
         while self.embedding.effort() < self.most_effort {
             let Some(u) = self.pop() else { return };
@@ -25,7 +24,7 @@ impl Resolver {
         }
     }
 
-    /// Makes an edit at a vertex that changes the sampling and not the topology, unless the mesh would intersect itself.
+    /// Makes an edit at a vertex that changes sampling, not topology, unless the mesh would intersect itself.
     fn edit<T>(
         &mut self,
         mesh: &mut Mesh,
@@ -39,7 +38,7 @@ impl Resolver {
         }
     }
 
-    /// Whether edges around `u` are mended in this call.
+    /// Whether edges around `u` may still be edited in this call.
     fn may_edit(&self, u: VertexId) -> bool {
         self.edits.get(u.index()).is_none_or(|&edits| edits < MOST_EDITS)
     }
@@ -51,7 +50,7 @@ impl Resolver {
         self.edits[u.index()] += 1;
     }
 
-    /// Mends the first edge around `u` that is out of bounds and can be mended.
+    /// Brings the first edge around `u` within bounds that is not and can be.
     fn settle_vertex(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide, u: VertexId) {
         let from = mesh.position(u);
         for k in 0..mesh.ring(u).valence() {
@@ -72,7 +71,7 @@ impl Resolver {
         }
     }
 
-    /// Flips an edge that is too long where a new vertex on it would come too near its opposite ones; else splits it.
+    /// Shortens an edge that is too long: flips it if a new vertex would be too near the opposite ones, else splits it.
     fn shorten(
         &mut self,
         mesh: &mut Mesh,
@@ -99,7 +98,7 @@ impl Resolver {
         Ok(true)
     }
 
-    /// Collapses an edge that is too short; where a neck is in the way, cuts it; a lone tetrahedron is removed.
+    /// Removes an edge that is too short: collapses it, cuts the neck in its way, or removes a lone tetrahedron.
     fn remove_short(
         &mut self,
         mesh: &mut Mesh,
@@ -119,7 +118,7 @@ impl Resolver {
         }
     }
 
-    /// Draws the edge together at the best of the places where nothing crosses.
+    /// Collapses the edge into the best position without self-intersections.
     fn collapse(
         &mut self,
         mesh: &mut Mesh,
@@ -128,14 +127,14 @@ impl Resolver {
         v: VertexId,
     ) -> Result<bool, EditError> {
         let longest = LENGTHENED * sampling.between(mesh, u, v).longest();
-        for place in collapse_places(mesh, u, v) {
-            if lengthens(mesh, [u, v], place, longest) {
+        for position in collapse_positions(mesh, u, v) {
+            if lengthens(mesh, [u, v], position, longest) {
                 continue;
             }
-            match self.edit(mesh, u, |mesh| mesh.collapse(u, v, place)) {
+            match self.edit(mesh, u, |mesh| mesh.collapse(u, v, position)) {
                 Ok(()) => {
                     self.changes.deletions += 1;
-                    // At the end of the queue: trying the survivor again at once piles up valence.
+                    // Appended to the queue: processed at once, its valence would grow.
                     self.touch_edited(u);
                     return Ok(true);
                 }
@@ -147,15 +146,15 @@ impl Resolver {
     }
 }
 
-/// The middle of the edge and its ends, in this order, those first at which no triangle turns over.
-fn collapse_places(mesh: &Mesh, u: VertexId, v: VertexId) -> [Vec3; 3] {
+/// The middle of the edge and its ends, in this order, but positions at which a triangle turns over last.
+fn collapse_positions(mesh: &Mesh, u: VertexId, v: VertexId) -> [Vec3; 3] {
     let (p, q) = (mesh.position(u), mesh.position(v));
-    let mut places = [(p + q) * 0.5, p, q];
-    sort_by_rank(&mut places, |&at| u64::from(turns_over(mesh, u, v, at) || turns_over(mesh, v, u, at)));
-    places
+    let mut positions = [(p + q) * 0.5, p, q];
+    sort_by_rank(&mut positions, |&at| u64::from(turns_over(mesh, u, v, at) || turns_over(mesh, v, u, at)));
+    positions
 }
 
-/// Whether `u` and `v` drawn together `at` a place makes an edge longer than `most`, and than it was.
+/// Whether collapsing `ends` into a position makes an edge longer than `most` and than before.
 fn lengthens(mesh: &Mesh, ends: [VertexId; 2], at: Vec3, most: f32) -> bool {
     ends.into_iter().any(|end| {
         let from = mesh.position(end);
@@ -166,7 +165,7 @@ fn lengthens(mesh: &Mesh, ends: [VertexId; 2], at: Vec3, most: f32) -> bool {
     })
 }
 
-/// Whether moving `u` to `to` turns over a triangle around it that does not have `v` as a corner.
+/// Whether moving `u` turns over a triangle around it that does not have `v` as a corner.
 fn turns_over(mesh: &Mesh, u: VertexId, v: VertexId, to: Vec3) -> bool {
     let from = mesh.position(u);
     mesh.ring(u).pairs().filter(|&(a, b)| a != v && b != v).any(|(a, b)| {

@@ -1,11 +1,11 @@
 //! Passes that keep a moving mesh well sampled and change its topology on contact (Lachaud & Montanvert, sections
 //! 3.2, 3.3 and figure 9).
 //!
-//! [`Resolver::resolve`] is the whole of it: edges out of bounds are split, flipped or collapsed (`edges`), or a neck is
-//! cut there (`necks`), vertices in contact are joined (`contact`), and again until all bounds hold; what is left after
-//! eight rounds stays queued for the next call. Small parts without volume are removed (`specks`).
+//! [`Resolver::resolve`] repeats these steps until all bounds hold: edges out of bounds are split, flipped or collapsed (`edges`), necks in
+//! the way are cut (`necks`), vertices in contact are joined (`contact`). After eight rounds the rest stays pending for the next call.
+//! Small parts without volume are removed (`specks`). [`Embedding`] keeps the mesh free of self-intersections.
 //!
-//! [`decimate`] makes a mesh at rest coarser, [`remesh`] makes its triangles alike; neither changes its topology.
+//! [`decimate`] reduces a static mesh, [`remesh`] makes its triangles even; neither changes topology.
 
 mod changes;
 mod contact;

@@ -1,20 +1,19 @@
-//! Necks that are thinner than edges may be short: the annular change of figure 5.
+//! Necks thinner than the lower bound of edges: the annular change of figure 5.
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::Vec3;
 use crate::math::order::{rank, sort_by_rank};
 use crate::mesh::{Cut, EditError, Mesh, VertexId};
 
-/// How far the two sides of a cut neck are moved apart, in δ: the first that makes nothing cross. With less they are soon
-/// in contact again.
+/// Distances by which the two sides of a cut are moved apart, in δ; the first without self-intersections is taken. At shorter ones they
+/// are soon in contact again.
 const CUT_PUSHES: [f32; 4] = [0.75, 0.4, 0.2, 0.05];
 
-/// The share of the way to its own side's neighbours that a side is pushed at most, so that no triangle turns over.
+/// The largest push of a side, as a share of the distance to its neighbours: no triangle turns over.
 const CUT_PUSH_LIMIT: f32 = 0.6;
 
 impl Resolver {
-    /// Annular change through the edge `uv` and a common neighbour: the one that makes the shortest ring, where nothing
-    /// crosses then.
+    /// Cuts along the edge `uv` and a common neighbour (annular change): the shortest ring without self-intersections afterwards.
     pub(super) fn cut_neck(
         &mut self,
         mesh: &mut Mesh,
@@ -44,7 +43,7 @@ impl Resolver {
         Ok(true)
     }
 
-    /// Cuts the mesh along a ring and moves the two sides apart as far as nothing crosses.
+    /// Cuts along a ring of three edges and moves the two sides apart as far as possible without self-intersections.
     fn cut_apart(&mut self, mesh: &mut Mesh, sampling: Sampling, [u, v, o]: [VertexId; 3]) -> Option<Cut> {
         let mut apart = |push: f32| {
             self.embedding.attempt(mesh, |mesh| {
@@ -56,8 +55,8 @@ impl Resolver {
         CUT_PUSHES.into_iter().find_map(|push| apart(push).ok())
     }
 
-    /// Cuts necks through vertices that could not move: pressed together until its vertices are held, a neck would stay
-    /// for ever where no edge gets short.
+    /// Cuts necks at vertices that could not move: where a neck is pressed together until its vertices are held, no edge becomes short, and
+    /// it would stay.
     pub(super) fn cut_crushed(
         &mut self,
         mesh: &mut Mesh,
@@ -90,7 +89,7 @@ fn part(mesh: &mut Mesh, cut: Cut, push: f32) {
     }
 }
 
-/// The mean of the neighbours of a cut's side, its own corners left out.
+/// The mean of the neighbours of one side of a cut, without its own corners.
 fn side_centre(mesh: &Mesh, side: [VertexId; 3]) -> Vec3 {
     let outer = side.iter().flat_map(|&v| mesh.ring(v).as_slice()).filter(|w| !side.contains(w));
     let (sum, count) =

@@ -1,4 +1,4 @@
-//! The loop of figure 9: edges, then contact, until every bound holds.
+//! The loop of figure 9: restores edge bounds, then resolves contacts, until all bounds hold.
 
 use super::specks::SmallParts;
 use super::{Changes, Embedding, Sampling};
@@ -8,37 +8,36 @@ use crate::spatial::CellSet;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// Rounds of edges and contact in one call. A round mends what the round before it broke; hard scenes never
-/// needed more than five, and what is left waits for the next call.
+/// Rounds of edges and contacts in one call. Each repairs what the one before broke. Hard scenes never needed more than five; the rest
+/// stays pending for the next call.
 const PASSES: usize = 8;
 
-/// Near vertices that a call may look at for each vertex of the mesh, and for any mesh, before the rest is left for the
-/// next call. An edit looks at some 60, and ordinary iterations take less than one edit for ten vertices. A cycle of edits
-/// that undo each other, or edges that cannot be mended in a crowd, as on a needle that was pulled out of the surface,
-/// would take any number.
+/// The work of a call in nearby vertices visited, per vertex of the mesh and for any mesh; the rest stays pending for the next call. An
+/// edit visits about 60, and ordinary iterations make less than one edit per ten vertices. Without a bound, edits that undo each other,
+/// or edges that cannot be repaired where vertices crowd, as on a needle pulled out of the surface, would never end.
 const EFFORT_PER_VERTEX: u64 = 400;
 const LEAST_EFFORT: u64 = 100_000;
 
-/// Keeps the bounds of a [`Sampling`] on a mesh that moves, and keeps it from crossing itself.
+/// Keeps a moving mesh within the bounds of a [`Sampling`] and free of self-intersections.
 #[derive(Clone, Debug)]
 pub struct Resolver {
     most_vertices: usize,
     contact: Contact,
-    /// Where splits, flips and collapses are tested for all self-intersections, if not everywhere.
+    /// The cells in which splits, flips and collapses are tested in full; everywhere if `None`.
     pub(super) tested: Option<CellSet>,
     full: bool,
-    /// [`Embedding::effort`] at which this call ends.
+    /// The [`Embedding::effort`] at which this call ends.
     pub(super) most_effort: u64,
     queue: VecDeque<VertexId>,
     queued: Vec<bool>,
-    /// By vertex, the edits around it in this call.
+    /// By vertex, the number of edits around it in this call.
     pub(super) edits: Vec<u8>,
-    /// Vertices that were moved or made since contact was last looked for.
+    /// Vertices moved or made since the last contact query.
     stirred: Vec<VertexId>,
     is_stirred: Vec<bool>,
-    /// Vertices that the last move could not move at all.
+    /// Vertices that could not move at all in the last move.
     pub(super) stuck: Vec<VertexId>,
-    /// Components that may vanish.
+    /// Components small enough to vanish.
     pub(super) small: SmallParts,
     /// Vertices made or displaced by the last call.
     pub(super) edited: Vec<VertexId>,
@@ -46,17 +45,17 @@ pub struct Resolver {
     pub(super) changes: Changes,
 }
 
-/// What becomes of vertices in contact.
+/// How contacts are resolved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Contact {
-    /// A tube is made between them.
+    /// The two vertices are joined by a tube.
     #[default]
     Join,
-    /// They press against each other.
+    /// They stay in contact and press against each other.
     Leave,
 }
 
-/// Decides which of the topology changes that the sampling calls for are made.
+/// Decides which topology changes are made of those that the sampling asks for.
 pub trait TopologyGuide {
     /// Whether two vertices in contact may be joined by a tube (axial change).
     fn may_join(&self, mesh: &Mesh, pair: [VertexId; 2]) -> bool;
@@ -64,15 +63,15 @@ pub trait TopologyGuide {
     /// Whether the mesh may be cut along a ring of three edges (annular change).
     fn may_cut(&self, mesh: &Mesh, ring: [VertexId; 3]) -> bool;
 
-    /// Whether a short edge may be drawn together.
+    /// Whether a short edge may be collapsed.
     fn may_collapse(&self, mesh: &Mesh, edge: [VertexId; 2]) -> bool;
 
-    /// Whether there is matter inside a small solid component, or background inside a small hollow. Without, a solid that is pressed
-    /// on itself is removed, and so is a hollow, which would grow in matter.
+    /// Whether there is matter inside a small solid component, or background inside a small hollow. If not, a component pressed on itself
+    /// is removed; a hollow would otherwise grow in matter.
     fn has_content(&self, mesh: &Mesh, members: &[VertexId], is_solid: bool) -> bool;
 }
 
-/// Makes every topology change that the sampling calls for, as in the paper.
+/// Allows every topology change, as in the paper.
 #[derive(Clone, Copy, Debug)]
 pub struct Unguided;
 
@@ -94,17 +93,17 @@ impl TopologyGuide for Unguided {
     }
 }
 
-/// Vertices that the last call left over, in order.
+/// The vertices left pending by the last call, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Waiting {
-    /// Whose edges are to be looked at.
+    /// Vertices whose edges have to be checked.
     pub queue: Vec<VertexId>,
-    /// Whose contacts are to be looked at.
+    /// Vertices whose contacts have to be queried.
     pub stirred: Vec<VertexId>,
 }
 
 impl Waiting {
-    /// The same vertices after a renumbering; those that are gone are left out.
+    /// The same vertices after renumbering, without deleted ones.
     pub fn renamed(&self, names: &[Option<VertexId>]) -> Self {
         let rename = |list: &[VertexId]| list.iter().filter_map(|v| *names.get(v.index())?).collect();
         Self { queue: rename(&self.queue), stirred: rename(&self.stirred) }
@@ -112,7 +111,7 @@ impl Waiting {
 }
 
 impl Resolver {
-    /// A resolver that splits no edge of a mesh with so many vertices.
+    /// A resolver that splits no edge once the mesh has `most_vertices`.
     pub fn with_room_for(most_vertices: usize) -> Self {
         Self {
             most_vertices,
@@ -133,18 +132,18 @@ impl Resolver {
         }
     }
 
-    /// What becomes of vertices in contact from now on.
+    /// Sets how contacts are resolved.
     pub fn set_contact(&mut self, contact: Contact) {
         self.contact = contact;
     }
 
-    /// From now on splits, flips and collapses are tested for all self-intersections only in `cells`, elsewhere as by
-    /// [`Embedding::attempt_in_one_rings`]. That takes half the time, and the mesh has to be tested as a whole afterwards.
+    /// Tests splits, flips and collapses in full only in `cells`, and elsewhere as [`Embedding::attempt_in_one_rings`] does. This halves the
+    /// time; the whole mesh has to be tested afterwards.
     pub fn test_only_in(&mut self, cells: CellSet) {
         self.tested = Some(cells);
     }
 
-    /// What keeps the mesh from crossing itself, for edits beside these.
+    /// The collision guard, in sync with `mesh`, for other edits.
     pub fn guard(&mut self, mesh: &Mesh, sampling: Sampling) -> &mut Embedding {
         self.embedding.follow_with(mesh, sampling.longest());
         &mut self.embedding
@@ -155,25 +154,25 @@ impl Resolver {
         self.embedding.watch_output(map, bounds);
     }
 
-    /// The number of vertices from which on no edge is split.
+    /// The number of vertices at which splitting stops.
     pub fn most_vertices(&self) -> usize {
         self.most_vertices
     }
 
-    /// That number, where the last call left an edge too long because of it; told once.
+    /// That number, if the last call left an edge too long because of it; reported once.
     pub fn take_overflow(&mut self) -> Option<usize> {
         std::mem::take(&mut self.full).then_some(self.most_vertices)
     }
 
-    /// Whether a vertex may be added; if not, [`Self::take_overflow`] will tell.
+    /// Whether a vertex may be added; if not, [`Self::take_overflow`] reports it.
     pub(super) fn has_room(&mut self, mesh: &Mesh) -> bool {
         self.full |= mesh.vertex_count() >= self.most_vertices;
         !self.full
     }
 
-    /// Restores the bounds around the `active` vertices and returns what was done.
+    /// Restores the bounds around the `active` vertices and returns the changes made.
     ///
-    /// Vertices that are not named are looked at only where an edit or a contact reaches them.
+    /// Other vertices are checked only if an edit or a contact reaches them.
     pub fn resolve(&mut self, mesh: &mut Mesh, sampling: Sampling, active: &[VertexId]) -> Changes {
         self.resolve_guided(mesh, sampling, active, &Unguided)
     }
@@ -201,7 +200,7 @@ impl Resolver {
         }
         for _ in 0..PASSES {
             self.settle_edges(mesh, sampling, guide);
-            // Between edges out of bounds nearly every pair of vertices is in contact, and joins make it worse.
+            // While edges are out of bounds nearly all pairs of vertices are in contact, and joints add more.
             if self.is_waiting()
                 || self.contact == Contact::Leave
                 || !self.join_contacts(mesh, sampling, guide)
@@ -238,12 +237,12 @@ impl Resolver {
         held
     }
 
-    /// Whether no two triangles cross, exactly.
+    /// Whether no two triangles intersect; exact.
     pub fn is_embedded(&mut self, mesh: &Mesh) -> bool {
         self.embedding.is_embedded(mesh)
     }
 
-    /// Refines the mesh as [`Embedding::refine`] does; `sampling` is that of the mesh as it is.
+    /// Refines the mesh as [`Embedding::refine`] does; `sampling` is that before refinement.
     ///
     /// # Errors
     /// As [`Mesh::refine`].
@@ -252,22 +251,22 @@ impl Resolver {
         self.embedding.refine(mesh)
     }
 
-    /// The vertices that edits of the last call made or displaced; some may be gone again.
+    /// The vertices that edits of the last call made or displaced; some may have been deleted since.
     pub fn edited(&self) -> &[VertexId] {
         &self.edited
     }
 
-    /// Whether something waits for the next call.
+    /// Whether vertices are pending for the next call.
     pub fn is_waiting(&self) -> bool {
         !self.queue.is_empty()
     }
 
-    /// What waits for the next call.
+    /// The vertices pending for the next call.
     pub fn waiting(&self) -> Waiting {
         Waiting { queue: self.queue.iter().copied().collect(), stirred: self.stirred.clone() }
     }
 
-    /// Lets `waiting` wait in place of what waits now.
+    /// Replaces the pending vertices.
     pub fn set_waiting(&mut self, waiting: Waiting) {
         self.queued.clear();
         self.is_stirred.clear();
@@ -277,7 +276,7 @@ impl Resolver {
         self.stirred = waiting.stirred;
     }
 
-    /// Puts `v` at the end of the queue, and marks it for the next search for contact.
+    /// Appends `v` to the queue, and marks it for the next contact query.
     pub(super) fn touch(&mut self, v: VertexId) {
         if mark(&mut self.queued, v) {
             self.queue.push_back(v);
@@ -299,7 +298,7 @@ impl Resolver {
         Some(v)
     }
 
-    /// The stirred vertices in the order they were touched; none are left.
+    /// Takes the vertices marked for a contact query, in the order they were marked.
     pub(super) fn take_stirred(&mut self) -> Vec<VertexId> {
         let stirred = std::mem::take(&mut self.stirred);
         for v in &stirred {
@@ -309,7 +308,7 @@ impl Resolver {
     }
 }
 
-/// Sets a flag and says whether it was clear.
+/// Sets a flag; returns whether it was clear.
 fn mark(flags: &mut Vec<bool>, v: VertexId) -> bool {
     if v.index() >= flags.len() {
         flags.resize(v.index() + 1, false);
@@ -323,8 +322,8 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// A vertex pulled far out of a sphere: edits on its needle undo each other or would cross something, and contact is
-    /// everywhere along it. Once a single call never came back.
+    /// Regression: on a needle pulled out of a sphere, edits undo each other or are rejected, and contacts are everywhere; a single call
+    /// never returned.
     #[test]
     fn a_needle_is_resolved_in_calls_of_bounded_work() {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 5.0, 1.5).unwrap();
@@ -339,12 +338,12 @@ mod tests {
             assert_eq!(mesh.check(), Ok(()));
             assert!(resolver.is_embedded(&mesh));
             active.clear();
-            // An edit more than is allowed, which may look at all and change all of the triangles, in some variants.
+            // The last edit may exceed the budget: in all its variants it may visit and change all triangles.
             let most = LEAST_EFFORT + (EFFORT_PER_VERTEX + 200) * 500;
             assert!(resolver.embedding.effort() - effort < most);
             effort = resolver.embedding.effort();
         }
-        // Joints add a few where no edge is split any more.
+        // Joints add a few vertices even where splitting has stopped.
         assert!(mesh.vertex_count() <= 520);
     }
 }

@@ -1,35 +1,33 @@
-//! The invariant δ and the three bounds derived from it (section 3.2), the same everywhere or with a size by vertex.
+//! The sampling distance δ and the three bounds derived from it (section 3.2), uniform or with a size per vertex.
 
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
-/// How densely a mesh is sampled.
+/// The sampling density of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
     delta: f32,
-    /// By vertex, by how much its size differs from 1; 0 for those that edits make of nothing.
+    /// The scalar attribute size − 1; 0 for new vertices without a source.
     sizes: Option<ScalarKey>,
 }
 
 /// Upper bound of an edge in δ, equation (2): above 2, so that halves of a split edge respect the lower bound.
 const LONGEST: f32 = 2.5;
 
-/// Contact distance in δ, 2.5/√3, equation (3): the longest distance between a vertex that goes through a triangle and
-/// the nearest corner of that triangle.
+/// Contact distance in δ, 2.5/√3, equation (3): the longest distance between a vertex passing through a triangle and the nearest corner.
 const CONTACT: f32 = 1.443_375_7;
 
 impl Sampling {
-    /// The bounds that belong to δ, a positive length.
+    /// Uniform sampling with δ, a positive length.
     pub fn new(delta: f32) -> Self {
         Self { delta, sizes: None }
     }
 
-    /// The same with δ times 1 + a scalar of the mesh (above −1) in place of δ at each vertex; small parts and what moves together
-    /// are still measured by δ.
+    /// The same with δ · (1 + scalar) at each vertex, by a scalar attribute above −1. Small parts are still measured by δ.
     pub fn with_sizes(self, sizes: ScalarKey) -> Self {
         Self { sizes: Some(sizes), ..self }
     }
 
-    /// The bounds between two vertices.
+    /// The sampling between two vertices.
     #[inline]
     pub(super) fn between(self, mesh: &Mesh, u: VertexId, v: VertexId) -> Self {
         let Some(sizes) = self.sizes else { return self };
@@ -49,7 +47,7 @@ impl Sampling {
         LONGEST * self.delta
     }
 
-    /// 2.5/√3 δ, the distance below which two vertices that are no neighbours touch (3).
+    /// 2.5/√3 δ, the distance below which two non-adjacent vertices are in contact (3).
     #[inline]
     pub fn contact(self) -> f32 {
         CONTACT * self.delta

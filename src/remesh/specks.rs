@@ -1,34 +1,34 @@
-//! Small parts that vanish: specks without volume, parts crushed, parts turned inside out.
+//! Removal of small components: specks without volume, crushed ones, inverted ones.
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::triangle::solid_angle;
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, VertexId};
 
-/// Components of more vertices are never removed, whatever their volume: a cavity has a negative one.
+/// Components with more vertices are never removed, whatever their volume; that of a cavity is negative.
 const LARGEST_SPECK: usize = 32;
 
-/// The volume in δ³ of an icosahedron with edges of δ: the smallest ball that is no speck.
+/// The volume of an icosahedron with edges of δ, in δ³: the smallest sphere that can be sampled.
 const SMALLEST_BALL: f32 = 2.18;
 
-/// The components of a mesh that are small enough to vanish.
+/// The components of a mesh small enough to vanish.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SmallParts {
-    /// A vertex of each, and whether it is solid: its volume is positive.
+    /// A vertex of each, and whether it is solid, with a positive volume.
     parts: Vec<(VertexId, bool)>,
-    /// Of the mesh these are the parts of.
+    /// The topology version of the mesh they were found in.
     topology_version: Option<u32>,
 }
 
 impl SmallParts {
-    /// Finds the small parts of the mesh as it is, unless they are known.
+    /// Finds the small parts, unless they are up to date.
     pub(super) fn find(&mut self, mesh: &Mesh) {
         if self.topology_version != Some(mesh.topology_version()) {
             self.find_among(mesh, mesh.vertices());
         }
     }
 
-    /// Finds the small parts again where nothing but the parts of `edited` has changed.
+    /// Updates the small parts after edits of the components of `edited`.
     fn find_again(&mut self, mesh: &Mesh, edited: &[VertexId]) {
         let known = std::mem::take(&mut self.parts);
         let members = known.into_iter().map(|(v, _)| v).chain(edited.iter().copied());
@@ -42,7 +42,7 @@ impl SmallParts {
             if seen[v.index()] {
                 continue;
             }
-            // Where this is not all of a component, it is still a piece of a large one.
+            // If this is not all of a component, it belongs to a large one.
             let found = mesh.component_of(v, LARGEST_SPECK + 1);
             found.iter().for_each(|w| seen[w.index()] = true);
             if found.len() <= LARGEST_SPECK {
@@ -54,12 +54,12 @@ impl SmallParts {
 }
 
 impl Resolver {
-    /// Removes the component of `v` where it is a speck, and says whether it is gone.
+    /// Removes the component of `v` if it is a speck; returns whether it does not exist any more.
     ///
-    /// It may be gone already: the two sides of a cut handle are one component.
+    /// It may have been removed before: the two sides of a cut handle are one component.
     ///
-    /// A speck has at most 32 vertices and less than δ³ of volume. Those of negative volume would grow in empty space, unless
-    /// `guide` knows of a hollow there.
+    /// A speck has at most 32 vertices and less than δ³ of volume. One of negative volume would grow in empty space, unless `guide` finds a
+    /// hollow there.
     pub(super) fn remove_speck(
         &mut self,
         mesh: &mut Mesh,
@@ -82,11 +82,11 @@ impl Resolver {
         true
     }
 
-    /// Removes small components that cannot go on as they are after the vertices were moved.
+    /// Removes small components that were crushed or inverted by a move.
     ///
-    /// Where two sides are pressed on each other, vertices are held, no edge gets short, and a part would stay for ever:
-    /// so those go that are flat, or of which no vertex could move. And a part so small may turn inside out between two
-    /// states of which neither crosses itself, as when the tip of a tetrahedron passes through its base.
+    /// Where two sides are pressed on each other, vertices are held, no edge becomes short, and a component would stay for ever; so it is
+    /// removed if it is flat, or if none of its vertices could move. One so small can also be inverted between two states without
+    /// self-intersections, as when the apex of a tetrahedron passes through its base.
     pub(super) fn remove_crushed(
         &mut self,
         mesh: &mut Mesh,
@@ -97,7 +97,7 @@ impl Resolver {
         self.small.find(mesh);
         let is_stuck = |v: &VertexId| stuck.binary_search(v).is_ok();
         for (v, was_solid) in std::mem::take(&mut self.small.parts) {
-            // It may have been within a part that was removed.
+            // It may have been inside a component that was removed.
             if !mesh.is_live(v) {
                 continue;
             }
@@ -113,8 +113,8 @@ impl Resolver {
         }
     }
 
-    /// Notes which parts are small after the edits of a call. Cavities smaller than any ball are removed: such a one may
-    /// be a part that an edit turned inside out, and would grow in empty space.
+    /// Updates the small parts after the edits of a call, and removes cavities smaller than the smallest sphere: an edit may have inverted a
+    /// solid, which would grow in empty space.
     pub(super) fn note_small_parts(
         &mut self,
         mesh: &mut Mesh,
@@ -141,7 +141,7 @@ impl Resolver {
         self.small.topology_version = Some(mesh.topology_version());
     }
 
-    /// Removes the component of `v` and, if that is small, all components inside it: they would be on the wrong side of what is left.
+    /// Removes the component of `v` and, if it is small, those inside it, which would be on the wrong side of the surface around them.
     pub(super) fn remove_part(&mut self, mesh: &mut Mesh, v: VertexId) {
         let members = mesh.component_of(v, LARGEST_SPECK + 1);
         let within =
@@ -154,7 +154,7 @@ impl Resolver {
         }
     }
 
-    /// Vertices of other components inside a component.
+    /// The vertices of other components inside a component.
     fn vertices_within(&mut self, mesh: &Mesh, members: &[VertexId]) -> Vec<VertexId> {
         let positions: Vec<Vec3> = members.iter().map(|&v| mesh.position(v)).collect();
         let mut found = self.embedding.vertices_in(mesh, &Bounds::of(&positions));
@@ -162,7 +162,7 @@ impl Resolver {
         found
     }
 
-    /// Removes every speck of the mesh and returns how many there were.
+    /// Removes all specks and returns their number.
     pub fn sweep(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide) -> u32 {
         let before = self.changes.vanished;
         for members in mesh.component_members() {
@@ -172,8 +172,7 @@ impl Resolver {
     }
 }
 
-/// Whether a part of which some vertices are stuck is as small as it can get: flat, or all stuck; half of them will do for one that has
-/// nothing in it and was to vanish.
+/// Whether a component with stuck vertices is crushed: flat, or all stuck, or more than half stuck and empty by `guide`.
 fn is_crushed(
     mesh: &Mesh,
     members: &[VertexId],
@@ -187,19 +186,19 @@ fn is_crushed(
     is_flat || stuck == members.len() || 2 * stuck > members.len() && is_empty()
 }
 
-/// The volume of a part as it counts against being removed: that of a hollow which `guide` knows of is positive.
+/// The volume of a component that counts against its removal: positive for a hollow that `guide` confirms.
 fn kept_volume(mesh: &Mesh, members: &[VertexId], volume: f32, guide: &dyn TopologyGuide) -> f32 {
     if volume < 0.0 && guide.has_content(mesh, members, false) { -volume } else { volume }
 }
 
-/// Whether a point is inside a whole component.
+/// Whether a point is inside a component.
 fn is_within(mesh: &Mesh, members: &[VertexId], p: Vec3) -> bool {
-    // 4π from inside, 0 from outside.
+    // 4π for points inside, 0 for points outside.
     let angle: f64 = triangles(mesh, members).map(|corners| solid_angle(corners, p)).sum();
     angle.abs() > std::f64::consts::TAU
 }
 
-/// The triangles of a whole component, each once, by the positions of their corners.
+/// The corners of the triangles of a component, each once.
 fn triangles(mesh: &Mesh, members: &[VertexId]) -> impl Iterator<Item = [Vec3; 3]> {
     members.iter().flat_map(move |&u| {
         let counted_here = mesh.ring(u).pairs().filter(move |&(a, b)| u < a && u < b);
@@ -207,7 +206,7 @@ fn triangles(mesh: &Mesh, members: &[VertexId]) -> impl Iterator<Item = [Vec3; 3
     })
 }
 
-/// The signed volume of a whole component; positive where its triangles face outwards.
+/// The signed volume of a component; positive if its triangles face outwards.
 fn volume(mesh: &Mesh, members: &[VertexId]) -> f32 {
     let origin = mesh.position(members[0]);
     let below = |corners: [Vec3; 3]| {
@@ -239,8 +238,7 @@ mod tests {
         resolver.resolve(mesh, sampling, &all)
     }
 
-    /// Neither state crosses itself. One like the one after grew in empty space until it filled it: merge and split,
-    /// seed 297.
+    /// Neither state intersects itself. Regression: an inverted component grew until it filled the image (merge and split, seed 297).
     #[test]
     fn a_part_turned_inside_out_vanishes() {
         let rim = |k: u32| {
@@ -259,7 +257,7 @@ mod tests {
         assert_eq!(passing.vertex_count(), 0);
     }
 
-    /// All edges are within bounds, and any move inwards makes it cross: merge and split, seed 404.
+    /// All edges are within bounds, and any move inwards is rejected (merge and split, seed 404).
     #[test]
     fn a_part_that_cannot_shrink_vanishes() {
         let part = mesh(
@@ -297,7 +295,7 @@ mod tests {
         assert_shrinks_away(part, Sampling::new(1.4), 0.3);
     }
 
-    /// More than half of its vertices are held, though it is larger than the smallest ball: merge and split, seed 10529.
+    /// More than half of its vertices are held, though it is larger than the smallest sphere (merge and split, seed 10529).
     #[test]
     fn a_crumpled_part_vanishes() {
         let part = mesh(
@@ -350,7 +348,7 @@ mod tests {
         assert_shrinks_away(part, Sampling::new(1.324), 0.02);
     }
 
-    /// A solid in a small hollow came to lie in matter when that was removed: deformable fuzz, seed 21981.
+    /// Regression: a solid in a small hollow lay in matter after that was removed (deformable fuzz, seed 21981).
     #[test]
     fn what_is_within_a_part_vanishes_with_it() {
         let (mut both, hollow) = nested();
@@ -360,7 +358,7 @@ mod tests {
         assert!(both.vertices().all(|v| both.position(v).x > 1.0));
     }
 
-    /// The component inside is in the list of small parts, too, after the one that it vanishes with.
+    /// The inner component is in the list of small parts after the one it is removed with.
     #[test]
     fn parts_that_vanished_with_others_are_not_asked_for_again() {
         let (mut both, hollow) = nested();
