@@ -17,7 +17,7 @@ use crate::mesh::{Measures, Mesh, MeshReport, Texture, TriangleMesh, curvature, 
 use crate::methods::deformable::DeformableModel;
 use crate::methods::implicit::ImplicitSurface;
 use crate::remesh::{
-    Changes, EdgeBounds, Trusting, collapse_short, decimate, flip_for_valence, remesh, split_long,
+    Changes, EdgeBounds, Unchecked, collapse_short, decimate, flip_for_valence, remesh, split_long,
 };
 use crate::spatial::{SurfaceDistance, SurfacePoint, TriangleTree, cross_section, surface_distance};
 use crate::volume::marching_cubes_world;
@@ -219,9 +219,9 @@ impl RawMesh {
         let mut changes = Changes::default();
         for pass in passes {
             changes += match pass {
-                0 => collapse_short(mesh, bounds, &mut Trusting),
-                1 => split_long(mesh, bounds, usize::MAX, &mut Trusting),
-                _ => flip_for_valence(mesh, bounds, &mut Trusting),
+                0 => collapse_short(mesh, bounds, &mut Unchecked),
+                1 => split_long(mesh, bounds, usize::MAX, &mut Unchecked),
+                _ => flip_for_valence(mesh, bounds, &mut Unchecked),
             };
         }
         Ok(changes.creations + changes.deletions + changes.inversions)

@@ -1,10 +1,9 @@
-//! Fewer triangles for the same surface: edges are drawn together in the order of the error that this makes (Garland &
-//! Heckbert, *Surface simplification using quadric error metrics*, 1997).
+//! Decimation: edges are collapsed in the order of their quadric error (Garland & Heckbert, *Surface simplification using quadric error
+//! metrics*, 1997).
 //!
-//! Guarantees: closed, oriented and manifold stays so, with the same components and χ; no triangle turns over; where
-//! the surface did not cross itself, it never does, and no component comes to lie on the other side of another. Each
-//! edge is tested for all of this before it is drawn together, exactly as far as crossing goes. Not guaranteed: a bound
-//! on the error.
+//! Guarantees: a closed, oriented manifold stays one, with the same components and χ; no triangle turns over; no self-intersections are
+//! added, and no component changes sides of another. All of this is tested before each collapse, intersections exactly. Not guaranteed: a
+//! bound on the error.
 
 use super::obstacles::Obstacles;
 use crate::math::predicates::collinear;
@@ -14,33 +13,30 @@ use smallvec::SmallVec;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// What the squared distance from a vertex's old places counts beside that from the planes. It decides where planes
-/// do not, on flat parts: with none, needles grow there and the minimiser is anywhere; with a hundredth, detail is
-/// rounded off.
+/// The weight of the squared distance from the original positions against that from the planes. It regularises flat parts, where the
+/// minimiser is undetermined and needles would grow; with a hundredth, detail is rounded off.
 const POINT_WEIGHT: f64 = 1e-4;
 
-/// A vertex may not end up with more neighbours: needles would meet in it, and the test for crossing is quadratic in them.
+/// The highest valence: needles would meet in such a vertex, and the test for intersections is quadratic in it.
 const MOST_NEIGHBOURS: usize = 24;
 
-/// The least cosine between the normals of a triangle before and after: it may turn by 78°.
+/// The cosine of the largest angle by which a triangle may turn, 78°.
 const LEAST_COSINE: f64 = 0.2;
 
-/// How often all edges are queued. An edge that was refused may be free once its neighbours are gone; without a bound,
-/// rounds that free one edge each would make the work quadratic.
+/// How often all edges are queued. A rejected edge may become possible once its neighbours are gone; rounds that free one edge each would
+/// make the work quadratic.
 const ROUNDS: usize = 4;
 
-/// Boxes and triangles that may be looked at for each triangle of the mesh, and for any mesh. 200 to 600 for each are
-/// common. Without a bound, triangles that are all in each other's boxes would take for ever; with five times as much,
-/// 42,000 of them took 48 s.
+/// The work allowed, in pairs of boxes and triangles, per triangle of the mesh and for any mesh; 200 to 600 per triangle are common. With
+/// five times as much, 42,000 triangles whose boxes all overlap took 48 s.
 const WORK_PER_TRIANGLE: u64 = 2_000;
 const WORK_AT_LEAST: u64 = 10_000_000;
 
-/// Draws edges together until at most `target_triangles` are left, or no edge can be drawn together safely, or finding
-/// that out takes too long, as among thousands of needles in each other's way; returns how many were. Ids then mean
-/// nothing any more, as the vertices are numbered anew.
+/// Collapses edges until at most `target_triangles` are left, no edge can be collapsed safely, or the work allowed is used up, as among
+/// thousands of needles in each other's way. Returns the number of collapses, each of which removes two triangles. Vertices are renumbered.
 ///
-/// Each takes two triangles. A component has four at least. What crosses already keeps its triangles, as far as drawing
-/// them together would leave it crossing. Attributes of the vertex that stays are the mean of both.
+/// A component keeps at least four triangles. Intersecting triangles are kept unless a collapse resolves the intersection. The attributes
+/// of the remaining vertex are the mean of both.
 pub fn decimate(mesh: &mut Mesh, target_triangles: usize) -> usize {
     if mesh.triangle_count() <= target_triangles {
         return 0;
@@ -62,29 +58,29 @@ pub fn decimate(mesh: &mut Mesh, target_triangles: usize) -> usize {
 struct Decimation<'a> {
     mesh: &'a mut Mesh,
     target: usize,
-    /// The error of a place, about `origin`, by vertex slot.
+    /// The quadric of each vertex slot, about `origin`.
     quadrics: Vec<Quadric>,
-    /// Where coordinates of quadrics are counted from: far from it they would lose digits.
+    /// The origin of the quadrics, near the mesh for precision.
     origin: DVec3,
-    /// How often each vertex was drawn together with another, by slot.
+    /// The number of collapses at each vertex slot.
     stamps: Vec<u32>,
     queue: BinaryHeap<Reverse<Candidate>>,
     obstacles: Obstacles,
 }
 
-/// An edge that may be drawn together. The order is that of the error; ties go to the lower ids.
+/// A candidate edge, ordered by error, then by ids.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Candidate {
-    /// Its bits, which for numbers that are not negative are in the order of the numbers.
+    /// The bits of the error; those of non-negative numbers are ordered like the numbers.
     error: u64,
     ends: [VertexId; 2],
-    /// Which of the places for the vertex, from the one with the least error on.
+    /// The index of the position to be tried, by increasing error.
     choice: u8,
-    /// The sum of the stamps of the ends: another than now, and the candidate is out of date.
+    /// The sum of the stamps of both ends; the candidate is outdated if it has changed.
     stamp: u32,
 }
 
-/// A place for the vertex that stays, and its error.
+/// A position for the remaining vertex, and its error.
 type Place = (f64, Vec3);
 
 impl<'a> Decimation<'a> {
@@ -121,12 +117,12 @@ impl<'a> Decimation<'a> {
         }
     }
 
-    /// Draws the edge together if that is safe; else offers it again with the next choice of place.
+    /// Collapses the edge if that is safe; else queues it with the next position.
     fn attempt(&mut self, u: VertexId, v: VertexId, choice: u8) {
         if self.mesh.can_collapse(u, v).is_err() {
             return;
         }
-        let Some(&(_, place)) = self.places(u, v).get(choice as usize) else { return };
+        let Some(&(_, place)) = self.positions(u, v).get(choice as usize) else { return };
         if !self.is_safe(u, v, place) {
             self.offer(u, v, choice + 1);
             return;
@@ -144,9 +140,9 @@ impl<'a> Decimation<'a> {
         ring.as_slice().iter().for_each(|&w| self.offer(u.min(w), u.max(w), 0));
     }
 
-    /// Queues the edge with the error of the given choice of place, if there is that choice.
+    /// Queues the edge with the error of the given position, if there is one.
     fn offer(&mut self, u: VertexId, v: VertexId, choice: u8) {
-        if let Some(&(error, _)) = self.places(u, v).get(choice as usize) {
+        if let Some(&(error, _)) = self.positions(u, v).get(choice as usize) {
             let stamp = self.stamp(u, v);
             self.queue.push(Reverse(Candidate { error: error.to_bits(), ends: [u, v], choice, stamp }));
         }
@@ -156,23 +152,23 @@ impl<'a> Decimation<'a> {
         self.stamps[u.index()] + self.stamps[v.index()]
     }
 
-    /// Where the vertex that stays may go, least error first: the place where that is least, the middle, either end.
-    fn places(&self, u: VertexId, v: VertexId) -> SmallVec<[Place; 4]> {
+    /// Positions for the remaining vertex by increasing error: the minimiser, the midpoint, both ends.
+    fn positions(&self, u: VertexId, v: VertexId) -> SmallVec<[Place; 4]> {
         let quadric = self.quadrics[u.index()] + self.quadrics[v.index()];
         let (p, q) = (self.mesh.position(u).as_dvec3(), self.mesh.position(v).as_dvec3());
         let least = quadric.least().map(|place| place + self.origin);
-        let places = least.into_iter().chain([0.5 * (p + q), p, q]).map(DVec3::as_vec3);
-        let rated = places.map(|place| (quadric.at(place.as_dvec3() - self.origin), place));
-        // Only the place of least error can be out of range.
-        let mut places: SmallVec<[Place; 4]> =
+        let positions = least.into_iter().chain([0.5 * (p + q), p, q]).map(DVec3::as_vec3);
+        let rated = positions.map(|place| (quadric.at(place.as_dvec3() - self.origin), place));
+        // Only the minimiser can be out of range.
+        let mut positions: SmallVec<[Place; 4]> =
             rated.filter(|(error, place)| error.is_finite() && place.is_finite()).collect();
-        places.sort_by(|a, b| a.0.total_cmp(&b.0));
-        places
+        positions.sort_by(|a, b| a.0.total_cmp(&b.0));
+        positions
     }
 
-    /// Whether nothing turns over, loses its area or crosses where the edge is drawn together into `place`.
+    /// Whether no triangle turns over, degenerates or intersects another after the collapse.
     fn is_safe(&mut self, u: VertexId, v: VertexId, place: Vec3) -> bool {
-        // The two triangles at the edge go: each end loses the other, and the two opposite are neighbours of both.
+        // Two triangles are removed: each end loses the other, and the two opposite vertices are counted twice.
         let neighbours = self.mesh.ring(u).valence() + self.mesh.ring(v).valence() - 4;
         if neighbours > MOST_NEIGHBOURS {
             return false;
@@ -192,14 +188,14 @@ impl<'a> Decimation<'a> {
     }
 }
 
-/// Whether a triangle keeps an area and does not turn over. One without area has no side to turn from.
+/// Whether a triangle keeps its orientation and an area. One without area has no orientation to lose.
 fn may_become(old: &Facet, new: &Facet) -> bool {
     let (before, after) = (triangle::area_vector(old.points), triangle::area_vector(new.points));
     let turns = before.dot(after) < LEAST_COSINE * before.length() * after.length();
     !turns && !collinear(new.points)
 }
 
-/// For each vertex the planes of the triangles around it, and a little of its own place, by a third of their area.
+/// By vertex, the quadric of the planes around it and, with a small weight, of its position; weighted by a third of the area.
 fn quadrics(mesh: &Mesh, origin: DVec3) -> Vec<Quadric> {
     let mut quadrics = vec![Quadric::default(); mesh.slots()];
     for corners in mesh.triangles() {
@@ -244,12 +240,12 @@ mod tests {
         let mut mesh = Mesh::icosphere(Vec3::splat(100.0), 1.0, 0.3).unwrap();
         let decimation = Decimation::new(&mut mesh, 4);
         for (u, v) in decimation.mesh.edges() {
-            let places = decimation.places(u, v);
-            assert_eq!(places.len(), 4);
-            assert!(places.is_sorted_by(|a, b| a.0 <= b.0));
-            // The planes around an edge of a ball meet above it.
+            let positions = decimation.positions(u, v);
+            assert_eq!(positions.len(), 4);
+            assert!(positions.is_sorted_by(|a, b| a.0 <= b.0));
+            // The planes around an edge of a sphere meet above it.
             let ends = [u, v].map(|w| decimation.mesh.position(w));
-            let height = places[0].1.distance(Vec3::splat(100.0));
+            let height = positions[0].1.distance(Vec3::splat(100.0));
             let sagitta = ends[0].distance_squared(ends[1]) / 8.0;
             assert!(height > 1.0 - sagitta && height < 1.0 + 2.0 * sagitta, "{height}");
         }

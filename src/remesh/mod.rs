@@ -26,6 +26,6 @@ pub use embedding::Embedding;
 pub use isotropic::remesh;
 pub use resolve::{Contact, Resolver, TopologyGuide, Unguided, Waiting};
 pub use restructure::{
-    EdgeBounds, Edits, Trusting, collapse_short, flip_for_valence, restructure, split_long,
+    EdgeBounds, EditPolicy, Unchecked, collapse_short, flip_for_valence, restructure, split_long,
 };
 pub use sampling::Sampling;

@@ -1,15 +1,13 @@
-//! What new triangles may not touch: the rest of the surface, found through a tree of boxes that follows the edits.
+//! Intersection tests for decimation: new triangles against the rest of the surface, by a bounding volume hierarchy that follows the edits.
 
 use crate::math::{Bounds, Vec3, triangle};
 use crate::mesh::{Facet, Mesh, VertexId, facets_cross};
 
-/// The stars of all vertices by where they are: a balanced tree of boxes over the vertices in the order of a space-filling
-/// curve.
+/// A balanced tree of boxes around the one-rings of all vertices, in the order of a space-filling curve.
 ///
-/// The box of a vertex holds all triangles around it. The tree keeps its form while vertices go, so an edit costs
-/// O(log n); it is meant for passes that make a mesh coarser.
+/// The tree keeps its form while vertices are removed, so an edit costs O(log n); it is meant for passes that coarsen a mesh.
 pub(super) struct Obstacles {
-    /// A heap: the children of node i are 2i and 2i + 1, the leaves are the last half.
+    /// A heap: node i has the children 2i and 2i + 1, and the leaves are the last half.
     nodes: Vec<Bounds>,
     /// The leaf of each vertex slot, counted from the first leaf.
     leaves: Vec<u32>,
@@ -17,13 +15,13 @@ pub(super) struct Obstacles {
     vertices: Vec<VertexId>,
     /// The component of each vertex slot.
     components: Vec<u32>,
-    /// Pairs of a box and a triangle that may still be compared; see [`Self::is_exhausted`].
+    /// The work left, in pairs of a box and a triangle; see [`Self::is_exhausted`].
     work_left: u64,
     stack: Vec<u32>,
 }
 
 impl Obstacles {
-    /// The stars of `mesh`, for looking at `work` pairs.
+    /// The tree of `mesh`, for at most `work` pairs.
     pub fn new(mesh: &Mesh, work: u64) -> Self {
         let vertices = along_a_curve(mesh);
         let first_leaf = vertices.len().next_power_of_two();
@@ -40,11 +38,10 @@ impl Obstacles {
         Self { nodes, leaves, vertices, components, work_left: work, stack: Vec::new() }
     }
 
-    /// Whether putting the triangles `fresh` in the place of the stars of `replaced` would do harm: they share more than
-    /// common corners and edges with each other or with other triangles of `mesh` (exact, touching included), or a whole
-    /// component changes sides without being touched.
+    /// Whether the triangles `fresh` may not replace the one-rings of `replaced`: they share more than common corners and edges with each other
+    /// or with other triangles of `mesh` (exact, touching included), or a whole component would change sides without being touched.
     ///
-    /// `mesh` is as it was before the edit. The first of `replaced` names the component that is edited.
+    /// `mesh` is the mesh before the edit; the first of `replaced` is in the component that is edited.
     pub fn block(&mut self, mesh: &Mesh, fresh: &[Facet], replaced: &[VertexId]) -> bool {
         let boxes: Vec<Bounds> = fresh.iter().map(|facet| Bounds::of(&facet.points)).collect();
         if cross_each_other(fresh, &boxes) {
@@ -81,7 +78,7 @@ impl Obstacles {
         self.star_crosses(mesh, v, edit) || is_apart && changes_sides(mesh, mesh.position(v), edit)
     }
 
-    /// Whether one of the triangles of which `v` is the lowest corner, none of them in `replaced`, crosses a fresh one.
+    /// Whether a triangle with `v` as its lowest corner, and none in `replaced`, intersects a fresh one.
     fn star_crosses(&mut self, mesh: &Mesh, v: VertexId, edit: &Edit) -> bool {
         for (a, b) in mesh.ring(v).pairs().filter(|&(a, b)| v < a && v < b) {
             self.work_left = self.work_left.saturating_sub(1);
@@ -99,12 +96,12 @@ impl Obstacles {
         false
     }
 
-    /// Whether more was looked at than was allowed. Triangles whose boxes all meet make work quadratic in their number.
+    /// Whether the work allowed is used up: it is quadratic in the number of triangles whose boxes all overlap.
     pub fn is_exhausted(&self) -> bool {
         self.work_left == 0
     }
 
-    /// Takes over that `gone` is gone and that the triangles around `centre` are new.
+    /// Updates the tree after `gone` was removed and the triangles around `centre` changed.
     pub fn follow(&mut self, mesh: &Mesh, centre: VertexId, gone: VertexId) {
         self.set(gone, Bounds::EMPTY);
         self.set(centre, star(mesh, centre));
@@ -127,12 +124,12 @@ impl Obstacles {
     }
 }
 
-/// Triangles that would stand in for others.
+/// New triangles and those they replace.
 struct Edit<'a> {
     fresh: &'a [Facet],
     boxes: &'a [Bounds],
     replaced: &'a [VertexId],
-    /// A box around all of it, before and after.
+    /// The box around both.
     around: Bounds,
 }
 
@@ -141,25 +138,25 @@ fn around(mesh: &Mesh, boxes: &[Bounds], replaced: &[VertexId]) -> Bounds {
     boxes.iter().copied().chain(before).fold(Bounds::EMPTY, |all, one| all.joined(&one))
 }
 
-/// Whether `p` lies between the triangles that were and those that would be.
+/// Whether `p` is enclosed between the old and the new triangles.
 fn changes_sides(mesh: &Mesh, p: Vec3, edit: &Edit) -> bool {
     if !edit.around.contains(p) {
         return false;
     }
     let fresh: f64 = edit.fresh.iter().map(|facet| triangle::solid_angle(facet.points, p)).sum();
     let old = edit.replaced.iter().enumerate().flat_map(|(k, &v)| {
-        // A triangle at several of the vertices counts for the first of them.
+        // A triangle at several of the vertices is counted at the first.
         let counted = move |&(a, b): &(VertexId, VertexId)| {
             !edit.replaced[..k].contains(&a) && !edit.replaced[..k].contains(&b)
         };
         mesh.ring(v).pairs().filter(counted).map(move |(a, b)| [v, a, b])
     });
     let old: f64 = old.map(|corners| triangle::solid_angle(mesh.facet(corners).points, p)).sum();
-    // 4π between them, else 0.
+    // The solid angle is 4π between them, else 0.
     (fresh - old).abs() > std::f64::consts::TAU
 }
 
-/// The number of the component of each slot.
+/// The component of each slot.
 fn components(mesh: &Mesh) -> Vec<u32> {
     let mut components = vec![0; mesh.slots()];
     for (number, members) in (0..).zip(mesh.component_members()) {
@@ -179,18 +176,18 @@ fn star(mesh: &Mesh, v: VertexId) -> Bounds {
     ring.fold(point(mesh.position(v)), |all, &w| all.joined(&point(mesh.position(w))))
 }
 
-/// The vertices in the order of a Z-curve through their box: those near each other in it are mostly near in space.
+/// The vertices in the order of a Z-curve through their box.
 fn along_a_curve(mesh: &Mesh) -> Vec<VertexId> {
     let bounds = mesh
         .vertices()
         .fold(Bounds::EMPTY, |all, v| all.joined(&Bounds { min: mesh.position(v), max: mesh.position(v) }));
-    // In f64, where no size of finite coordinates overflows.
+    // In f64, where the size of finite coordinates cannot overflow.
     let (low, size) = (bounds.min.as_dvec3(), (bounds.max.as_dvec3() - bounds.min.as_dvec3()).max_element());
     let mut keyed: Vec<(u64, u32)> = mesh
         .vertices()
         .map(|v| {
             let cell = (mesh.position(v).as_dvec3() - low) / size * f64::from((1_u32 << CURVE_BITS) - 1);
-            // A size of 0 gives NaN, and NaN the cell 0.
+            // A size of 0 gives NaN, which is cast to cell 0.
             (spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2, v.0)
         })
         .collect();
@@ -198,7 +195,7 @@ fn along_a_curve(mesh: &Mesh) -> Vec<VertexId> {
     keyed.into_iter().map(|(_, v)| VertexId(v)).collect()
 }
 
-/// Cells of the curve along an axis are 2 to this power: more than enough to part the vertices of a mesh.
+/// The binary logarithm of the cells along an axis: more than enough to separate the vertices of a mesh.
 const CURVE_BITS: u32 = 16;
 
 /// The bits of a number below 2^16 with two zeros after each.
@@ -217,7 +214,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Two balls beside each other, and the triangles that would stand around `v` if it were at `place`.
+    /// Two spheres beside each other, and the triangles around `v` after a move to `place`.
     fn moved(place: Vec3) -> (Mesh, VertexId, Vec<Facet>) {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
         mesh.append(&Mesh::icosphere(Vec3::X * 2.2, 1.0, 0.3).unwrap()).unwrap();
@@ -232,7 +229,7 @@ mod tests {
         (mesh, v, fan)
     }
 
-    /// How far along x a vertex of the first ball is.
+    /// The x of a vertex of the first sphere.
     fn first_x(mesh: &Mesh, v: VertexId) -> f32 {
         let x = mesh.position(v).x;
         if x < 1.1 { x } else { f32::MIN }

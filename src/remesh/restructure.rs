@@ -1,47 +1,47 @@
-//! Edges into bounds and valences towards six (Kobbelt, Bareuther & Seidel, *Multiresolution shape deformations for
-//! meshes with dynamic vertex connectivity*, section 4).
+//! Restructuring: edges within bounds and valences near six (Kobbelt, Bareuther & Seidel, *Multiresolution shape deformations for meshes with
+//! dynamic vertex connectivity*, section 4).
 //!
-//! Guarantees: closed, oriented and manifold stays so, with the same components and χ; no triangle turns by more than
-//! 78°; no collapse makes an edge longer than the upper bound, nor a vertex with fewer than four neighbours. Not
-//! guaranteed: that all edges come into bounds, nor, with [`Trusting`] edits, that nothing crosses.
+//! Guarantees: a closed, oriented manifold stays one, with the same components and χ; no triangle turns by more than 78°; no collapse makes
+//! an edge longer than the upper bound, or leaves a vertex with fewer than four neighbours. Not guaranteed: that all edges come within
+//! bounds, and, with [`Unchecked`] edits, that no triangles intersect.
 
 use super::{Changes, Embedding};
 use crate::math::order::{by_both, rank, sort_by_rank};
 use crate::math::{Vec3, triangle};
 use crate::mesh::{EditError, Mesh, MeshError, Opposite, VertexId};
 
-/// The least and the greatest length of an edge (ε_min and ε_max of the paper).
+/// The shortest and the longest edge allowed (ε_min and ε_max of the paper).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeBounds {
-    /// Shorter edges are drawn together.
+    /// Shorter edges are collapsed.
     pub min: f32,
-    /// Longer edges are split: more than twice `min`, so that halves stay in bounds.
+    /// Longer edges are split. More than twice `min`, so that halves stay within bounds.
     pub max: f32,
 }
 
 impl EdgeBounds {
-    /// Both bounds `factor` times as long.
+    /// Both bounds times `factor`.
     pub fn scaled(self, factor: f32) -> Self {
         Self { min: self.min * factor, max: self.max * factor }
     }
 }
 
-/// Vertices that a mesh may get, and the memory that one takes while they are made: what fits a browser.
+/// The largest number of vertices of a result, and the memory of each while it is made: what fits a browser.
 pub(super) const MOST_VERTICES: usize = 8_000_000;
 const BYTES_PER_VERTEX: f64 = 250.0;
 
-/// Vertices of equilateral triangles to an area, in squared edges: 2 / √3.
+/// Vertices per area of equilateral triangles, in squared edges: 2 / √3.
 const VERTICES_PER_AREA: f64 = 1.1547;
 
 impl EdgeBounds {
-    /// Tests the bounds against each other, and that a mesh with the shape of `mesh` and such edges can be held.
+    /// Checks the bounds, and that a mesh of the shape of `mesh` with such edges fits into memory.
     ///
     /// # Errors
     /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice as much;
     /// [`MeshError::TooLarge`] where more than eight million vertices would be needed.
     pub fn check_for(self, mesh: &Mesh) -> Result<(), MeshError> {
         let Self { min, max } = self;
-        // Not so for NaN either.
+        // Also refuses NaN.
         if !(min > 0.0 && max > 2.0 * min && max.is_finite()) {
             let problem = format!(
                 "min {min} and max {max}; a min above 0 and a finite max of more than twice as much are needed"
@@ -49,7 +49,7 @@ impl EdgeBounds {
             return Err(MeshError::InvalidArgument { parameter: "edge", problem });
         }
         let area: f64 = mesh.triangles().map(|corners| triangle::area(mesh.facet(corners).points)).sum();
-        // Needles have edges to be split and hardly an area.
+        // Needles have long edges and hardly any area.
         let length = |(u, v)| mesh.position(u).as_dvec3().distance(mesh.position(v).as_dvec3());
         let length: f64 = mesh.edges().map(length).sum();
         let [min, max] = [min, max].map(f64::from);
@@ -61,46 +61,46 @@ impl EdgeBounds {
     }
 }
 
-/// The memory of so many vertices.
+/// The memory of a number of vertices.
 pub(super) fn bytes(vertices: f64) -> u64 {
-    // Beyond the range it is the largest number.
+    // Saturates beyond the range.
     (vertices * BYTES_PER_VERTEX) as u64
 }
 
-/// How edits are made: at once, or only where nothing would cross.
-pub trait Edits {
-    /// Makes an edit, or leaves the mesh as it was.
+/// Whether and how edits are made.
+pub trait EditPolicy {
+    /// Makes an edit, or leaves the mesh unchanged.
     ///
     /// # Errors
-    /// That of the edit, or why it was taken back.
+    /// The error of the edit, or why it was rolled back.
     fn attempt<T>(
         &mut self,
         mesh: &mut Mesh,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
     ) -> Result<T, EditError>;
 
-    /// Whether `gone` may be drawn into `kept`, as far as the mesh's own tests allow it.
+    /// Whether `gone` may be collapsed into `kept`, beyond the tests of the mesh itself.
     fn may_collapse(&mut self, _mesh: &Mesh, _kept: VertexId, _gone: VertexId) -> bool {
         true
     }
 
-    /// Whether the edge between `ends` may become the one `across`, as far as the mesh's own tests allow it.
+    /// Whether the edge between `ends` may be flipped to `across`, beyond the tests of the mesh itself.
     fn may_flip(&mut self, _mesh: &Mesh, _ends: [VertexId; 2], _across: [VertexId; 2]) -> bool {
         true
     }
 
-    /// Hears that the edge that was asked about last was drawn together into `kept`.
+    /// Called after the edge that was asked about last was collapsed into `kept`.
     fn collapsed(&mut self, _kept: VertexId) {}
 
-    /// Hears that `fresh` now stands between `u` and its other end.
+    /// Called after an edge at `u` was split by the new vertex `fresh`.
     fn was_split(&mut self, _fresh: VertexId, _u: VertexId) {}
 }
 
-/// Edits are made whatever they cross: ten times as fast as with an [`Embedding`]. Whoever takes it looks at the outcome.
+/// Makes edits without checks for self-intersections: ten times as fast as with an [`Embedding`]. The caller checks the result.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Trusting;
+pub struct Unchecked;
 
-impl Edits for Trusting {
+impl EditPolicy for Unchecked {
     fn attempt<T>(
         &mut self,
         mesh: &mut Mesh,
@@ -110,7 +110,7 @@ impl Edits for Trusting {
     }
 }
 
-impl Edits for Embedding {
+impl EditPolicy for Embedding {
     fn attempt<T>(
         &mut self,
         mesh: &mut Mesh,
@@ -120,36 +120,34 @@ impl Edits for Embedding {
     }
 }
 
-/// The cosine of the angle that a triangle may turn by in an edit. With less, folds come up where many edits follow each
-/// other; with more, edges on ridges stay out of bounds.
+/// The cosine of the largest angle by which an edit may turn a triangle. A larger angle lets folds develop over many edits; with a smaller
+/// one edges on ridges stay out of bounds.
 const LEAST_COSINE: f32 = 0.2;
 
-/// A collapse leaves no vertex with fewer neighbours: three would lie in the middle of a triangle.
+/// The lowest valence after a collapse: a vertex of valence three lies inside a triangle.
 pub(super) const LEAST_VALENCE: usize = 4;
 
-/// No vertex gets more: among many short edges it would grow without a bound, and rings are searched linearly.
+/// The highest valence: among many short edges it would grow without bound, and rings are searched linearly.
 const MOST_VALENCE: usize = 16;
 
-/// Passes of one kind in one call. Each halves the longest edges, so this many reach any bound there can be; flips never
-/// needed more than six.
+/// Passes of one kind in one call. Each halves the longest edges, so this many reach any bound; flips never needed more than six.
 const PASSES: usize = 24;
 
-/// One round: short edges are drawn together, long ones split, edges flipped where that brings valences nearer to six.
-/// Edits refused for any reason are left out.
-pub fn restructure(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Edits) -> Changes {
+/// One round: collapses short edges, splits long ones, and flips edges to bring valences near six. Rejected edits are skipped.
+pub fn restructure(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = collapse_short(mesh, bounds, edits);
     changes += split_long(mesh, bounds, usize::MAX, edits);
     changes += flip_for_valence(mesh, bounds, edits);
     changes
 }
 
-/// Draws edges shorter than the lower bound together into the end of higher valence, else into the other (figure 4).
-pub fn collapse_short(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Edits) -> Changes {
+/// Collapses edges shorter than the lower bound into the end of higher valence, else into the other (figure 4).
+pub fn collapse_short(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
     let shortest = bounds.min * bounds.min;
     for slot in 0..mesh.slots() {
         let u = VertexId::from_index(slot);
-        // Whoever stays is looked at again until none of its edges can be drawn together.
+        // The remaining vertex is processed again until none of its edges can be collapsed.
         while let Some((kept, gone)) = short_edge(mesh, u, shortest, |kept, gone| {
             may_collapse(mesh, bounds, kept, gone) && edits.may_collapse(mesh, kept, gone)
         }) {
@@ -164,7 +162,7 @@ pub fn collapse_short(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Edit
     changes
 }
 
-/// The first edge at `u` that is too short and may be drawn together: the end that stays, and the one that goes.
+/// The first edge at `u` that is too short and may be collapsed: the end that stays, and the one removed.
 fn short_edge(
     mesh: &Mesh,
     u: VertexId,
@@ -183,9 +181,9 @@ fn short_edge(
     })
 }
 
-/// Whether `gone` may be drawn into `kept`.
+/// Whether `gone` may be collapsed into `kept`.
 pub(super) fn may_collapse(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone: VertexId) -> bool {
-    // First what most refusals are for.
+    // The most frequent reasons for rejection first.
     if !may_move(mesh, bounds, kept, gone) {
         return false;
     }
@@ -195,7 +193,7 @@ pub(super) fn may_collapse(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone
         && [left, right].iter().all(|&w| mesh.ring(w).valence() > LEAST_VALENCE)
 }
 
-/// Whether the star of `gone` may be drawn to the place of `kept`: no edge gets too long and no triangle turns over.
+/// Whether collapsing `gone` into `kept` makes no edge too long and turns over no triangle.
 fn may_move(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone: VertexId) -> bool {
     let (to, from) = (mesh.position(kept), mesh.position(gone));
     let longest = bounds.max * bounds.max;
@@ -209,17 +207,16 @@ fn may_move(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone: VertexId) -> 
     })
 }
 
-/// Whether two normals, of any length but 0, are within the angle that a triangle may turn by.
+/// Whether two normals of any positive length are within the angle by which a triangle may turn.
 pub(super) fn faces_alike(before: Vec3, after: Vec3) -> bool {
     let cosine = before.dot(after);
-    // Squares instead of roots; the comparison fails for NaN.
+    // Squares avoid roots; the comparison is false for NaN.
     cosine > 0.0
         && cosine * cosine > LEAST_COSINE * LEAST_COSINE * before.length_squared() * after.length_squared()
 }
 
-/// Splits edges longer than the upper bound in the middle, longest first, until none is left (figure 5) or the mesh has
-/// `most` vertices.
-pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut impl Edits) -> Changes {
+/// Splits edges longer than the upper bound at their midpoint, longest first, until none is left (figure 5) or the mesh has `most` vertices.
+pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
     let longest = bounds.max * bounds.max;
     for _ in 0..PASSES {
@@ -246,10 +243,10 @@ pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut 
     changes
 }
 
-/// Flips edges where Σ (valence − 6)² over the four corners around them falls (figure 6), again until none is left.
-pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Edits) -> Changes {
+/// Flips edges while that lowers Σ (valence − 6)² over the four corners around them (figure 6).
+pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
-    // Vertices with an edge that may have become worth a flip since they were looked at.
+    // Vertices whose edges may have become worth a flip since they were tested.
     let mut stale = vec![true; mesh.slots()];
     for _ in 0..PASSES {
         let before = changes.inversions;
@@ -274,12 +271,12 @@ pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Ed
     changes
 }
 
-/// Flips the edge where that is worth it, and marks the vertices of all edges whose four corners have changed.
+/// Flips the edge if that lowers the sum, and marks the vertices of all edges with changed corners.
 fn flip_if_wanted(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
     [u, v]: [VertexId; 2],
-    edits: &mut impl Edits,
+    edits: &mut impl EditPolicy,
     stale: &mut [bool],
 ) -> bool {
     let Ok(Opposite { left, right }) = mesh.opposite(u, v) else { return false };
@@ -300,7 +297,7 @@ fn wants_flip(
     bounds: EdgeBounds,
     [u, v]: [VertexId; 2],
     [left, right]: [VertexId; 2],
-    edits: &mut impl Edits,
+    edits: &mut impl EditPolicy,
 ) -> bool {
     let excess = |w: VertexId, change: i32| {
         let over = mesh.ring(w).valence() as i32 + change - 6;
@@ -315,7 +312,7 @@ fn wants_flip(
         && edits.may_flip(mesh, [u, v], [left, right])
 }
 
-/// Whether the new edge is in bounds, or nearer to them than the old one, and neither triangle turns over.
+/// Whether the new edge is within bounds, or nearer to them than the old one, and neither triangle turns over.
 pub(super) fn may_flip(mesh: &Mesh, bounds: EdgeBounds, ends: [VertexId; 2], across: [VertexId; 2]) -> bool {
     let [[p, q], [a, b]] = [ends, across].map(|pair| pair.map(|v| mesh.position(v)));
     let (old, new) = (p.distance_squared(q), a.distance_squared(b));

@@ -10,7 +10,7 @@ use super::params::MultiresParams;
 use crate::math::{DVec3, Vec3};
 use crate::mesh::{Mesh, MeshError, TriangleMesh};
 use crate::methods::MethodError;
-use crate::remesh::{Embedding, Trusting, restructure};
+use crate::remesh::{Embedding, Unchecked, restructure};
 use crate::spatial::SurfacePoint;
 use crate::volume::{Follower, Lattice};
 use std::rc::Rc;
@@ -30,7 +30,7 @@ pub(super) fn decomposition(
 ) -> Result<Vec<Rc<Band>>, MethodError> {
     let mut mesh = Mesh::from_triangles(&detail)?;
     let mut bands = vec![Band::of(detail)?];
-    restructure(&mut mesh, params.bounds(), &mut Trusting);
+    restructure(&mut mesh, params.bounds(), &mut Unchecked);
     let mut last_good = None;
     for round in 0..ROUNDS {
         let softly = MultiresParams { smoothing: 1 + round as u32 / 2, ..params.clone() };

@@ -4,7 +4,7 @@ use super::ellipsoid::{Ellipsoid, pushed_out};
 use super::params::{Energy, MultiresParams};
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
-use crate::remesh::{Changes, EdgeBounds, Trusting, restructure};
+use crate::remesh::{Changes, EdgeBounds, Unchecked, restructure};
 
 /// The longest edges of a level in the thinnest of the ellipsoids: a mesh much coarser would slip off it.
 const COARSEST: f64 = 0.8;
@@ -66,7 +66,7 @@ fn solve_level(
     bounds: EdgeBounds,
     still: f64,
 ) -> Changes {
-    let changes = restructure(mesh, bounds, &mut Trusting);
+    let changes = restructure(mesh, bounds, &mut Unchecked);
     let places = relaxed(mesh, ellipsoids, params, still);
     mesh.positions_mut().copy_from_slice(&places);
     changes
@@ -74,7 +74,7 @@ fn solve_level(
 
 /// The last level left edges that are too short or too long, and what is made in the middle of an edge lies inside.
 fn finish(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], bounds: EdgeBounds) -> Changes {
-    let changes = restructure(mesh, bounds, &mut Trusting);
+    let changes = restructure(mesh, bounds, &mut Unchecked);
     let places = hold(mesh, ellipsoids);
     mesh.positions_mut().copy_from_slice(&places);
     changes

@@ -1,13 +1,13 @@
-//! How far triangles around a new place are from an old one.
+//! The distance of a vertex from the triangles that replace its own.
 
 use crate::math::{Vec3, triangle};
 use smallvec::SmallVec;
 
-/// The squared cosine of the angle from the mean normal up to which triangles count as flat: they then cover what was
-/// there, and the distance from their planes is no less than that from them.
+/// The squared cosine of the angle to the mean normal up to which triangles count as flat: they then cover the old ones, and the distance
+/// from their planes is no less than from themselves.
 const FLAT: f32 = 0.5;
 
-/// The triangles that would stand around `to` in place of others around `from`.
+/// The triangles around `to` that replace those around `from`.
 pub(super) struct Fan {
     from: Vec3,
     to: Vec3,
@@ -21,7 +21,7 @@ impl Fan {
         Self { from, to, sides: SmallVec::new(), sum: Vec3::ZERO }
     }
 
-    /// Adds a triangle and returns its normal, twice its area long.
+    /// Adds a triangle; returns its normal, whose length is twice the area.
     pub fn push(&mut self, a: Vec3, b: Vec3) -> Vec3 {
         let normal = (a - self.to).cross(b - self.to);
         self.sides.push((a, b, normal));
@@ -29,7 +29,7 @@ impl Fan {
         normal
     }
 
-    /// How far the old place is from the triangles, or a little less than it may be.
+    /// The distance of `from` from the triangles, or a slightly larger bound.
     pub fn gap(&self) -> f32 {
         let (sum, squared) = (self.sum, self.sum.length_squared());
         let mut most = 0.0;

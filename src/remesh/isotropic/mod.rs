@@ -1,54 +1,48 @@
-//! Triangles alike: edges into bounds, valences towards six, and the shape kept.
+//! Isotropic remeshing: edges within bounds, valences near six, shape preserved.
 //!
-//! Rounds of [`restructure`](super::restructure) with vertices spaced evenly along the surface in between and put back
-//! onto the surface as it was (Botsch & Kobbelt, *A remeshing approach to multiresolution modeling*, 2004), and at the
-//! end the sharpest corners one by one (`sharpen`).
+//! Rounds of [`restructure`](super::restructure) alternate with tangential relaxation and projection onto the input surface (Botsch &
+//! Kobbelt, *A remeshing approach to multiresolution modeling*, 2004); then the worst angles are improved one by one (`min_angle`).
 //!
-//! Guarantees: closed, oriented and manifold stays so, with the same components and χ; a surface that did not cross
-//! itself does not afterwards. Aimed at, not guaranteed: all edges in bounds (upper bounds nearly always are; lower ones
-//! give way where the shape, the topology or another sheet is in the way), no angle below 33°, and the surface within
-//! half an edge of what it was.
+//! Guarantees: a closed, oriented manifold stays one, with the same components and χ; no self-intersections are added. Aims: all edges within
+//! bounds (lower bounds may be violated where shape, topology or another sheet is in the way), no angle below 33°, and a surface within half
+//! an edge of the input.
 //!
-//! Edits are made without a look at what they might cross, as that takes most of the time and hardly anything ever does;
-//! then one look is taken at all of it. Where something crosses, those places are left as they were in a second run from
-//! the start (`danger`), and then remeshed with edits that look.
+//! Edits are unchecked at first, since checks take most of the time and intersections are rare; the result is checked as a whole. A second
+//! run from the start leaves regions with intersections unchanged (`conflicts`); these are then remeshed with checked edits.
 
-mod danger;
+mod closest_point;
+mod conflicts;
 mod fan;
+mod min_angle;
+mod one_ring;
 mod relax;
 mod session;
-mod sharpen;
-mod star;
-mod surface;
 
 use super::restructure::{MOST_VERTICES, bytes, collapse_short, flip_for_valence, split_long};
-use super::{Changes, EdgeBounds, Edits, Embedding, Trusting};
+use super::{Changes, EdgeBounds, EditPolicy, Embedding, Unchecked};
 use crate::mesh::{Mesh, MeshError};
-use danger::Danger;
+use conflicts::ConflictMask;
+use min_angle::improve_angles;
 use relax::relax;
 use session::Session;
-use sharpen::blunt;
 
-/// Rounds of restructuring, and how often vertices are spaced in each. With one fewer of either there are twice as many
-/// sharp corners left for the end; more cost more than they save.
+/// Rounds of restructuring, and relaxations in each. One fewer of either leaves twice as many poor angles for the end; more cost more than
+/// they save.
 const ROUNDS: usize = 5;
 const SWEEPS: usize = 2;
 
-/// The ratio of the bounds that rounds work with, as of Botsch & Kobbelt: triangles of such edges have no angle below 33°.
-/// With less, halves of long edges are short; but no further inside than this, or wide bounds would not be made use of.
+/// The ratio of the bounds used in rounds, by Botsch & Kobbelt: triangles with such edges have no angle below 33°. With a smaller ratio
+/// halves of long edges are too short; wider bounds are narrowed no further than this.
 const INNER_RATIO: f32 = 5.0 / 3.0;
 const MOST_INSIDE: f32 = 1.2;
 
-/// Runs with edits that do not look. Mostly the second one is free of crossings; after so many, all edits look.
+/// Runs with unchecked edits. Usually the second one has no intersections; after this many all edits are checked.
 const TRUSTING_RUNS: usize = 4;
 
-/// Brings the lengths of edges into bounds and the valences of vertices towards six, and keeps the shape, its components
-/// and their χ; returns what was done. Ids then mean nothing any more, as the vertices are numbered anew.
+/// Brings edges within bounds and valences near six, preserving shape, components and χ; returns the changes made. Vertices are renumbered.
 ///
-/// The edges become about √(min max) long, and vertices lie on the surface as it was. A surface that does not cross
-/// itself never does afterwards. One that does is taken, too: it crosses itself nowhere else then, but where it does,
-/// edges may stay out of bounds. Attributes of a vertex are blended where edges are drawn together or split; moves do not
-/// change them.
+/// Edges become about √(min max) long, and vertices lie on the input surface. No self-intersections are added; where the input has some,
+/// edges may stay out of bounds. Attributes are blended by collapses and splits; moves do not change them.
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice as much;
@@ -56,7 +50,7 @@ const TRUSTING_RUNS: usize = 4;
 pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError> {
     bounds.check_for(mesh)?;
     let before = mesh.clone();
-    // To edges of about 1, whose squares are in range whatever the units; a power of two, so that nothing is rounded.
+    // Scaled to edges of about 1, whose squares neither over- nor underflow; by a power of two, which rounds nothing.
     let (_, exponent) = libm::frexpf(bounds.max);
     let exponent = exponent.clamp(-EXPONENTS, EXPONENTS);
     let [shrink, grow] = [-exponent, exponent].map(|power| libm::ldexpf(1.0, power));
@@ -71,32 +65,32 @@ pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError>
     Ok(changes)
 }
 
-/// Powers of two by which lengths can be multiplied and divided without leaving the range.
+/// The exponents of two by which lengths can be multiplied and divided within range.
 const EXPONENTS: i32 = 120;
 
-/// First without a look, then with one where that is needed.
+/// Remeshes with unchecked edits, then with checked ones where needed.
 fn in_bounds(mesh: &mut Mesh, bounds: EdgeBounds) -> Changes {
     let surface = mesh.clone();
-    let aim = (bounds.min * bounds.max).sqrt();
-    let mut danger = Danger::new(&surface);
+    let target_edge = (bounds.min * bounds.max).sqrt();
+    let mut conflicts = ConflictMask::new(&surface);
     for run in 0..TRUSTING_RUNS {
-        let mut session = Session::new(&surface, aim, danger.elsewhere(), Trusting);
+        let mut session = Session::new(&surface, target_edge, conflicts.complement(), Unchecked);
         let mut changes = rounds(mesh, bounds, &mut session);
         let mut embedding = followed(mesh, bounds);
         if embedding.is_embedded(mesh) {
-            if !danger.is_nowhere() {
-                changes += rounds(mesh, bounds, &mut session.with(danger.and_around(aim), embedding));
+            if !conflicts.is_empty() {
+                changes += rounds(mesh, bounds, &mut session.with(conflicts.dilated(target_edge), embedding));
             }
             return changes;
         }
-        danger.add_crossings(mesh, aim, |v| session.home(v));
+        conflicts.add_intersections(mesh, target_edge, |v| session.anchor(v));
         mesh.clone_from(&surface);
         if run == 0 && !followed(mesh, bounds).is_embedded(mesh) {
             break;
         }
     }
     let embedding = followed(mesh, bounds);
-    rounds(mesh, bounds, &mut Session::new(&surface, aim, vec![true; surface.slots()], embedding))
+    rounds(mesh, bounds, &mut Session::new(&surface, target_edge, vec![true; surface.slots()], embedding))
 }
 
 fn followed(mesh: &Mesh, bounds: EdgeBounds) -> Embedding {
@@ -105,7 +99,7 @@ fn followed(mesh: &Mesh, bounds: EdgeBounds) -> Embedding {
     embedding
 }
 
-fn rounds<E: Edits>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
+fn rounds<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
     let mut changes = Changes::default();
     let inner = inside(bounds);
     for round in 0..ROUNDS {
@@ -120,19 +114,19 @@ fn rounds<E: Edits>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E
         }
     }
     changes += pass(mesh, bounds, session);
-    changes += blunt(mesh, bounds, session);
+    changes += improve_angles(mesh, bounds, session);
     changes
 }
 
-/// As [`restructure`](super::restructure), for so many vertices at the most.
-fn pass<E: Edits>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
+/// As [`restructure`](super::restructure), up to a number of vertices.
+fn pass<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
     let mut changes = collapse_short(mesh, bounds, session);
     changes += split_long(mesh, bounds, MOST_VERTICES, session);
     changes += flip_for_valence(mesh, bounds, session);
     changes
 }
 
-/// The bounds that rounds work with, a little within those asked for: moves then leave few edges out of them.
+/// The bounds used in rounds, a little narrower than those asked for, so that moves leave few edges out of bounds.
 fn inside(EdgeBounds { min, max }: EdgeBounds) -> EdgeBounds {
     let margin = (max / min / INNER_RATIO).sqrt();
     let margin = if margin < MOST_INSIDE { margin } else { MOST_INSIDE };

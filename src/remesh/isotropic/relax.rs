@@ -1,36 +1,36 @@
-//! Vertices spaced evenly: each goes along the surface to the middle of its triangles, and back onto the surface as it
-//! was (Botsch & Kobbelt, *A remeshing approach to multiresolution modeling*, 2004).
+//! Tangential relaxation: each vertex moves along the surface to the centroid of its triangles, then to the closest point on the input
+//! surface (Botsch & Kobbelt, *A remeshing approach to multiresolution modeling*, 2004).
 
+use super::one_ring::{Move, OneRing, least_quality, moved};
 use super::session::Session;
-use super::star::{Move, Star, moved, sharpest};
 use crate::mesh::{Mesh, VertexId};
-use crate::remesh::{EdgeBounds, Edits};
+use crate::remesh::{EdgeBounds, EditPolicy};
 
-/// The squared sine of 35°. Moves may make angles smaller as long as they stay above it.
-const FINE: f32 = 0.329;
+/// The squared sine of 35°: moves may reduce angles that stay above it.
+const GOOD: f32 = 0.329;
 
-/// Shorter ways, in the aim, are not worth the search. With more, angles stay sharper.
-const STILL: f32 = 0.02;
+/// Shorter steps, in the target edge, are skipped; with a higher value angles stay smaller.
+const SHORTEST_STEP: f32 = 0.02;
 
-/// Moves every vertex once, one after the other; returns how many went.
-pub(super) fn relax<E: Edits>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> usize {
+/// Moves every vertex once, one after the other; returns the number moved.
+pub(super) fn relax<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> usize {
     let mut moves = 0;
-    let still = STILL * session.aim();
+    let shortest = SHORTEST_STEP * session.target_edge();
     for slot in 0..mesh.slots() {
         let v = VertexId::from_index(slot);
         if !mesh.is_live(v) || !session.is_free(v) {
             continue;
         }
-        let Some(star) = Star::of(mesh, v) else { continue };
-        let way = star.along(star.to_centroid);
-        if way.length_squared() < still * still {
+        let Some(star) = OneRing::of(mesh, v) else { continue };
+        let step = star.along(star.to_centroid);
+        if step.length_squared() < shortest * shortest {
             continue;
         }
-        let foot = session.foot(v, mesh.position(v) + way);
-        if let Some(Move { sharpest: after, lost }) = moved(mesh, v, foot.point, bounds, session)
-            && (after >= FINE || after >= sharpest(mesh, v))
+        let closest = session.closest_point(v, mesh.position(v) + step);
+        if let Some(Move { least_quality: after, deviation }) = moved(mesh, v, closest.point, bounds, session)
+            && (after >= GOOD || after >= least_quality(mesh, v))
         {
-            moves += usize::from(session.place(mesh, v, foot, lost));
+            moves += usize::from(session.move_to(mesh, v, closest, deviation));
         }
     }
     moves

@@ -1,120 +1,129 @@
-//! What is known of each vertex while a mesh is remeshed, and what edits may take from the shape.
+//! The state of a remeshing run: by vertex, an anchor on the input surface and the deviation from it, which edits must keep small.
 
+use super::closest_point::{ClosestPoint, closest_point};
 use super::fan::Fan;
-use super::surface::{Foot, foot};
 use crate::math::Vec3;
 use crate::mesh::{EditError, Mesh, VertexId};
-use crate::remesh::Edits;
+use crate::remesh::EditPolicy;
 
-/// How far the surface may move in collapses and moves, all in all, and in one flip, in the aim. With more, thin parts get short and
-/// sharp edges blunt; with less, edges on rough surfaces stay out of bounds.
-const MOST_LOST: f32 = 0.25;
+/// The largest deviation accumulated by collapses and moves, and the largest depth of a flip, in the target edge. Higher values shorten
+/// thin parts and blunt sharp edges; with lower ones edges on rough surfaces stay out of bounds.
+const MOST_DEVIATION: f32 = 0.25;
 const FLIP_DEPTH: f32 = 0.15;
 
-/// A mesh on its way from the surface as it was.
+/// A remeshing run.
 pub(super) struct Session<'a, E> {
-    /// The mesh as it was.
+    /// The input surface.
     pub surface: &'a Mesh,
-    /// By slot of the surface as it was, its normals.
+    /// By slot of the input surface, its normals.
     normals: Vec<Vec3>,
-    /// By slot, a vertex of the surface as it was that is near.
-    homes: Vec<VertexId>,
-    /// By slot of the surface as it was, whether anything but splits may be done there.
+    /// By slot, a nearby vertex of the input surface.
+    anchors: Vec<VertexId>,
+    /// By slot of the input surface, whether edits other than splits are allowed there.
     free: Vec<bool>,
-    /// By slot, how far collapses have moved the surface here, at most.
-    lost: Vec<f32>,
-    /// What the collapse that was asked about last would make of it.
-    would_lose: f32,
-    aim: f32,
+    /// By slot, an upper bound of the deviation from the input surface.
+    deviation: Vec<f32>,
+    /// The deviation after the collapse that was asked about last.
+    pending_deviation: f32,
+    target_edge: f32,
     edits: E,
 }
 
-impl<'a, E: Edits> Session<'a, E> {
-    /// For a copy of `surface`, with edges of about `aim` to come.
-    pub fn new(surface: &'a Mesh, aim: f32, free: Vec<bool>, edits: E) -> Self {
+impl<'a, E: EditPolicy> Session<'a, E> {
+    /// For a copy of `surface`, to be remeshed to edges of about `target_edge`.
+    pub fn new(surface: &'a Mesh, target_edge: f32, free: Vec<bool>, edits: E) -> Self {
         let slots = surface.slots();
-        let homes = (0..slots).map(VertexId::from_index).collect();
-        let normals = homes_normals(surface);
-        Self { surface, normals, free, homes, lost: vec![0.0; slots], would_lose: 0.0, aim, edits }
+        let anchors = (0..slots).map(VertexId::from_index).collect();
+        let normals = unit_normals(surface);
+        Self {
+            surface,
+            normals,
+            free,
+            anchors,
+            deviation: vec![0.0; slots],
+            pending_deviation: 0.0,
+            target_edge,
+            edits,
+        }
     }
 
-    /// The same with edits made in another way.
+    /// The same run with another policy.
     pub fn with<F>(self, free: Vec<bool>, edits: F) -> Session<'a, F> {
-        let Self { surface, normals, homes, lost, would_lose, aim, .. } = self;
-        Session { surface, normals, free, homes, lost, would_lose, aim, edits }
+        let Self { surface, normals, anchors, deviation, pending_deviation, target_edge, .. } = self;
+        Session { surface, normals, free, anchors, deviation, pending_deviation, target_edge, edits }
     }
 
-    /// A vertex of the surface as it was that is near.
-    pub fn home(&self, v: VertexId) -> VertexId {
-        self.homes[v.index()]
+    /// A nearby vertex of the input surface.
+    pub fn anchor(&self, v: VertexId) -> VertexId {
+        self.anchors[v.index()]
     }
 
     /// Whether `v` may be moved and its edges collapsed and flipped.
     pub fn is_free(&self, v: VertexId) -> bool {
-        self.free[self.homes[v.index()].index()]
+        self.free[self.anchors[v.index()].index()]
     }
 
-    /// The length of the edges to come.
-    pub fn aim(&self) -> f32 {
-        self.aim
+    /// The target edge length.
+    pub fn target_edge(&self) -> f32 {
+        self.target_edge
     }
 
-    /// The point of the surface as it was that is nearest to `p`, as seen from `v`.
-    pub fn foot(&self, v: VertexId, p: Vec3) -> Foot {
-        foot(self.surface, self.homes[v.index()], p)
+    /// The point of the input surface closest to `p`, found from the anchor of `v`.
+    pub fn closest_point(&self, v: VertexId, p: Vec3) -> ClosestPoint {
+        closest_point(self.surface, self.anchors[v.index()], p)
     }
 
-    /// Whether a triangle with these corners and this normal looks out of the surface as it was.
-    pub fn looks_out(&self, corners: [VertexId; 3], normal: Vec3) -> bool {
-        let [u, v, w] = corners.map(|corner| self.normals[self.homes[corner.index()].index()]);
+    /// Whether a triangle with these corners and this normal faces out of the input surface.
+    pub fn faces_outwards(&self, corners: [VertexId; 3], normal: Vec3) -> bool {
+        let [u, v, w] = corners.map(|corner| self.normals[self.anchors[corner.index()].index()]);
         normal.dot(u) > 0.0 || normal.dot(v) > 0.0 || normal.dot(w) > 0.0
     }
 
-    /// Puts `v` at a point of the surface as it was, if nothing is in the way.
-    pub fn place(&mut self, mesh: &mut Mesh, v: VertexId, foot: Foot, lost: f32) -> bool {
+    /// Moves `v` to a point of the input surface, if the policy allows it.
+    pub fn move_to(&mut self, mesh: &mut Mesh, v: VertexId, closest: ClosestPoint, deviation: f32) -> bool {
         let moved = self.edits.attempt(mesh, |mesh| {
-            mesh.set_position(v, foot.point);
+            mesh.set_position(v, closest.point);
             Ok(())
         });
         if moved.is_ok() {
-            self.homes[v.index()] = foot.home;
-            self.lost[v.index()] = lost;
+            self.anchors[v.index()] = closest.anchor;
+            self.deviation[v.index()] = deviation;
         }
         moved.is_ok()
     }
 
-    /// How far the surface around `gone` would be from it without it; `None` where a triangle would not look out.
-    fn drop(&self, mesh: &Mesh, kept: VertexId, gone: VertexId) -> Option<f32> {
+    /// The distance of `gone` from the surface after its collapse; `None` if a triangle would not face outwards.
+    fn gap_without(&self, mesh: &Mesh, kept: VertexId, gone: VertexId) -> Option<f32> {
         let mut fan = Fan::new(mesh.position(gone), mesh.position(kept));
         for (a, b) in mesh.ring(gone).pairs().filter(|&(a, b)| a != kept && b != kept) {
-            if !self.looks_out([kept, a, b], fan.push(mesh.position(a), mesh.position(b))) {
+            if !self.faces_outwards([kept, a, b], fan.push(mesh.position(a), mesh.position(b))) {
                 return None;
             }
         }
         Some(fan.gap())
     }
 
-    /// What `v` has lost if it loses `gap` more; `None` where that is too much.
-    pub fn after_losing(&self, v: VertexId, gap: f32) -> Option<f32> {
-        let lost = self.lost[v.index()] + gap;
-        (lost <= MOST_LOST * self.aim).then_some(lost)
+    /// The deviation at `v` with `gap` added; `None` if it is too large.
+    pub fn deviation_after(&self, v: VertexId, gap: f32) -> Option<f32> {
+        let deviation = self.deviation[v.index()] + gap;
+        (deviation <= MOST_DEVIATION * self.target_edge).then_some(deviation)
     }
 
-    /// Brings the mesh into the order of memory.
+    /// Renumbers the mesh along its surface.
     pub fn reorder(&mut self, mesh: &mut Mesh) {
         let names = mesh.reorder();
-        let (mut homes, mut lost) = (vec![VertexId(0); mesh.slots()], vec![0.0; mesh.slots()]);
+        let (mut anchors, mut deviation) = (vec![VertexId(0); mesh.slots()], vec![0.0; mesh.slots()]);
         for (old, new) in names.iter().enumerate() {
             if let Some(new) = new {
-                homes[new.index()] = self.homes[old];
-                lost[new.index()] = self.lost[old];
+                anchors[new.index()] = self.anchors[old];
+                deviation[new.index()] = self.deviation[old];
             }
         }
-        (self.homes, self.lost) = (homes, lost);
+        (self.anchors, self.deviation) = (anchors, deviation);
     }
 }
 
-impl<E: Edits> Edits for Session<'_, E> {
+impl<E: EditPolicy> EditPolicy for Session<'_, E> {
     fn attempt<T>(
         &mut self,
         mesh: &mut Mesh,
@@ -127,9 +136,9 @@ impl<E: Edits> Edits for Session<'_, E> {
         if !self.is_free(kept) || !self.is_free(gone) {
             return false;
         }
-        let Some(drop) = self.drop(mesh, kept, gone) else { return false };
-        let Some(lost) = self.after_losing(gone, drop) else { return false };
-        self.would_lose = lost.max(self.lost[kept.index()]);
+        let Some(gap_without) = self.gap_without(mesh, kept, gone) else { return false };
+        let Some(deviation) = self.deviation_after(gone, gap_without) else { return false };
+        self.pending_deviation = deviation.max(self.deviation[kept.index()]);
         true
     }
 
@@ -137,29 +146,29 @@ impl<E: Edits> Edits for Session<'_, E> {
         let [[p, q], [a, b]] = [ends, across].map(|pair| pair.map(|v| mesh.position(v)));
         let between = (q - p).cross(b - a);
         let depth = between.dot(a - p);
-        let most = FLIP_DEPTH * self.aim;
+        let most = FLIP_DEPTH * self.target_edge;
         [ends, across].as_flattened().iter().all(|&v| self.is_free(v))
             && depth * depth <= most * most * between.length_squared()
-            && self.looks_out([ends[0], across[1], across[0]], (b - p).cross(a - p))
-            && self.looks_out([ends[1], across[0], across[1]], (a - q).cross(b - q))
+            && self.faces_outwards([ends[0], across[1], across[0]], (b - p).cross(a - p))
+            && self.faces_outwards([ends[1], across[0], across[1]], (a - q).cross(b - q))
     }
 
     fn collapsed(&mut self, kept: VertexId) {
-        self.lost[kept.index()] = self.would_lose;
+        self.deviation[kept.index()] = self.pending_deviation;
     }
 
-    fn was_split(&mut self, fresh: VertexId, u: VertexId) {
-        if fresh.index() >= self.homes.len() {
-            self.homes.resize(fresh.index() + 1, VertexId(0));
-            self.lost.resize(fresh.index() + 1, 0.0);
+    fn was_split(&mut self, new: VertexId, u: VertexId) {
+        if new.index() >= self.anchors.len() {
+            self.anchors.resize(new.index() + 1, VertexId(0));
+            self.deviation.resize(new.index() + 1, 0.0);
         }
-        self.homes[fresh.index()] = self.homes[u.index()];
-        self.lost[fresh.index()] = self.lost[u.index()];
+        self.anchors[new.index()] = self.anchors[u.index()];
+        self.deviation[new.index()] = self.deviation[u.index()];
     }
 }
 
-/// The unit normals by slot; zero where there is no area.
-fn homes_normals(surface: &Mesh) -> Vec<Vec3> {
+/// Unit normals by slot; zero without area.
+fn unit_normals(surface: &Mesh) -> Vec<Vec3> {
     (0..surface.slots())
         .map(|slot| surface.area_normal(VertexId::from_index(slot)).normalize_or_zero())
         .collect()

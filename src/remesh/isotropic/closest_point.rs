@@ -1,40 +1,38 @@
-//! The nearest point of the surface as it was, found by walking along it.
+//! The closest point on the input surface, found by a walk along it.
 
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 
-/// Steps of one walk. A vertex goes less than an edge at a time; this many pass where the surface as it was is a hundred
-/// times finer than the bounds, and longer walks would only make hostile meshes slow.
+/// Steps of one walk. Vertices move by less than an edge at a time; this many suffice on an input a hundred times finer than the bounds.
+/// Longer walks would only slow down malformed meshes.
 const STEPS: usize = 200;
 
-/// A point inside a triangle that is nearer than this share (squared) of the distance to its corner is taken at once: no
-/// other triangle around the corner is much nearer, unless the surface is rough there.
+/// A point inside a triangle is accepted at once if its squared distance is below this share of that to the corner: no other triangle
+/// around the corner is much nearer, except on rough surfaces.
 const NEAR: f32 = 0.04;
 
-/// The squared sine of an angle below which a triangle is taken as its edges: which side of one a point is on is lost in
-/// rounding there.
+/// The squared sine of an angle below which only the edges of a triangle are tested: the side of a point is lost in rounding there.
 const SLIVER: f32 = 1e-6;
 
-/// A point of the surface as it was.
+/// A point of the input surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Foot {
-    /// Where it is.
+pub(super) struct ClosestPoint {
+    /// Its position.
     pub point: Vec3,
     /// A corner of its triangle.
-    pub home: VertexId,
+    pub anchor: VertexId,
 }
 
-/// The nearest point to `p` that is found by going downhill from around `home`: nearest in the same sheet, where a search
-/// through space could find another sheet.
-pub(super) fn foot(surface: &Mesh, home: VertexId, p: Vec3) -> Foot {
-    let mut best = Foot { point: surface.position(home), home };
+/// The closest point to `p` by descent from `anchor`: closest on the same sheet, where a search in space might find another one.
+pub(super) fn closest_point(surface: &Mesh, anchor: VertexId, p: Vec3) -> ClosestPoint {
+    let mut best = ClosestPoint { point: surface.position(anchor), anchor };
     let mut least = f32::INFINITY;
     for _ in 0..STEPS {
-        let Some((square, found)) = foot_around(surface, best.home, p) else { break };
+        let Some((square, found)) = closest_in_ring(surface, best.anchor, p) else { break };
         if square >= least {
             break;
         }
-        let stays = found.home == best.home;
+        let stays = found.anchor == best.anchor;
         (least, best) = (square, found);
         if stays {
             break;
@@ -43,37 +41,37 @@ pub(super) fn foot(surface: &Mesh, home: VertexId, p: Vec3) -> Foot {
     best
 }
 
-/// The nearest point of the triangles around `centre`, with its squared distance; its home is its nearest corner.
-fn foot_around(surface: &Mesh, centre: VertexId, p: Vec3) -> Option<(f32, Foot)> {
+/// The closest point on the triangles around `centre`, anchored at the nearest corner, and its squared distance.
+fn closest_in_ring(surface: &Mesh, centre: VertexId, p: Vec3) -> Option<(f32, ClosestPoint)> {
     let origin = surface.position(centre);
     let target = p - origin;
     let near = NEAR * target.length_squared();
     let (mut least, mut best) = (f32::INFINITY, None);
     for (a, b) in surface.ring(centre).pairs() {
         let sides = [surface.position(a) - origin, surface.position(b) - origin];
-        let (place, inside) = nearest_in(sides, target);
-        let point = sides[0] * place.a + sides[1] * place.b;
+        let (at, inside) = nearest_in(sides, target);
+        let point = sides[0] * at.a + sides[1] * at.b;
         let square = point.distance_squared(target);
         if square < least {
-            (least, best) = (square, Some((point, [centre, a, b][place.heaviest()])));
+            (least, best) = (square, Some((point, [centre, a, b][at.nearest_corner()])));
             if inside && square < near {
                 break;
             }
         }
     }
-    best.map(|(point, home)| (least, Foot { point: origin + point, home }))
+    best.map(|(point, anchor)| (least, ClosestPoint { point: origin + point, anchor }))
 }
 
 /// A point a·A + b·B of a triangle with corners at the origin, A and B.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct Barycentric {
     a: f32,
     b: f32,
 }
 
-impl Place {
-    /// The number of the nearest corner: 0 for the origin, 1 for A, 2 for B.
-    fn heaviest(self) -> usize {
+impl Barycentric {
+    /// The corner with the largest weight: 0 for the origin, 1 for A, 2 for B.
+    fn nearest_corner(self) -> usize {
         let Self { a, b } = self;
         let rest = 1.0 - a - b;
         if rest >= a && rest >= b {
@@ -86,40 +84,40 @@ impl Place {
     }
 }
 
-/// The place nearest to `p` in the triangle with corners at the origin, `a` and `b`, and whether `p` is above it.
-fn nearest_in([a, b]: [Vec3; 2], p: Vec3) -> (Place, bool) {
+/// The point closest to `p` in the triangle with corners at the origin, `a` and `b`, and whether `p` projects into it.
+fn nearest_in([a, b]: [Vec3; 2], p: Vec3) -> (Barycentric, bool) {
     let (aa, ab, bb) = (a.length_squared(), a.dot(b), b.length_squared());
     let (pa, pb) = (p.dot(a), p.dot(b));
     let size = aa * bb - ab * ab;
     let is_sliver = size.is_nan() || size <= SLIVER * aa * bb;
     let inverse = if is_sliver { 0.0 } else { 1.0 / size };
-    let inside = Place { a: (bb * pa - ab * pb) * inverse, b: (aa * pb - ab * pa) * inverse };
+    let inside = Barycentric { a: (bb * pa - ab * pb) * inverse, b: (aa * pb - ab * pa) * inverse };
     let [beyond_a, beyond_b] = [inside.b < 0.0 || is_sliver, inside.a < 0.0 || is_sliver];
     let beyond_other = inside.a + inside.b > 1.0 || is_sliver;
     if !(beyond_a || beyond_b || beyond_other) {
         return (inside, true);
     }
-    // Across one edge the nearest point is on it; beyond a corner, on one of two.
+    // Beyond one edge the closest point is on it; beyond a corner, on one of two edges.
     let on_other = || {
         let s = share(aa - ab - pa + pb, aa - 2.0 * ab + bb);
-        Place { a: 1.0 - s, b: s }
+        Barycentric { a: 1.0 - s, b: s }
     };
     let edges = [
-        beyond_a.then(|| Place { a: share(pa, aa), b: 0.0 }),
-        beyond_b.then(|| Place { a: 0.0, b: share(pb, bb) }),
+        beyond_a.then(|| Barycentric { a: share(pa, aa), b: 0.0 }),
+        beyond_b.then(|| Barycentric { a: 0.0, b: share(pb, bb) }),
         beyond_other.then(on_other),
     ];
     let mut best = (f32::INFINITY, inside);
-    for place in edges.into_iter().flatten() {
-        let square = (a * place.a + b * place.b).distance_squared(p);
+    for at in edges.into_iter().flatten() {
+        let square = (a * at.a + b * at.b).distance_squared(p);
         if square < best.0 {
-            best = (square, place);
+            best = (square, at);
         }
     }
     (best.1, false)
 }
 
-/// How far along a segment a point is, in 0..=1; by their products.
+/// The parameter of a point along a segment, in 0..=1, from dot products.
 fn share(along: f32, whole: f32) -> f32 {
     if whole > 0.0 { (along / whole).clamp(0.0, 1.0) } else { 0.0 }
 }
@@ -132,7 +130,7 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     #[test]
-    fn a_place_is_as_near_as_that_found_with_twice_the_digits() {
+    fn the_closest_point_agrees_with_double_precision() {
         let random = &mut Random::new(1);
         let mut any = || {
             let mut unit = || 2.0 * random.unit() as f32 - 1.0;
@@ -142,13 +140,13 @@ mod tests {
             let (a, p) = (any(), any() * 2.0);
             // Thin ones, flat ones and points, too.
             let b = [any(), a * 0.5 + any() * 1e-3, a, Vec3::ZERO, any() * 1e-4][k % 5];
-            let (place, inside) = nearest_in([a, b], p);
-            let found = (a * place.a + b * place.b).distance(p);
+            let (at, inside) = nearest_in([a, b], p);
+            let found = (a * at.a + b * at.b).distance(p);
             let corners = [Vec3::ZERO, a, b];
             let weights = triangle::closest(corners, p);
             let expected = triangle::at(corners, weights).distance(p.as_dvec3()) as f32;
             assert!((found - expected).abs() < 1e-4, "{corners:?} to {p}: {found} instead of {expected}");
-            assert!(place.a >= 0.0 && place.b >= 0.0 && place.a + place.b <= 1.0 + 1e-6, "{place:?}");
+            assert!(at.a >= 0.0 && at.b >= 0.0 && at.a + at.b <= 1.0 + 1e-6, "{at:?}");
             assert!(!inside || weights.min_element() > -1e-3);
         }
     }

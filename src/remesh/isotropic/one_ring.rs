@@ -1,31 +1,30 @@
-//! The triangles around a vertex: where it wants to go, and how sharp they would be there.
+//! The one-ring of a vertex: its centroid, and the quality of its triangles after a move.
 
 use super::fan::Fan;
 use super::session::Session;
 use crate::math::{Mat3, Vec3, Vec3Swizzles};
 use crate::mesh::{Mesh, VertexId};
 use crate::remesh::restructure::faces_alike;
-use crate::remesh::{EdgeBounds, Edits};
+use crate::remesh::{EdgeBounds, EditPolicy};
 
-/// What moving off the surface costs beside moving along it. With more, sharp edges are worn off; with less, vertices on
-/// curved parts hardly move.
+/// The cost of moving along the surface relative to moving off it. Higher values wear off sharp edges; with lower ones vertices on curved
+/// parts hardly move.
 const SLACK: f32 = 0.04;
 
-/// The triangles around a vertex in sums.
-pub(super) struct Star {
+/// Sums over the triangles around a vertex.
+pub(super) struct OneRing {
     /// From the vertex to the centroid of the triangles.
     pub to_centroid: Vec3,
-    /// Takes out of a way what leads off the planes of the triangles: leaves ways in a plane, along a sharp edge, and at a
-    /// corner none.
+    /// Projects displacements onto the planes of the triangles: onto a plane, onto a sharp edge, and to nothing at a corner.
     along: Mat3,
 }
 
-impl Star {
-    /// That of `v`; `None` where it has no area.
+impl OneRing {
+    /// The one-ring of `v`; `None` if it has no area.
     pub fn of(mesh: &Mesh, v: VertexId) -> Option<Self> {
         let p = mesh.position(v);
         let (mut area, mut sum) = (0.0, Vec3::ZERO);
-        // Of n nᵀ / |n|, summed: what is on the diagonal, and yz, zx, xy.
+        // The sum of n nᵀ / |n|: its diagonal, and its entries yz, zx, xy.
         let (mut diagonal, mut beside) = (Vec3::ZERO, Vec3::ZERO);
         for (a, b) in mesh.ring(v).pairs() {
             let (a, b) = (mesh.position(a) - p, mesh.position(b) - p);
@@ -48,30 +47,30 @@ impl Star {
         Some(Self { to_centroid: sum / (3.0 * area), along: stiff.inverse() })
     }
 
-    /// What is left of a way along the surface.
-    pub fn along(&self, way: Vec3) -> Vec3 {
-        self.along * (self.along * way)
+    /// The part of a displacement along the surface.
+    pub fn along(&self, displacement: Vec3) -> Vec3 {
+        self.along * (self.along * displacement)
     }
 }
 
-/// The squared sine of the smallest angle of a triangle that is not obtuse there; 0 without area.
-pub(super) fn sharpness(corners: [Vec3; 3]) -> f32 {
-    let [part, whole] = sharpness_parts(corners);
+/// The squared sine of the smallest angle of a triangle; 0 without area.
+pub(super) fn angle_quality(corners: [Vec3; 3]) -> f32 {
+    let [part, whole] = angle_quality_fraction(corners);
     if whole > 0.0 { part / whole } else { 0.0 }
 }
 
-/// Whether a triangle has area and its [`sharpness`] is more than that.
-pub(super) fn is_blunter(corners: [Vec3; 3], sharpness: f32) -> bool {
-    let [part, whole] = sharpness_parts(corners);
-    part > sharpness * whole
+/// Whether a triangle has area and a higher [`angle_quality`].
+pub(super) fn has_better_angle(corners: [Vec3; 3], angle_quality: f32) -> bool {
+    let [part, whole] = angle_quality_fraction(corners);
+    part > angle_quality * whole
 }
 
-/// [`sharpness`] as a fraction.
+/// [`angle_quality`] as a fraction.
 #[inline]
-fn sharpness_parts([a, b, c]: [Vec3; 3]) -> [f32; 2] {
+fn angle_quality_fraction([a, b, c]: [Vec3; 3]) -> [f32; 2] {
     let (ab, bc, ca) = (b - a, c - b, a - c);
     let (x, y, z) = (ab.length_squared(), bc.length_squared(), ca.length_squared());
-    // Twice the area over the two longer sides.
+    // The sine is twice the area over the product of the two longer sides.
     let least = if x < y {
         if x < z { x } else { z }
     } else if y < z {
@@ -82,53 +81,52 @@ fn sharpness_parts([a, b, c]: [Vec3; 3]) -> [f32; 2] {
     [ab.cross(ca).length_squared() * least, x * y * z]
 }
 
-/// What a move would make of the triangles around a vertex.
+/// The outcome of moving a vertex.
 pub(super) struct Move {
-    /// The least of [`sharpness`] then.
-    pub sharpest: f32,
-    /// How far the surface would have moved here, all in all.
-    pub lost: f32,
+    /// The least [`angle_quality`] around it.
+    pub least_quality: f32,
+    /// The accumulated deviation from the input surface.
+    pub deviation: f32,
 }
 
-/// What comes of `v` at `place`; `None` where a triangle turned over, an edge left its bounds, or too much of the shape
-/// were lost.
-pub(super) fn moved<E: Edits>(
+/// The outcome of moving `v` to `position`; `None` if a triangle would turn over, an edge leave its bounds, or the surface deviate too far.
+pub(super) fn moved<E: EditPolicy>(
     mesh: &Mesh,
     v: VertexId,
-    place: Vec3,
+    position: Vec3,
     bounds: EdgeBounds,
     session: &Session<E>,
 ) -> Option<Move> {
     let p = mesh.position(v);
     let [shortest, longest] = [bounds.min * bounds.min, bounds.max * bounds.max];
-    let mut sharpest = 1.0;
-    let mut fan = Fan::new(p, place);
+    let mut least_quality = 1.0;
+    let mut fan = Fan::new(p, position);
     for (u, w) in mesh.ring(v).pairs() {
         let (a, b) = (mesh.position(u), mesh.position(w));
-        let new = place.distance_squared(a);
+        let new = position.distance_squared(a);
         if (new < shortest || new > longest) && leaves(new, p.distance_squared(a), shortest) {
             return None;
         }
         let (before, after) = ((a - p).cross(b - p), fan.push(a, b));
         if !faces_alike(before, after)
-            || !session.looks_out([v, u, w], after) && session.looks_out([v, u, w], before)
+            || !session.faces_outwards([v, u, w], after) && session.faces_outwards([v, u, w], before)
         {
             return None;
         }
-        let here = sharpness([place, a, b]);
-        sharpest = if here < sharpest { here } else { sharpest };
+        let here = angle_quality([position, a, b]);
+        least_quality = if here < least_quality { here } else { least_quality };
     }
-    Some(Move { sharpest, lost: session.after_losing(v, fan.gap())? })
+    Some(Move { least_quality, deviation: session.deviation_after(v, fan.gap())? })
 }
 
-/// Whether an edge that is out of bounds was nearer to them before; all squared.
+/// Whether an edge out of bounds was nearer to them before; squared lengths.
 fn leaves(new: f32, old: f32, shortest: f32) -> bool {
     if new < shortest { new < old } else { new > old }
 }
 
-/// The least of [`sharpness`] around `v`.
-pub(super) fn sharpest(mesh: &Mesh, v: VertexId) -> f32 {
+/// The least [`angle_quality`] around `v`.
+pub(super) fn least_quality(mesh: &Mesh, v: VertexId) -> f32 {
     let p = mesh.position(v);
-    let of = |(a, b)| sharpness([p, mesh.position(a), mesh.position(b)]);
+    let of = |(a, b)| angle_quality([p, mesh.position(a), mesh.position(b)]);
     mesh.ring(v).pairs().map(of).fold(1.0, |least, here| if here < least { here } else { least })
 }

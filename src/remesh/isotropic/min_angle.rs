@@ -1,0 +1,182 @@
+//! Minimum-angle optimisation: improves the worst angles one by one, by a flip, a collapse or a move.
+
+use super::one_ring::{Move, OneRing, angle_quality, has_better_angle, least_quality, moved};
+use super::session::Session;
+use crate::math::Vec3;
+use crate::mesh::{Mesh, Opposite, VertexId};
+use crate::remesh::restructure::{LEAST_VALENCE, may_collapse, may_flip};
+use crate::remesh::{Changes, EdgeBounds, EditPolicy};
+
+/// The squared sine of 33°: triangles with a smaller angle are improved.
+const POOR: f32 = 0.2966;
+
+/// Passes over all poor triangles; most improvements are made in three.
+const ROUNDS: usize = 6;
+
+/// Step lengths tried, in the target edge, and the number of steps of a vertex.
+const STEPS: [f32; 3] = [0.2, 0.1, 0.05];
+const MOVES: usize = 4;
+
+/// The highest valence after a flip: with eleven neighbours one angle must be below 33°.
+const MOST_VALENCE: usize = 10;
+
+/// Improves poor angles where edges stay within bounds or come nearer to them.
+pub(super) fn improve_angles<E: EditPolicy>(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    session: &mut Session<E>,
+) -> Changes {
+    let mut changes = Changes::default();
+    // Failed attempts are repeated only where something has changed around them.
+    let mut changed = vec![true; mesh.slots()];
+    for _ in 0..ROUNDS {
+        let may_be_improved = |&v: &VertexId| session.is_free(v) && is_poor(mesh, v);
+        let poor: Vec<VertexId> =
+            mesh.vertices().filter(|v| changed[v.index()]).filter(may_be_improved).collect();
+        if poor.is_empty() {
+            break;
+        }
+        changed.fill(false);
+        for v in poor {
+            if mesh.is_live(v) && is_poor(mesh, v) {
+                let (ring, position) = (mesh.ring(v).clone(), mesh.position(v));
+                let here = improve_around(mesh, bounds, v, ring.as_slice(), session);
+                if here != Changes::default() || mesh.position(v) != position {
+                    ring.as_slice().iter().chain([&v]).for_each(|w| changed[w.index()] = true);
+                }
+                changes += here;
+            }
+        }
+    }
+    changes
+}
+
+/// Tries to improve the angles at `v`; `ring` are its neighbours before.
+fn improve_around<E: EditPolicy>(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    v: VertexId,
+    ring: &[VertexId],
+    session: &mut Session<E>,
+) -> Changes {
+    let mut changes = Changes::default();
+    for &w in ring {
+        changes.inversions += u32::from(flip(mesh, bounds, [v, w], session));
+    }
+    let now = least_quality(mesh, v);
+    if now >= POOR {
+        return changes;
+    }
+    for &w in ring {
+        if collapse(mesh, bounds, [w, v], now, session) {
+            changes.deletions += 1;
+            return changes;
+        }
+    }
+    shift(mesh, bounds, v, session);
+    changes
+}
+
+/// Flips an edge if the smallest angle of its two triangles grows.
+fn flip<E: EditPolicy>(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    [u, v]: [VertexId; 2],
+    session: &mut Session<E>,
+) -> bool {
+    let Ok(Opposite { left, right }) = mesh.opposite(u, v) else { return false };
+    let [p, q, a, b] = [u, v, left, right].map(|w| mesh.position(w));
+    let lesser = |s: f32, t: f32| if s < t { s } else { t };
+    let now = lesser(angle_quality([p, q, a]), angle_quality([q, p, b]));
+    if now >= POOR {
+        return false;
+    }
+    let then = lesser(angle_quality([p, b, a]), angle_quality([q, a, b]));
+    let valence = |w: VertexId| mesh.ring(w).valence();
+    let fits = [u, v].iter().all(|&w| valence(w) > LEAST_VALENCE)
+        && [left, right].iter().all(|&w| valence(w) < MOST_VALENCE);
+    then > now
+        && fits
+        && may_flip(mesh, bounds, [u, v], [left, right])
+        && session.may_flip(mesh, [u, v], [left, right])
+        && session.attempt(mesh, |mesh| mesh.flip(u, v)).is_ok()
+}
+
+/// Collapses `gone` into `kept` if the smallest angle around it grows from `now`.
+fn collapse<E: EditPolicy>(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    [kept, gone]: [VertexId; 2],
+    now: f32,
+    session: &mut Session<E>,
+) -> bool {
+    let position = mesh.position(kept);
+    let others = |(a, b): &(VertexId, VertexId)| *a != kept && *b != kept;
+    let done = all_better(mesh, mesh.ring(gone).pairs().filter(others), position, now)
+        && may_collapse(mesh, bounds, kept, gone)
+        && session.may_collapse(mesh, kept, gone)
+        && session.attempt(mesh, |mesh| mesh.collapse(kept, gone, position)).is_ok();
+    if done {
+        session.collapsed(kept);
+    }
+    done
+}
+
+/// Moves `v` along the surface to a larger smallest angle.
+fn shift<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, v: VertexId, session: &mut Session<E>) {
+    let mut step = 0;
+    for _ in 0..MOVES {
+        let Some(star) = OneRing::of(mesh, v) else { return };
+        while step < STEPS.len() {
+            let reach = STEPS[step] * session.target_edge();
+            if best_step(mesh, bounds, v, &star, reach, session) {
+                break;
+            }
+            step += 1;
+        }
+    }
+}
+
+/// Makes the best step of one length, if it improves anything.
+fn best_step<E: EditPolicy>(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    v: VertexId,
+    star: &OneRing,
+    reach: f32,
+    session: &mut Session<E>,
+) -> bool {
+    let p = mesh.position(v);
+    let mut best = None;
+    let mut most = least_quality(mesh, v);
+    let ring = mesh.ring(v).as_slice();
+    let towards = ring.iter().map(|&w| mesh.position(w) - p).flat_map(|direction| [direction, -direction]);
+    for direction in towards {
+        let position = p + star.along(direction.normalize_or(Vec3::ZERO) * reach);
+        // The closest point is nearby, so most steps can be rejected without it.
+        if !all_better(mesh, mesh.ring(v).pairs(), position, most) {
+            continue;
+        }
+        let closest = session.closest_point(v, position);
+        if let Some(Move { least_quality: after, deviation }) = moved(mesh, v, closest.point, bounds, session)
+            && after > most
+        {
+            (best, most) = (Some((closest, deviation)), after);
+        }
+    }
+    best.is_some_and(|(closest, deviation)| session.move_to(mesh, v, closest, deviation))
+}
+
+fn is_poor(mesh: &Mesh, v: VertexId) -> bool {
+    !all_better(mesh, mesh.ring(v).pairs(), mesh.position(v), POOR)
+}
+
+/// Whether all triangles with a corner at `position` and the given others have a better angle than `now`.
+fn all_better(
+    mesh: &Mesh,
+    mut others: impl Iterator<Item = (VertexId, VertexId)>,
+    position: Vec3,
+    now: f32,
+) -> bool {
+    others.all(|(a, b)| has_better_angle([position, mesh.position(a), mesh.position(b)], now))
+}
