@@ -1,9 +1,9 @@
-//! What is near some points, by the cell.
+//! The neighbourhood of a set of points, as grid cells.
 
 use crate::math::Vec3;
 use std::collections::BTreeSet;
 
-/// Cells of a grid around points: those with a point, and their neighbours.
+/// The cells of a grid that contain a point or are adjacent to one that does.
 #[derive(Clone, Debug)]
 pub struct CellSet {
     side: f32,
@@ -11,7 +11,7 @@ pub struct CellSet {
 }
 
 impl CellSet {
-    /// An empty set of cells with sides of a length.
+    /// An empty set of cells with the given side.
     pub fn new(side: f32) -> Self {
         Self { side, cells: BTreeSet::new() }
     }
@@ -25,7 +25,7 @@ impl CellSet {
         }
     }
 
-    /// Whether a point is in one of the cells: so are all that are no further than a side from a point that was added.
+    /// Whether a point is in one of the cells. All points within one side of an added point are.
     pub fn contains(&self, p: Vec3) -> bool {
         self.cells.contains(&self.cell(p))
     }

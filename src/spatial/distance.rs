@@ -1,36 +1,34 @@
-//! How far two surfaces are from each other.
+//! The distance between two surfaces.
 
 use super::TriangleTree;
 use crate::math::order::{rank_f64, sort_by_rank};
 use crate::math::triangle;
 use crate::mesh::{MeshError, TriangleMesh};
 
-/// Distances between two surfaces, in the meshes' units. All but `per_vertex` are the same to the bit when the
-/// two change places.
+/// Distances between two surfaces, in the units of the meshes. All but `per_vertex` are symmetric, to the bit.
 ///
-/// "One way" is from the vertices of one mesh to the whole surface of the other; each vertex counts by a third of the area
-/// of the triangles around it, so that dense parts do not count for more. Vertices of no triangle do not count. Between
-/// its vertices a surface may be further away than at them, by an edge at most.
+/// One-way distances are from the vertices of one mesh to the surface of the other, weighted by a third of the area of the triangles
+/// around each vertex. Vertices without triangles are left out. Between its vertices a surface may be further away, by an edge at most.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceDistance {
-    /// From each vertex of the first mesh to the surface of the second; not negative.
+    /// The unsigned distance of each vertex of the first mesh from the second surface.
     pub per_vertex: Vec<f64>,
     /// The mean of the two one-way means.
     pub mean: f64,
-    /// The root of the mean of the two one-way mean squares.
+    /// The root mean square of both ways.
     pub rms: f64,
-    /// The larger of the two one-way 95th percentiles: each the least distance that at least 95 % of the area keep to.
+    /// The larger of the two one-way 95th percentiles by area.
     pub p95: f64,
-    /// The largest distance of all, of both ways: the Hausdorff distance as the vertices show it.
+    /// The Hausdorff distance, measured at vertices.
     pub hausdorff: f64,
 }
 
-/// The distance of two surfaces from each other; O(n log n), but for parts that are equally far from everything: of a
-/// speck in the very middle of a ball, each vertex looks at every triangle.
+/// The distance between two surfaces. O(n log n), except for parts equally far from everything: each vertex of a speck at the centre of a
+/// sphere visits every triangle.
 ///
 /// # Errors
-/// [`MeshError::InvalidArgument`] where either has no triangle (`mesh` is the first, `other` the second), names a vertex
-/// that does not exist, or has a position that is not finite.
+/// [`MeshError::InvalidArgument`] if either (`mesh` is the first, `other` the second) has no triangle, an invalid index, or a position that
+/// is not finite.
 pub fn surface_distance(mesh: &TriangleMesh, other: &TriangleMesh) -> Result<SurfaceDistance, MeshError> {
     not_empty("mesh", mesh)?;
     not_empty("other", other)?;
@@ -54,12 +52,12 @@ fn not_empty(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MeshErr
 }
 
 fn one_way(mesh: &TriangleMesh, surface: &TriangleTree) -> Vec<f64> {
-    // The tree has triangles, and positions were found to be finite.
+    // The tree has triangles, and positions are finite.
     let distance = |p| surface.closest(p).map_or(0.0, |nearest| nearest.distance);
     mesh.positions.iter().map(|&p| distance(p)).collect()
 }
 
-/// One way.
+/// One-way distances.
 struct Summary {
     mean: f64,
     mean_square: f64,
@@ -86,8 +84,7 @@ impl Summary {
     }
 }
 
-/// A third of the area of the triangles around each vertex, `None` for one of no triangle; all the same where there is
-/// no area at all.
+/// By vertex, a third of the area of the triangles around it; `None` without triangles. Uniform if the total area is 0.
 fn weights(mesh: &TriangleMesh) -> Vec<Option<f64>> {
     let mut weights = vec![None; mesh.positions.len()];
     for (triangle, corners) in mesh.triangles.iter().zip(mesh.corners()) {

@@ -1,4 +1,4 @@
-//! Points near a place, in a grid of cells that points are added to one by one.
+//! A hashed grid of points, added one by one.
 
 use crate::math::Vec3;
 use crate::math::order::by_both;
@@ -6,39 +6,39 @@ use crate::math::order::by_both;
 /// No point.
 const NONE: u32 = u32::MAX;
 
-/// Points by the cell they are in. Cells share buckets by a hash, so empty space costs nothing.
+/// Points by cell. Cells are hashed into buckets, so empty space costs nothing.
 #[derive(Clone, Debug)]
 pub struct PointGrid {
     cell: f32,
     points: Vec<Vec3>,
-    /// By bucket, the point added last.
+    /// By bucket, the head of its list: the point added last.
     heads: Vec<u32>,
-    /// By point, the one added before to the same bucket.
+    /// By point, the next in the list of its bucket.
     next: Vec<u32>,
 }
 
 impl Default for PointGrid {
-    /// Empty, for a few points about 1 apart.
+    /// An empty grid for a few points about 1 apart.
     fn default() -> Self {
         Self::new(1.0, 0)
     }
 }
 
 impl PointGrid {
-    /// An empty grid of cells of edge `cell`, with buckets enough for about `expected` points.
+    /// An empty grid with cells of edge `cell`, for about `expected` points.
     pub fn new(cell: f32, expected: usize) -> Self {
         let buckets = (2 * expected).next_power_of_two().max(16);
         Self { cell, points: Vec::new(), heads: vec![NONE; buckets], next: Vec::new() }
     }
 
-    /// A grid of all `points`, which keep their order.
+    /// A grid of `points`, with their indices.
     pub fn of(points: &[Vec3], cell: f32) -> Self {
         let mut grid = Self::new(cell, points.len());
         points.iter().for_each(|&p| grid.insert(p));
         grid
     }
 
-    /// Adds a finite point; it is known by how many there were before it.
+    /// Adds a finite point; its index is the number of points before it.
     pub fn insert(&mut self, p: Vec3) {
         let bucket = self.bucket(self.cell_of(p));
         self.next.push(self.heads[bucket]);
@@ -46,13 +46,13 @@ impl PointGrid {
         self.points.push(p);
     }
 
-    /// All points, in the order they were added in.
+    /// All points, by index.
     pub fn points(&self) -> &[Vec3] {
         &self.points
     }
 
-    /// Visits the points within `radius` of `p` with their squared distance, until `visit` gives back false. The order is
-    /// fixed, but says nothing.
+    /// Visits the points within `radius` of `p` with their squared distances, until `visit` returns false. The order is unspecified but
+    /// deterministic.
     pub fn within(&self, p: Vec3, radius: f32, mut visit: impl FnMut(u32, f32) -> bool) {
         let [low, high] = [-radius, radius].map(|reach| self.cell_of(p + Vec3::splat(reach)));
         for z in low[2]..=high[2] {
@@ -76,14 +76,14 @@ impl PointGrid {
         found
     }
 
-    /// The `count` points nearest to `p` with their squared distances, nearest first (of equal ones the lower index); all,
-    /// where there are fewer. Looks within `radius` first, then farther.
+    /// The `count` points nearest to `p`, or all if there are fewer, with their squared distances: nearest first, ties by index. Searches
+    /// within `radius` first, then further.
     pub fn nearest(&self, p: Vec3, count: usize, radius: f32) -> Vec<(f32, u32)> {
         let mut found = Vec::new();
-        // From 0 no factor leads anywhere.
+        // A radius of 0 would not grow.
         let mut reach = if radius > 0.0 { radius } else { self.cell };
         loop {
-            // So many cells take longer than all points. With a cell of 0 there is no number of them.
+            // Visiting this many cells takes longer than visiting all points. With a cell of 0 their number is not finite.
             let across = 2.0 * reach / self.cell;
             let few = across * across * across <= 8.0 * self.points.len() as f32;
             found.clear();
@@ -106,7 +106,7 @@ impl PointGrid {
             ranked.truncate(count);
         }
         ranked.sort_unstable();
-        // Squares are not below 0: their bits are in their order.
+        // The bits of non-negative numbers are ordered like the numbers.
         ranked.into_iter().map(|rank| (f32::from_bits((rank >> 32) as u32), rank as u32)).collect()
     }
 
@@ -121,7 +121,7 @@ impl PointGrid {
         while at != NONE {
             let q = self.points[at as usize];
             let squared = q.distance_squared(p);
-            // A bucket may hold points of other cells, which are visited with those.
+            // Skips points of other cells in the same bucket.
             if squared <= most && self.cell_of(q) == cell && !visit(at, squared) {
                 return false;
             }
@@ -152,7 +152,7 @@ mod tests {
     fn points(count: usize) -> Vec<Vec3> {
         let mut random = Random::new(4);
         let mut unit = || random.bits() as f32 / 4_294_967_296.0;
-        // Even, then in a clump far away, then some equal ones.
+        // Even ones, then a distant cluster, then some equal ones.
         let mut all: Vec<Vec3> = (0..count).map(|_| Vec3::new(unit(), unit(), unit()) * 2.0 - 1.0).collect();
         all.extend((0..count / 4).map(|_| Vec3::new(9.0 + 1e-4 * unit(), -3.0, 1e-4 * unit())));
         all.extend_from_within(..3);

@@ -1,14 +1,13 @@
-//! The outline where a plane cuts a surface.
+//! The cross-section of a surface by a plane.
 
 use crate::math::{DVec3, Vec3};
 use crate::mesh::TriangleMesh;
 
-/// The segments where the plane through `origin` cuts the surface, in the order of the triangles.
+/// The segments in which the plane through `origin` intersects the surface, in the order of the triangles.
 ///
-/// A vertex exactly on the plane is taken as just above it, so that an edge is either cut or not and triangles that
-/// share it agree to the bit: in a closed mesh the segments form closed loops. Each runs with what lies inside to its
-/// left, seen against `normal`. Segments of no length, where the surface only touches, are left out. Nothing where
-/// `normal` is zero, or where it or `origin` is not finite. Indices must exist.
+/// A vertex exactly on the plane counts as just above it, so that triangles with a common edge agree to the bit: segments of a closed mesh
+/// form closed loops. The inside is on the left of each segment, seen against `normal`. Segments without length, where the surface only
+/// touches the plane, are left out. Empty if `normal` is zero, or if it or `origin` is not finite. Indices must be valid.
 pub fn cross_section(mesh: &TriangleMesh, origin: Vec3, normal: Vec3) -> Vec<[Vec3; 2]> {
     let (origin, normal) = (origin.as_dvec3(), normal.as_dvec3());
     if !origin.is_finite() || !normal.is_finite() || normal == DVec3::ZERO {
@@ -26,7 +25,7 @@ pub fn cross_section(mesh: &TriangleMesh, origin: Vec3, normal: Vec3) -> Vec<[Ve
     segments.filter(|[p, q]| p != q).collect()
 }
 
-/// The corner alone on its side, where the corners are on two sides.
+/// The corner alone on its side, if the corners are on two sides.
 fn lone_corner([a, b, c]: [bool; 3]) -> Option<usize> {
     match (a == b, b == c) {
         (true, true) => None,
@@ -36,7 +35,7 @@ fn lone_corner([a, b, c]: [bool; 3]) -> Option<usize> {
     }
 }
 
-/// Where the edge meets the plane, the same for both of its directions.
+/// The intersection of an edge and the plane, the same for both directions of the edge.
 fn cut(mesh: &TriangleMesh, heights: &[f64], from: u32, to: u32) -> Vec3 {
     let (low, high) = (from.min(to) as usize, from.max(to) as usize);
     let fraction = heights[low] / (heights[low] - heights[high]);

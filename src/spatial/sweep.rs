@@ -12,26 +12,23 @@ use crate::math::order::{by_both, rank, sort_by_rank};
 /// a class of their own; with more, all of its columns are wide because of them.
 const FIRST: f32 = 1.6;
 
-/// From class to class, the largest balls in those of the class before. With less there are more classes to look through,
-/// with more the smallest balls of a class meet many in vain.
+/// The ratio of the largest balls of consecutive classes. A smaller one gives more classes, a larger one more pairs to reject.
 const FACTOR: f32 = 4.0;
 
-/// Columns are so much wider than the reach of their class: balls further apart than one column are further apart than it,
-/// whatever rounding does to their places in columns.
+/// The width of columns in the reach of their class: balls more than a column apart are out of reach in spite of rounding.
 const WIDER: f64 = 1.001;
 
-/// Columns end here in both directions, so that all have neighbours. They are counted from the origin: at this distance a
-/// column is finer than the steps of single precision, unless its balls are smaller than them.
+/// The last column in both directions, so that all have neighbours. At this distance from the origin a column is finer than single
+/// precision resolves, unless its balls are.
 const LAST: f64 = 1_073_741_824.0;
 
-/// Columns without a ball for each ball, up to which they are counted one by one.
+/// The number of empty columns per ball up to which columns are sorted by counting.
 const MOST_EMPTY: usize = 8;
 
-/// Bits for each column around a large ball, in the filter of small ones: fewer let more of the others through.
+/// Bits of the filter per column around a large ball; with fewer, more small balls pass in vain.
 const BITS: usize = 8;
 
-/// Calls `found` once with every pair of `balls` that are no further apart than [`Proximity::between`], in an order that
-/// follows from theirs, but says nothing.
+/// Calls `found` once with every pair of `balls` within [`Proximity::between`]. The order is unspecified but deterministic.
 pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut(&VertexBall, &VertexBall)) {
     let mut bound = FIRST * middle(&balls);
     let (mut smaller, mut left) = (Vec::new(), balls);
@@ -39,7 +36,7 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
         let (class, larger): (Vec<VertexBall>, Vec<VertexBall>) =
             left.into_iter().partition(|ball| ball.longest <= bound);
         left = larger;
-        // An edge may be endless, where its square is more than single precision holds.
+        // Longest edges are infinite if their squares overflow.
         bound = if bound < f32::MAX / FACTOR { bound * FACTOR } else { f32::INFINITY };
         if !class.is_empty() {
             sweep_class(&class, &smaller, near, &mut found);
@@ -48,7 +45,7 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
     }
 }
 
-/// The longest edge of the ball in the middle by size; some length above 0 where it has none.
+/// The median radius, above 0.
 fn middle(balls: &[VertexBall]) -> f32 {
     let mut sizes: Vec<f32> = balls.iter().map(|ball| ball.longest).collect();
     let half = sizes.len() / 2;
@@ -59,7 +56,7 @@ fn middle(balls: &[VertexBall]) -> f32 {
     if middle > f32::MIN_POSITIVE { middle } else { f32::MIN_POSITIVE }
 }
 
-/// Finds the pairs of a class, and those of one of it and one of the smaller balls.
+/// Finds the pairs within a class, and those with smaller balls.
 fn sweep_class(
     class: &[VertexBall],
     smaller: &[VertexBall],
@@ -84,7 +81,7 @@ fn sweep_class(
     }
 }
 
-/// How wide columns are, as its inverse.
+/// The inverse of the width of columns.
 #[derive(Clone, Copy)]
 struct Width(f64);
 
@@ -106,8 +103,7 @@ fn floor(x: f64) -> i32 {
     whole - i32::from(f64::from(whole) > x)
 }
 
-/// The indices of `places` in their order. Where they lie as close as the columns of a mesh, they are counted; sorting takes
-/// several times as long.
+/// The indices of `places`, sorted: by counting if they are as dense as the columns of a mesh, which is several times as fast.
 fn in_order_of_columns(places: &[[i32; 2]]) -> Vec<u32> {
     let extent = |axis: usize| {
         let of_axis = || places.iter().map(|place| i64::from(place[axis]));
@@ -140,10 +136,10 @@ fn in_order_of_columns(places: &[[i32; 2]]) -> Vec<u32> {
     order
 }
 
-/// Balls sorted by column, and by height in each.
+/// Balls sorted by column, then by height.
 struct Columns {
     balls: Vec<VertexBall>,
-    /// Where each column lies, sorted, and the first of its balls; one more at the end.
+    /// The columns, sorted, each with the index of its first ball; and one more at the end.
     columns: Vec<([i32; 2], usize)>,
 }
 
@@ -185,7 +181,7 @@ impl Columns {
         &self.balls[self.columns[k].1..self.columns[k + 1].1]
     }
 
-    /// Meets every pair within a column and of columns side by side, as far as their heights differ by `reach` at most.
+    /// Visits the pairs in one column or in adjacent ones whose heights differ by at most `reach`.
     fn pairs(&self, reach: f32, test: &mut impl FnMut(&VertexBall, &VertexBall)) {
         let mut row = 0;
         for k in 0..self.count() {
@@ -202,7 +198,7 @@ impl Columns {
         }
     }
 
-    /// Meets every ball of the columns with every one of those at `other`, in the same column or side by side.
+    /// Visits the pairs with the balls of `other`, in the same column or in adjacent ones.
     fn pairs_with(&self, other: &Self, reach: f32, test: &mut impl FnMut(&VertexBall, &VertexBall)) {
         let mut rows = [0; 3];
         for k in 0..self.count() {
@@ -213,8 +209,8 @@ impl Columns {
         }
     }
 
-    /// Meets `balls` with those of the column at `[x, y]` and of the ones before and behind it. `row` is at or before the
-    /// first of the three, and is moved there: columns are gone through in order.
+    /// Visits the pairs of `balls` with those of the column `[x, y]` and of the two adjacent along y. `row` is at or before the first of the
+    /// three, and is moved there: columns are visited in order.
     fn meet_row(
         &self,
         balls: &[VertexBall],
@@ -234,7 +230,7 @@ impl Columns {
     }
 }
 
-/// Meets balls of one column with those of another, both sorted by height.
+/// Visits the pairs of two columns, both sorted by height.
 #[inline]
 fn meet(
     balls: &[VertexBall],
@@ -252,7 +248,7 @@ fn meet(
     }
 }
 
-/// Tells most columns that are not beside any of some.
+/// A filter that rejects most columns not adjacent to any of a set.
 struct Filter {
     bits: Vec<u64>,
     mask: u32,

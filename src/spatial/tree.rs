@@ -1,26 +1,26 @@
-//! The triangle nearest to a point, and the first one a ray meets.
+//! A bounding volume hierarchy of triangles: closest points and ray intersections.
 
 use crate::math::triangle::{self, Line, LineHit};
 use crate::math::{Bounds, BoxTree, DVec3, Ray, Vec3};
 use crate::mesh::{MeshError, TriangleMesh};
 
-/// A tree over the triangles of a mesh as it was when the tree was made.
+/// A tree of the triangles of a static mesh.
 #[derive(Clone, Debug)]
 pub struct TriangleTree {
     boxes: BoxTree,
     corners: Vec<[Vec3; 3]>,
 }
 
-/// A point of a surface, and how far away it is.
+/// A point on a surface and its distance from a query.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// Index of the triangle; the lowest one, where the point is on several.
+    /// The index of the triangle; the lowest if the point is on several.
     pub triangle: u32,
-    /// Weights of the triangle's corners, none negative, sum 1.
+    /// Barycentric coordinates: not negative, with a sum of 1.
     pub barycentric: Vec3,
-    /// Where it is.
+    /// Its position.
     pub point: Vec3,
-    /// How far from the query's point or ray origin, in the mesh's units.
+    /// The distance from the query point or the origin of the ray, in the units of the mesh.
     pub distance: f64,
 }
 
@@ -41,7 +41,7 @@ impl TriangleTree {
         Self { boxes: BoxTree::default(), corners: Vec::new() }
     }
 
-    /// The point of the surface nearest to `p`; `None` where there are no triangles, or `p` is not finite.
+    /// The point of the surface closest to `p`; `None` without triangles, or if `p` is not finite.
     pub fn closest(&self, p: Vec3) -> Option<SurfacePoint> {
         if !p.is_finite() {
             return None;
@@ -74,7 +74,7 @@ impl TriangleTree {
         found
     }
 
-    /// Puts the labels of all triangles that have a point at most `distance` from `p` into `found`, each once.
+    /// Puts the labels of all triangles within `distance` of `p` into `found`, each once.
     pub fn labels_within(&self, p: Vec3, distance: f64, label: impl Fn(u32) -> u32, found: &mut Vec<u32>) {
         let reach = distance * distance;
         found.clear();
@@ -91,8 +91,8 @@ impl TriangleTree {
         });
     }
 
-    /// Where the ray from `origin` along `direction` (of any length) first meets the surface, from either side;
-    /// `None` where it does not, where `direction` is zero or where either is not finite.
+    /// The first intersection with the ray from `origin` along `direction` of any length, from either side; `None` if there is none, if
+    /// `direction` is zero, or if either is not finite.
     pub fn ray_hit(&self, origin: Vec3, direction: Vec3) -> Option<SurfacePoint> {
         let (origin, direction) = finite(origin, direction)?;
         let (line, mut first) = (Line::new(origin, direction), FirstHit::within(f64::INFINITY));
@@ -103,8 +103,8 @@ impl TriangleTree {
         first.found(|item| self.corners[item as usize])
     }
 
-    /// Where the line through `origin` along `direction` meets the surface nearest to `origin`, no further than `most`
-    /// away; its `distance` is negative behind. Else as [`Self::ray_hit`].
+    /// The intersection with the line through `origin` along `direction` nearest to `origin`, within `most`; its `distance` is negative behind.
+    /// Else as [`Self::ray_hit`].
     pub fn line_hit(&self, origin: Vec3, direction: Vec3, most: f64) -> Option<SurfacePoint> {
         let (origin, direction) = finite(origin, direction)?;
         let (line, mut first) = (Line::new(origin, direction), FirstHit::within(most));
@@ -114,7 +114,7 @@ impl TriangleTree {
         first.found(|item| self.corners[item as usize])
     }
 
-    /// Calls `visit` with every triangle that has a box with a point in common with `bounds`.
+    /// Calls `visit` with every triangle whose bounding box meets `bounds`.
     pub fn meeting(&self, bounds: &Bounds, visit: impl FnMut(u32)) {
         self.boxes.meeting(bounds, visit);
     }
@@ -127,25 +127,25 @@ impl SurfacePoint {
     }
 }
 
-/// Origin and direction of a ray, that of length 1; `None` where there is none.
+/// The origin and unit direction of a ray; `None` if it has none.
 fn finite(origin: Vec3, direction: Vec3) -> Option<(DVec3, DVec3)> {
     let direction = direction.as_dvec3().try_normalize()?;
     origin.is_finite().then(|| (origin.as_dvec3(), direction))
 }
 
-/// The hit nearest to the origin so far; ties go to the lower index.
+/// The nearest hit so far; ties go to the lower index.
 pub struct FirstHit {
     most: f64,
     found: Option<(u32, LineHit)>,
 }
 
 impl FirstHit {
-    /// Of those no further away than `most`.
+    /// For hits within `most`.
     pub fn within(most: f64) -> Self {
         Self { most, found: None }
     }
 
-    /// Takes the hit of an item into account, and gives back how far away others are to be looked for.
+    /// Adds the hit of an item; returns the distance within which others are searched.
     #[inline]
     pub fn look_at(&mut self, item: u32, hit: Option<LineHit>) -> f64 {
         let Some(hit) = hit else { return self.most };
@@ -156,7 +156,7 @@ impl FirstHit {
         self.most
     }
 
-    /// Where that is, on a triangle with those corners.
+    /// The hit as a point of the triangle with these corners.
     pub fn found(&self, corners: impl FnOnce(u32) -> [Vec3; 3]) -> Option<SurfacePoint> {
         let (item, hit) = self.found?;
         Some(SurfacePoint::on(item, corners(item), hit.barycentric, hit.distance))
@@ -169,7 +169,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Triangles of many sizes about the origin, and points to ask from.
+    /// Triangles of many sizes around the origin, and query points.
     fn scattered() -> (TriangleMesh, Vec<Vec3>) {
         let mut state = 9_u32;
         let mut next = || {

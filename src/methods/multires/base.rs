@@ -80,15 +80,15 @@ fn is_embedded(mesh: &Mesh) -> bool {
 fn strays(coarse: &Rc<Band>, bands: &[Rc<Band>]) -> f64 {
     let Some(fine) = bands.last() else { return 0.0 };
     let reach = reach(coarse, fine);
-    let count = coarse.terrain.mesh().positions.len();
-    let stray = (0..coarse.terrain.mesh().triangles.len()).filter(|&t| {
+    let count = coarse.walker.mesh().positions.len();
+    let stray = (0..coarse.walker.mesh().triangles.len()).filter(|&t| {
         let third = Vec3::splat(1.0 / 3.0);
-        let [a, b, c] = coarse.terrain.corners(t as u32);
+        let [a, b, c] = coarse.walker.corners(t as u32);
         let at = Linked { triangle: t as u32, weights: third, point: (a + b + c) * third };
-        let outward = normal_at(&coarse.terrain, &coarse.normals, &at);
-        let met = fine.terrain.tree().line_hit(at.point, outward, reach);
+        let outward = normal_at(&coarse.walker, &coarse.normals, &at);
+        let met = fine.walker.tree().line_hit(at.point, outward, reach);
         let faces_back = |found: SurfacePoint| {
-            normal_at(&fine.terrain, &fine.normals, &found.into()).dot((b - a).cross(c - a)) <= 0.0
+            normal_at(&fine.walker, &fine.normals, &found.into()).dot((b - a).cross(c - a)) <= 0.0
         };
         met.is_none_or(faces_back)
     });

@@ -5,13 +5,13 @@ use super::prisms::Prisms;
 use crate::math::Vec3;
 use crate::mesh::{Mesh, MeshError, TriangleMesh, VertexId};
 use crate::remesh::Embedding;
-use crate::spatial::Terrain;
+use crate::spatial::SurfaceWalker;
 use std::rc::Rc;
 
 /// One surface of the decomposition.
 #[derive(Clone, Debug)]
 pub(super) struct Band {
-    pub terrain: Terrain,
+    pub walker: SurfaceWalker,
     /// Of its vertices, of length 1.
     pub normals: Vec<Vec3>,
 }
@@ -19,9 +19,9 @@ pub(super) struct Band {
 impl Band {
     /// Of a closed mesh.
     pub fn of(mesh: TriangleMesh) -> Result<Rc<Self>, MeshError> {
-        let terrain = Terrain::new(mesh)?;
-        let normals = terrain.mesh().vertex_normals();
-        Ok(Rc::new(Self { terrain, normals }))
+        let walker = SurfaceWalker::new(mesh)?;
+        let normals = walker.mesh().vertex_normals();
+        Ok(Rc::new(Self { walker, normals }))
     }
 }
 
@@ -64,7 +64,7 @@ impl Bands {
         let mut offsets = Offsets { last: *at, ..NOTHING };
         for (k, Leap { reach, prisms }) in self.leaps.iter().enumerate() {
             let (from, to) = (&self.all[k], &self.all[k + 1]);
-            let normal = normal_at(&from.terrain, &from.normals, &offsets.last);
+            let normal = normal_at(&from.walker, &from.normals, &offsets.last);
             let met = prisms.line_hit(to, &offsets.last, normal, *reach);
             (offsets.lambdas[k], offsets.last) = met.map_or_else(
                 || to.beside(offsets.last.point, normal),
@@ -100,7 +100,7 @@ pub(super) struct Offsets {
 impl Band {
     /// The nearest point, and how far it is along the normal.
     fn beside(&self, origin: Vec3, normal: Vec3) -> (f32, Linked) {
-        match self.terrain.closest(origin) {
+        match self.walker.closest(origin) {
             Some(found) => ((found.point - origin).dot(normal), found.into()),
             None => (0.0, NOWHERE),
         }
@@ -110,7 +110,7 @@ impl Band {
 /// The largest distance from a vertex of either to the other.
 fn farthest(a: &Band, b: &Band) -> f64 {
     let one_way = |from: &Band, to: &Band| {
-        let distances = from.terrain.mesh().positions.iter().filter_map(|&p| to.terrain.closest(p));
+        let distances = from.walker.mesh().positions.iter().filter_map(|&p| to.walker.closest(p));
         distances.map(|found| found.distance).fold(0.0, f64::max)
     };
     one_way(a, b).max(one_way(b, a))
@@ -263,7 +263,7 @@ impl Samples {
     /// The middle of an edge, with its detail.
     fn middle(&self, bands: &Bands, u: VertexId, v: VertexId) -> Sample {
         let (from, to) = (&self.link[u.index()], &self.link[v.index()]);
-        let on_base = bands.base().terrain.march(from.triangle, (from.point + to.point) * 0.5);
+        let on_base = bands.base().walker.march(from.triangle, (from.point + to.point) * 0.5);
         let link: Linked = on_base.into();
         Sample {
             position: (self.mesh.position(u) + self.mesh.position(v)) * 0.5,

@@ -10,7 +10,7 @@ use super::{MOST_VERTICES, MultiresParams, MultiresolutionModel, REST, area, mea
 use crate::mesh::{Mesh, VertexId, measure};
 use crate::methods::{MethodError, Times};
 use crate::remesh::{Changes, EdgeBounds, Resolver};
-use crate::spatial::Terrain;
+use crate::spatial::SurfaceWalker;
 
 /// By how much the resolution changes in one frame at most: far finer or coarser than its bounds, a mesh can neither be
 /// guarded nor solved in bounded time.
@@ -111,18 +111,18 @@ impl MultiresolutionModel {
 
     /// A new skin over the ellipsoids, and its link.
     fn solve(&mut self, ahead: &Ahead, lap: &mut Lap) -> Result<Changes, MethodError> {
-        let terrain = Terrain::new(ahead.carried.to_triangles())?;
+        let walker = SurfaceWalker::new(ahead.carried.to_triangles())?;
         let (next, changes) = self.solved(ahead);
         lap.ends("membrane");
         let linked: Vec<Linked> = self.surface.vertices().map(|v| self.link[v.index()]).collect();
-        let before = Before { terrain: &terrain, link: &linked };
+        let before = Before { walker: &walker, link: &linked };
         let base = self.bands.base();
-        let mut link = project(&next, &before, &base.terrain, f64::MAX);
+        let mut link = project(&next, &before, &base.walker, f64::MAX);
         lap.ends("project");
         for _ in 0..self.params.distribute {
-            distribute(&next, &base.terrain, &mut link);
+            distribute(&next, &base.walker, &mut link);
         }
-        unfold(&next, &base.terrain, &base.normals, &mut link);
+        unfold(&next, &base.walker, &base.normals, &mut link);
         lap.ends("distribute");
         (self.surface, self.link) = (next, link);
         Ok(changes)

@@ -3,7 +3,7 @@
 
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
-use crate::spatial::{SurfacePoint, Terrain};
+use crate::spatial::{SurfacePoint, SurfaceWalker};
 
 /// Where a vertex lies on the base; nowhere, for free slots.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,14 +24,14 @@ impl From<SurfacePoint> for Linked {
 
 impl Linked {
     /// The place on `base` of a triangle and weights, with the same bits whenever it is worked out.
-    pub fn at(base: &Terrain, triangle: u32, weights: Vec3) -> Self {
+    pub fn at(base: &SurfaceWalker, triangle: u32, weights: Vec3) -> Self {
         let [a, b, c] = base.corners(triangle);
         Self { triangle, weights, point: a * weights.x + b * weights.y + c * weights.z }
     }
 }
 
 /// A place on the base as it is kept.
-fn linked(base: &Terrain, found: &SurfacePoint) -> Linked {
+fn linked(base: &SurfaceWalker, found: &SurfacePoint) -> Linked {
     Linked::at(base, found.triangle, found.barycentric)
 }
 
@@ -42,8 +42,8 @@ pub(super) const NOWHERE: Linked = Linked { triangle: 0, weights: Vec3::ZERO, po
 
 /// The surface before a step, and the link of its vertices.
 pub(super) struct Before<'a> {
-    pub terrain: &'a Terrain,
-    /// In the order of the terrain's vertices.
+    pub walker: &'a SurfaceWalker,
+    /// In the order of the walker's vertices.
     pub link: &'a [Linked],
 }
 
@@ -51,10 +51,10 @@ pub(super) struct Before<'a> {
 /// triangle to a place near the base; then onto the base.
 ///
 /// `farthest` is how far it can be: a place beyond was found wrongly, and is looked for in a tree.
-pub(super) fn project(mesh: &Mesh, before: &Before, base: &Terrain, farthest: f64) -> Link {
+pub(super) fn project(mesh: &Mesh, before: &Before, base: &SurfaceWalker, farthest: f64) -> Link {
     let mut link = vec![NOWHERE; mesh.slots()];
     traverse(mesh, |v, start| {
-        let found = nearest(mesh, before.terrain, v, start, farthest);
+        let found = nearest(mesh, before.walker, v, start, farthest);
         link[v.index()] = onto_base(before, base, &found);
         found.triangle
     });
@@ -62,27 +62,33 @@ pub(super) fn project(mesh: &Mesh, before: &Before, base: &Terrain, farthest: f6
 }
 
 /// The nearest point of the surface before, on the same side of it.
-fn nearest(mesh: &Mesh, terrain: &Terrain, v: VertexId, start: Option<u32>, farthest: f64) -> SurfacePoint {
+fn nearest(
+    mesh: &Mesh,
+    walker: &SurfaceWalker,
+    v: VertexId,
+    start: Option<u32>,
+    farthest: f64,
+) -> SurfacePoint {
     let p = mesh.position(v);
     let normal = mesh.area_normal(v);
     let faces_alike = |found: &SurfacePoint| {
-        let [a, b, c] = terrain.corners(found.triangle);
+        let [a, b, c] = walker.corners(found.triangle);
         (b - a).cross(c - a).dot(normal) >= 0.0
     };
-    let marched = start.map(|start| terrain.march(start, p));
+    let marched = start.map(|start| walker.march(start, p));
     match marched.filter(|found| found.distance <= farthest && faces_alike(found)) {
         Some(found) => found,
         // Positions are finite, so there is one.
         None => {
-            let found = if start.is_some() { terrain.closest(p) } else { terrain.closest_of_all(p) };
-            found.unwrap_or_else(|| terrain.march(0, p))
+            let found = if start.is_some() { walker.closest(p) } else { walker.closest_of_all(p) };
+            found.unwrap_or_else(|| walker.march(0, p))
         }
     }
 }
 
 /// The place on the base that belongs to a point of the surface before.
-fn onto_base(before: &Before, base: &Terrain, at: &SurfacePoint) -> Linked {
-    let corners = before.terrain.mesh().triangles[at.triangle as usize].map(|v| before.link[v as usize]);
+fn onto_base(before: &Before, base: &SurfaceWalker, at: &SurfacePoint) -> Linked {
+    let corners = before.walker.mesh().triangles[at.triangle as usize].map(|v| before.link[v as usize]);
     let weights = at.barycentric;
     let point = corners[0].point * weights.x + corners[1].point * weights.y + corners[2].point * weights.z;
     let heaviest = (0..3).fold(0, |best, k| if weights[k] > weights[best] { k } else { best });
@@ -113,7 +119,7 @@ fn traverse(mesh: &Mesh, mut visit: impl FnMut(VertexId, Option<u32>) -> u32) {
 }
 
 /// Operator D, equation 1: q ← Σ dⱼ qⱼ / Σ dⱼ, where dⱼ is the mean length of the edges at qⱼ; then onto the base again.
-pub(super) fn distribute(mesh: &Mesh, base: &Terrain, link: &mut Link) {
+pub(super) fn distribute(mesh: &Mesh, base: &SurfaceWalker, link: &mut Link) {
     let densities: Vec<f32> =
         (0..mesh.slots()).map(|i| density(mesh, link, VertexId::from_index(i))).collect();
     for v in mesh.vertices() {
@@ -131,7 +137,7 @@ fn density(mesh: &Mesh, link: &Link, v: VertexId) -> f32 {
 /// Where D takes one vertex.
 fn spread(
     mesh: &Mesh,
-    base: &Terrain,
+    base: &SurfaceWalker,
     link: &Link,
     v: VertexId,
     density: impl Fn(VertexId) -> f32,
@@ -146,19 +152,19 @@ fn spread(
 }
 
 /// Whether the image of a triangle on the base is turned over, or has no area.
-fn is_folded(corners: [VertexId; 3], base: &Terrain, normals: &[Vec3], link: &Link) -> bool {
+fn is_folded(corners: [VertexId; 3], base: &SurfaceWalker, normals: &[Vec3], link: &Link) -> bool {
     let [a, b, c] = corners.map(|v| link[v.index()]);
     let outward = [a, b, c].map(|at| normal_at(base, normals, &at)).into_iter().sum::<Vec3>();
     (b.point - a.point).cross(c.point - a.point).dot(outward) <= 0.0
 }
 
 /// Triangles of the surface whose image on the base is turned over, or has no area.
-pub(super) fn folded(mesh: &Mesh, base: &Terrain, normals: &[Vec3], link: &Link) -> usize {
+pub(super) fn folded(mesh: &Mesh, base: &SurfaceWalker, normals: &[Vec3], link: &Link) -> usize {
     mesh.triangles().filter(|&corners| is_folded(corners, base, normals, link)).count()
 }
 
 /// Applies D to the corners of folded triangles alone, and to those around them, until none is left or it does not help.
-pub(super) fn unfold(mesh: &Mesh, base: &Terrain, normals: &[Vec3], link: &mut Link) {
+pub(super) fn unfold(mesh: &Mesh, base: &SurfaceWalker, normals: &[Vec3], link: &mut Link) {
     for _ in 0..UNFOLDINGS {
         let folded = mesh.triangles().filter(|&corners| is_folded(corners, base, normals, link));
         let mut around: Vec<VertexId> = folded.flatten().collect();
@@ -180,7 +186,7 @@ pub(super) fn unfold(mesh: &Mesh, base: &Terrain, normals: &[Vec3], link: &mut L
 const UNFOLDINGS: usize = 12;
 
 /// The normal of the base at a place, of length 1: the vertices' normals, interpolated.
-pub(super) fn normal_at(base: &Terrain, normals: &[Vec3], at: &Linked) -> Vec3 {
+pub(super) fn normal_at(base: &SurfaceWalker, normals: &[Vec3], at: &Linked) -> Vec3 {
     let [a, b, c] = base.mesh().triangles[at.triangle as usize].map(|v| normals[v as usize]);
     (a * at.weights.x + b * at.weights.y + c * at.weights.z).normalize_or_zero()
 }

@@ -98,7 +98,7 @@ impl MultiresolutionModel {
         let ellipsoids = movers.now();
         let (bands, params) = set_up(detail, base, &ellipsoids, params)?;
         let bands = Bands::new(bands);
-        let surface = Mesh::from_triangles(bands.base().terrain.mesh())?;
+        let surface = Mesh::from_triangles(bands.base().walker.mesh())?;
         Self::started(bands, movers, params, surface)
     }
 
@@ -116,10 +116,10 @@ impl MultiresolutionModel {
         let places = hold(&surface, &movers.now());
         let mut ways = ways_to(&surface, &places);
         guard.carry(&mut surface, &mut ways);
-        let terrain = &bands.base().terrain;
-        let itself = on_itself(terrain);
-        let before = Before { terrain, link: &itself };
-        let link = project(&surface, &before, terrain, f64::MAX);
+        let walker = &bands.base().walker;
+        let itself = on_itself(walker);
+        let before = Before { walker, link: &itself };
+        let link = project(&surface, &before, walker, f64::MAX);
         let shown = detailed(&surface, &link, &bands, &mut guard, fineness(&params));
         let mut model = Self {
             components: 0,
@@ -152,7 +152,7 @@ impl MultiresolutionModel {
     /// The surface with its detail as triangles, with texture coordinates where the finest surface has them.
     pub fn surface(&self) -> TriangleMesh {
         let mut mesh = self.shown.mesh.to_triangles();
-        let finest = &self.bands.finest().terrain;
+        let finest = &self.bands.finest().walker;
         mesh.corner_uvs = texture::corner_uvs(&self.shown.mesh, &self.shown.places, finest);
         mesh.texture = finest.mesh().texture.clone();
         mesh
@@ -244,7 +244,7 @@ impl MultiresolutionModel {
     /// Triangles of the surface whose image on the base is turned over.
     pub fn folded(&self) -> usize {
         let base = self.bands.base();
-        folded(&self.surface, &base.terrain, &base.normals, &self.link)
+        folded(&self.surface, &base.walker, &base.normals, &self.link)
     }
 
     /// Surfaces of the decomposition, the base among them.

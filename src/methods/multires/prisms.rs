@@ -30,15 +30,15 @@ const LEAST_COSINE: f32 = 0.1;
 impl Prisms {
     /// Of the triangles of `from` among those of `to`; no deeper than `reach`.
     pub fn new(from: &Band, to: &Band, reach: f64) -> Self {
-        let count = from.terrain.mesh().triangles.len();
+        let count = from.walker.mesh().triangles.len();
         let mut prisms = Self { first: vec![0], met: Vec::new(), depths: Vec::with_capacity(count) };
         for t in 0..count as u32 {
             let depth = depth(from, to, reach, t).min(reach);
             prisms.depths.push(depth as f32);
             if depth > 0.0 {
                 let prism = Prism::new(from, t, depth);
-                to.terrain.tree().meeting(&prism.bounds(), |other| {
-                    if prism.meets(to.terrain.corners(other)) {
+                to.walker.tree().meeting(&prism.bounds(), |other| {
+                    if prism.meets(to.walker.corners(other)) {
                         prisms.met.push(other);
                     }
                 });
@@ -54,10 +54,10 @@ impl Prisms {
         let line = Line::new(at.point.as_dvec3(), normal.as_dvec3().try_normalize()?);
         let mut nearest = FirstHit::within(f64::from(self.depths[t]));
         for &other in &self.met[self.first[t] as usize..self.first[t + 1] as usize] {
-            nearest.look_at(other, line.hit(to.terrain.corners(other)));
+            nearest.look_at(other, line.hit(to.walker.corners(other)));
         }
-        let found = nearest.found(|other| to.terrain.corners(other));
-        found.or_else(|| to.terrain.tree().line_hit(at.point, normal, reach))
+        let found = nearest.found(|other| to.walker.corners(other));
+        found.or_else(|| to.walker.tree().line_hit(at.point, normal, reach))
     }
 }
 
@@ -65,9 +65,9 @@ impl Prisms {
 fn depth(from: &Band, to: &Band, reach: f64, t: u32) -> f64 {
     let third = Vec3::splat(1.0 / 3.0);
     let farthest = [Vec3::X, Vec3::Y, Vec3::Z, third].into_iter().filter_map(|weights| {
-        let at = Linked::at(&from.terrain, t, weights);
-        let normal = normal_at(&from.terrain, &from.normals, &at);
-        to.terrain.tree().line_hit(at.point, normal, reach).map(|hit| hit.distance.abs())
+        let at = Linked::at(&from.walker, t, weights);
+        let normal = normal_at(&from.walker, &from.normals, &at);
+        to.walker.tree().line_hit(at.point, normal, reach).map(|hit| hit.distance.abs())
     });
     let normals = corner_normals(from, t);
     let bends = (0..3).any(|k| normals[k].dot(normals[(k + 1) % 3]) < LEAST_COSINE);
@@ -75,7 +75,7 @@ fn depth(from: &Band, to: &Band, reach: f64, t: u32) -> f64 {
 }
 
 fn corner_normals(from: &Band, t: u32) -> [Vec3; 3] {
-    from.terrain.mesh().triangles[t as usize].map(|v| from.normals[v as usize])
+    from.walker.mesh().triangles[t as usize].map(|v| from.normals[v as usize])
 }
 
 /// A convex body around all places of a triangle moved along its normals.
@@ -92,7 +92,7 @@ struct Prism {
 
 impl Prism {
     fn new(from: &Band, t: u32, depth: f64) -> Self {
-        let corners = from.terrain.corners(t).map(Vec3::as_dvec3);
+        let corners = from.walker.corners(t).map(Vec3::as_dvec3);
         let normals = corner_normals(from, t).map(Vec3::as_dvec3);
         let square = (0..3).map(|k| normals[k].dot(normals[(k + 1) % 3])).fold(1.0, f64::min);
         let way = depth / square.sqrt();
@@ -151,7 +151,7 @@ mod tests {
     fn lines_meet_what_they_meet_in_the_tree() {
         let (from, to) = pair();
         let prisms = Prisms::new(&from, &to, 0.5);
-        let count = from.terrain.mesh().triangles.len();
+        let count = from.walker.mesh().triangles.len();
         let mut random = Random::new(8);
         for k in 0..20_000 {
             let (u, v) = (random.unit() as f32, random.unit() as f32);
@@ -161,9 +161,9 @@ mod tests {
                 Vec3::new(u + v - 1.0, 1.0 - u, 1.0 - v)
             };
             let triangle = (k % count) as u32;
-            let at = Linked::at(&from.terrain, triangle, weights);
-            let normal = normal_at(&from.terrain, &from.normals, &at);
-            let expected = to.terrain.tree().line_hit(at.point, normal, 0.5);
+            let at = Linked::at(&from.walker, triangle, weights);
+            let normal = normal_at(&from.walker, &from.normals, &at);
+            let expected = to.walker.tree().line_hit(at.point, normal, 0.5);
             assert_eq!(prisms.line_hit(&to, &at, normal, 0.5), expected, "{triangle} {weights}");
             assert!(expected.is_some());
         }

@@ -9,7 +9,7 @@ use crate::math::{DVec3, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::methods::MethodError;
 use crate::methods::given::check_edges;
-use crate::spatial::Terrain;
+use crate::spatial::SurfaceWalker;
 use std::rc::Rc;
 
 /// Triangles of the base where no bounds of edges are given: the paper's "moderately complex models".
@@ -50,7 +50,7 @@ pub(super) fn set_up(
             (vec![Band::of(skin(ellipsoids, &params)?)?], params)
         }
     };
-    touches(ellipsoids, &bands.0[0].terrain, bands.1.target())?;
+    touches(ellipsoids, &bands.0[0].walker, bands.1.target())?;
     Ok(bands)
 }
 
@@ -64,7 +64,7 @@ fn closed(parameter: &'static str, mesh: TriangleMesh) -> Result<TriangleMesh, M
 }
 
 /// Tests that an ellipsoid reaches the base: else nothing would hold it.
-fn touches(ellipsoids: &[Ellipsoid], base: &Terrain, target: f64) -> Result<(), MethodError> {
+fn touches(ellipsoids: &[Ellipsoid], base: &SurfaceWalker, target: f64) -> Result<(), MethodError> {
     let near = |p: &Vec3| {
         let p: DVec3 = p.as_dvec3();
         ellipsoids.iter().any(|e| e.unit(p).length_squared() <= 1.0 || e.nearest(p).distance(p) <= target)
@@ -85,14 +85,14 @@ pub(super) fn check_size(area: f64, params: &MultiresParams) -> Result<(), Metho
 }
 
 /// The link of every vertex of the base to itself.
-pub(super) fn on_itself(terrain: &Terrain) -> Vec<Linked> {
-    let mut link = vec![NOWHERE; terrain.mesh().positions.len()];
-    for (t, corners) in terrain.mesh().triangles.iter().enumerate() {
+pub(super) fn on_itself(walker: &SurfaceWalker) -> Vec<Linked> {
+    let mut link = vec![NOWHERE; walker.mesh().positions.len()];
+    for (t, corners) in walker.mesh().triangles.iter().enumerate() {
         for (k, &v) in corners.iter().enumerate() {
             let mut weights = Vec3::ZERO;
             weights[k] = 1.0;
             link[v as usize] =
-                Linked { triangle: t as u32, weights, point: terrain.mesh().positions[v as usize] };
+                Linked { triangle: t as u32, weights, point: walker.mesh().positions[v as usize] };
         }
     }
     link

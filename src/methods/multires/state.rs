@@ -76,7 +76,7 @@ impl MultiresolutionModel {
 
     /// Places on the base; nothing where one has no such triangle.
     fn linked(&self, places: &[(u32, Vec3)]) -> Option<Link> {
-        let base = &self.bands.base().terrain;
+        let base = &self.bands.base().walker;
         let count = base.mesh().triangles.len();
         let place = |&(triangle, weights): &(u32, Vec3)| {
             let fits = (triangle as usize) < count && weights.is_finite();
@@ -89,7 +89,7 @@ impl MultiresolutionModel {
     fn fingerprint(&self) -> u64 {
         let mut hash = Hash::new();
         for band in &self.bands.all {
-            let mesh = band.terrain.mesh();
+            let mesh = band.walker.mesh();
             hash.mix(mesh.positions.len() as u64);
             mesh.positions.iter().flat_map(|p| p.to_array()).for_each(|x| hash.mix(u64::from(x.to_bits())));
             mesh.triangles.iter().flatten().for_each(|&v| hash.mix(u64::from(v)));

@@ -3,7 +3,7 @@
 use super::link::{Link, Linked};
 use crate::math::{Vec2, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, VertexId};
-use crate::spatial::Terrain;
+use crate::spatial::SurfaceWalker;
 
 /// Coordinates at the corners of a triangle that lie further apart than this many times what its size in space calls for
 /// belong to two sides of a seam. With less, stretched texture is taken for a seam; with much more, narrow strips of the
@@ -12,7 +12,7 @@ const JUMP: f32 = 6.0;
 
 /// Texture coordinates by corner of each triangle, in the order of [`Mesh::triangles`]; nothing where the finest surface
 /// has none.
-pub(super) fn corner_uvs(mesh: &Mesh, places: &Link, finest: &Terrain) -> Option<Vec<[Vec2; 3]>> {
+pub(super) fn corner_uvs(mesh: &Mesh, places: &Link, finest: &SurfaceWalker) -> Option<Vec<[Vec2; 3]>> {
     let source = finest.mesh();
     if source.uvs.is_none() && source.corner_uvs.is_none() {
         return None;
@@ -20,7 +20,7 @@ pub(super) fn corner_uvs(mesh: &Mesh, places: &Link, finest: &Terrain) -> Option
     Some(mesh.triangles().map(|corners| of_triangle(corners, places, finest)).collect())
 }
 
-fn of_triangle(corners: [VertexId; 3], places: &Link, finest: &Terrain) -> [Vec2; 3] {
+fn of_triangle(corners: [VertexId; 3], places: &Link, finest: &SurfaceWalker) -> [Vec2; 3] {
     let at = corners.map(|v| places[v.index()]);
     let own = at.map(|at| uv_at(finest.mesh(), &at));
     let [a, b, c] = own;
@@ -52,7 +52,7 @@ fn uv_at(mesh: &TriangleMesh, at: &Linked) -> Vec2 {
 }
 
 /// Length in the texture for a length in space, at a triangle.
-fn density(finest: &Terrain, triangle: u32) -> f32 {
+fn density(finest: &SurfaceWalker, triangle: u32) -> f32 {
     let [a, b, c] = triangle_uvs(finest.mesh(), triangle);
     let [p, q, r] = finest.corners(triangle);
     let in_texture = a.distance(b).max(b.distance(c)).max(c.distance(a));
@@ -60,7 +60,7 @@ fn density(finest: &Terrain, triangle: u32) -> f32 {
 }
 
 /// The coordinates that a triangle's own would have at a point beside it.
-fn continued(finest: &Terrain, triangle: u32, p: Vec3) -> Vec2 {
+fn continued(finest: &SurfaceWalker, triangle: u32, p: Vec3) -> Vec2 {
     let [a, b, c] = finest.corners(triangle);
     let normal = (b - a).cross(c - a);
     let size = normal.length_squared();

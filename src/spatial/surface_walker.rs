@@ -1,35 +1,35 @@
-//! The nearest point of a closed surface, found by marching over it from a triangle that is near (Kobbelt, Bareuther &
-//! Seidel, *Multiresolution shape deformations for meshes with dynamic vertex connectivity*, section 8).
+//! The closest point on a closed surface, by a walk from a nearby triangle (Kobbelt, Bareuther & Seidel, *Multiresolution shape deformations
+//! for meshes with dynamic vertex connectivity*, section 8).
 
 use super::{SurfacePoint, TriangleTree};
 use crate::math::{DVec3, Vec3, triangle};
 use crate::mesh::{MeshError, TriangleMesh};
 use std::cell::OnceCell;
 
-/// A surface at rest that many points are projected onto, one near the other.
+/// A static surface onto which many points are projected, each near the one before.
 ///
-/// Marching goes to a neighbour as long as that is nearer, so it ends at a place that is nearer than all around it. That
-/// need not be the nearest of all: where it could not be, [`Self::closest`] asks a tree, which is made when first needed.
+/// A walk goes to neighbours as long as they are nearer, so it ends at a local minimum of the distance. Where that may not be the global one
+/// [`Self::closest`] queries a tree, which is built when first needed.
 #[derive(Clone, Debug)]
-pub struct Terrain {
+pub struct SurfaceWalker {
     mesh: TriangleMesh,
-    /// For each triangle the one across the edge opposite each corner.
+    /// By triangle, the triangles across the edges opposite its corners.
     across: Vec<[u32; 3]>,
     tree: OnceCell<TriangleTree>,
 }
 
-impl Terrain {
-    /// The surface of a closed, oriented, manifold mesh.
+impl SurfaceWalker {
+    /// For the surface of a closed, oriented manifold mesh.
     ///
     /// # Errors
-    /// As [`TriangleMesh::validate`]; [`MeshError::NotClosed`] where an edge has no triangle on its other side.
+    /// As [`TriangleMesh::validate`]; [`MeshError::NotClosed`] if an edge has one triangle only.
     pub fn new(mesh: TriangleMesh) -> Result<Self, MeshError> {
         mesh.validate()?;
         let across = neighbours(&mesh)?;
         Ok(Self { mesh, across, tree: OnceCell::new() })
     }
 
-    /// The mesh it was made of.
+    /// The mesh.
     pub fn mesh(&self) -> &TriangleMesh {
         &self.mesh
     }
@@ -40,25 +40,25 @@ impl Terrain {
         self.mesh.triangles[triangle as usize].map(|v| self.mesh.positions[v as usize])
     }
 
-    /// The value at a point of one that is given per vertex.
+    /// Interpolates values by vertex at a point.
     #[inline]
     pub fn blend(&self, values: &[Vec3], at: &SurfacePoint) -> Vec3 {
         let [a, b, c] = self.mesh.triangles[at.triangle as usize].map(|v| values[v as usize]);
         a * at.barycentric.x + b * at.barycentric.y + c * at.barycentric.z
     }
 
-    /// The point nearest to `p`; `None` where `p` is not finite.
+    /// The point closest to `p`; `None` if `p` is not finite.
     pub fn closest(&self, p: Vec3) -> Option<SurfacePoint> {
         self.tree().closest(p)
     }
 
-    /// The tree over its triangles.
+    /// The tree of its triangles.
     pub fn tree(&self) -> &TriangleTree {
-        // The mesh was found valid before.
+        // The mesh was validated before.
         self.tree.get_or_init(|| TriangleTree::new(&self.mesh).unwrap_or_else(|_| TriangleTree::empty()))
     }
 
-    /// The nearest point by looking at every triangle: for one point, when there is no tree yet.
+    /// The closest point by testing every triangle, for a single point without a tree.
     pub fn closest_of_all(&self, p: Vec3) -> Option<SurfacePoint> {
         let found = |t: u32| self.nearest_on(t, p);
         (0..self.mesh.triangles.len() as u32)
@@ -68,7 +68,7 @@ impl Terrain {
             .map(|found| self.point(&found))
     }
 
-    /// A point that is nearer to `p` than all around it, by marching from `start`, the name of a triangle.
+    /// A local minimum of the distance to `p`, by a walk from the triangle `start`.
     pub fn march(&self, start: u32, p: Vec3) -> SurfacePoint {
         let mut here = self.nearest_on(start, p);
         while let Some(next) = self.step(&here, p) {
@@ -77,7 +77,7 @@ impl Terrain {
         self.point(&here)
     }
 
-    /// The nearest point of the triangles around the edge or corner that the nearest of this one is on, if that is nearer.
+    /// The closest point on the triangles at the edge or corner that the current one is on, if it is nearer.
     fn step(&self, here: &Nearest, p: Vec3) -> Option<Nearest> {
         let weights = here.barycentric.to_array();
         let zeros = weights.iter().filter(|&&weight| weight == 0.0).count();
@@ -89,18 +89,18 @@ impl Terrain {
             }
             _ => self.nearest_around(here.triangle, weights.iter().position(|&weight| weight > 0.0)?, p),
         };
-        // Strictly, so that marching ends.
+        // Strictly nearer, so that the walk ends.
         (best.square < here.square).then_some(best)
     }
 
-    /// The nearest point of the triangles around a corner.
+    /// The closest point on the triangles around a corner.
     fn nearest_around(&self, start: u32, corner: usize, p: Vec3) -> Nearest {
         let hub = self.mesh.triangles[start as usize][corner];
         let mut best = self.nearest_on(start, p);
         let (mut t, mut k) = (start, corner);
-        // On a manifold the way round is shorter.
+        // On a manifold the loop ends earlier.
         for _ in 0..self.across.len() {
-            // Across the edge from the hub to the next corner.
+            // Across the edge from the centre to the next corner.
             t = self.across[t as usize][(k + 2) % 3];
             if t == start {
                 break;
@@ -132,7 +132,7 @@ impl Terrain {
     }
 }
 
-/// The nearest point of one triangle.
+/// The closest point on one triangle.
 #[derive(Clone, Copy, Debug)]
 struct Nearest {
     triangle: u32,
@@ -141,7 +141,7 @@ struct Nearest {
     square: f64,
 }
 
-/// For each triangle the one across the edge opposite each corner.
+/// By triangle, the triangles across the edges opposite its corners.
 fn neighbours(mesh: &TriangleMesh) -> Result<Vec<[u32; 3]>, MeshError> {
     let (first, sides) = sides_by_start(mesh);
     let across = |from: u32, to: u32| {
@@ -159,7 +159,7 @@ fn neighbours(mesh: &TriangleMesh) -> Result<Vec<[u32; 3]>, MeshError> {
     all.collect()
 }
 
-/// The end and the triangle of every side of a triangle, by the vertex it starts at: where those of each begin, and all.
+/// The half-edges by their start vertex: the first of each vertex, and all as pairs of end vertex and triangle.
 fn sides_by_start(mesh: &TriangleMesh) -> (Vec<u32>, Vec<(u32, u32)>) {
     let mut first = vec![0_u32; mesh.positions.len() + 1];
     mesh.triangles.iter().flatten().for_each(|&v| first[v as usize + 1] += 1);
@@ -185,21 +185,22 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    fn ball() -> Terrain {
-        Terrain::new(Mesh::icosphere(Vec3::new(1.0, 2.0, 3.0), 2.0, 0.2).unwrap().to_triangles()).unwrap()
+    fn ball() -> SurfaceWalker {
+        SurfaceWalker::new(Mesh::icosphere(Vec3::new(1.0, 2.0, 3.0), 2.0, 0.2).unwrap().to_triangles())
+            .unwrap()
     }
 
     #[test]
     fn on_a_ball_marching_from_anywhere_ends_at_the_nearest_point() {
-        let terrain = ball();
+        let walker = ball();
         let mut random = Random::new(5);
-        for start in 0..terrain.mesh().triangles.len() as u32 {
+        for start in 0..walker.mesh().triangles.len() as u32 {
             let way = Vec3::from_array(std::array::from_fn(|_| random.unit() as f32 - 0.5));
             let p = Vec3::new(1.0, 2.0, 3.0) + way.normalize() * 2.5;
-            let (found, expected) = (terrain.march(start, p), terrain.closest(p).unwrap());
+            let (found, expected) = (walker.march(start, p), walker.closest(p).unwrap());
             assert!((found.distance - expected.distance).abs() < 1e-6, "{start}");
-            assert_eq!(terrain.closest_of_all(p), Some(expected));
-            let again = terrain.blend(&terrain.mesh().positions, &found);
+            assert_eq!(walker.closest_of_all(p), Some(expected));
+            let again = walker.blend(&walker.mesh().positions, &found);
             assert!(again.distance(found.point) < 1e-5);
         }
     }
@@ -207,14 +208,14 @@ mod tests {
     #[test]
     fn it_ends_on_edges_and_at_corners() {
         let cube = crate::mesh::Mesh::icosahedron(Vec3::ZERO, 1.0).to_triangles();
-        let terrain = Terrain::new(cube.clone()).unwrap();
+        let walker = SurfaceWalker::new(cube.clone()).unwrap();
         for start in 0..20 {
             for &corner in &cube.positions {
-                assert!(terrain.march(start, corner * 3.0).point.distance(corner) < 1e-6);
+                assert!(walker.march(start, corner * 3.0).point.distance(corner) < 1e-6);
             }
-            let [a, b, _] = terrain.corners(7);
+            let [a, b, _] = walker.corners(7);
             let middle = (a + b) * 0.5;
-            assert!(terrain.march(start, middle * 3.0).point.distance(middle) < 1e-6);
+            assert!(walker.march(start, middle * 3.0).point.distance(middle) < 1e-6);
         }
     }
 
@@ -222,6 +223,6 @@ mod tests {
     fn an_open_surface_is_refused() {
         let mut open = Mesh::icosahedron(Vec3::ZERO, 1.0).to_triangles();
         open.triangles.pop();
-        assert!(matches!(Terrain::new(open), Err(MeshError::NotClosed { .. })));
+        assert!(matches!(SurfaceWalker::new(open), Err(MeshError::NotClosed { .. })));
     }
 }
