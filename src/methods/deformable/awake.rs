@@ -1,31 +1,31 @@
-//! Which vertices move: where the surface has come to rest, nothing is worked out any more.
+//! Sleeping vertices: where the surface has settled, nothing is computed.
 //!
-//! A vertex falls asleep when it has hardly moved for some iterations. It wakes when a neighbour moves or an edit reaches
-//! it. A level ends only after all have been awake and still.
+//! A vertex falls asleep after some still iterations, and wakes when a neighbour moves or an edit reaches it. Before a level ends all
+//! vertices are woken once.
 
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
-/// Iterations a vertex must hardly move before it sleeps.
+/// Still iterations after which a vertex sleeps.
 pub(super) const PATIENCE: f32 = 6.0;
 
-/// What hardly moves, in the speed of a surface that is at rest in the mean.
+/// The speed of a still vertex, in that of a surface whose mean energy has converged.
 const STILLNESS: f64 = 0.5;
 
-/// With a smaller share asleep all are looked at: it takes no longer.
+/// If a smaller share sleeps, all vertices are processed, which takes no longer.
 const FEW_ASLEEP: f64 = 0.25;
 
-/// The vertices that are awake.
+/// The vertices awake.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Awake {
-    /// Those that may move.
+    /// The vertices awake.
     pub(super) moving: Vec<VertexId>,
-    /// Those and their neighbours.
+    /// These and their neighbours.
     pub(super) around: Vec<VertexId>,
     is_around: Vec<bool>,
 }
 
 impl Awake {
-    /// Finds them by the iterations that each has hardly moved, `still`.
+    /// Finds them by the number of still iterations.
     pub(super) fn find(&mut self, mesh: &Mesh, still: ScalarKey) {
         let still = mesh.scalar(still);
         self.moving.clear();
@@ -51,7 +51,7 @@ impl Awake {
     }
 }
 
-/// The speed along the normal, in δ per unit of time, below which a vertex hardly moves.
+/// The speed along the normal, in δ per unit of time, below which a vertex is still.
 pub(super) fn stillness(mass: f64, energy_tolerance: f64) -> f32 {
     (STILLNESS * (2.0 * energy_tolerance / mass).sqrt()) as f32
 }

@@ -7,19 +7,18 @@ use crate::math::{Mat3, Vec3};
 use crate::mesh::{Ring, VertexId};
 use crate::volume::KnownCell;
 
-/// Speed along the normal, in δ per unit of time, from which on rigidity evens out the sampling with its full force.
+/// The speed along the normal, in δ per unit of time, from which on the tangential part of rigidity acts in full.
 ///
-/// The force f_c has a part along the surface, which spaces the vertices evenly while the surface travels. At rest it
-/// would go on: vertices slide off ridges for ever, edges there grow and are split, those beside it shrink and are
-/// collapsed, and each edit throws vertices off the surface, so that the energy never falls. Below 0.02 the sampling
-/// of slow fronts suffers; from 0.3 on the slide does not die out everywhere.
+/// The tangential part of f_c spaces vertices evenly while the surface moves. On a settled surface it would not end: vertices slide off
+/// ridges, edges there grow and are split, those beside shrink and are collapsed, and each edit displaces vertices, so that the energy
+/// never falls. Below 0.02 the sampling of slow fronts suffers; from 0.3 on sliding does not fade everywhere.
 const SLIDE_SPEED: f32 = 0.1;
 
-/// How far off the contour, in voxels, rigidity alone may take the surface, about: more, and thin strands shrink; less, and noise
-/// is not smoothed.
+/// About the largest distance from the contour, in voxels, to which rigidity may pull the surface: with more, thin strands shrink; with
+/// less, noise is not smoothed.
 const YIELD: f32 = 0.1;
 
-/// The furthest that the surface is taken to be inside its vertices, in voxels.
+/// The largest depth of the mean surface below its vertices that is compensated, in voxels.
 const MOST_INSET: f32 = 0.15;
 
 /// A point that pulls the surface, in the space of the model.
@@ -27,7 +26,7 @@ const MOST_INSET: f32 = 0.15;
 pub(super) struct Pull {
     pub(super) point: Vec3,
     pub(super) strength: f32,
-    /// From ways in the model to ways in the world, in radii of the attractor.
+    /// From displacements in the model to displacements in the world, in radii of the attractor.
     pub(super) in_radii: Mat3,
 }
 
@@ -52,7 +51,7 @@ pub(super) struct ForceScale {
 }
 
 impl ForceScale {
-    /// `iso` is normalised, `gain` by how much α_I is larger here, `voxel` the world length of a unit of the model.
+    /// `iso` is normalised, `gain` the factor on α_I, `voxel` the world length of a unit of the model.
     pub(super) fn new(params: &DeformableParams, [iso, gain]: [f32; 2], voxel: f64, delta: f32) -> Self {
         let yields = params.yields_to_image();
         Self {
@@ -72,7 +71,7 @@ impl ForceScale {
         }
     }
 
-    /// δ |α_I|: the force of the image where it differs by all of its range from π_I.
+    /// δ |α_I|: the image force for a difference of the whole range from π_I.
     pub(super) fn pull(&self) -> f32 {
         self.delta * self.iso_force.abs()
     }
@@ -82,38 +81,38 @@ impl ForceScale {
     }
 }
 
-/// What pushes and pulls from outside.
+/// External forces.
 pub(super) struct Field<'a> {
     pub(super) image: &'a LevelImage,
     pub(super) scale: ForceScale,
     pub(super) pulls: &'a [Pull],
 }
 
-/// Forces and what they are made of, by vertex slot; kept between steps to save allocations.
+/// Forces and their parts, by vertex slot; buffers are kept between steps.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Forces {
-    /// L(x): the way from a vertex to the mean of its neighbours.
+    /// L(x): from a vertex to the mean of its neighbours.
     laplacian: Vec<Vec3>,
     /// Unit normals, outwards.
     pub(super) normal: Vec<Vec3>,
-    /// By how much Π changes over a voxel along the normal.
+    /// The change of Π over a voxel along the normal.
     pub(super) slope: Vec<f32>,
-    /// The image around each vertex, where it was last felt.
+    /// The image cell around each vertex at its last sample.
     cells: Vec<KnownCell>,
     /// The sum of all forces.
     pub(super) force: Vec<Vec3>,
-    /// Milliseconds of evaluating forces that no report has told of.
+    /// Milliseconds of force evaluation not reported yet.
     pub(super) spent: f64,
 }
 
 impl Forces {
-    /// Forgets the image, which is another one from now on.
+    /// Discards the image cells, when the image changes.
     pub(super) fn forget_image(&mut self) {
         self.cells.fill(KnownCell::default());
     }
 
-    /// Normals and L of some vertices.
-    pub(super) fn look_around(&mut self, rings: &[Ring], positions: &[Vec3], vertices: &[VertexId]) {
+    /// Updates normals and L of some vertices.
+    pub(super) fn update_normals(&mut self, rings: &[Ring], positions: &[Vec3], vertices: &[VertexId]) {
         self.laplacian.resize(rings.len(), Vec3::ZERO);
         self.normal.resize(rings.len(), Vec3::ZERO);
         self.force.resize(rings.len(), Vec3::ZERO);
@@ -136,7 +135,7 @@ impl Forces {
         }
     }
 
-    /// The forces on some vertices; needs [`Self::look_around`] of them and their neighbours at the same positions.
+    /// The forces on some vertices; needs [`Self::update_normals`] of them and their neighbours at the same positions.
     pub(super) fn evaluate(
         &mut self,
         rings: &[Ring],
@@ -171,8 +170,8 @@ impl Forces {
         }
     }
 
-    /// f_c = α_c (L(x) − mean of L over the neighbours) (5), its part along the surface fading out at rest, that across it no
-    /// stronger than `most`.
+    /// f_c = α_c (L(x) − mean of L over the neighbours) (5); its tangential part fades out as the surface settles, its normal part is at most
+    /// `most`.
     #[inline]
     fn curvature(&self, v: usize, ring: &Ring, velocity: Vec3, scale: &ForceScale, most: f32) -> Vec3 {
         let sum: Vec3 = ring.as_slice().iter().map(|w| self.laplacian[w.index()]).sum();
@@ -187,9 +186,8 @@ impl Forces {
         (yielding + along) * scale.rigidity
     }
 
-    /// Where the triangles at a vertex are in the mean: on a sphere through their corners, triangles of edge l are l²/8r inside, a
-    /// quarter of L. There the image is sampled, so that the surface encloses the volume of the contour; with its vertices on the
-    /// contour it would be too small.
+    /// The mean position of the triangles at a vertex: with corners on a sphere, triangles of edge l are l²/8r inside, a quarter of L. The image
+    /// is sampled there, so that the surface encloses the volume of the contour; with vertices on the contour it would be too small.
     #[inline]
     fn middle_of_star(&self, v: usize, x: Vec3) -> Vec3 {
         let normal = self.normal[v];
@@ -197,7 +195,7 @@ impl Forces {
         x + normal * inset.clamp(-MOST_INSET, MOST_INSET)
     }
 
-    /// By how much Π changes over a voxel along the normal.
+    /// The change of Π over a voxel along the normal.
     #[inline]
     fn slope_along_normal(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
         let half = self.normal[v] * 0.5;
@@ -205,15 +203,14 @@ impl Forces {
         (at(x + half) - at(x - half)).abs()
     }
 
-    /// The strongest bending across the surface that the image holds against where it is, so that at rest no vertex is
-    /// further than 4/3 [`YIELD`] from the contour.
+    /// The largest normal part of rigidity that the image balances, so that no settled vertex is further than 4/3 [`YIELD`] from the contour.
     #[inline]
     fn hold_of_image(&self, v: usize, miss: f32, scale: &ForceScale) -> f32 {
         scale.pull() * (YIELD * self.slope[v] + 0.25 * miss.abs())
     }
 
-    /// A force whose part along the surface fades out at rest, faster than that of rigidity: it would draw the vertices around
-    /// to a point, where they vanish, and so on for ever.
+    /// A force whose tangential part fades out as the surface settles, faster than that of rigidity: it would draw the vertices around into a
+    /// point, where they vanish, again and again.
     fn without_slide(&self, v: usize, force: Vec3, velocity: Vec3, delta: f32) -> Vec3 {
         let normal = self.normal[v];
         let across = normal * force.dot(normal);
@@ -221,7 +218,7 @@ impl Forces {
         across + (force - across) * (speed * speed).min(1.0)
     }
 
-    /// π_I − Π(x), with x in the middle of the star where the surface yields to the image.
+    /// π_I − Π(x), with x the mean position of the one-ring if the surface yields to the image.
     #[inline]
     fn miss(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
         let p = if scale.yields { self.middle_of_star(v, x) } else { x };
@@ -273,7 +270,7 @@ fn springs(ring: &Ring, positions: &[Vec3], x: Vec3, rest: f32) -> Vec3 {
 
 /// A spring to the point that fades out smoothly at its radius.
 fn attraction(pull: &Pull, x: Vec3) -> Vec3 {
-    let way = pull.point - x;
-    let far = (pull.in_radii * way).length_squared();
-    if far >= 1.0 { Vec3::ZERO } else { way * (pull.strength * (1.0 - far) * (1.0 - far)) }
+    let offset = pull.point - x;
+    let far = (pull.in_radii * offset).length_squared();
+    if far >= 1.0 { Vec3::ZERO } else { offset * (pull.strength * (1.0 - far) * (1.0 - far)) }
 }

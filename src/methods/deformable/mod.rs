@@ -3,17 +3,16 @@
 //! Lachaud & Montanvert, *Deformable meshes with automated topology changes for coarse-to-fine 3D surface extraction*.
 //! A closed mesh moves under internal forces and forces of the image (`forces`, `motion`; sections 3.5–3.8). After each
 //! move its edges are kept within bounds derived from δ, parts that meet are joined and necks cut (the `remesh` layer;
-//! sections 3.2–3.3). It first comes to rest on a coarse level of an image pyramid (`image`; section 4), then is
-//! refined by √3 and goes on one level down (`schedule`; section 5.1).
+//! sections 3.2–3.3). It converges on a coarse level of an image pyramid first (`image`; section 4), is refined by √3, and continues
+//! one level down (`schedule`; section 5.1).
 //!
-//! # What it guarantees
-//! After every step the mesh is closed, oriented and 2-manifold, no two of its triangles cross, and χ is what the edits
-//! predict. The same input gives the same bits, natively and in wasm, also after [`DeformableModel::save`] and
+//! # Guarantees
+//! After every step the mesh is a closed, oriented 2-manifold without self-intersections, and χ is as predicted by the edits. The same input gives the same bits, natively and in wasm, also after [`DeformableModel::save`] and
 //! [`DeformableModel::restore`].
 //!
-//! # What it does not
-//! Sheets nearer to each other than the contact distance, 2.5/√3 δ, meet: holes and walls thinner than that are lost, on
-//! coarse levels those thinner than the contact distance there.
+//! # Limits
+//! With `adaptivity: 0` sheets nearer to each other than the contact distance, 2.5/√3 δ, merge: holes and walls thinner than that are lost,
+//! on coarse levels those thinner than the contact distance there.
 //!
 //! # Example
 //! ```
@@ -77,20 +76,19 @@ use schedule::Rest;
 use start::Frame;
 use std::ops::RangeInclusive;
 
-/// How a [`DeformableModel`] is set up.
+/// The setup of a [`DeformableModel`].
 #[derive(Clone, Debug)]
 pub struct DeformableOptions {
     /// The frame of a 4D volume.
     pub frame: usize,
-    /// What to start from.
+    /// The start shape.
     pub start: Start,
-    /// Pyramid levels above the volume itself; 0 is direct. On those above, the surface rests a little outside the iso
-    /// value, so that thin walls are not lost there.
+    /// Pyramid levels above the volume itself; 0 is direct. In runs without seeding the surface settles a little outside the iso value on
+    /// coarse levels, so that thin walls are not lost there.
     pub levels: usize,
-    /// Mean edge at the finest level in world units, in the mean of all directions where voxels are not cubes; else from
-    /// the voxel size.
+    /// Mean edge length at the finest level in world units, averaged over directions if voxels are not cubes; by default from the voxel size.
     pub edge: Option<f64>,
-    /// Parameters; else [`DeformableParams::for_volume`].
+    /// Parameters; by default [`DeformableParams::for_volume`].
     pub params: Option<DeformableParams>,
 }
 
@@ -103,48 +101,47 @@ impl Default for DeformableOptions {
 /// An attachment point that pulls the surface within `radius`.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Attractor {
-    /// Where, in world space.
+    /// Position in world space.
     pub point: DVec3,
     /// Spring constant; negative pushes away.
     pub strength: f64,
-    /// Beyond this distance in world units nothing is felt.
+    /// Reach of the force in world units.
     pub radius: f64,
 }
 
 /// Mean edge of a resolved mesh in δ, measured on converged spheres and skulls.
 const MEAN_EDGE: f64 = 1.7;
 
-/// δ at the finest level in voxels, where no edge is asked for: inside 0.693 ≤ δ/U ≤ 1 (14), near its upper end,
-/// because vertices grow as 1/δ².
+/// The default δ at the finest level in voxels: near the upper end of 0.693 ≤ δ/U ≤ 1 (14), since the number of vertices grows as 1/δ².
 const DEFAULT_DELTA: f64 = 0.9;
 
-/// δ in voxels that is accepted: below, a mesh of the whole image no longer fits memory; above, it misses it.
+/// The accepted range of δ in voxels: below, a mesh of the whole image does not fit into memory; above, it misses the object.
 const DELTA_RANGE: RangeInclusive<f64> = 0.2..=20.0;
 
-/// The strongest attractor, and how far away in voxels one may be: beyond, forces overflow.
+/// The strongest attractor, and the largest distance of one in voxels: beyond, forces overflow.
 const STRONGEST: f64 = 1e3;
 const FURTHEST: f64 = 1e6;
 
-/// A vertex is looked at again when it has gone this far since the last time, in δ…
+/// The bounds at a vertex are checked when it has moved this far since the last check, in δ…
 const CHECK_TRAVEL: f32 = 0.1;
 
-/// …and every so many iterations. Rules by momentary speed miss slow vertices that go far.
+/// …and every so many iterations. Criteria by speed miss slow vertices that move far.
 const CHECK_PERIOD: usize = 50;
 
-/// Slots in use below which the mesh is put in order again.
+/// The share of used slots below which the mesh is renumbered.
 const LEAST_OCCUPANCY: f32 = 0.7;
 
 /// The per-vertex attributes of the model.
 #[derive(Clone, Copy, Debug)]
 struct Keys {
     velocity: VectorKey,
-    /// Where the vertex was when its bounds were last looked at.
+    /// The position at the last check of bounds.
     checked: VectorKey,
-    /// Iterations that it has hardly moved.
+    /// The number of still iterations in a row.
     still: ScalarKey,
-    /// Iterations since an edit made or displaced the vertex.
+    /// The number of iterations since an edit made or displaced the vertex.
     calm: ScalarKey,
-    /// By how much the size of edges at the vertex differs from 1, in δ.
+    /// The size of edges at the vertex, in δ, less 1.
     size: ScalarKey,
 }
 
@@ -158,13 +155,13 @@ pub struct DeformableModel {
     fingerprint: u64,
     params: DeformableParams,
     attractors: Vec<Attractor>,
-    /// Whether the run began on the contour.
+    /// Whether the run started from the contour.
     from_contour: bool,
     finest_delta: f64,
     level: usize,
     /// π_I on this level, normalised.
     level_iso: f32,
-    /// By how much α_I is larger on this level.
+    /// The factor on α_I on this level.
     gain: f32,
     mesh: Mesh,
     keys: Keys,
@@ -181,7 +178,7 @@ impl DeformableModel {
     /// A model of one frame of `volume`, before its first step.
     ///
     /// # Errors
-    /// [`MethodError`] naming the option or parameter that cannot be used, and what is accepted.
+    /// [`MethodError`] with the option or parameter that cannot be used, and what is accepted.
     pub fn new(volume: &Volume, options: DeformableOptions) -> Result<Self, MethodError> {
         let params = options.params.unwrap_or_else(|| DeformableParams::for_volume(volume));
         params.validate()?;
@@ -239,25 +236,25 @@ impl DeformableModel {
         };
         model.watch_output();
         model.reorder();
-        model.settle_in();
+        model.mark_checked();
         model.prepare_level()?;
-        // The contour of the finest level is nearly what the surface converges to. Other starts are sized when it has settled.
+        // A contour of the finest level is close to the result. Other starts are sized once they have settled.
         if model.from_contour && model.level == 0 && model.set_sizes() {
             model.check_everything(&mut Times::default());
             model.reorder();
         }
-        // No edit has displaced them lately.
+        // No edit has displaced vertices recently.
         model.mesh.scalar_mut(keys.calm).fill(motion::CALM);
         Ok(model)
     }
 
-    /// One iteration of figure 9, and the way one level down where the surface has come to rest.
+    /// One iteration of figure 9; descends one level if the surface has converged.
     ///
-    /// After the end the model stays as it is and reports `done`.
+    /// After the end nothing changes, and the report says `done`.
     ///
     /// # Errors
-    /// [`MethodError::TooManyVertices`] where the surface grows beyond all bounds. It is sound then, but edges that
-    /// should have been split are too long; other parameters may bring it back.
+    /// [`MethodError::TooManyVertices`] if the surface grows without bound. It stays valid, but some edges are too long; other parameters may
+    /// bring it back.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
         let mut changes = Changes::default();
@@ -279,7 +276,7 @@ impl DeformableModel {
 
     fn move_vertices(&mut self, times: &mut Times) {
         let begin = (self.clock)();
-        self.motion.look_around(&self.mesh, self.keys);
+        self.motion.update_normals(&self.mesh, self.keys);
         let normals = (self.clock)();
         let delta = self.model_delta();
         let pulls = self.pulls();
@@ -299,9 +296,9 @@ impl DeformableModel {
             clock: self.clock,
         };
         let (clock, mut embedding) = (self.clock, 0.0);
-        let carry = |mesh: &mut Mesh, moving: &[VertexId], ways: &mut [Vec3]| {
+        let carry = |mesh: &mut Mesh, moving: &[VertexId], displacements: &mut [Vec3]| {
             let begin = clock();
-            let held = self.resolver.carry_some(mesh, Sampling::new(delta), moving, ways);
+            let held = self.resolver.carry_some(mesh, Sampling::new(delta), moving, displacements);
             embedding = clock() - begin;
             held
         };
@@ -313,8 +310,7 @@ impl DeformableModel {
         times.add("motion", (self.clock)() - normals - forces - embedding);
     }
 
-    /// Vertices that have travelled far enough since their bounds were last looked at, and those that have moved at all
-    /// where it is their turn.
+    /// The vertices that have moved far enough since their last check, and those that have moved at all and whose turn it is.
     fn vertices_to_check(&mut self) -> Vec<VertexId> {
         let limit = CHECK_TRAVEL * self.model_delta();
         let turn = self.iteration as usize % CHECK_PERIOD;
@@ -329,7 +325,7 @@ impl DeformableModel {
         active
     }
 
-    /// Restores the bounds around `active`, and memory order where it has suffered.
+    /// Restores the bounds around `active`, and renumbers the mesh if its slots are sparse.
     fn restore_bounds(&mut self, active: &[VertexId], times: &mut Times) -> Changes {
         let begin = (self.clock)();
         let sampling = self.sampling();
@@ -356,7 +352,7 @@ impl DeformableModel {
         Sampling::new(self.model_delta()).with_sizes(self.keys.size)
     }
 
-    /// Whether levels are searched for what is missing.
+    /// Whether levels are searched for missing parts.
     fn seeds_levels(&self) -> bool {
         match self.params.seeding {
             Seeding::Auto => self.from_contour,
@@ -365,7 +361,7 @@ impl DeformableModel {
         }
     }
 
-    /// Keeps the surface from crossing itself in world space, too, where it is handed out in single precision.
+    /// Keeps the surface free of self-intersections in world space, too, where it is returned in single precision.
     fn watch_output(&mut self) {
         self.resolver.watch_output(self.to_world, &self.domain.bounds);
     }
@@ -382,8 +378,8 @@ impl DeformableModel {
         }
     }
 
-    /// Marks every vertex as just looked at.
-    fn settle_in(&mut self) {
+    /// Marks every vertex as checked.
+    fn mark_checked(&mut self) {
         let positions = self.mesh.positions().to_vec();
         self.mesh.vector_mut(self.keys.checked).copy_from_slice(&positions);
         self.components = self.mesh.component_count() as u32;
@@ -407,11 +403,10 @@ impl DeformableModel {
         }
     }
 
-    /// Takes all parameters, from the next step on.
+    /// Sets all parameters from the next step on.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`]; nothing is taken then. [`MethodError::Volume`] where the gradient image does
-    /// not fit memory.
+    /// [`MethodError::InvalidArgument`], with nothing changed. [`MethodError::Volume`] if the gradient image does not fit into memory.
     pub fn set_params(&mut self, params: DeformableParams) -> Result<(), MethodError> {
         params.validate()?;
         let before = std::mem::replace(&mut self.params, params);
@@ -423,15 +418,15 @@ impl DeformableModel {
         Ok(())
     }
 
-    /// The parameters now.
+    /// The current parameters.
     pub fn params(&self) -> &DeformableParams {
         &self.params
     }
 
-    /// Takes the attachment points, from the next step on.
+    /// Sets the attachment points from the next step on.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] where a number is not finite or too large, or a radius is not positive.
+    /// [`MethodError::InvalidArgument`] if a number is not finite or too large, or a radius is not positive.
     pub fn set_attractors(&mut self, attractors: Vec<Attractor>) -> Result<(), MethodError> {
         let from_world = self.to_world.inverse();
         for (i, a) in attractors.iter().enumerate() {
@@ -461,7 +456,7 @@ impl DeformableModel {
         self.attractors.iter().map(local).collect()
     }
 
-    /// What the forces need of the level and the parameters.
+    /// What the forces need from level and parameters.
     fn prepare_level(&mut self) -> Result<(), MethodError> {
         if self.params.gradient_normal != 0.0 || self.params.gradient_tangent != 0.0 {
             self.pyramid.levels[self.level].prepare_gradient()?;
@@ -482,7 +477,7 @@ impl DeformableModel {
         self.level
     }
 
-    /// δ now, in world units; where voxels are not cubes, in the mean of all directions.
+    /// The current δ in world units, averaged over directions if voxels are not cubes.
     pub fn delta(&self) -> f64 {
         f64::from(self.model_delta()) * self.voxel
     }
@@ -501,8 +496,8 @@ impl DeformableModel {
         self.mesh.to_triangles().transformed(&self.to_world)
     }
 
-    /// Speed of each vertex of [`Self::surface`] along its outward normal, in world units per unit of time (of Δt: an iteration
-    /// counts as one, however long a step the integrator takes); negative inwards. A vertex that an edit made has what its neighbourhood had.
+    /// Speed of each vertex of [`Self::surface`] along its outward normal, in world units per unit of time (Δt per iteration, however long the
+    /// step of the integrator); negative inwards. New vertices have the speed of their neighbourhood.
     pub fn speeds(&self) -> Vec<f32> {
         let normals = self.surface().normals.unwrap_or_default();
         let velocities = self.mesh.vector(self.keys.velocity);
@@ -514,7 +509,7 @@ impl DeformableModel {
         self.mesh.vertices().zip(normals).map(along).collect()
     }
 
-    /// Takes a clock in milliseconds, by which reports tell the time of each part.
+    /// Sets a clock in milliseconds, by which reports time each part.
     pub fn set_clock(&mut self, clock: fn() -> f64) {
         self.clock = clock;
     }

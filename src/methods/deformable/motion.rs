@@ -8,62 +8,61 @@ use super::params::{DeformableParams, Integrator};
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 
-/// How much the mesh moved in one iteration.
+/// The motion of the mesh in one iteration.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Movement {
-    /// Mean of ½ m (v·n)² / δ², the criterion of section 5.1.
+    /// The mean of ½ m (v·n)² / δ², the criterion of section 5.1.
     pub(super) energy: f64,
-    /// Largest speed along a normal, in δ per unit of time, of a vertex that no edit displaced lately. Edits of a
-    /// surface at rest throw single vertices off it; they come back in a few iterations and are no sign that the surface
-    /// still travels.
+    /// The largest speed along a normal, in δ per unit of time, of vertices that no edit displaced recently. Edits displace single vertices of
+    /// a settled surface, which return in a few iterations.
     pub(super) fastest: f32,
 }
 
-/// Iterations after which a vertex has come back from an edit.
+/// Iterations after which a vertex has returned from an edit.
 pub(super) const CALM: f32 = 6.0;
 
-/// Still iterations that are counted extra for a vertex that could not move at all: pressed against others, it could not in the next
-/// iteration, either.
+/// Still iterations counted in addition for a vertex that could not move at all: it is pressed against others and will not in the next
+/// iteration either.
 const STUCK: f32 = 2.0;
 
-/// Still iterations that are counted for one with a long step.
+/// Still iterations counted for one long step.
 const LONG_STEP: f32 = 2.0;
 
-/// By how much f_c and f_e fall off as a vertex of valence 6 moves away from its neighbours, in α_c and α_e.
+/// The stiffness of f_c and f_e against moving a vertex of valence 6 away from its neighbours, in α_c and α_e.
 const BENDING_STIFFNESS: f32 = 1.3;
 const STRETCHING_STIFFNESS: f32 = 6.0;
 
-/// What pushes and what holds the vertices.
+/// External forces and constraints.
 pub(super) struct World<'a> {
     pub(super) field: Field<'a>,
-    /// Where vertices are held back.
+    /// The region that vertices must stay in.
     pub(super) domain: Domain,
     pub(super) params: &'a DeformableParams,
     pub(super) delta: f32,
     pub(super) clock: fn() -> f64,
 }
 
-/// Moves the vertices of a mesh; what it needs is kept between steps to save allocations.
+/// Moves the vertices of a mesh; buffers are kept between steps.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Motion {
     pub(super) awake: Awake,
     pub(super) forces: Forces,
-    /// The way of each vertex in this iteration, by slot; zero before and after.
-    ways: Vec<Vec3>,
+    /// Displacements in this iteration, by slot; zero before and after.
+    displacements: Vec<Vec3>,
 }
 
 impl Motion {
-    /// Finds the vertices that are awake, their normals and L.
-    pub(super) fn look_around(&mut self, mesh: &Mesh, keys: Keys) {
+    /// Updates the vertices awake, their normals and L.
+    pub(super) fn update_normals(&mut self, mesh: &Mesh, keys: Keys) {
         self.awake.find(mesh, keys.still);
-        self.forces.look_around(mesh.rings(), mesh.positions(), &self.awake.around);
-        self.ways.resize(mesh.slots(), Vec3::ZERO);
+        self.forces.update_normals(mesh.rings(), mesh.positions(), &self.awake.around);
+        self.displacements.resize(mesh.slots(), Vec3::ZERO);
     }
 
-    /// Moves the vertices by one time step, as far as `carry` can; needs [`Self::look_around`] of the mesh as it is.
+    /// Moves the vertices by one time step as far as `carry` allows; needs [`Self::update_normals`] of the current mesh.
     ///
-    /// `carry` moves some vertices by ways, by slot; it leaves there what they went, and tells which share of its way each
-    /// of the vertices went that it held back.
+    /// `carry` moves vertices by displacements, by slot, and replaces them by those applied; it returns the vertices held back, and the share
+    /// of its displacement that each moved by.
     pub(super) fn advance(
         &mut self,
         mesh: &mut Mesh,
@@ -77,14 +76,14 @@ impl Motion {
             Integrator::Implicit => self.implicit(mesh, keys, world),
         }
         self.bound(mesh, keys, world);
-        let held = carry(mesh, &self.awake.moving, &mut self.ways);
+        let held = carry(mesh, &self.awake.moving, &mut self.displacements);
         let velocities = mesh.vector_mut(keys.velocity);
         held.iter().for_each(|&(v, share)| velocities[v.index()] *= share);
         let stuck = held.iter().filter(|(_, share)| *share == 0.0);
         let still = mesh.scalar_mut(keys.still);
         stuck.for_each(|(v, _)| still[v.index()] += STUCK);
         let movement = self.measure(mesh, keys, world);
-        self.awake.moving.iter().for_each(|v| self.ways[v.index()] = Vec3::ZERO);
+        self.awake.moving.iter().for_each(|v| self.displacements[v.index()] = Vec3::ZERO);
         movement
     }
 
@@ -96,12 +95,12 @@ impl Motion {
         let velocities = mesh.vector_mut(keys.velocity);
         for i in self.awake.moving.iter().map(|v| v.index()) {
             velocities[i] += (self.forces.force[i] - velocities[i] * damping) * step;
-            self.ways[i] = velocities[i] * time_step as f32;
+            self.displacements[i] = velocities[i] * time_step as f32;
         }
     }
 
-    /// Linearly implicit Euler with a long time step, v ← (m v + Δt f) / (m + Δt γ + Δt² k): each vertex by itself, with k by how
-    /// much the forces on it fall off as it moves along its normal.
+    /// Linearly implicit Euler with a long time step, v ← (m v + Δt f) / (m + Δt γ + Δt² k), for each vertex by itself; k is the stiffness of the
+    /// forces against a move along the normal.
     fn implicit(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
         self.act(mesh, mesh.positions(), mesh.vector(keys.velocity), world);
         let &DeformableParams { mass, damping, rigidity, stiffness, .. } = world.params;
@@ -113,7 +112,7 @@ impl Motion {
             let k = pull * self.forces.slope[i] + internal;
             velocities[i] = (velocities[i] * mass + self.forces.force[i] * step)
                 * (1.0 / (mass + step * damping + step * step * k));
-            self.ways[i] = velocities[i] * step;
+            self.displacements[i] = velocities[i] * step;
         }
     }
 
@@ -129,12 +128,12 @@ impl Motion {
             [(1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)].into_iter().enumerate()
         {
             if stage > 0 {
-                self.forces.look_around(mesh.rings(), &x, &self.awake.around);
+                self.forces.update_normals(mesh.rings(), &x, &self.awake.around);
             }
             self.act(mesh, &x, &v, world);
             for i in self.awake.moving.iter().map(|v| v.index()) {
                 let acceleration = (self.forces.force[i] - v[i] * damping) * (1.0 / mass);
-                self.ways[i] += v[i] * (weight * step / 6.0);
+                self.displacements[i] += v[i] * (weight * step / 6.0);
                 gain[i] += acceleration * (weight * step / 6.0);
                 x[i] = x0[i] + v[i] * (ahead * step);
                 v[i] = v0[i] + acceleration * (ahead * step);
@@ -145,33 +144,33 @@ impl Motion {
         self.awake.moving.iter().map(|v| v.index()).for_each(|i| velocities[i] += gain[i]);
     }
 
-    /// The forces on the vertices that are awake, at given positions and with the normals there.
+    /// The forces on the vertices awake, at given positions and with the normals there.
     fn act(&mut self, mesh: &Mesh, positions: &[Vec3], velocities: &[Vec3], world: &World) {
         let begin = (world.clock)();
         self.forces.evaluate(mesh.rings(), positions, velocities, &world.field, &self.awake.moving);
         self.forces.spent += (world.clock)() - begin;
     }
 
-    /// Shortens ways that are too long or lead out of the domain, and the velocities with them.
+    /// Shortens displacements that are too long or leave the domain, and the velocities with them.
     fn bound(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
         let &World { domain, params, delta, .. } = world;
         let limit = params.max_move as f32 * delta;
         for i in self.awake.moving.iter().map(|v| v.index()) {
-            let way = &mut self.ways[i];
-            let length = way.length();
+            let displacement = &mut self.displacements[i];
+            let length = displacement.length();
             if length > limit {
-                *way *= limit / length;
+                *displacement *= limit / length;
                 mesh.vector_mut(keys.velocity)[i] *= limit / length;
             }
             let from = mesh.positions()[i];
-            if !domain.bounds.contains(from + *way) {
-                *way = domain.hold(from + *way) - from;
-                mesh.vector_mut(keys.velocity)[i] = *way * (1.0 / params.step_length() as f32);
+            if !domain.bounds.contains(from + *displacement) {
+                *displacement = domain.hold(from + *displacement) - from;
+                mesh.vector_mut(keys.velocity)[i] = *displacement * (1.0 / params.step_length() as f32);
             }
         }
     }
 
-    /// How much the mesh moved; puts vertices to sleep and wakes others.
+    /// Measures the motion, puts vertices to sleep and wakes others.
     fn measure(&self, mesh: &mut Mesh, keys: Keys, world: &World) -> Movement {
         let per_time = 1.0 / (world.params.step_length() as f32 * world.delta);
         let stillness = stillness(world.params.mass, world.params.energy_tolerance);
@@ -179,7 +178,7 @@ impl Motion {
         let mut movement = Movement::default();
         for &v in &self.awake.moving {
             let i = v.index();
-            let along = (self.ways[i].dot(self.forces.normal[i]) * per_time).abs();
+            let along = (self.displacements[i].dot(self.forces.normal[i]) * per_time).abs();
             movement.energy += f64::from(along) * f64::from(along);
             let calm = &mut mesh.scalar_mut(keys.calm)[i];
             if along > movement.fastest && *calm >= CALM {
@@ -187,7 +186,7 @@ impl Motion {
             }
             *calm += 1.0;
             if along > stillness {
-                rouse(mesh, keys, v);
+                wake(mesh, keys, v);
             } else {
                 count_still(mesh, keys, v, counted);
             }
@@ -197,14 +196,14 @@ impl Motion {
     }
 }
 
-/// Wakes a vertex that moved, and its neighbours.
-fn rouse(mesh: &mut Mesh, keys: Keys, v: VertexId) {
+/// Wakes a moving vertex and its neighbours.
+fn wake(mesh: &mut Mesh, keys: Keys, v: VertexId) {
     let (rings, still) = mesh.rings_and_scalar_mut(keys.still);
     still[v.index()] = 0.0;
     rings[v.index()].as_slice().iter().for_each(|w| still[w.index()] = 0.0);
 }
 
-/// Adds to the iterations in which a vertex has hardly moved; after enough of them it sleeps.
+/// Counts still iterations of a vertex; after enough of them it sleeps.
 fn count_still(mesh: &mut Mesh, keys: Keys, v: VertexId, iterations: f32) {
     let still = &mut mesh.scalar_mut(keys.still)[v.index()];
     *still += iterations;

@@ -1,4 +1,4 @@
-//! When a level is finished, and the way down to the next (section 5.1, figures 12 and 13).
+//! Convergence of a level, and the descent to the next (section 5.1, figures 12 and 13).
 
 use super::renewal::Renewal;
 use super::{DeformableModel, DeformableParams, Integrator, Topology, contact};
@@ -7,37 +7,37 @@ use crate::methods::{MethodError, Times};
 use crate::remesh::{Changes, Sampling};
 use serde::{Deserialize, Serialize};
 
-/// Iterations running that must be quiet: one alone may be a turning point of a swing.
+/// Quiet iterations in a row for convergence: a single one may be a turning point of an oscillation.
 const QUIET_ITERATIONS: f64 = 3.0;
 
-/// A long step that damps each vertex by the slope of its forces has none.
+/// The same for long steps, which are damped and do not oscillate.
 const QUIET_LONG_STEPS: f64 = 2.0;
 
-/// They need never be more, however small time step and damping are.
+/// The largest number of quiet iterations, for small time steps and damping.
 const MOST_QUIET_ITERATIONS: f64 = 500.0;
 
-/// The fastest vertex of a surface at rest, in δ per unit of time. The mean energy hides a few vertices that still travel,
-/// such as a front in a hole; with no bound the model stops before it has passed.
+/// The largest speed in a converged surface, in δ per unit of time. The mean energy hides a few moving vertices, such as a front in a hole;
+/// without this bound the model would stop before it has passed.
 const REST_SPEED: f32 = 0.03;
 
-/// Searches of the finest level for what is missing.
+/// The number of searches of the finest level for missing parts.
 const MOST_SEARCHES: u32 = 3;
 
-/// The longest move of a vertex of a surface at rest in one iteration, in δ.
+/// The largest displacement in one iteration of a converged surface, in δ.
 const REST_MOVE: f32 = 0.1;
 
-/// Where the model stands between moving and done.
+/// The state of convergence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Rest {
     quiet: u32,
     /// Whether all vertices have been woken since the surface first came to rest, or something was seeded.
     woken: bool,
     done: bool,
-    /// Searches of the finest level for what is missing; all of them once nothing was found.
+    /// Searches of the finest level made; the largest number once one found nothing.
     searches: u32,
-    /// Whether the sizes of edges fit the surface as it came to rest.
+    /// Whether edges have been sized.
     pub(super) sized: bool,
-    /// The iteration at whose end this level began.
+    /// The iteration after which this level began.
     pub(super) began: u32,
 }
 
@@ -46,8 +46,8 @@ impl DeformableModel {
         self.rest.done
     }
 
-    /// Levels done, and the way of this one from the energy of a surface at full speed to that of one at rest, as its
-    /// logarithm falls. It can go back where the surface finds a way on.
+    /// The share of levels done, and of this one by the logarithm of the energy, from full speed to convergence. It may decrease when the
+    /// surface starts moving again.
     pub(super) fn progress(&self) -> f64 {
         if self.rest.done {
             return 1.0;
@@ -55,20 +55,20 @@ impl DeformableModel {
         let DeformableParams { mass, max_move, energy_tolerance, .. } = self.params;
         let speed = max_move / self.params.step_length();
         let full = (0.5 * mass * speed * speed).max(2.0 * energy_tolerance);
-        // Where a level begins, the energy is still that of the level before.
+        // At the beginning of a level the energy is still that of the level before.
         let energy = if self.iteration == self.rest.began { full } else { self.movement.energy };
         let way = libm::log(full / energy.max(energy_tolerance)) / libm::log(full / energy_tolerance);
         let levels = self.pyramid.levels.len();
         ((levels - 1 - self.level) as f64 + way.clamp(0.0, 1.0)) / levels as f64
     }
 
-    /// Wakes all vertices: something changed that may move them.
+    /// Wakes all vertices after a change that may move them.
     pub(super) fn wake_all(&mut self) {
         self.mesh.scalar_mut(self.keys.still).fill(0.0);
         self.rest = Rest { began: self.rest.began, ..Rest::default() };
     }
 
-    /// Counts quiet iterations; after enough of them checks the whole mesh and goes one level down, or ends.
+    /// Counts quiet iterations; after enough of them checks the whole mesh, and descends one level or ends.
     pub(super) fn come_to_rest(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let quiet =
             self.movement.energy < self.params.energy_tolerance && self.movement.fastest < self.rest_speed();
@@ -82,7 +82,7 @@ impl DeformableModel {
                 return Ok(changes);
             }
         }
-        // What has gone to sleep may be pushed by what came to rest since.
+        // Sleeping vertices may be pushed by others that have settled since.
         if !self.rest.woken {
             self.mesh.scalar_mut(self.keys.still).fill(0.0);
             self.rest.quiet = 0;
@@ -98,8 +98,8 @@ impl DeformableModel {
         Ok(changes)
     }
 
-    /// Fits sizes to the finest level's surface, and adds what it leaves out; the surface is no longer quiet where that changed it.
-    /// Edits wake what they reach, and nothing else.
+    /// Sizes edges on the finest level and seeds missing parts; if that changed the mesh it is no longer quiet. Edits wake only the vertices
+    /// around them.
     fn complete(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         if self.set_sizes() {
             self.rest.quiet = 0;
@@ -119,20 +119,20 @@ impl DeformableModel {
         Ok(found)
     }
 
-    /// The speed below which the fastest vertex has settled. A long step is an iteration, too: no vertex goes far in one.
+    /// The speed below which the fastest vertex counts as settled; no vertex may move far in a long step either.
     fn rest_speed(&self) -> f32 {
         let longest = REST_MOVE / self.params.step_length() as f32;
         if longest < REST_SPEED { longest } else { REST_SPEED }
     }
 
-    /// Iterations a surface takes to follow a force, m/γ: one that has just begun to move is slow too, and not at rest.
+    /// The response time m/γ in iterations: a surface that has just begun to move is slow, too, without being converged.
     fn quiet_iterations(&self) -> u32 {
         let DeformableParams { mass, damping, integrator, .. } = self.params;
         let least = if integrator == Integrator::Implicit { QUIET_LONG_STEPS } else { QUIET_ITERATIONS };
         libm::ceil(mass / (damping * self.params.step_length())).clamp(least, MOST_QUIET_ITERATIONS) as u32
     }
 
-    /// Looks at every vertex whether it has moved or not, and removes specks.
+    /// Checks the bounds at every vertex, and removes specks.
     pub(super) fn check_everything(&mut self, times: &mut Times) -> Changes {
         if self.params.topology == Topology::Fixed {
             return Changes::default();
@@ -143,11 +143,11 @@ impl DeformableModel {
         let guide = contact::guide(&self.pyramid.levels[self.level], self.level_iso, &self.params);
         changes.vanished += self.resolver.sweep(&mut self.mesh, sampling, &*guide);
         drop(guide);
-        self.settle_in();
+        self.mark_checked();
         changes
     }
 
-    /// Refines the mesh and takes the next finer image (figure 13); renews what leaves out part of that.
+    /// Refines the mesh and descends to the next finer image (figure 13); renews components that leave out part of it.
     fn descend(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let begin = (self.clock)();
         let renewal = if self.seeds_levels() { self.renewal()? } else { Renewal::default() };
@@ -166,7 +166,7 @@ impl DeformableModel {
         self.level -= 1;
         self.rest = Rest { began: self.iteration, ..Rest::default() };
         self.reorder();
-        self.settle_in();
+        self.mark_checked();
         self.wake_all();
         self.prepare_level()?;
         changes += self.check_everything(times);
@@ -182,7 +182,7 @@ impl DeformableModel {
             if self.mesh.vertex_count() + self.mesh.triangle_count() > most {
                 return Err(MethodError::TooManyVertices { most });
             }
-            // Where it cannot be refined, edges that are now too long are split.
+            // If it cannot be refined, edges that are too long now are split.
             let sampling = Sampling::new(self.model_delta());
             self.resolver.refine(&mut self.mesh, sampling)?;
         }

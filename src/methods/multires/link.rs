@@ -43,7 +43,7 @@ pub(super) const NOWHERE: Linked = Linked { triangle: 0, weights: Vec3::ZERO, po
 /// The surface before a step, and the link of its vertices.
 pub(super) struct Before<'a> {
     pub walker: &'a SurfaceWalker,
-    /// In the order of the walker's vertices.
+    /// In the order of the vertices of the surface.
     pub link: &'a [Linked],
 }
 
