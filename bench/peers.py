@@ -71,12 +71,12 @@ def read_volume(path):
     return numpy.frombuffer(data, numpy.uint8, x * y * z, int(start)).reshape(z, y, x), spacing
 
 
-def vtk(job):
+def flying_edges(voxels, spacing, iso):
+    """A function that extracts the iso-surface of an array of voxels, z first, with VTK."""
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonDataModel import vtkImageData
     from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
-    voxels, spacing = read_volume(job["scan"])
     image = vtkImageData()
     image.SetDimensions(*reversed(voxels.shape))
     image.SetSpacing(spacing)
@@ -85,14 +85,18 @@ def vtk(job):
     def surface():
         edges = vtkFlyingEdges3D()
         edges.SetInputData(image)
-        edges.SetValue(0, job["iso"])
+        edges.SetValue(0, iso)
         edges.ComputeNormalsOff()
         edges.ComputeGradientsOff()
         edges.ComputeScalarsOff()
         edges.Update()
         return edges.GetOutput()
 
-    milliseconds, found = best(job["cheapRepeats"], surface)
+    return surface
+
+
+def vtk(job):
+    milliseconds, found = best(job["cheapRepeats"], flying_edges(*read_volume(job["scan"]), job["iso"]))
     counts = {"vertices": found.GetNumberOfPoints(), "triangles": found.GetNumberOfPolys()}
     yield {"task": "cubes", "what": "flying edges", "milliseconds": milliseconds, **counts}
 

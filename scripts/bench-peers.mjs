@@ -9,7 +9,7 @@ import { at, run } from './shell.mjs';
 /** For what takes a moment only: so many times as many runs, on both sides. */
 const CHEAP = 10;
 
-const PYTHON = process.env.VESICLE_PYTHON ?? 'python3';
+export const PYTHON = process.env.VESICLE_PYTHON ?? 'python3';
 
 /** What the machine was busy with before anything was measured here. */
 const [load] = loadavg();

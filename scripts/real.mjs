@@ -1,6 +1,6 @@
 // The deformable model at its default settings on every volume of a folder: `npm run real -- FOLDER [--levels N] [--pipeline]`; by
-// default on the example volumes. Prints a row for each volume and iso value, with --pipeline what one would do without us below it;
-// ends with 1 where a surface intersects itself, or recall or precision is below 99 %.
+// default on the example volumes. Prints a row for each volume and iso value, with --pipeline the figures of what one would use without
+// us below it. Ends with 1 if a surface intersects itself, or if recall or precision is below 99 %.
 import { readdir, readFile } from 'node:fs/promises';
 import { basename, dirname, join, relative } from 'node:path';
 import { parseArgs } from 'node:util';

@@ -152,8 +152,15 @@ impl Mesh {
 
     /// Every edge once, from the lower id to the higher.
     pub fn edges(&self) -> impl Iterator<Item = (VertexId, VertexId)> + '_ {
-        self.vertices()
-            .flat_map(|u| self.ring(u).as_slice().iter().filter(move |&&v| u < v).map(move |&v| (u, v)))
+        self.edges_from(self.vertices())
+    }
+
+    /// The edges that have one of `vertices` as their lower end, from the lower id to the higher.
+    pub fn edges_from<'a>(
+        &'a self,
+        vertices: impl Iterator<Item = VertexId> + 'a,
+    ) -> impl Iterator<Item = (VertexId, VertexId)> + 'a {
+        vertices.flat_map(|u| self.ring(u).as_slice().iter().filter(move |&&v| u < v).map(move |&v| (u, v)))
     }
 
     /// The oriented neighbours of `v`; empty where `v` is not live.

@@ -13,8 +13,8 @@ use std::collections::VecDeque;
 const PASSES: usize = 8;
 
 /// The work of a call in nearby vertices visited, per vertex of the mesh and for any mesh; the rest stays pending for the next call. An
-/// edit visits about 60, and ordinary iterations make less than one edit per ten vertices. Without a bound, edits that undo each other,
-/// or edges that cannot be repaired where vertices crowd, as on a needle pulled out of the surface, would never end.
+/// edit visits about 60, and ordinary iterations make less than one edit per ten vertices. Without this limit a call might never return: edits
+/// can undo each other, and on a needle pulled out of the surface edges cannot be brought within bounds.
 const EFFORT_PER_VERTEX: u64 = 400;
 const LEAST_EFFORT: u64 = 100_000;
 

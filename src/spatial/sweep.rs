@@ -1,9 +1,9 @@
 //! Sweep and prune: all pairs of vertex balls that are near each other.
 //!
-//! Balls are classed by size. Those of a class are swept over each other, then over the smaller ones around them: so many tiny balls
-//! beside a huge one are not compared with each other in cells of its size. In a class, space is cut into columns as wide as its reach.
-//! Balls are sorted by column and height, and each is compared with those of neighbouring columns at its height. All of it lies in flat
-//! arrays, and each pair is visited once.
+//! Balls are grouped into classes by size. Each class is swept against itself, then against the smaller balls around it, so that the many
+//! tiny balls beside a huge one are not all compared with each other. In a class, space is cut into columns as wide as its reach. Balls are
+//! sorted by column and height, and each is compared with those of neighbouring columns at its height. All of it lies in flat arrays, and
+//! each pair is visited once.
 
 use super::vertex_grid::{Proximity, VertexBall};
 use crate::math::order::{by_both, rank, sort_by_rank};

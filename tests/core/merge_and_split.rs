@@ -154,8 +154,8 @@ fn run(seed: u64) -> [u32; 2] {
     changes
 }
 
-/// Balls that merge on a coarse level, and `seeding: On`: what the finer level added was seeded beside them, joined them by several tubes
-/// each, and some handles stayed. Components that leave something out are taken anew now, whatever the start.
+/// Regression: with `seeding: On` and balls that merge on a coarse level, parts of the finer level were seeded beside the surface, joined it
+/// by several tubes each, and left handles.
 #[test]
 fn what_a_coarse_level_leaves_out_makes_no_handles() {
     for seed in [10117, 10574, 10696, 10704, 11538, 12352, 12652] {

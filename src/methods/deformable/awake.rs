@@ -14,7 +14,7 @@ const STILLNESS: f64 = 0.5;
 /// If a smaller share sleeps, all vertices are processed, which takes no longer.
 const FEW_ASLEEP: f64 = 0.25;
 
-/// The vertices awake.
+/// The vertices awake in an iteration.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Awake {
     /// The vertices awake.

@@ -125,7 +125,7 @@ const FURTHEST: f64 = 1e6;
 /// The bounds at a vertex are checked when it has moved this far since the last check, in δ…
 const CHECK_TRAVEL: f32 = 0.1;
 
-/// …and every so many iterations. Criteria by speed miss slow vertices that move far.
+/// …and once in this many iterations. A criterion on speed would miss slow vertices that move far.
 const CHECK_PERIOD: usize = 50;
 
 /// The share of used slots below which the mesh is renumbered.
@@ -178,7 +178,7 @@ impl DeformableModel {
     /// A model of one frame of `volume`, before its first step.
     ///
     /// # Errors
-    /// [`MethodError`] with the option or parameter that cannot be used, and what is accepted.
+    /// [`MethodError`] that names the invalid option or parameter and the accepted values.
     pub fn new(volume: &Volume, options: DeformableOptions) -> Result<Self, MethodError> {
         let params = options.params.unwrap_or_else(|| DeformableParams::for_volume(volume));
         params.validate()?;
@@ -276,7 +276,7 @@ impl DeformableModel {
 
     fn move_vertices(&mut self, times: &mut Times) {
         let begin = (self.clock)();
-        self.motion.update_normals(&self.mesh, self.keys);
+        self.motion.prepare(&self.mesh, self.keys);
         let normals = (self.clock)();
         let delta = self.model_delta();
         let pulls = self.pulls();

@@ -53,13 +53,13 @@ pub(super) struct Motion {
 
 impl Motion {
     /// Updates the vertices awake, their normals and L.
-    pub(super) fn update_normals(&mut self, mesh: &Mesh, keys: Keys) {
+    pub(super) fn prepare(&mut self, mesh: &Mesh, keys: Keys) {
         self.awake.find(mesh, keys.still);
         self.forces.update_normals(mesh.rings(), mesh.positions(), &self.awake.around);
         self.displacements.resize(mesh.slots(), Vec3::ZERO);
     }
 
-    /// Moves the vertices by one time step as far as `carry` allows; needs [`Self::update_normals`] of the current mesh.
+    /// Moves the vertices by one time step as far as `carry` allows; needs [`Self::prepare`] for the current mesh.
     ///
     /// `carry` moves vertices by displacements, by slot, and replaces them by those applied; it returns the vertices held back, and the share
     /// of its displacement that each moved by.

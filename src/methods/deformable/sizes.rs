@@ -40,7 +40,7 @@ const ORDINARY: f32 = super::MEAN_EDGE as f32;
 const FURTHEST: f32 = 0.5;
 
 impl DeformableModel {
-    /// Sets the size of every vertex, unless that was done since the last seeds; says whether it did.
+    /// Sets the size of every vertex, unless that was done on this level; returns whether it was set. Seeds are sized when they are added.
     pub(super) fn set_sizes(&mut self) -> bool {
         if self.rest.sized || self.params.adaptivity == 0.0 || self.params.iso_force == 0.0 {
             return false;
@@ -51,7 +51,7 @@ impl DeformableModel {
         true
     }
 
-    /// Sets the sizes of whole components.
+    /// Sets the sizes of the vertices of whole components.
     pub(super) fn set_sizes_of(&mut self, members: &[VertexId]) {
         let mut sizes = self.sizes_by_curvature(members);
         for _ in 0..PASSES {
@@ -66,7 +66,7 @@ impl DeformableModel {
     fn sizes_by_curvature(&self, members: &[VertexId]) -> Vec<f32> {
         let mut sizes = vec![LARGEST; self.mesh.slots()];
         let offsets = self.offsets_from_contour(members);
-        for (u, v) in self.edges_of(members) {
+        for (u, v) in self.mesh.edges_from(members.iter().copied()) {
             let size = self.size_of_edge([u, v], [u, v].map(|w| offsets[w.index()]));
             for w in [u, v].map(|w| w.index()) {
                 sizes[w] = if size < sizes[w] { size } else { sizes[w] };
@@ -80,14 +80,6 @@ impl DeformableModel {
             *size = size.max(SMALLEST);
         }
         sizes
-    }
-
-    /// Each edge of whole components once.
-    fn edges_of(&self, members: &[VertexId]) -> impl Iterator<Item = (VertexId, VertexId)> {
-        members.iter().flat_map(|&u| {
-            let ring = self.mesh.ring(u).as_slice().iter();
-            ring.filter(move |&&v| u < v).map(move |&v| (u, v))
-        })
     }
 
     /// The size at which sheets are further apart than contact reaches.
@@ -113,7 +105,7 @@ impl DeformableModel {
     fn bound_gradation(&self, members: &[VertexId], sizes: &mut [f32]) {
         let before = sizes.to_vec();
         let per_length = GRADATION / (ORDINARY * self.model_delta());
-        for (u, v) in self.edges_of(members) {
+        for (u, v) in self.mesh.edges_from(members.iter().copied()) {
             let growth = per_length * self.mesh.position(u).distance(self.mesh.position(v));
             for (a, b) in [(u.index(), v.index()), (v.index(), u.index())] {
                 let most = before[b] + growth;
@@ -122,7 +114,7 @@ impl DeformableModel {
         }
     }
 
-    /// How far each vertex is from the contour.
+    /// The offset of each vertex from the contour.
     fn offsets_from_contour(&self, members: &[VertexId]) -> Vec<f32> {
         let mut offsets = vec![0.0; self.mesh.slots()];
         for &v in members {
@@ -132,7 +124,7 @@ impl DeformableModel {
         offsets
     }
 
-    /// The size at which the sagitta of an edge whose ends are that far from the contour would be as large as it may be.
+    /// The size of an edge by its sagitta; `offsets` are those of its ends from the contour.
     fn size_of_edge(&self, ends: [VertexId; 2], offsets: [f32; 2]) -> f32 {
         let [p, q] = ends.map(|w| self.mesh.position(w));
         let [m, n] = ends.map(|w| self.mesh.area_normal(w).normalize_or_zero());
@@ -150,7 +142,7 @@ impl DeformableModel {
         }
     }
 
-    /// About how far within the contour a point is, along a direction and back, in voxels; negative outside.
+    /// About the depth of a point inside the contour along a direction, in voxels; negative outside.
     fn offset_from_contour(&self, p: Vec3, direction: Vec3) -> f32 {
         let [here, ahead, behind] = [p, p + direction * 0.5, p - direction * 0.5].map(|p| self.depth(p));
         let slope = (ahead - behind).abs();
@@ -167,7 +159,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// A bean: flat below, curved above.
+    /// Half of a sphere and half of a flatter one.
     fn model() -> DeformableModel {
         let n = 24;
         let at = |k: usize| Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32) - 11.5;
@@ -188,7 +180,7 @@ mod tests {
         DeformableModel::new(&volume, options).unwrap()
     }
 
-    /// With the distance of the middle alone, edges of a surface 0.3 voxels off its contour were a quarter shorter than those of one at rest.
+    /// Regression: sized by the offset of the middle alone, edges of a surface 0.3 voxels off its contour were a quarter shorter.
     #[test]
     fn sizes_are_those_of_the_contour_where_the_surface_is_beside_it() {
         let mut model = model();

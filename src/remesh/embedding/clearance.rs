@@ -78,8 +78,8 @@ fn fold_clearance(edge: Vec3, tips: [Vec3; 2], longest: f32) -> f32 {
     let square = edge.length_squared();
     let per_length = edge * (1.0 / square);
     let [own, other] = tips.map(|tip| unit(tip - edge * tip.dot(per_length)));
-    let displacement = other - own;
-    let normal = unit(displacement - edge * displacement.dot(per_length));
+    let between = other - own;
+    let normal = unit(between - edge * between.dot(per_length));
     let gap = lower(-tips[0].dot(normal), tips[1].dot(normal));
     let reach =
         tips.into_iter().fold(1.0, |reach, tip| higher(reach, (2.0 * tip.dot(per_length) - 1.0).abs()));
@@ -223,21 +223,22 @@ mod tests {
     }
 
     #[test]
-    fn triangles_beside_each_other_do_not_cross_before_they_have_moved_by_the_margin() {
+    fn triangles_beside_each_other_do_not_intersect_before_they_have_moved_by_the_margin() {
         let mut found = [0; 2];
-        for seed in 0..4000 {
+        for seed in 0..2000 {
             let random = &mut Random::new(seed);
             let [s, t] = two_triangles(random);
-            let margin = 0.2 * random.unit() as f32;
-            let beside = are_beside(&s, &t, 4.0, margin);
-            found[usize::from(beside)] += 1;
-            for _ in 0..if beside { 4 } else { 0 } {
-                let mut moved =
-                    |t: Triangle| t.map(|p| p + any(random).normalize_or_zero() * (0.499 * margin));
-                assert!(!triangles_cross(moved(s), moved(t)), "seed {seed}");
+            let margins = (1..=100).map(|k| 0.01 * k as f32);
+            let largest = margins.take_while(|&margin| are_beside(&s, &t, 4.0, margin)).last();
+            found[usize::from(largest.is_some())] += 1;
+            let Some(margin) = largest else { continue };
+            for _ in 0..60 {
+                let towards = any(random).normalize_or_zero() * (0.499 * margin);
+                let [s, t] = [s.map(|p| p + towards), t.map(|p| p - towards)];
+                assert!(!triangles_cross(s, t), "seed {seed}");
             }
         }
-        assert!(found.iter().all(|&count| count > 800), "{found:?}");
+        assert!(found.iter().all(|&count| count > 400), "{found:?}");
     }
 
     #[test]

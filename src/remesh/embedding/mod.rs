@@ -95,7 +95,7 @@ impl Embedding {
 
     /// The clearance up to which triangles are tested exactly.
     fn finest(&self) -> f32 {
-        self.output.map_or(FINEST, |space| higher(FINEST, space.rounding()))
+        output::finest(self.output.as_ref())
     }
 
     /// As [`Self::follow`], for a mesh most of whose edges are shorter than `edge`. That affects speed and the largest distance of

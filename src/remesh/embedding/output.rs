@@ -3,6 +3,8 @@
 //! Sheets pressed on each other are nearer than the rounding of positions in world space, so that a mesh without self-intersections may
 //! have some after it was mapped there. Triangles that rounding can bring together are tested in that space, too, after rounding.
 
+use super::FINEST;
+use super::one_ring::higher;
 use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Facet, facets_cross};
 
@@ -48,6 +50,11 @@ impl OutputSpace {
         let out = |p: Vec3| self.map.transform_point3(p.as_dvec3()).as_vec3();
         Facet { points: facet.points.map(out), ..*facet }
     }
+}
+
+/// The clearance up to which triangles are tested exactly.
+pub(super) fn finest(output: Option<&OutputSpace>) -> f32 {
+    output.map_or(FINEST, |space| higher(FINEST, space.rounding()))
 }
 
 /// Whether two triangles intersect, in the space of the mesh or in its output space.

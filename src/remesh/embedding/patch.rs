@@ -1,9 +1,9 @@
 //! Tests whether the triangles that an edit changed intersect any other.
 
 use super::clearance::are_beside;
-use super::one_ring::{flat_clearance, higher, intersections_around, longest_edge};
-use super::output::{OutputSpace, bounds, intersect};
-use super::{Embedding, FINEST, NEAREST_CORNER};
+use super::one_ring::{flat_clearance, intersections_around, longest_edge};
+use super::output::{OutputSpace, bounds, finest, intersect};
+use super::{Embedding, NEAREST_CORNER};
 use crate::math::Bounds;
 use crate::mesh::{Facet, Mesh, VertexId};
 
@@ -112,6 +112,5 @@ fn are_beside_each_other(
 ) -> bool {
     let whole = around_s.joined(around_t);
     let reach = (whole.max - whole.min).max_element();
-    let margin = 2.0 * output.map_or(FINEST, |space| higher(FINEST, space.rounding()));
-    are_beside(&s.points, &t.points, reach, margin)
+    are_beside(&s.points, &t.points, reach, 2.0 * finest(output))
 }
