@@ -147,6 +147,17 @@ impl Mesh {
         self.touch(v);
         &mut self.rings[v.index()]
     }
+
+    /// The triangles at some vertices, each once, by their corners.
+    pub fn triangles_at(&self, vertices: &[VertexId]) -> Triangles {
+        let mut found: Triangles = vertices
+            .iter()
+            .flat_map(|&v| self.ring(v).pairs().map(move |(a, b)| from_lowest([v, a, b])))
+            .collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
 }
 
 fn from_lowest([a, b, c]: [VertexId; 3]) -> [VertexId; 3] {

@@ -137,10 +137,10 @@ impl Resolver {
         self.contact = contact;
     }
 
-    /// Tests splits, flips and collapses in full only in `cells`, and elsewhere as [`Embedding::attempt_in_one_rings`] does. This halves the
-    /// time; the whole mesh has to be tested afterwards.
-    pub fn test_only_in(&mut self, cells: CellSet) {
-        self.tested = Some(cells);
+    /// Tests splits, flips and collapses in full only in `cells`, and elsewhere as [`Embedding::attempt_in_one_rings`] does; everywhere in
+    /// full if `None`. That halves the time; the whole mesh has to be tested afterwards.
+    pub fn test_in(&mut self, cells: Option<CellSet>) {
+        self.tested = cells;
     }
 
     /// The collision guard, in sync with `mesh`, for other edits.

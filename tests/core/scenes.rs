@@ -305,7 +305,7 @@ fn two_hundred_steps_end_in_the_same_bits_everywhere() {
         model.step().unwrap();
     }
     let found = fingerprint(&model.surface().positions);
-    assert_eq!(format!("{found:016x}"), "6932f7d1a32c5238");
+    assert_eq!(format!("{found:016x}"), "b68397c8ac5b3b1f");
 }
 
 /// The same at the default settings, coarse to fine, to the end.
@@ -317,5 +317,5 @@ fn the_defaults_end_in_the_same_bits_everywhere() {
     let mut model = DeformableModel::new(&volume, options).unwrap();
     while !model.step().unwrap().done {}
     let found = fingerprint(&model.surface().positions);
-    assert_eq!(format!("{found:016x}"), "ddb0537372a53473");
+    assert_eq!(format!("{found:016x}"), "c53c7d12550beee5");
 }

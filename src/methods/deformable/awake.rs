@@ -1,7 +1,7 @@
 //! Sleeping vertices: where the surface has settled, nothing is computed.
 //!
-//! A vertex falls asleep after some still iterations, and wakes when a neighbour moves or an edit reaches it. Before a level ends all
-//! vertices are woken once.
+//! A vertex falls asleep after some still iterations, and wakes when a neighbour moves or an edit reaches it. Before a level ends the
+//! forces on all vertices are evaluated once, and those wake that are not at rest.
 
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
@@ -25,15 +25,15 @@ pub(super) struct Awake {
 }
 
 impl Awake {
-    /// Finds them by the number of still iterations.
-    pub(super) fn find(&mut self, mesh: &Mesh, still: ScalarKey) {
+    /// Finds them by the number of still iterations; or takes all vertices.
+    pub(super) fn find(&mut self, mesh: &Mesh, still: ScalarKey, all: bool) {
         let still = mesh.scalar(still);
         self.moving.clear();
         let awake = still.iter().enumerate().filter(|(_, still)| **still < PATIENCE);
         self.moving.extend(awake.map(|(i, _)| VertexId::from_index(i)).filter(|&v| mesh.is_live(v)));
         self.around.clear();
         let asleep = mesh.vertex_count() - self.moving.len();
-        if (asleep as f64) < FEW_ASLEEP * mesh.vertex_count() as f64 {
+        if all || (asleep as f64) < FEW_ASLEEP * mesh.vertex_count() as f64 {
             self.moving.clear();
             self.moving.extend(mesh.vertices());
             self.around.extend_from_slice(&self.moving);
@@ -71,7 +71,7 @@ mod tests {
         let tip = mesh.vertices().last().unwrap();
         mesh.scalar_mut(still)[tip.index()] = PATIENCE - 1.0;
         let mut awake = Awake::default();
-        awake.find(&mesh, still);
+        awake.find(&mesh, still, false);
         assert_eq!(awake.moving, [tip]);
         let mut expected = mesh.ring(tip).as_slice().to_vec();
         expected.push(tip);
@@ -87,10 +87,12 @@ mod tests {
         let few = mesh.vertex_count() / 5;
         mesh.scalar_mut(still)[..few].fill(PATIENCE);
         let mut awake = Awake::default();
-        awake.find(&mesh, still);
+        awake.find(&mesh, still, false);
         assert_eq!((awake.moving.len(), awake.around.len()), (mesh.vertex_count(), mesh.vertex_count()));
         mesh.scalar_mut(still)[..2 * few].fill(PATIENCE);
-        awake.find(&mesh, still);
+        awake.find(&mesh, still, false);
         assert_eq!(awake.moving.len(), mesh.vertex_count() - 2 * few);
+        awake.find(&mesh, still, true);
+        assert_eq!((awake.moving.len(), awake.around.len()), (mesh.vertex_count(), mesh.vertex_count()));
     }
 }

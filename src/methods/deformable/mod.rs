@@ -235,14 +235,13 @@ impl DeformableModel {
             clock: || 0.0,
         };
         model.watch_output();
-        model.reorder();
-        model.mark_checked();
         model.prepare_level()?;
-        // A contour of the finest level is close to the result. Other starts are sized once they have settled.
-        if model.from_contour && model.level == 0 && model.set_sizes() {
-            model.check_everything(&mut Times::default());
-            model.reorder();
+        if model.from_contour {
+            model.resolve_contour()?
+        } else {
+            model.reorder()
         }
+        model.mark_checked();
         // No edit has displaced vertices recently.
         model.mesh.scalar_mut(keys.calm).fill(motion::CALM);
         Ok(model)
@@ -276,7 +275,8 @@ impl DeformableModel {
 
     fn move_vertices(&mut self, times: &mut Times) {
         let begin = (self.clock)();
-        self.motion.prepare(&self.mesh, self.keys);
+        let examines = std::mem::take(&mut self.rest.examines);
+        self.motion.prepare(&self.mesh, self.keys, examines);
         let normals = (self.clock)();
         let delta = self.model_delta();
         let pulls = self.pulls();

@@ -28,6 +28,9 @@ const STUCK: f32 = 2.0;
 /// Still iterations counted for one long step.
 const LONG_STEP: f32 = 2.0;
 
+/// The speed of a vertex that wakes its neighbours, in that of a still one. A neighbour of valence six goes at most a sixth of its way.
+const WAKING: f32 = 4.0;
+
 /// The stiffness of f_c and f_e against moving a vertex of valence 6 away from its neighbours, in α_c and α_e.
 const BENDING_STIFFNESS: f32 = 1.3;
 const STRETCHING_STIFFNESS: f32 = 6.0;
@@ -47,14 +50,16 @@ pub(super) struct World<'a> {
 pub(super) struct Motion {
     pub(super) awake: Awake,
     pub(super) forces: Forces,
+    examines: bool,
     /// Displacements in this iteration, by slot; zero before and after.
     displacements: Vec<Vec3>,
 }
 
 impl Motion {
-    /// Updates the vertices awake, their normals and L.
-    pub(super) fn prepare(&mut self, mesh: &Mesh, keys: Keys) {
-        self.awake.find(mesh, keys.still);
+    /// Updates the vertices awake, their normals and L. `examines`: all vertices, of which [`Self::advance`] moves those that are not at rest.
+    pub(super) fn prepare(&mut self, mesh: &Mesh, keys: Keys, examines: bool) {
+        self.examines = examines;
+        self.awake.find(mesh, keys.still, examines);
         self.forces.update_normals(mesh.rings(), mesh.positions(), &self.awake.around);
         self.displacements.resize(mesh.slots(), Vec3::ZERO);
     }
@@ -74,6 +79,9 @@ impl Motion {
             Integrator::Euler => self.euler(mesh, keys, world),
             Integrator::RungeKutta => self.runge_kutta(mesh, keys, world),
             Integrator::Implicit => self.implicit(mesh, keys, world),
+        }
+        if self.examines {
+            self.wake_those_not_at_rest(mesh, keys, world);
         }
         self.bound(mesh, keys, world);
         let held = carry(mesh, &self.awake.moving, &mut self.displacements);
@@ -170,6 +178,24 @@ impl Motion {
         }
     }
 
+    /// Of all vertices, wakes those that are about to move; the others do not.
+    fn wake_those_not_at_rest(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
+        let stillness = stillness(world.params.mass, world.params.energy_tolerance);
+        let least = stillness * world.params.step_length() as f32 * world.delta;
+        let Self { awake, forces, displacements, .. } = self;
+        awake.moving.retain(|v| {
+            let i = v.index();
+            let is_about_to_move = displacements[i].dot(forces.normal[i]).abs() > least;
+            if !is_about_to_move {
+                displacements[i] = Vec3::ZERO;
+                mesh.vector_mut(keys.velocity)[i] = Vec3::ZERO;
+            }
+            is_about_to_move
+        });
+        let still = mesh.scalar_mut(keys.still);
+        awake.moving.iter().for_each(|v| still[v.index()] = 0.0);
+    }
+
     /// Measures the motion, puts vertices to sleep and wakes others.
     fn measure(&self, mesh: &mut Mesh, keys: Keys, world: &World) -> Movement {
         let per_time = 1.0 / (world.params.step_length() as f32 * world.delta);
@@ -185,8 +211,10 @@ impl Motion {
                 movement.fastest = along;
             }
             *calm += 1.0;
-            if along > stillness {
+            if along > WAKING * stillness {
                 wake(mesh, keys, v);
+            } else if along > stillness {
+                mesh.scalar_mut(keys.still)[i] = 0.0;
             } else {
                 count_still(mesh, keys, v, counted);
             }

@@ -30,8 +30,10 @@ const REST_MOVE: f32 = 0.1;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Rest {
     quiet: u32,
-    /// Whether all vertices have been woken since the surface first came to rest, or something was seeded.
-    woken: bool,
+    /// Whether all vertices have been examined since the surface first came to rest, or something was seeded.
+    examined: bool,
+    /// Whether the next iteration examines all vertices.
+    pub(super) examines: bool,
     done: bool,
     /// Searches of the finest level made; the largest number once one found nothing.
     searches: u32,
@@ -83,10 +85,10 @@ impl DeformableModel {
             }
         }
         // Sleeping vertices may be pushed by others that have settled since.
-        if !self.rest.woken {
-            self.mesh.scalar_mut(self.keys.still).fill(0.0);
+        if !self.rest.examined {
             self.rest.quiet = 0;
-            self.rest.woken = true;
+            self.rest.examines = true;
+            self.rest.examined = true;
             return Ok(Changes::default());
         }
         let mut changes = self.check_everything(times);
@@ -112,7 +114,7 @@ impl DeformableModel {
         self.rest.searches += 1;
         if found.seeds > 0 {
             self.rest.quiet = 0;
-            self.rest.woken = false;
+            self.rest.examined = false;
         } else {
             self.rest.searches = MOST_SEARCHES;
         }

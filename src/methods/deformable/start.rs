@@ -3,6 +3,7 @@
 use super::contour::{ObjectIs, contour, placed};
 use super::domain::{Domain, rounded_axes};
 use super::image::LevelImage;
+use super::{DeformableModel, contact};
 use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings};
 use crate::methods::MethodError;
@@ -90,7 +91,7 @@ const MOST_RUNS: usize = 2;
 const MOST_CALLS: usize = 20;
 
 impl Start {
-    /// The start mesh with its edges within bounds, and no two parts in contact.
+    /// The start mesh with its edges within bounds, and no two parts in contact; of a contour, as it is in the image.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] where a sphere is too small for the sampling or two overlap, or the iso-surface
@@ -109,10 +110,8 @@ impl Start {
             Self::MarchingCubes(value) => iso_surface(frame, iso(*value))?,
             Self::Mesh(mesh) => given(frame, mesh)?,
         };
-        if matches!(self, Self::Contour)
-            && let Some(resolved) = resolve_contour(&mesh, frame, guide)?
-        {
-            return Ok(resolved);
+        if matches!(self, Self::Contour) {
+            return Ok(mesh);
         }
         let mut resolver = resolve_all(&mut mesh, frame.most_vertices(), frame.sampling, guide)?;
         if !resolver.is_embedded(&mesh) {
@@ -122,26 +121,49 @@ impl Start {
     }
 }
 
-/// A contour with its edges within bounds. Edits hardly ever make it intersect itself, so most are not tested for that. All of it is at the
-/// end; where it does, it is resolved again with edits that are tested there. `None` if it still intersects itself then.
-fn resolve_contour(
-    contour: &Mesh,
-    frame: &Frame,
-    guide: &dyn TopologyGuide,
-) -> Result<Option<Mesh>, MethodError> {
-    let mut tested = CellSet::new(TESTED_CELL * frame.sampling.longest());
-    for _ in 0..MOST_RUNS {
-        let mut mesh = contour.clone();
-        let mut resolver = Resolver::with_room_for(frame.most_vertices());
-        resolver.test_only_in(tested.clone());
-        resolve_with(&mut resolver, &mut mesh, frame.sampling, guide)?;
-        let crossing = resolver.guard(&mesh, frame.sampling).crossing(&mesh);
-        if crossing.is_empty() {
-            return Ok(Some(mesh));
+impl DeformableModel {
+    /// Brings the edges of the contour that the mesh is within bounds, on the finest level by the sizes that they should have. Edits hardly
+    /// ever make it intersect itself, so most are not tested for that. All of it is at the end; what intersects is separated, or else
+    /// the contour is resolved again with edits that are tested there.
+    ///
+    /// # Errors
+    /// [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] if it intersects itself after all edits were tested.
+    pub(super) fn resolve_contour(&mut self) -> Result<(), MethodError> {
+        let contour = self.mesh.clone();
+        let mut tested = CellSet::new(TESTED_CELL * self.sampling().longest());
+        for run in 0..=MOST_RUNS {
+            self.resolver.test_in((run < MOST_RUNS).then(|| tested.clone()));
+            self.resolve_sized()?;
+            self.resolver.test_in(None);
+            let sampling = self.sampling();
+            let guard = self.resolver.guard(&self.mesh, sampling);
+            let crossing = guard.crossing(&self.mesh);
+            if crossing.is_empty() || guard.separate(&mut self.mesh, &crossing) {
+                return Ok(());
+            }
+            crossing.into_iter().for_each(|v| tested.add(self.mesh.position(v)));
+            let intersecting = std::mem::replace(&mut self.mesh, contour.clone());
+            self.mesh.count_on_from(&intersecting);
+            self.rest.sized = false;
         }
-        crossing.into_iter().for_each(|v| tested.add(mesh.position(v)));
+        Err(MeshError::SelfIntersecting { pairs: count_crossings(&self.mesh.to_triangles()) }.into())
     }
-    Ok(None)
+
+    fn resolve_sized(&mut self) -> Result<(), MethodError> {
+        self.resolve_everywhere()?;
+        // A contour of the finest level is close to the result. Other starts are sized once they have settled.
+        if self.level == 0 && self.set_sizes() {
+            self.resolve_everywhere()?;
+        }
+        self.reorder();
+        Ok(())
+    }
+
+    fn resolve_everywhere(&mut self) -> Result<(), MethodError> {
+        let sampling = self.sampling();
+        let guide = contact::guide(&self.pyramid.levels[self.level], self.level_iso, &self.params);
+        resolve_with(&mut self.resolver, &mut self.mesh, sampling, &*guide)
+    }
 }
 
 /// Brings the edges of a mesh within bounds, and what is in contact together.

@@ -148,7 +148,7 @@ fn gap_between_boxes(a: &Bounds, b: &Bounds) -> f32 {
 ///
 /// With the tips of one of them mirrored at the origin, all four are on one side of the plane. Its normal is the mean of those of the
 /// faces of the cone around them.
-fn gap_between_corners([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> f32 {
+pub(super) fn gap_between_corners([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> f32 {
     let rays = [a, b, -c, -d];
     let mut normal = Vec3::ZERO;
     for (i, j, k, l) in [(0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2), (1, 2, 0, 3), (1, 3, 0, 2), (2, 3, 0, 1)] {

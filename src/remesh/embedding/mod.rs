@@ -21,6 +21,7 @@ mod one_ring;
 mod output;
 mod patch;
 mod refine;
+mod separate;
 
 use crate::math::{Bounds, DAffine3, Vec3};
 use crate::mesh::{EditError, Mesh, VertexId};
@@ -163,7 +164,7 @@ impl Embedding {
         &mut self,
         mesh: &mut Mesh,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
-        intersects: fn(&mut Self, &Mesh, &[[VertexId; 3]]) -> bool,
+        intersects: impl FnOnce(&mut Self, &Mesh, &[[VertexId; 3]]) -> bool,
     ) -> Result<T, EditError> {
         self.follow(mesh);
         mesh.begin();
@@ -181,7 +182,7 @@ impl Embedding {
     fn accept_changes(
         &mut self,
         mesh: &Mesh,
-        intersects: fn(&mut Self, &Mesh, &[[VertexId; 3]]) -> bool,
+        intersects: impl FnOnce(&mut Self, &Mesh, &[[VertexId; 3]]) -> bool,
     ) -> Result<(), EditError> {
         let changed = mesh.changed_triangles();
         if intersects(self, mesh, &changed) {

@@ -4,7 +4,8 @@
 //! which no pair of triangles can intersect, not positive where the filter does not apply. Filters allow for rounding by a wide margin.
 
 use super::FINEST;
-use super::output::{OutputSpace, bounds, intersect};
+use super::clearance::gap_between_corners;
+use super::output::{OutputSpace, bounds, finest, intersect};
 use crate::math::{Bounds, DVec3, Vec3};
 use crate::mesh::{Facet, Mesh, VertexId};
 use smallvec::SmallVec;
@@ -225,6 +226,35 @@ pub(super) fn intersections_around(
             crossing.extend(s.corners.into_iter().chain(t.corners).map(VertexId));
         }
     }
+}
+
+/// Whether one of the `changed` triangles at `v` intersects another triangle there beyond their common corners; exact.
+pub(super) fn changes_intersect_around(
+    mesh: &Mesh,
+    v: VertexId,
+    changed: &[[VertexId; 3]],
+    output: Option<&OutputSpace>,
+) -> bool {
+    let is_changed =
+        |facet: &Facet| changed.iter().any(|names| names.iter().all(|w| facet.corners.contains(&w.0)));
+    let facets: SmallVec<[(Facet, bool); ORDINARY_RING]> =
+        facets_at(mesh, v).map(|facet| (facet, is_changed(&facet))).collect();
+    let margin = 2.0 * (finest(output) + ROUNDING * longest_edge(mesh, v));
+    let last = facets.len() - 1;
+    facets.iter().enumerate().any(|(k, (s, s_changed))| {
+        facets[..k].iter().enumerate().any(|(j, (t, t_changed))| {
+            let share_an_edge = j + 1 == k || (j == 0 && k == last);
+            (*s_changed || *t_changed)
+                && (share_an_edge || !are_apart_at_corner(mesh.position(v), s, t, margin))
+                && intersect(s, t, output)
+        })
+    })
+}
+
+/// Whether a plane through the common corner of two triangles is known to separate them by more than `margin`.
+fn are_apart_at_corner(corner: Vec3, s: &Facet, t: &Facet, margin: f32) -> bool {
+    let tips = |facet: &Facet| [facet.points[1] - corner, facet.points[2] - corner];
+    gap_between_corners(tips(s), tips(t)) > margin
 }
 
 /// Adds the corners of all pairs of intersecting triangles without a common corner, one at `u` and one at `v`; exact.

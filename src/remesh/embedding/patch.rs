@@ -1,7 +1,7 @@
 //! Tests whether the triangles that an edit changed intersect any other.
 
 use super::clearance::are_beside;
-use super::one_ring::{flat_clearance, intersections_around, longest_edge};
+use super::one_ring::{changes_intersect_around, flat_clearance, longest_edge};
 use super::output::{OutputSpace, bounds, finest, intersect};
 use super::{Embedding, NEAREST_CORNER};
 use crate::math::Bounds;
@@ -44,12 +44,9 @@ impl Embedding {
         let mut hubs: Vec<VertexId> = changed.iter().flatten().copied().collect();
         hubs.sort_unstable();
         hubs.dedup();
-        let mut found = Vec::new();
         hubs.into_iter().any(|hub| {
-            if flat_clearance(mesh, hub, longest_edge(mesh, hub)) <= self.finest() {
-                intersections_around(mesh, hub, self.output.as_ref(), &mut found);
-            }
-            !found.is_empty()
+            flat_clearance(mesh, hub, longest_edge(mesh, hub)) <= self.finest()
+                && changes_intersect_around(mesh, hub, changed, self.output.as_ref())
         })
     }
 
