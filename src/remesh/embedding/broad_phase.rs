@@ -1,7 +1,7 @@
 //! Broad phase: pairs of non-adjacent vertices that are near each other, so that their triangles may intersect soon.
 
 use super::motion_bound::Check;
-use super::{Embedding, NEAREST_CORNER, PIERCING, SEARCH_SKIN};
+use super::{Embedding, NEAREST_CORNER, Nearby, PIERCING, SEARCH_SKIN};
 use crate::math::Bounds;
 use crate::mesh::{Mesh, VertexId};
 use crate::spatial::{Proximity, VertexBall, near_pairs};
@@ -93,13 +93,20 @@ impl Embedding {
         }
         let is_close = a.position.distance_squared(b.position) < proximity.least * proximity.least;
         for (v, w) in [(a.vertex, b.vertex), (b.vertex, a.vertex)] {
-            if !self.nearby[v.index()].contains(&w) {
-                self.nearby[v.index()].push(w);
+            if self.position_of(v, w).is_none() {
+                // The other may still have a certificate.
+                let until = self.position_of(w, v).map_or(0.0, |k| self.nearby[w.index()][k].until);
+                self.nearby[v.index()].push(Nearby { vertex: w, until });
             }
             if is_close {
                 self.may_touch[v.index()] = true;
             }
         }
+    }
+
+    /// The position of `w` among the vertices near `v`.
+    pub(super) fn position_of(&self, v: VertexId, w: VertexId) -> Option<usize> {
+        self.nearby[v.index()].iter().position(|near| near.vertex == w)
     }
 
     /// How near two vertices are that can intersect or touch before either is searched around again.

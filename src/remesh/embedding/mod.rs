@@ -4,7 +4,7 @@
 //! - [`broad_phase`]: pairs of non-adjacent vertices whose triangles may intersect, from a grid that follows the mesh ([`VertexGrid`]);
 //! - [`narrow_phase`]: conservative filters (`one_ring`, `clearance`), then exact predicates on pairs of triangles;
 //! - [`motion_bound`]: each filter returns a displacement below which its pair cannot intersect; the pair is not tested again before
-//!   the displacements of its vertices add up to that.
+//!   the displacements of its vertices add up to that ([`certificates`]).
 //!
 //! Two triangles intersect in one of three configurations, each tested where it can occur:
 //! - they share a corner: in the one-ring of a vertex;
@@ -13,6 +13,7 @@
 //!   and A is the corner nearest to the intersection, then |PA|² ≤ a²/4 + b²/3 for one of the two ends.
 
 mod broad_phase;
+mod certificates;
 mod clearance;
 mod motion;
 mod motion_bound;
@@ -26,6 +27,7 @@ mod separate;
 use crate::math::{Bounds, DAffine3, Vec3};
 use crate::mesh::{EditError, Mesh, VertexId};
 use crate::spatial::VertexGrid;
+use certificates::Certificates;
 use motion_bound::{Checks, MotionBounds};
 use one_ring::{higher, longest_edge};
 use output::OutputSpace;
@@ -45,6 +47,13 @@ const SEARCH_SKIN: f32 = 0.04;
 /// as none.
 const FINEST: f32 = 1e-17;
 
+/// A non-adjacent vertex near one, and the sum of both odometers up to which the pair is certified.
+#[derive(Clone, Copy, Debug)]
+struct Nearby {
+    vertex: VertexId,
+    until: f32,
+}
+
 /// Keeps one mesh embedded.
 ///
 /// Motion bounds decide when a pair is tested, never the result of a test.
@@ -56,11 +65,12 @@ pub struct Embedding {
     /// By vertex, its longest edge when it was last measured.
     longest: Vec<f32>,
     /// By vertex, the non-adjacent vertices found near it by the broad phase.
-    nearby: Vec<SmallVec<[VertexId; 4]>>,
+    nearby: Vec<SmallVec<[Nearby; 4]>>,
     /// By vertex, whether a non-adjacent one may be within the contact distance.
     may_touch: Vec<bool>,
     /// By vertex, how far its one-ring may still move before it is tested again.
     motion_bounds: Vec<MotionBounds>,
+    certificates: Certificates,
     /// By vertex, the largest displacement in its one-ring during a move, and the vertices where it is not 0.
     travelled: Vec<f32>,
     touched: Vec<VertexId>,
@@ -118,7 +128,7 @@ impl Embedding {
 
     /// As [`Self::follow`], without filling the cells of the grid: a check of the whole mesh does not need them.
     fn sync(&mut self, mesh: &Mesh) {
-        if self.version == Some(mesh.geometry_version()) {
+        if self.version == Some(mesh.geometry_version()) && !self.certificates.are_worn() {
             return;
         }
         self.grid = VertexGrid::new(self.edge, SEARCH_SKIN * self.edge, mesh.slots());
@@ -126,6 +136,7 @@ impl Embedding {
         self.motion_bounds.clear();
         self.nearby.clear();
         self.may_touch.clear();
+        self.certificates.begin(self.edge, mesh.slots());
         self.resize_for(mesh.slots());
         self.edited.clear();
         for v in mesh.vertices() {
@@ -223,6 +234,7 @@ impl Embedding {
         self.nearby.resize(slots, SmallVec::new());
         self.may_touch.resize(slots, true);
         self.motion_bounds.resize(slots, MotionBounds::NONE);
+        self.certificates.resize(slots);
     }
 
     /// Measures the longest edge at `v`.
@@ -265,6 +277,7 @@ impl Embedding {
     /// Discards what is known of `v`, which an edit made or changed.
     fn forget(&mut self, v: VertexId) {
         self.may_touch[v.index()] = true;
+        self.certificates.revoke(v);
         if std::mem::replace(&mut self.motion_bounds[v.index()], MotionBounds::NONE) != MotionBounds::NONE {
             self.edited.push(v);
         }

@@ -98,6 +98,7 @@ impl Embedding {
             let travelled = std::mem::take(&mut self.travelled[v.index()]);
             let bounds = &mut self.motion_bounds[v.index()];
             bounds.spend(travelled);
+            self.certificates.advance(v, travelled);
             let used_up = bounds.used_up();
             self.mark_dirty(v, used_up);
         }

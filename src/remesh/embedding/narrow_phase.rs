@@ -1,6 +1,6 @@
 //! Narrow phase: tests the triangles at dirty vertices for intersections, and derives new motion bounds.
 
-use super::Embedding;
+use super::{Embedding, Nearby};
 use super::clearance::{fan_clearance, triangle_clearance};
 use super::motion_bound::{Check, Checks};
 use super::one_ring::{
@@ -16,23 +16,30 @@ const AMPLE: f32 = 0.03;
 const PAIRS: [Check; 2] = [Check::OneRing, Check::Nearby];
 
 impl Embedding {
-    /// As [`Self::check_dirty`], for every vertex.
+    /// As [`Self::check_dirty`], for every vertex, whatever is certified.
     pub(super) fn check_all(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         self.sync(mesh);
         self.pending.resize(mesh.slots(), Checks::default());
         mesh.vertices().for_each(|v| self.mark_dirty(v, Checks::ALL));
-        self.check_dirty(mesh)
+        self.check(mesh, true)
     }
 
-    /// Runs the pending checks of dirty vertices and stores the clearances found as motion bounds. Returns the corners of all triangles
-    /// that intersect another, sorted.
+    /// Runs the pending checks of dirty vertices and stores the clearances found as motion bounds and certificates. Returns the corners of
+    /// all triangles that intersect another, sorted.
     pub(super) fn check_dirty(&mut self, mesh: &Mesh) -> Vec<VertexId> {
+        self.check(mesh, false)
+    }
+
+    fn check(&mut self, mesh: &Mesh, anew: bool) -> Vec<VertexId> {
         let dirty = std::mem::take(&mut self.dirty);
         self.update_pairs(mesh, &dirty);
         for (&v, check) in dirty.iter().flat_map(|v| PAIRS.map(|check| (v, check))) {
             if self.pending[v.index()].has(check) {
                 self.motion_bounds[v.index()].set(check, f32::INFINITY);
             }
+        }
+        for &v in dirty.iter().filter(|v| self.pending[v.index()].has(Check::OneRing)) {
+            self.certificates.prepare(v, mesh.ring(v).valence(), anew);
         }
         let mut crossing = Vec::new();
         for &v in &dirty {
@@ -54,12 +61,18 @@ impl Embedding {
     }
 
     fn check_one_ring(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
+        if let Some(left) = self.certificates.left_of_own(v) {
+            return self.lower_bounds(Check::OneRing, [v, v], left);
+        }
         let longest = self.longest[v.index()];
         let mut clearance = flat_clearance(mesh, v, longest);
         if !self.is_ample(clearance) {
             clearance = higher(clearance, fan_clearance(mesh, v, longest));
         }
-        if !self.store_clearance(clearance, Check::OneRing, [v, v]) {
+        let clearance = self.or_none(clearance);
+        self.lower_bounds(Check::OneRing, [v, v], clearance);
+        self.certificates.set_own(v, clearance);
+        if clearance == 0.0 {
             intersections_around(mesh, v, self.output.as_ref(), crossing);
         }
     }
@@ -69,14 +82,17 @@ impl Embedding {
         let mut right = ring[ring.len() - 1];
         for (k, &w) in ring.iter().enumerate() {
             let left = ring[if k + 1 == ring.len() { 0 } else { k + 1 }];
-            if !self.is_checked_from(w, v, Check::OneRing) {
-                let longest = self.longest_of(v, w);
-                let mut clearance = plane_clearance(mesh, [v, w], [left, right], longest);
-                if !self.is_ample(clearance) {
-                    clearance = higher(clearance, spread_clearance(mesh, [v, w], [left, right], longest));
+            if let Some(left) = self.certificates.left_along([v, w], k) {
+                self.lower_bounds(Check::OneRing, [v, w], left);
+            } else if !self.is_checked_from(w, v, Check::OneRing) {
+                let clearance = self.or_none(self.clearance_along_edge(mesh, [v, w], [left, right]));
+                self.lower_bounds(Check::OneRing, [v, w], clearance);
+                let until = self.certificates.until([v, w], clearance);
+                self.certificates.set_along(v, k, until);
+                if let Some(position) = mesh.ring(w).position(v) {
+                    self.certificates.set_along(w, position, until);
                 }
-                let clearance = self.or_triangle_clearance(mesh, [v, w], clearance);
-                if !self.store_clearance(clearance, Check::OneRing, [v, w]) {
+                if clearance == 0.0 {
                     intersections_between(mesh, [v, w], self.output.as_ref(), crossing);
                 }
             }
@@ -84,20 +100,36 @@ impl Embedding {
         }
     }
 
+    fn clearance_along_edge(&self, mesh: &Mesh, pair: [VertexId; 2], opposite: [VertexId; 2]) -> f32 {
+        let longest = self.longest_of(pair[0], pair[1]);
+        let mut clearance = plane_clearance(mesh, pair, opposite, longest);
+        if !self.is_ample(clearance) {
+            clearance = higher(clearance, spread_clearance(mesh, pair, opposite, longest));
+        }
+        self.or_triangle_clearance(mesh, pair, clearance)
+    }
+
     fn check_nearby(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
         for k in 0..self.nearby[v.index()].len() {
-            let w = self.nearby[v.index()][k];
+            let Nearby { vertex: w, until } = self.nearby[v.index()][k];
             // Edits may have changed either since the pair was found.
-            if self.is_checked_from(w, v, Check::Nearby)
-                || !mesh.is_live(w)
-                || w == v
-                || mesh.ring(v).contains(w)
-            {
+            if !mesh.is_live(w) || w == v || mesh.ring(v).contains(w) {
                 continue;
             }
-            let clearance = self.or_triangle_clearance(mesh, [v, w], self.nearby_clearance(mesh, [v, w]));
-            if !self.store_clearance(clearance, Check::Nearby, [v, w]) {
-                intersections_between(mesh, [v, w], self.output.as_ref(), crossing);
+            if let Some(left) = self.certificates.left([v, w], until) {
+                self.lower_bounds(Check::Nearby, [v, w], left);
+            } else if !self.is_checked_from(w, v, Check::Nearby) {
+                let clearance = self.nearby_clearance(mesh, [v, w]);
+                let clearance = self.or_none(self.or_triangle_clearance(mesh, [v, w], clearance));
+                self.lower_bounds(Check::Nearby, [v, w], clearance);
+                let until = self.certificates.until([v, w], clearance);
+                self.nearby[v.index()][k].until = until;
+                if let Some(position) = self.position_of(w, v) {
+                    self.nearby[w.index()][position].until = until;
+                }
+                if clearance == 0.0 {
+                    intersections_between(mesh, [v, w], self.output.as_ref(), crossing);
+                }
             }
         }
     }
@@ -131,12 +163,13 @@ impl Embedding {
         higher(clearance, triangle_clearance(mesh, [v, w], self.longest_of(v, w), AMPLE * self.edge))
     }
 
-    /// Stores the clearance of two vertices from each other as motion bounds; returns whether it is positive.
-    fn store_clearance(&mut self, clearance: f32, check: Check, ends: [VertexId; 2]) -> bool {
-        let is_clear = clearance > self.finest();
-        let clearance = if is_clear { clearance } else { 0.0 };
+    /// The clearance, or 0 where exact tests have to decide.
+    fn or_none(&self, clearance: f32) -> f32 {
+        if clearance > self.finest() { clearance } else { 0.0 }
+    }
+
+    fn lower_bounds(&mut self, check: Check, ends: [VertexId; 2], clearance: f32) {
         ends.into_iter().for_each(|v| self.motion_bounds[v.index()].lower(check, clearance));
-        is_clear
     }
 
     fn is_ample(&self, clearance: f32) -> bool {
@@ -253,9 +286,14 @@ mod tests {
             searched.grid.fill_cells();
             searched.search(&mesh, &dirty);
             for v in mesh.vertices() {
-                [&mut swept, &mut searched].into_iter().for_each(|e| e.nearby[v.index()].sort_unstable());
+                let [swept, searched] = [&swept, &searched].map(|embedding| {
+                    let mut near: Vec<VertexId> =
+                        embedding.nearby[v.index()].iter().map(|near| near.vertex).collect();
+                    near.sort_unstable();
+                    near
+                });
+                assert_eq!(swept, searched, "seed {seed}");
             }
-            assert_eq!(swept.nearby, searched.nearby, "seed {seed}");
             assert_eq!(swept.may_touch, searched.may_touch, "seed {seed}");
         }
     }
