@@ -10,7 +10,7 @@ use super::coverage::Missing;
 use super::image::LevelImage;
 use super::{DeformableModel, Topology};
 use crate::math::Vec3;
-use crate::mesh::{Mesh, TriangleMesh, VertexId};
+use crate::mesh::{Groups, Mesh, TriangleMesh, VertexId};
 use crate::methods::{MethodError, StepReport, Times};
 use crate::remesh::Changes;
 use crate::spatial::{CellSet, TriangleTree};
@@ -22,6 +22,9 @@ const CLEARANCE: f64 = 0.9;
 
 /// The least volume of a seed, in that of the smallest part of its own: pieces of parts that the mesh has may be smaller.
 const SMALLEST_SEED: f64 = 1.0 / 32.0;
+
+/// The volume of the octahedron of the six neighbours of a voxel, in voxels: a contour around it alone encloses no more.
+const MOST_OF_ONE_VOXEL: f64 = 4.0 / 3.0;
 
 impl DeformableModel {
     /// Searches the level for parts that the mesh leaves out and adds them, whatever `seeding` says. The run goes on where it had
@@ -72,19 +75,19 @@ impl DeformableModel {
         if self.mesh.vertex_count() + parts.vertex_count() > most {
             return Err(MethodError::TooManyVertices { most });
         }
-        let mut added = self.mesh.append(parts)?;
-        self.welcome(&added);
         let sampling = self.sampling();
+        let guard = self.resolver.guard(&self.mesh, sampling);
+        let (mut added, crossing) = guard.append(&mut self.mesh, parts)?;
         let mut count = parts.component_count();
         let mut is_new = vec![false; self.mesh.slots()];
         added.iter().for_each(|v| is_new[v.index()] = true);
-        let guard = self.resolver.guard(&self.mesh, sampling);
-        for v in guard.crossing(&self.mesh) {
+        for v in crossing {
             if is_new[v.index()] && self.mesh.is_live(v) {
                 guard.remove_component(&mut self.mesh, v);
                 count -= 1;
             }
         }
+        self.welcome(&added);
         added.retain(|&v| self.mesh.is_live(v));
         Ok((Changes { seeds: count as u32, ..Changes::default() }, added))
     }
@@ -141,14 +144,20 @@ impl Comparison<'_> {
     fn parts(&self, kind: Missing, smallest: f64) -> Result<TriangleMesh, MethodError> {
         let (grid, position) = self.image.grid();
         let missing = self.missing_voxels(kind)?;
-        let Some((low, high)) = bounding_box(&missing, grid.dims) else { return Ok(TriangleMesh::default()) };
-        let field = self.field(kind, &missing, low, high);
-        let offset = Vec3::from(low.map(|k| k as f32));
-        let mut surface = placed(marching_cubes(&field, 0.0)?, |p| position(p + offset));
-        if kind == Missing::Hollow {
-            surface.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        let voxel = 1.0 / f64::from(self.image.voxels_per_unit());
+        let mut clusters = clusters(&missing, grid.dims);
+        clusters.retain(|cluster| cluster.len() > 1 || MOST_OF_ONE_VOXEL * voxel * voxel * voxel >= smallest);
+        let mut parts = TriangleMesh::default();
+        for cluster in clusters {
+            let (low, high) = bounding_box(&cluster, grid.dims);
+            let field = self.field(kind, &cluster, [low, high]);
+            let offset = Vec3::from(low.map(|k| k as f32));
+            append(&mut parts, &placed(marching_cubes(&field, 0.0)?, |p| position(p + offset)));
         }
-        Ok(surface.without_parts_below(smallest))
+        if kind == Missing::Hollow {
+            parts.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        }
+        Ok(parts.without_parts_below(smallest))
     }
 
     /// Whether the contour has a voxel on the side where something of this kind is.
@@ -156,35 +165,37 @@ impl Comparison<'_> {
         self.in_contour[voxel] == (kind == Missing::Matter)
     }
 
-    /// Voxels on the wrong side of the mesh and clear of it.
-    fn missing_voxels(&self, kind: Missing) -> Result<Vec<bool>, MethodError> {
+    /// Voxels on the wrong side of the mesh and clear of it, in order.
+    fn missing_voxels(&self, kind: Missing) -> Result<Vec<usize>, MethodError> {
         let mut missing = self.misplaced_voxels(kind);
+        if missing.is_empty() {
+            return Ok(missing);
+        }
         let dims = self.image.grid().0.dims;
         let mut places = CellSet::new(CLEARANCE as f32 + longest_edge(&self.surface));
-        let misplaced = missing.iter().enumerate().filter(|(_, missing)| **missing);
-        misplaced.for_each(|(voxel, _)| places.add(coordinates(dims, voxel)));
+        missing.iter().for_each(|&voxel| places.add(coordinates(dims, voxel)));
         let tree = TriangleTree::new(&self.surface_near(&places))?;
-        let far = |voxel| !tree.is_within(coordinates(dims, voxel), CLEARANCE);
-        missing.iter_mut().enumerate().for_each(|(voxel, missing)| *missing = *missing && far(voxel));
+        missing.retain(|&voxel| !tree.is_within(coordinates(dims, voxel), CLEARANCE));
         Ok(missing)
     }
 
-    /// Voxels on the wrong side of the mesh, whose neighbours are on that side, too.
-    fn misplaced_voxels(&self, kind: Missing) -> Vec<bool> {
+    /// Voxels on the wrong side of the mesh, whose neighbours are on that side, too; in order.
+    fn misplaced_voxels(&self, kind: Missing) -> Vec<usize> {
         let is_inside = kind == Missing::Hollow;
         let dims = self.image.grid().0.dims;
-        let is_misplaced = |voxel: usize| {
-            self.in_mesh[voxel] == is_inside
-                && self.is_of(kind, voxel)
-                && faces(dims, voxel).all(|w| w.map_or(!is_inside, |w| self.in_mesh[w] == is_inside))
-        };
-        (0..self.in_mesh.len()).map(is_misplaced).collect()
+        let is_surrounded =
+            |voxel: usize| faces(dims, voxel).all(|w| w.map_or(!is_inside, |w| self.in_mesh[w] == is_inside));
+        let sides = self.in_mesh.iter().zip(&self.in_contour).enumerate();
+        let on_wrong_side =
+            sides.filter(|(_, (mesh, contour))| **mesh == is_inside && **contour != is_inside);
+        on_wrong_side.map(|(voxel, _)| voxel).filter(|&voxel| is_surrounded(voxel)).collect()
     }
 
     /// The triangles that may be within [`CLEARANCE`] of some places.
     fn surface_near(&self, places: &CellSet) -> TriangleMesh {
-        let corner = |v: &u32| places.contains(self.surface.positions[*v as usize]);
-        let near = self.surface.triangles.iter().filter(|triangle| triangle.iter().any(corner));
+        let is_near: Vec<bool> = self.surface.positions.iter().map(|&p| places.contains(p)).collect();
+        let near =
+            self.surface.triangles.iter().filter(|corners| corners.iter().any(|&v| is_near[v as usize]));
         TriangleMesh {
             positions: self.surface.positions.clone(),
             triangles: near.copied().collect(),
@@ -192,16 +203,47 @@ impl Comparison<'_> {
         }
     }
 
-    /// A field around the missing voxels, 0 on their contour: the iso-surface where they end at it, else halfway to the next voxel.
-    fn field(&self, kind: Missing, missing: &[bool], low: [usize; 3], high: [usize; 3]) -> Grid {
+    /// How far the intensity of a voxel is on the side where something of this kind is.
+    fn depth(&self, kind: Missing, voxel: usize) -> f32 {
+        let depth = self.object.depth(self.image.grid().0.values[voxel], self.iso);
+        if kind == Missing::Matter { depth } else { -depth }
+    }
+
+    /// How steep the image is at the contour of some voxels: the root mean square of the differences between those that are on that side
+    /// and their neighbours that are not; without any, of their depths. Above 0.
+    fn steepness(&self, kind: Missing, voxels: &[usize]) -> f32 {
+        let dims = self.image.grid().0.dims;
+        let mut differences = Mean::default();
+        let mut depths = Mean::default();
+        for &voxel in voxels {
+            let depth = self.depth(kind, voxel);
+            if depth <= 0.0 {
+                continue;
+            }
+            depths.add(depth * depth);
+            for beyond in
+                faces(dims, voxel).flatten().map(|w| self.depth(kind, w)).filter(|&beyond| beyond < 0.0)
+            {
+                differences.add((depth - beyond) * (depth - beyond));
+            }
+        }
+        differences.value().or(depths.value()).map_or(1.0, |square| square.sqrt() as f32)
+    }
+
+    /// A field around a cluster of missing voxels, 0 on their contour: the iso-surface where they end at it, else halfway to the next voxel.
+    fn field(&self, kind: Missing, missing: &[usize], [low, high]: [[usize; 3]; 2]) -> Grid {
         let grid = self.image.grid().0;
-        let steep = self.image.steepness(self.iso).max(f32::MIN_POSITIVE);
+        let steep = self.steepness(kind, missing);
         let size = [0, 1, 2].map(|k| high[k] - low[k]);
         let mut values = Vec::with_capacity(size.iter().product());
-        let value = |voxel: usize| {
-            let depth = self.object.depth(grid.values[voxel], self.iso)
-                * if kind == Missing::Matter { 1.0 } else { -1.0 };
-            match missing[voxel] {
+        let mut ahead = missing.iter().peekable();
+        let mut is_missing = |voxel: usize| {
+            while ahead.next_if(|&&next| next < voxel).is_some() {}
+            ahead.peek() == Some(&&voxel)
+        };
+        let mut value = |voxel: usize| {
+            let depth = self.depth(kind, voxel);
+            match is_missing(voxel) {
                 // What belongs to a part that is too small has the other sign.
                 true if depth < 0.0 => 0.5 * steep,
                 true => depth.min(steep),
@@ -212,10 +254,28 @@ impl Comparison<'_> {
         for z in low[2]..high[2] {
             for y in low[1]..high[1] {
                 let row = grid.dims[0] * (y + grid.dims[1] * z);
-                values.extend((row + low[0]..row + high[0]).map(value));
+                values.extend((row + low[0]..row + high[0]).map(&mut value));
             }
         }
         Grid { dims: size, values }
+    }
+}
+
+/// A mean of numbers.
+#[derive(Default)]
+struct Mean {
+    sum: f64,
+    count: u32,
+}
+
+impl Mean {
+    fn add(&mut self, number: f32) {
+        self.sum += f64::from(number);
+        self.count += 1;
+    }
+
+    fn value(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.sum / f64::from(self.count))
     }
 }
 
@@ -245,18 +305,44 @@ fn faces(dims: [usize; 3], voxel: usize) -> impl Iterator<Item = Option<usize>> 
     })
 }
 
-/// The lowest voxel of a box around the marked ones and the one beyond its highest, with a voxel to spare where there is one.
-fn bounding_box(marked: &[bool], dims: [usize; 3]) -> Option<([usize; 3], [usize; 3])> {
-    let mut bounds: Option<([usize; 3], [usize; 3])> = None;
-    for (voxel, _) in marked.iter().enumerate().filter(|(_, marked)| **marked) {
+/// The lowest voxel of a box around some and the one beyond its highest, with a voxel to spare where there is one.
+fn bounding_box(voxels: &[usize], dims: [usize; 3]) -> ([usize; 3], [usize; 3]) {
+    let (mut low, mut high) = (dims, [0; 3]);
+    for voxel in voxels {
         let at = [voxel % dims[0], voxel / dims[0] % dims[1], voxel / dims[0] / dims[1]];
-        let (low, high) = bounds.get_or_insert((at, at));
         for axis in 0..3 {
             low[axis] = low[axis].min(at[axis]);
             high[axis] = high[axis].max(at[axis]);
         }
     }
-    bounds.map(|(low, high)| {
-        (low.map(|k| k.saturating_sub(1)), [0, 1, 2].map(|axis| (high[axis] + 2).min(dims[axis])))
-    })
+    (low.map(|k| k.saturating_sub(1)), [0, 1, 2].map(|axis| (high[axis] + 2).min(dims[axis])))
+}
+
+/// The voxels in groups of those connected over faces, edges or corners; all in order.
+fn clusters(voxels: &[usize], dims: [usize; 3]) -> Vec<Vec<usize>> {
+    let mut groups = Groups::new(voxels.len());
+    for (i, &voxel) in voxels.iter().enumerate() {
+        let at = [voxel % dims[0], voxel / dims[0] % dims[1], voxel / dims[0] / dims[1]];
+        // The 13 neighbours that come before it.
+        for k in 0..13 {
+            let shift = [k % 3, k / 3 % 3, k / 9];
+            let neighbour = [0, 1, 2].map(|axis| (at[axis] + shift[axis]).wrapping_sub(1));
+            if (0..3).all(|axis| neighbour[axis] < dims[axis]) {
+                let other = neighbour[0] + dims[0] * (neighbour[1] + dims[1] * neighbour[2]);
+                if let Ok(j) = voxels[..i].binary_search(&other) {
+                    groups.join(i, j);
+                }
+            }
+        }
+    }
+    let mut clusters = vec![Vec::new(); voxels.len()];
+    voxels.iter().enumerate().for_each(|(i, &voxel)| clusters[groups.find(i)].push(voxel));
+    clusters.retain(|cluster| !cluster.is_empty());
+    clusters
+}
+
+fn append(all: &mut TriangleMesh, part: &TriangleMesh) {
+    let first = all.positions.len() as u32;
+    all.positions.extend(&part.positions);
+    all.triangles.extend(part.triangles.iter().map(|corners| corners.map(|v| v + first)));
 }

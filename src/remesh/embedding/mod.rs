@@ -25,7 +25,7 @@ mod refine;
 mod separate;
 
 use crate::math::{Bounds, DAffine3, Vec3};
-use crate::mesh::{EditError, Mesh, VertexId};
+use crate::mesh::{EditError, Mesh, MeshError, VertexId};
 use crate::spatial::VertexGrid;
 use certificates::Certificates;
 use motion_bound::{Checks, MotionBounds};
@@ -216,6 +216,31 @@ impl Embedding {
     /// The number of nearby vertices visited for edits since the beginning: a measure of work.
     pub fn effort(&self) -> u64 {
         self.effort
+    }
+
+    /// Appends the components of another mesh; returns the new vertices, and the corners of all triangles that intersect one of those
+    /// components, sorted.
+    ///
+    /// # Errors
+    /// As [`Mesh::append`].
+    pub fn append(
+        &mut self,
+        mesh: &mut Mesh,
+        components: &Mesh,
+    ) -> Result<(Vec<VertexId>, Vec<VertexId>), MeshError> {
+        self.follow(mesh);
+        let added = mesh.append(components)?;
+        self.resize_for(mesh.slots());
+        self.pending.resize(mesh.slots(), Checks::default());
+        self.mark_edited_dirty(mesh);
+        for &v in &added {
+            self.measure(mesh, v);
+            self.enter(mesh, v);
+            self.mark_dirty(v, Checks::ALL);
+        }
+        let crossing = self.check_dirty(mesh);
+        self.version = Some(mesh.geometry_version());
+        Ok((added, crossing))
     }
 
     /// Deletes the component of `v` and returns how many vertices it had.
