@@ -5,7 +5,8 @@
 //! without a valid certificate are tested again; the bounds of the others are half of what is left. (Certificates with failure times, as in
 //! kinetic data structures: Basch, Guibas, Hershberger, *Data structures for mobile data*, 1999.)
 
-use super::one_ring::{ORDINARY_RING, lower};
+use super::one_ring::ORDINARY_RING;
+use crate::math::lower;
 use crate::mesh::VertexId;
 use smallvec::SmallVec;
 

@@ -3,17 +3,24 @@
 //! Two triangles do not intersect if their projections onto some axis are disjoint (separating axes: Gottschalk, Lin, Manocha, OBBTree,
 //! SIGGRAPH 1996). Half the gap there is the clearance of the pair.
 
-use super::one_ring::{ORDINARY_RING, ROUNDING, clearance_beside_line, higher, lower, unit};
-use crate::math::{Bounds, Vec3};
+use super::one_ring::{ORDINARY_RING, ROUNDING, clearance_beside_line, unit};
+use crate::math::{Bounds, Vec3, higher, lower};
 use crate::mesh::{Mesh, VertexId};
 use smallvec::SmallVec;
+use wide::f32x4;
+
+/// The square of the shortest product of two edges with a direction, in the longest edge.
+const SHORTEST: f32 = 1e-30;
 
 type Triangle = [Vec3; 3];
 
 /// The clearance between the triangles at `u` and those at `v` without a common corner; not positive where some pair is not known to be
 /// disjoint. The search ends at `enough`. `longest` is the longest edge at `u` and `v`.
 pub(super) fn triangle_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32, enough: f32) -> f32 {
-    let at = |w: VertexId| mesh.position(w);
+    // Lengths in the longest edge, so that squares of products of edges neither over- nor underflow.
+    let (origin, per_length) = (mesh.position(u), 1.0 / longest);
+    let at = |w: VertexId| (mesh.position(w) - origin) * per_length;
+    let enough = enough * per_length;
     let triangles_at = |hub: VertexId, not: VertexId| {
         mesh.ring(hub).pairs().filter(move |&(a, b)| a != not && b != not).map(move |(a, b)| [hub, a, b])
     };
@@ -21,7 +28,6 @@ pub(super) fn triangle_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f3
         .map(|names| (names, names.map(at)))
         .map(|(names, points)| (names, points, Bounds::of(&points)))
         .collect();
-    let rounding = ROUNDING * longest;
     let mut clearance = f32::INFINITY;
     let mut axis = Vec3::ZERO;
     for names in triangles_at(u, v) {
@@ -32,21 +38,21 @@ pub(super) fn triangle_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f3
             if names[1..].iter().any(|w| other_names[1..].contains(w)) {
                 continue;
             }
-            let wanted = 2.0 * (lower(enough, clearance) + rounding);
+            let wanted = 2.0 * (lower(enough, clearance) + ROUNDING);
             let boxes = gap_between_boxes(&bounds, other_bounds);
             let gap = if boxes > wanted {
                 boxes
             } else {
                 higher(boxes, gap_between(&triangle, other, wanted, &mut axis))
             };
-            let clear = 0.5 * gap - rounding;
+            let clear = 0.5 * gap - ROUNDING;
             if clear.is_nan() || clear <= 0.0 {
                 return 0.0;
             }
             clearance = lower(clearance, clear);
         }
     }
-    clearance
+    clearance * longest
 }
 
 /// The clearance between the triangles at `v`, beyond their common corners and edges; not positive where some pair may intersect.
@@ -86,28 +92,80 @@ fn fold_clearance(edge: Vec3, tips: [Vec3; 2], longest: f32) -> f32 {
     clearance_beside_line(gap, reach, square, longest)
 }
 
-/// The largest gap between the projections of two triangles onto their normals and the cross products of their edges, or the first above
+/// The largest gap between the projections of two triangles onto their normals and the cross products of their edges, or one above
 /// `wanted`; negative where all overlap. `axis` is tried first and becomes the one found: an axis that separates two triangles often
 /// separates their neighbours.
 fn gap_between(s: &Triangle, t: &Triangle, wanted: f32, axis: &mut Vec3) -> f32 {
-    let origin = s[0];
-    let (s, t) = (s.map(|p| p - origin), t.map(|p| p - origin));
-    let edges = |[a, b, c]: Triangle| [b - a, c - b, a - c];
-    let (own, others) = (edges(s), edges(t));
-    let normals = [own[0].cross(own[1]), others[0].cross(others[1])];
-    let across = own.into_iter().flat_map(|edge| others.map(|other| edge.cross(other)));
-    let mut gap = gap_along(*axis, &s, &t);
-    for direction in normals.into_iter().chain(across) {
-        if gap > wanted {
-            return gap;
+    let mut gap = gap_along(*axis, s, t);
+    if gap > wanted {
+        return gap;
+    }
+    let edges = |[a, b, c]: &Triangle| [*b - *a, *c - *b, *a - *c];
+    let ([e, f, g], [p, q, r]) = (edges(s), edges(t));
+    // The normals first.
+    for (one, other) in [([e, p, e, e], [f, q, p, q]), ([e, f, f, f], [r, p, q, r]), ([g; 4], [p, q, r, r])] {
+        let directions = Vectors::of(one).cross(Vectors::of(other)).unit();
+        for (lane, along) in directions.gaps(s, t).to_array().into_iter().enumerate() {
+            if along > gap {
+                (gap, *axis) = (along, directions.lane(lane));
+            }
         }
-        let direction = unit(direction);
-        let along = gap_along(direction, &s, &t);
-        if along > gap {
-            (gap, *axis) = (along, direction);
+        if gap > wanted {
+            break;
         }
     }
     gap
+}
+
+/// Four vectors side by side.
+#[derive(Clone, Copy)]
+struct Vectors([f32x4; 3]);
+
+impl Vectors {
+    fn of(vectors: [Vec3; 4]) -> Self {
+        Self([0, 1, 2].map(|axis| f32x4::from(vectors.map(|v| v[axis]))))
+    }
+
+    fn lane(self, lane: usize) -> Vec3 {
+        Vec3::from(self.0.map(|axis| axis.to_array()[lane]))
+    }
+
+    fn cross(self, other: Self) -> Self {
+        let ([a, b, c], [x, y, z]) = (self.0, other.0);
+        Self([b * z - c * y, c * x - a * z, a * y - b * x])
+    }
+
+    /// Unit vectors; 0 for those without a direction.
+    fn unit(self) -> Self {
+        let [x, y, z] = self.0;
+        let square = x * x + y * y + z * z;
+        let scale = f32x4::splat(1.0) / square.sqrt();
+        let scale = square.simd_gt(f32x4::splat(SHORTEST)).select(scale, f32x4::ZERO);
+        Self([x * scale, y * scale, z * scale])
+    }
+
+    fn dot(self, p: Vec3) -> f32x4 {
+        let [x, y, z] = self.0;
+        x * f32x4::splat(p.x) + y * f32x4::splat(p.y) + z * f32x4::splat(p.z)
+    }
+
+    /// The gaps between the projections of two triangles onto each.
+    fn gaps(self, s: &Triangle, t: &Triangle) -> f32x4 {
+        let ([a, b, c], [p, q, r]) = (s.map(|corner| self.dot(corner)), t.map(|corner| self.dot(corner)));
+        let (low, high) = (lower_of(lower_of(a, b), c), higher_of(higher_of(a, b), c));
+        let (other_low, other_high) = (lower_of(lower_of(p, q), r), higher_of(higher_of(p, q), r));
+        higher_of(other_low - high, low - other_high)
+    }
+}
+
+/// As [`lower`], lane by lane.
+fn lower_of(a: f32x4, b: f32x4) -> f32x4 {
+    b.simd_lt(a).select(b, a)
+}
+
+/// As [`higher`], lane by lane.
+fn higher_of(a: f32x4, b: f32x4) -> f32x4 {
+    b.simd_gt(a).select(b, a)
 }
 
 /// Whether two triangles are known to be further apart than `margin`, by axes in the plane of either and normal to one of its edges. Most

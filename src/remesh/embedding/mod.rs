@@ -24,12 +24,12 @@ mod patch;
 mod refine;
 mod separate;
 
-use crate::math::{Bounds, DAffine3, Vec3};
+use crate::math::{Bounds, DAffine3, Vec3, higher};
 use crate::mesh::{EditError, Mesh, MeshError, VertexId};
 use crate::spatial::VertexGrid;
 use certificates::Certificates;
 use motion_bound::{Checks, MotionBounds};
-use one_ring::{higher, longest_edge};
+use one_ring::longest_edge;
 use output::OutputSpace;
 use smallvec::SmallVec;
 

@@ -3,9 +3,8 @@
 //! A test of the triangles at two vertices returns a clearance: they cannot intersect before some vertex of both one-rings has moved
 //! that far. So they are tested again when the largest displacements in one of the two one-rings add up to the clearance.
 
-use super::one_ring::higher;
 use super::{Embedding, FINEST};
-use crate::math::Vec3;
+use crate::math::{Vec3, higher};
 use crate::mesh::{Mesh, VertexId};
 
 /// A kind of check with a motion bound of its own.

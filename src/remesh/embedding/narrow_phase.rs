@@ -3,10 +3,11 @@
 use super::clearance::{fan_clearance, triangle_clearance};
 use super::motion_bound::{Check, Checks};
 use super::one_ring::{
-    corner_plane_clearance, flat_clearance, higher, intersections_around, intersections_between,
-    mid_plane_clearance, plane_clearance, sheet_clearance, spread_clearance,
+    corner_plane_clearance, flat_clearance, intersections_around, intersections_between, mid_plane_clearance,
+    plane_clearance, sheet_clearance, spread_clearance,
 };
 use super::{Embedding, Nearby};
+use crate::math::higher;
 use crate::mesh::{Mesh, VertexId};
 
 /// With a smaller clearance, in the ordinary edge, the next filter is tried, too.

@@ -6,7 +6,7 @@
 use super::FINEST;
 use super::clearance::gap_between_corners;
 use super::output::{OutputSpace, bounds, finest, intersect};
-use crate::math::{Bounds, DVec3, Vec3};
+use crate::math::{Bounds, DVec3, Vec3, higher, lower};
 use crate::mesh::{Facet, Mesh, VertexId};
 use smallvec::SmallVec;
 
@@ -199,18 +199,6 @@ fn gap(mesh: &Mesh, [u, v]: [VertexId; 2], in_plane: [VertexId; 2], origin: Vec3
         }
     }
     least
-}
-
-/// The lower of two numbers; the first if either is NaN.
-#[inline]
-pub(super) fn lower(a: f32, b: f32) -> f32 {
-    if b < a { b } else { a }
-}
-
-/// The higher of two numbers; the first if either is NaN.
-#[inline]
-pub(super) fn higher(a: f32, b: f32) -> f32 {
-    if b > a { b } else { a }
 }
 
 /// Adds the corners of all pairs of triangles at `v` that intersect beyond their common corners; exact.

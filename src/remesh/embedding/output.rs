@@ -4,8 +4,7 @@
 //! have some after it was mapped there. Triangles that rounding can bring together are tested in that space, too, after rounding.
 
 use super::FINEST;
-use super::one_ring::higher;
-use crate::math::{Bounds, DAffine3, DVec3, Vec3};
+use crate::math::{Bounds, DAffine3, DVec3, Vec3, higher};
 use crate::mesh::{Facet, facets_cross};
 
 /// Half a unit in the last place of single precision, relative to the number, times √3 for three axes and 2 to be safe.
