@@ -298,4 +298,31 @@ mod tests {
             assert_eq!(swept.may_touch, searched.may_touch, "seed {seed}");
         }
     }
+
+    #[test]
+    fn appended_components_are_tested_against_everything_and_what_was_there_is_not() {
+        let (mut sound, mut intersecting) = (0, 0);
+        for seed in 0..300 {
+            let random = &mut Random::new(seed);
+            let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.5).unwrap();
+            let mut embedding = Embedding::default();
+            embedding.follow_with(&mesh, 0.6);
+            let mut displacements = vec![Vec3::X * 0.01; mesh.slots()];
+            embedding.carry(&mut mesh, &mut displacements);
+            let parts = Mesh::icosphere(any(random) * 1.6, 0.4, 0.3).unwrap();
+            let (added, found) = embedding.append(&mut mesh, &parts).unwrap();
+            assert_eq!(added.len(), parts.vertex_count());
+            assert_eq!(found, expected(&mesh), "seed {seed}");
+            if found.is_empty() {
+                sound += 1
+            } else {
+                intersecting += 1
+            }
+            // What was found before is still known, and what is new moves as all else does.
+            let mut displacements = vec![Vec3::X * 0.02; mesh.slots()];
+            embedding.carry(&mut mesh, &mut displacements);
+            assert_eq!(embedding.check_all(&mesh), expected(&mesh), "seed {seed}");
+        }
+        assert!(sound > 50 && intersecting > 50, "{sound} sound, {intersecting} intersecting");
+    }
 }
