@@ -15,6 +15,13 @@ impl TriangleMesh {
         self.parts_where(|v| enclosed[part_of[v as usize] as usize].abs() >= volume)
     }
 
+    /// Appends the positions and triangles of another mesh.
+    pub(crate) fn append(&mut self, other: &Self) {
+        let first = self.positions.len() as u32;
+        self.positions.extend(&other.positions);
+        self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|v| v + first)));
+    }
+
     /// The triangles whose first vertex `keeps`, with the vertices they use; only positions and triangles are kept.
     pub(crate) fn parts_where(&self, mut keeps: impl FnMut(u32) -> bool) -> Self {
         let mut slots = vec![u32::MAX; self.positions.len()];

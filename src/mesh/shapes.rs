@@ -66,11 +66,7 @@ pub fn torus(major: f64, minor: f64, around: u32, along: u32) -> TriangleMesh {
 /// The meshes as one, positions and triangles only.
 pub fn joined(meshes: &[TriangleMesh]) -> TriangleMesh {
     let mut all = TriangleMesh::default();
-    for mesh in meshes {
-        let first = all.positions.len() as u32;
-        all.positions.extend(&mesh.positions);
-        all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
-    }
+    meshes.iter().for_each(|mesh| all.append(mesh));
     all
 }
 

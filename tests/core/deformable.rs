@@ -308,6 +308,23 @@ fn a_state_goes_on_bit_for_bit() {
 }
 
 #[test]
+fn a_state_of_any_iteration_goes_on_bit_for_bit() {
+    let volume = scenes::chain();
+    let new =
+        || DeformableModel::new(&volume, DeformableOptions { levels: 1, ..Default::default() }).unwrap();
+    let (mut model, mut other) = (new(), new());
+    loop {
+        other.restore(&model.save()).unwrap();
+        let report = model.step().unwrap();
+        assert_eq!(other.step().unwrap(), report);
+        assert!(model.save() == other.save(), "iteration {}", report.iteration);
+        if report.done {
+            break;
+        }
+    }
+}
+
+#[test]
 fn damaged_states_are_refused_and_nothing_is_lost() {
     let volume = ball([24, 24, 24], 6.0);
     let mut model = DeformableModel::new(&volume, enclosing()).unwrap();

@@ -293,6 +293,7 @@ impl DeformableModel {
             domain: self.domain,
             params: &self.params,
             delta,
+            examines,
             clock: self.clock,
         };
         let (clock, mut embedding) = (self.clock, 0.0);

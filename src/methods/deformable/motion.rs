@@ -42,6 +42,8 @@ pub(super) struct World<'a> {
     pub(super) domain: Domain,
     pub(super) params: &'a DeformableParams,
     pub(super) delta: f32,
+    /// Whether all vertices are examined, so that only those move that are not at rest.
+    pub(super) examines: bool,
     pub(super) clock: fn() -> f64,
 }
 
@@ -50,15 +52,13 @@ pub(super) struct World<'a> {
 pub(super) struct Motion {
     pub(super) awake: Awake,
     pub(super) forces: Forces,
-    examines: bool,
     /// Displacements in this iteration, by slot; zero before and after.
     displacements: Vec<Vec3>,
 }
 
 impl Motion {
-    /// Updates the vertices awake, their normals and L. `examines`: all vertices, of which [`Self::advance`] moves those that are not at rest.
+    /// Updates the vertices awake, or takes all vertices to examine them; their normals and L.
     pub(super) fn prepare(&mut self, mesh: &Mesh, keys: Keys, examines: bool) {
-        self.examines = examines;
         self.awake.find(mesh, keys.still, examines);
         self.forces.update_normals(mesh.rings(), mesh.positions(), &self.awake.around);
         self.displacements.resize(mesh.slots(), Vec3::ZERO);
@@ -80,7 +80,7 @@ impl Motion {
             Integrator::RungeKutta => self.runge_kutta(mesh, keys, world),
             Integrator::Implicit => self.implicit(mesh, keys, world),
         }
-        if self.examines {
+        if world.examines {
             self.wake_those_not_at_rest(mesh, keys, world);
         }
         self.bound(mesh, keys, world);

@@ -152,7 +152,7 @@ impl Comparison<'_> {
             let (low, high) = bounding_box(&cluster, grid.dims);
             let field = self.field(kind, &cluster, [low, high]);
             let offset = Vec3::from(low.map(|k| k as f32));
-            append(&mut parts, &placed(marching_cubes(&field, 0.0)?, |p| position(p + offset)));
+            parts.append(&placed(marching_cubes(&field, 0.0)?, |p| position(p + offset)));
         }
         if kind == Missing::Hollow {
             parts.triangles.iter_mut().for_each(|t| t.swap(1, 2));
@@ -183,12 +183,12 @@ impl Comparison<'_> {
     fn misplaced_voxels(&self, kind: Missing) -> Vec<usize> {
         let is_inside = kind == Missing::Hollow;
         let dims = self.image.grid().0.dims;
-        let is_surrounded =
-            |voxel: usize| faces(dims, voxel).all(|w| w.map_or(!is_inside, |w| self.in_mesh[w] == is_inside));
-        let sides = self.in_mesh.iter().zip(&self.in_contour).enumerate();
-        let on_wrong_side =
-            sides.filter(|(_, (mesh, contour))| **mesh == is_inside && **contour != is_inside);
-        on_wrong_side.map(|(voxel, _)| voxel).filter(|&voxel| is_surrounded(voxel)).collect()
+        let is_misplaced = |&voxel: &usize| {
+            self.in_mesh[voxel] == is_inside
+                && self.is_of(kind, voxel)
+                && faces(dims, voxel).all(|w| w.map_or(!is_inside, |w| self.in_mesh[w] == is_inside))
+        };
+        (0..self.in_mesh.len()).filter(is_misplaced).collect()
     }
 
     /// The triangles that may be within [`CLEARANCE`] of some places.
@@ -213,8 +213,7 @@ impl Comparison<'_> {
     /// and their neighbours that are not; without any, of their depths. Above 0.
     fn steepness(&self, kind: Missing, voxels: &[usize]) -> f32 {
         let dims = self.image.grid().0.dims;
-        let mut differences = Mean::default();
-        let mut depths = Mean::default();
+        let (mut differences, mut depths) = (Mean::default(), Mean::default());
         for &voxel in voxels {
             let depth = self.depth(kind, voxel);
             if depth <= 0.0 {
@@ -288,17 +287,18 @@ fn longest_edge(surface: &TriangleMesh) -> f32 {
     surface.triangles.iter().map(longest).fold(0.0, f32::max).sqrt()
 }
 
+/// The indices of a voxel along the axes.
+fn indices(dims: [usize; 3], voxel: usize) -> [usize; 3] {
+    [voxel % dims[0], voxel / dims[0] % dims[1], voxel / dims[0] / dims[1]]
+}
+
 fn coordinates(dims: [usize; 3], voxel: usize) -> Vec3 {
-    Vec3::new(
-        (voxel % dims[0]) as f32,
-        (voxel / dims[0] % dims[1]) as f32,
-        (voxel / dims[0] / dims[1]) as f32,
-    )
+    Vec3::from(indices(dims, voxel).map(|k| k as f32))
 }
 
 /// The six voxels that share a face with one; `None` beyond the image.
 fn faces(dims: [usize; 3], voxel: usize) -> impl Iterator<Item = Option<usize>> {
-    let at = [voxel % dims[0], voxel / dims[0] % dims[1], voxel / dims[0] / dims[1]];
+    let at = indices(dims, voxel);
     let step = [1, dims[0], dims[0] * dims[1]];
     (0..3).flat_map(move |axis| {
         [(at[axis] > 0).then(|| voxel - step[axis]), (at[axis] + 1 < dims[axis]).then(|| voxel + step[axis])]
@@ -308,8 +308,8 @@ fn faces(dims: [usize; 3], voxel: usize) -> impl Iterator<Item = Option<usize>> 
 /// The lowest voxel of a box around some and the one beyond its highest, with a voxel to spare where there is one.
 fn bounding_box(voxels: &[usize], dims: [usize; 3]) -> ([usize; 3], [usize; 3]) {
     let (mut low, mut high) = (dims, [0; 3]);
-    for voxel in voxels {
-        let at = [voxel % dims[0], voxel / dims[0] % dims[1], voxel / dims[0] / dims[1]];
+    for &voxel in voxels {
+        let at = indices(dims, voxel);
         for axis in 0..3 {
             low[axis] = low[axis].min(at[axis]);
             high[axis] = high[axis].max(at[axis]);
@@ -322,7 +322,7 @@ fn bounding_box(voxels: &[usize], dims: [usize; 3]) -> ([usize; 3], [usize; 3]) 
 fn clusters(voxels: &[usize], dims: [usize; 3]) -> Vec<Vec<usize>> {
     let mut groups = Groups::new(voxels.len());
     for (i, &voxel) in voxels.iter().enumerate() {
-        let at = [voxel % dims[0], voxel / dims[0] % dims[1], voxel / dims[0] / dims[1]];
+        let at = indices(dims, voxel);
         // The 13 neighbours that come before it.
         for k in 0..13 {
             let shift = [k % 3, k / 3 % 3, k / 9];
@@ -339,10 +339,4 @@ fn clusters(voxels: &[usize], dims: [usize; 3]) -> Vec<Vec<usize>> {
     voxels.iter().enumerate().for_each(|(i, &voxel)| clusters[groups.find(i)].push(voxel));
     clusters.retain(|cluster| !cluster.is_empty());
     clusters
-}
-
-fn append(all: &mut TriangleMesh, part: &TriangleMesh) {
-    let first = all.positions.len() as u32;
-    all.positions.extend(&part.positions);
-    all.triangles.extend(part.triangles.iter().map(|corners| corners.map(|v| v + first)));
 }

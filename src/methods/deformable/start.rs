@@ -8,7 +8,7 @@ use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings};
 use crate::methods::MethodError;
 use crate::methods::given::surface;
-use crate::remesh::{Resolver, Sampling, TopologyGuide, Unguided};
+use crate::remesh::{Resolver, Sampling, TopologyGuide, Unguided, Waiting};
 use crate::spatial::CellSet;
 use crate::volume::marching_cubes;
 
@@ -103,16 +103,13 @@ impl Start {
         guide: &dyn TopologyGuide,
     ) -> Result<Mesh, MethodError> {
         let mut mesh = match self {
-            Self::Contour => on_contour(frame)?,
+            Self::Contour => return on_contour(frame),
             Self::Enclosing => enclosing(frame)?,
             Self::Bubbles(n) => bubbles(frame, *n)?,
             Self::Seeds { points, radius } => seeds(frame, points, *radius)?,
             Self::MarchingCubes(value) => iso_surface(frame, iso(*value))?,
             Self::Mesh(mesh) => given(frame, mesh)?,
         };
-        if matches!(self, Self::Contour) {
-            return Ok(mesh);
-        }
         let mut resolver = resolve_all(&mut mesh, frame.most_vertices(), frame.sampling, guide)?;
         if !resolver.is_embedded(&mesh) {
             return Err(MeshError::SelfIntersecting { pairs: count_crossings(&mesh.to_triangles()) }.into());
@@ -131,8 +128,9 @@ impl DeformableModel {
     pub(super) fn resolve_contour(&mut self) -> Result<(), MethodError> {
         let contour = self.mesh.clone();
         let mut tested = CellSet::new(TESTED_CELL * self.sampling().longest());
-        for run in 0..=MOST_RUNS {
-            self.resolver.test_in((run < MOST_RUNS).then(|| tested.clone()));
+        let mut runs = 0;
+        loop {
+            self.resolver.test_in((runs < MOST_RUNS).then(|| tested.clone()));
             self.resolve_sized()?;
             self.resolver.test_in(None);
             let sampling = self.sampling();
@@ -141,12 +139,17 @@ impl DeformableModel {
             if crossing.is_empty() || guard.separate(&mut self.mesh, &crossing) {
                 return Ok(());
             }
+            if runs == MOST_RUNS {
+                let pairs = count_crossings(&self.mesh.to_triangles());
+                return Err(MeshError::SelfIntersecting { pairs }.into());
+            }
+            runs += 1;
             crossing.into_iter().for_each(|v| tested.add(self.mesh.position(v)));
             let intersecting = std::mem::replace(&mut self.mesh, contour.clone());
             self.mesh.count_on_from(&intersecting);
+            self.resolver.set_waiting(Waiting::default());
             self.rest.sized = false;
         }
-        Err(MeshError::SelfIntersecting { pairs: count_crossings(&self.mesh.to_triangles()) }.into())
     }
 
     fn resolve_sized(&mut self) -> Result<(), MethodError> {

@@ -216,10 +216,12 @@ pub(super) fn intersections_around(
     }
 }
 
-/// Whether one of the `changed` triangles at `v` intersects another triangle there beyond their common corners; exact.
+/// Whether one of the `changed` triangles at `v` intersects another triangle there beyond their common corners; exact. `longest` is the
+/// longest edge at `v`.
 pub(super) fn changes_intersect_around(
     mesh: &Mesh,
     v: VertexId,
+    longest: f32,
     changed: &[[VertexId; 3]],
     output: Option<&OutputSpace>,
 ) -> bool {
@@ -227,7 +229,7 @@ pub(super) fn changes_intersect_around(
         |facet: &Facet| changed.iter().any(|names| names.iter().all(|w| facet.corners.contains(&w.0)));
     let facets: SmallVec<[(Facet, bool); ORDINARY_RING]> =
         facets_at(mesh, v).map(|facet| (facet, is_changed(&facet))).collect();
-    let margin = 2.0 * (finest(output) + ROUNDING * longest_edge(mesh, v));
+    let margin = 2.0 * (finest(output) + ROUNDING * longest);
     let last = facets.len() - 1;
     facets.iter().enumerate().any(|(k, (s, s_changed))| {
         facets[..k].iter().enumerate().any(|(j, (t, t_changed))| {

@@ -45,8 +45,9 @@ impl Embedding {
         hubs.sort_unstable();
         hubs.dedup();
         hubs.into_iter().any(|hub| {
-            flat_clearance(mesh, hub, longest_edge(mesh, hub)) <= self.finest()
-                && changes_intersect_around(mesh, hub, changed, self.output.as_ref())
+            let longest = longest_edge(mesh, hub);
+            flat_clearance(mesh, hub, longest) <= self.finest()
+                && changes_intersect_around(mesh, hub, longest, changed, self.output.as_ref())
         })
     }
 
