@@ -232,12 +232,14 @@ impl Embedding {
         let added = mesh.append(components)?;
         self.resize_for(mesh.slots());
         self.pending.resize(mesh.slots(), Checks::default());
-        self.mark_edited_dirty(mesh);
         for &v in &added {
+            // Its slot may have been that of another.
+            self.forget(v);
             self.measure(mesh, v);
             self.enter(mesh, v);
             self.mark_dirty(v, Checks::ALL);
         }
+        self.mark_edited_dirty(mesh);
         let crossing = self.check_dirty(mesh);
         self.version = Some(mesh.geometry_version());
         Ok((added, crossing))

@@ -205,7 +205,7 @@ fn common_edge(mesh: &Mesh, v: VertexId, w: VertexId) -> Option<[VertexId; 2]> {
 mod tests {
     use super::*;
     use crate::math::{Random, Vec3};
-    use crate::mesh::{crossing_pairs, shapes};
+    use crate::mesh::{TriangleMesh, crossing_pairs, shapes};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -328,5 +328,37 @@ mod tests {
             assert_eq!(embedding.check_all(&mesh), expected(&mesh), "seed {seed}");
         }
         assert!(sound > 50 && intersecting > 50, "{sound} sound, {intersecting} intersecting");
+    }
+
+    /// A new component gets the slots of one that was removed, and nothing of what was known of that.
+    #[test]
+    fn components_in_slots_of_removed_ones_are_tested() {
+        let mut intersecting = 0;
+        for seed in 0..300 {
+            let random = &mut Random::new(seed);
+            let mut mesh = Mesh::icosahedron(Vec3::ZERO, 1.0);
+            let first = mesh.slots();
+            mesh.append(&Mesh::icosahedron(Vec3::X * 1.6, 0.8)).unwrap();
+            let mut embedding = Embedding::default();
+            embedding.follow_with(&mesh, 1.2);
+            assert!(embedding.check_all(&mesh).is_empty());
+            // Slots are handed out again in the order in which vertices are found.
+            let members = mesh.component_of(VertexId::from_index(first), usize::MAX);
+            let position = |v: VertexId| members.iter().position(|&w| w == v).unwrap() as u32;
+            let closer = any(random) * 0.03 - Vec3::X * 0.08;
+            let mut component = TriangleMesh {
+                positions: members.iter().map(|&v| mesh.position(v) + closer).collect(),
+                ..TriangleMesh::default()
+            };
+            let of_component = mesh.triangles().filter(|corners| corners[0].index() >= first);
+            component.triangles.extend(of_component.map(|corners| corners.map(position)));
+            let component = Mesh::from_triangles(&component).unwrap();
+            embedding.remove_component(&mut mesh, members[0]);
+            let (added, found) = embedding.append(&mut mesh, &component).unwrap();
+            assert_eq!(added, members);
+            assert_eq!(found, expected(&mesh), "seed {seed}");
+            intersecting += u32::from(!found.is_empty());
+        }
+        assert!(intersecting > 100, "{intersecting} intersecting");
     }
 }
