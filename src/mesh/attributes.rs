@@ -49,6 +49,14 @@ impl Attributes {
         &mut self.scalars[key.0]
     }
 
+    pub(super) fn vector_and_scalar_mut(
+        &mut self,
+        vector: VectorKey,
+        scalar: ScalarKey,
+    ) -> (&mut [Vec3], &mut [f32]) {
+        (&mut self.vectors[vector.0], &mut self.scalars[scalar.0])
+    }
+
     pub(super) fn grow(&mut self) {
         self.vectors.iter_mut().for_each(|v| v.push(Vec3::ZERO));
         self.scalars.iter_mut().for_each(|s| s.push(0.0));

@@ -246,6 +246,15 @@ impl Mesh {
         (&self.positions, self.attributes.vector_mut(key))
     }
 
+    /// A vector and a scalar attribute to be written together.
+    pub fn vector_and_scalar_mut(
+        &mut self,
+        vector: VectorKey,
+        scalar: ScalarKey,
+    ) -> (&mut [Vec3], &mut [f32]) {
+        self.attributes.vector_and_scalar_mut(vector, scalar)
+    }
+
     /// The rings, and a scalar attribute to be written with them.
     pub fn rings_and_scalar_mut(&mut self, key: ScalarKey) -> (&[Ring], &mut [f32]) {
         (&self.rings, self.attributes.scalar_mut(key))

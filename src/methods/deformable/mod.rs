@@ -141,6 +141,8 @@ struct Keys {
     still: ScalarKey,
     /// The number of iterations since an edit made or displaced the vertex.
     calm: ScalarKey,
+    /// The number of times that the vertex turned back lately.
+    swings: ScalarKey,
     /// The size of edges at the vertex, in δ, less 1.
     size: ScalarKey,
 }
@@ -209,6 +211,7 @@ impl DeformableModel {
             checked: mesh.add_vector(),
             still: mesh.add_scalar(),
             calm: mesh.add_scalar(),
+            swings: mesh.add_scalar(),
             size: mesh.add_scalar(),
         };
         let mut model = Self {
@@ -237,7 +240,8 @@ impl DeformableModel {
         model.watch_output();
         model.prepare_level()?;
         if model.from_contour {
-            model.resolve_contour()?
+            model.resolve_contour()?;
+            model.rest.began_on_contour = true;
         } else {
             model.reorder()
         }

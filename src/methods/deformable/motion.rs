@@ -5,7 +5,7 @@ use super::awake::{Awake, PATIENCE, stillness};
 use super::domain::Domain;
 use super::forces::{Field, Forces};
 use super::params::{DeformableParams, Integrator};
-use crate::math::Vec3;
+use crate::math::{Vec3, higher};
 use crate::mesh::{Mesh, VertexId};
 
 /// The motion of the mesh in one iteration.
@@ -34,6 +34,12 @@ const WAKING: f32 = 4.0;
 /// The stiffness of f_c and f_e against moving a vertex of valence 6 away from its neighbours, in α_c and α_e.
 const BENDING_STIFFNESS: f32 = 1.3;
 const STRETCHING_STIFFNESS: f32 = 6.0;
+
+/// A vertex that turns back swings if its speed is more than this share of that before; with less it soon comes to rest by itself.
+const SWINGING: f32 = 0.5;
+
+/// What an iteration in which a vertex goes on takes from its swings: those of up to eight iterations add up.
+const LESS_SWINGS: f32 = 0.25;
 
 /// External forces and constraints.
 pub(super) struct World<'a> {
@@ -109,17 +115,24 @@ impl Motion {
 
     /// Linearly implicit Euler with a long time step, v ← (m v + Δt f) / (m + Δt γ + Δt² k), for each vertex by itself; k is the stiffness of the
     /// forces against a move along the normal.
+    ///
+    /// Vertices around a step of the image, or moved by edits again and again, would swing without end: with n swings a vertex takes the
+    /// (n + 1)-th part of its way, and settles at the mean (Kesten, *Accelerated stochastic approximation*, 1958).
     fn implicit(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
         self.act(mesh, mesh.positions(), mesh.vector(keys.velocity), world);
         let &DeformableParams { mass, damping, rigidity, stiffness, .. } = world.params;
         let (step, mass, damping) = (world.params.step_length() as f32, mass as f32, damping as f32);
         let internal = BENDING_STIFFNESS * rigidity as f32 + STRETCHING_STIFFNESS * stiffness as f32;
         let pull = world.field.scale.pull();
-        let velocities = mesh.vector_mut(keys.velocity);
+        let (velocities, swings) = mesh.vector_and_scalar_mut(keys.velocity, keys.swings);
         for i in self.awake.moving.iter().map(|v| v.index()) {
             let k = pull * self.forces.slope[i] + internal;
-            velocities[i] = (velocities[i] * mass + self.forces.force[i] * step)
+            let before = velocities[i];
+            let velocity = (before * mass + self.forces.force[i] * step)
                 * (1.0 / (mass + step * damping + step * step * k));
+            let normal = self.forces.normal[i];
+            swings[i] = count_swings(swings[i], before.dot(normal), velocity.dot(normal));
+            velocities[i] = velocity * (1.0 / (1.0 + swings[i]));
             self.displacements[i] = velocities[i] * step;
         }
     }
@@ -222,6 +235,15 @@ impl Motion {
         movement.energy *= 0.5 * world.params.mass / mesh.vertex_count().max(1) as f64;
         movement
     }
+}
+
+/// The swings counted of a vertex whose speed along its normal was `before` and is to be `after`.
+fn count_swings(swings: f32, before: f32, after: f32) -> f32 {
+    if before * after >= 0.0 {
+        return higher(swings - LESS_SWINGS, 0.0);
+    }
+    let is_undamped = after.abs() > SWINGING * before.abs();
+    if is_undamped { swings + 1.0 } else { swings }
 }
 
 /// Wakes a moving vertex and its neighbours.

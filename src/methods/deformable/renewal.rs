@@ -5,11 +5,9 @@
 //! replaced by the contour, brought into edge bounds like a start; components that leave nothing out are refined and go on.
 
 use super::contour::{ObjectIs, contour};
-use super::start::resolve_all;
-use super::{DeformableModel, Topology, contact};
+use super::{DeformableModel, Topology};
 use crate::mesh::{Groups, Mesh, TriangleMesh, VertexId};
 use crate::methods::MethodError;
-use crate::remesh::Sampling;
 use crate::spatial::TriangleTree;
 
 /// A point of the contour is left out where the mesh is further away than this, in voxels of the finer level.
@@ -20,7 +18,7 @@ const REACH: f32 = 1.0;
 pub(super) struct Renewal {
     /// A vertex of each component that goes.
     pub(super) stale: Vec<VertexId>,
-    /// What comes instead, its edges within the bounds of the finer level.
+    /// What comes instead: parts of the contour.
     pub(super) fresh: Mesh,
 }
 
@@ -41,11 +39,7 @@ impl DeformableModel {
         if fresh.triangles.is_empty() {
             return Ok(Renewal::default());
         }
-        let mut fresh = Mesh::from_triangles(&fresh)?;
-        let sampling = Sampling::new(super::delta_at(self.finest_delta, level));
-        let guide = contact::guide(image, iso, &self.params);
-        let mut resolver = resolve_all(&mut fresh, self.resolver.most_vertices(), sampling, &*guide)?;
-        if resolver.is_embedded(&fresh) { Ok(Renewal { stale, fresh }) } else { Ok(Renewal::default()) }
+        Ok(Renewal { stale, fresh: Mesh::from_triangles(&fresh)? })
     }
 
     /// A vertex of each component of the mesh that goes, and the components of the contour that replace them: all that are joined,

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Quiet iterations in a row for convergence: a single one may be a turning point of an oscillation.
 const QUIET_ITERATIONS: f64 = 3.0;
 
-/// The same for long steps, which are damped and do not oscillate.
+/// The same for long steps, which are damped and do not oscillate, where no vertex is fast either.
 const QUIET_LONG_STEPS: f64 = 2.0;
 
 /// The largest number of quiet iterations, for small time steps and damping.
@@ -39,6 +39,8 @@ pub(super) struct Rest {
     searches: u32,
     /// Whether edges have been sized.
     pub(super) sized: bool,
+    /// Whether the surface was on the contour when this level began, and is still to go there: no front has a way to go then.
+    pub(super) began_on_contour: bool,
     /// The iteration after which this level began.
     pub(super) began: u32,
 }
@@ -67,13 +69,14 @@ impl DeformableModel {
     /// Wakes all vertices after a change that may move them.
     pub(super) fn wake_all(&mut self) {
         self.mesh.scalar_mut(self.keys.still).fill(0.0);
+        self.mesh.scalar_mut(self.keys.swings).fill(0.0);
         self.rest = Rest { began: self.rest.began, ..Rest::default() };
     }
 
     /// Counts quiet iterations; after enough of them checks the whole mesh, and descends one level or ends.
     pub(super) fn come_to_rest(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
-        let quiet =
-            self.movement.energy < self.params.energy_tolerance && self.movement.fastest < self.rest_speed();
+        let is_slow = self.rest.began_on_contour || self.movement.fastest < self.rest_speed();
+        let quiet = is_slow && self.movement.energy < self.params.energy_tolerance;
         self.rest.quiet = if quiet { self.rest.quiet + 1 } else { 0 };
         if self.rest.quiet < self.quiet_iterations() {
             return Ok(Changes::default());
@@ -130,7 +133,8 @@ impl DeformableModel {
     /// The response time m/γ in iterations: a surface that has just begun to move is slow, too, without being converged.
     fn quiet_iterations(&self) -> u32 {
         let DeformableParams { mass, damping, integrator, .. } = self.params;
-        let least = if integrator == Integrator::Implicit { QUIET_LONG_STEPS } else { QUIET_ITERATIONS };
+        let is_settled = integrator == Integrator::Implicit && !self.rest.began_on_contour;
+        let least = if is_settled { QUIET_LONG_STEPS } else { QUIET_ITERATIONS };
         libm::ceil(mass / (damping * self.params.step_length())).clamp(least, MOST_QUIET_ITERATIONS) as u32
     }
 
@@ -149,33 +153,54 @@ impl DeformableModel {
         changes
     }
 
-    /// Refines the mesh and descends to the next finer image (figure 13); renews components that leave out part of it.
+    /// Refines the mesh and descends to the next finer image (figure 13); renews components that leave out part of it, if what replaces
+    /// them fits.
     fn descend(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let begin = (self.clock)();
         let renewal = if self.seeds_levels() { self.renewal()? } else { Renewal::default() };
-        let whole = self.mesh.clone();
-        renewal.stale.iter().for_each(|&v| _ = self.mesh.remove_component(v));
-        self.refine()?;
-        let (mut changes, _) = self.add_components(&renewal.fresh)?;
-        let fits = changes.seeds == renewal.fresh.component_count() as u32;
-        if !fits {
-            let partly = std::mem::replace(&mut self.mesh, whole);
-            self.mesh.count_on_from(&partly);
-            self.refine()?;
-            changes = Changes::default();
-        }
+        let seeds = renewal.fresh.component_count() as u32;
+        let (level, coarse, waiting) = (self.level, self.mesh.clone(), self.resolver.waiting());
+        let is_renewed = seeds > 0 && self.descend_renewed(&renewal).is_ok();
         times.add("renewal", (self.clock)() - begin);
-        self.level -= 1;
-        self.rest = Rest { began: self.iteration, ..Rest::default() };
+        if is_renewed {
+            return Ok(Changes { seeds, ..Changes::default() });
+        }
+        let partly = std::mem::replace(&mut self.mesh, coarse);
+        self.mesh.count_on_from(&partly);
+        self.resolver.set_waiting(waiting);
+        self.level = level;
+        self.descend_refined()?;
         self.reorder();
         self.mark_checked();
-        self.wake_all();
-        self.prepare_level()?;
-        changes += self.check_everything(times);
-        if self.seeds_levels() && !fits {
+        let mut changes = self.check_everything(times);
+        if seeds > 0 {
             changes += self.seed_missing(times)?;
         }
         Ok(changes)
+    }
+
+    /// Descends with some components replaced by parts of the finer contour, all of it resolved like a start.
+    ///
+    /// # Errors
+    /// Where the new parts do not fit beside the others, or not in memory.
+    fn descend_renewed(&mut self, renewal: &Renewal) -> Result<(), MethodError> {
+        renewal.stale.iter().for_each(|&v| _ = self.mesh.remove_component(v));
+        self.descend_refined()?;
+        self.test_room_for(&renewal.fresh)?;
+        let added = self.mesh.append(&renewal.fresh)?;
+        self.welcome(&added);
+        self.resolve_contour()?;
+        self.rest.began_on_contour = true;
+        self.mark_checked();
+        Ok(())
+    }
+
+    fn descend_refined(&mut self) -> Result<(), MethodError> {
+        self.refine()?;
+        self.level -= 1;
+        self.rest.began = self.iteration;
+        self.wake_all();
+        self.prepare_level()
     }
 
     fn refine(&mut self) -> Result<(), MethodError> {

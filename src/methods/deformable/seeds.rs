@@ -71,10 +71,7 @@ impl DeformableModel {
     /// # Errors
     /// [`MethodError::TooManyVertices`]; nothing is added then.
     pub(super) fn add_components(&mut self, parts: &Mesh) -> Result<(Changes, Vec<VertexId>), MethodError> {
-        let most = self.resolver.most_vertices();
-        if self.mesh.vertex_count() + parts.vertex_count() > most {
-            return Err(MethodError::TooManyVertices { most });
-        }
+        self.test_room_for(parts)?;
         let sampling = self.sampling();
         let guard = self.resolver.guard(&self.mesh, sampling);
         let (mut added, crossing) = guard.append(&mut self.mesh, parts)?;
@@ -92,13 +89,20 @@ impl DeformableModel {
         Ok((Changes { seeds: count as u32, ..Changes::default() }, added))
     }
 
+    pub(super) fn test_room_for(&self, parts: &Mesh) -> Result<(), MethodError> {
+        let most = self.resolver.most_vertices();
+        let fits = self.mesh.vertex_count() + parts.vertex_count() <= most;
+        if fits { Ok(()) } else { Err(MethodError::TooManyVertices { most }) }
+    }
+
     /// Makes new vertices known to the model.
-    fn welcome(&mut self, added: &[VertexId]) {
+    pub(super) fn welcome(&mut self, added: &[VertexId]) {
         let keys = self.keys;
         for v in added.iter().map(|v| v.index()) {
             self.mesh.vector_mut(keys.velocity)[v] = Vec3::ZERO;
             self.mesh.scalar_mut(keys.still)[v] = 0.0;
             self.mesh.scalar_mut(keys.calm)[v] = 0.0;
+            self.mesh.scalar_mut(keys.swings)[v] = 0.0;
             self.mesh.scalar_mut(keys.size)[v] = 0.0;
             let (positions, checked) = self.mesh.positions_and_vector_mut(keys.checked);
             checked[v] = positions[v];

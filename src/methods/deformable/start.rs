@@ -170,7 +170,7 @@ impl DeformableModel {
 }
 
 /// Brings the edges of a mesh within bounds, and what is in contact together.
-pub(super) fn resolve_all(
+fn resolve_all(
     mesh: &mut Mesh,
     most_vertices: usize,
     sampling: Sampling,

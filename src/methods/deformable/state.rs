@@ -11,7 +11,7 @@ use crate::remesh::{Resolver, Waiting};
 use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
 
-const MARK: Mark = *b"VSCLDEF\x04";
+const MARK: Mark = *b"VSCLDEF\x05";
 
 /// Everything a run has beside its volume.
 #[derive(Serialize, Deserialize)]
