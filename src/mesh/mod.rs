@@ -13,6 +13,7 @@
 mod attributes;
 mod build;
 mod check;
+mod clustering;
 mod compact;
 mod components;
 mod crossing;

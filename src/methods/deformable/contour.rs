@@ -7,6 +7,9 @@ use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::volume::{Grid, marching_cubes};
 
+/// δ in voxels below which clusters of a voxel would be too large.
+const LEAST_SIDE: f32 = 0.7;
+
 /// Which side of the iso value the object is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ObjectIs {
@@ -57,6 +60,17 @@ pub(super) fn contour(
         }
     };
     Ok(placed(surface, position).without_parts_below(smallest_part))
+}
+
+/// A contour with about as many vertices as a mesh of edges of δ needs at most, which spares most of the edits that bring its edges within
+/// bounds.
+pub(super) fn simplified(contour: TriangleMesh, image: &LevelImage, delta: f32) -> TriangleMesh {
+    let side = delta * image.voxels_per_unit();
+    if side < LEAST_SIDE || contour.triangles.is_empty() {
+        return contour;
+    }
+    let side = if side > 1.0 { side } else { 1.0 };
+    contour.clustered(|p| (image.index(p) / side).round().as_ivec3())
 }
 
 /// The surface with its positions in the space of the model.

@@ -4,7 +4,7 @@
 //! finer image. Where a component of the contour has points that no component of the mesh is near, it and all that it touches are
 //! replaced by the contour, brought into edge bounds like a start; components that leave nothing out are refined and go on.
 
-use super::contour::{ObjectIs, contour};
+use super::contour::{ObjectIs, contour, simplified};
 use super::{DeformableModel, Topology};
 use crate::mesh::{Groups, Mesh, TriangleMesh, VertexId};
 use crate::methods::MethodError;
@@ -39,6 +39,7 @@ impl DeformableModel {
         if fresh.triangles.is_empty() {
             return Ok(Renewal::default());
         }
+        let fresh = simplified(fresh, image, super::delta_at(self.finest_delta, level));
         Ok(Renewal { stale, fresh: Mesh::from_triangles(&fresh)? })
     }
 

@@ -1,6 +1,6 @@
 //! The surface a run starts from (section 3.6), made in the space of the model and resolved before the first step.
 
-use super::contour::{ObjectIs, contour, placed};
+use super::contour::{ObjectIs, contour, placed, simplified};
 use super::domain::{Domain, rounded_axes};
 use super::image::LevelImage;
 use super::{DeformableModel, contact};
@@ -342,7 +342,10 @@ fn largest(spacing: [f64; 3]) -> f64 {
 fn on_contour(frame: &Frame) -> Result<Mesh, MethodError> {
     let surface = contour(frame.image, frame.iso, frame.object, frame.smallest_part)?;
     match (surface.triangles.is_empty(), frame.may_be_empty) {
-        (false, _) => Ok(Mesh::from_triangles(&surface)?),
+        (false, _) => {
+            let surface = simplified(surface, frame.image, frame.sampling.shortest());
+            Ok(Mesh::from_triangles(&surface)?)
+        }
         (true, true) => Ok(Mesh::default()),
         (true, false) => enclosing(frame),
     }
