@@ -11,6 +11,6 @@ pub mod triangle;
 
 pub use bounds::{Bounds, BoxTree, Ray};
 pub use extremes::{higher, lower};
-pub use glam::{IVec3, DAffine3, DMat3, DVec2, DVec3, Mat3, Vec2, Vec3, Vec3Swizzles};
+pub use glam::{DAffine3, DMat3, DVec2, DVec3, IVec3, Mat3, Vec2, Vec3, Vec3Swizzles};
 pub use quadric::Quadric;
 pub use random::Random;

@@ -13,7 +13,6 @@
 mod attributes;
 mod build;
 mod check;
-mod clustering;
 mod compact;
 mod components;
 mod crossing;

@@ -8,6 +8,7 @@
 //! [`decimate`] reduces a static mesh, [`remesh`] makes its triangles even; neither changes topology.
 
 mod changes;
+mod clustering;
 mod contact;
 mod decimate;
 mod edges;
@@ -21,6 +22,7 @@ mod sampling;
 mod specks;
 
 pub use changes::Changes;
+pub use clustering::clustered;
 pub use decimate::decimate;
 pub use embedding::Embedding;
 pub use isotropic::remesh;

@@ -1,0 +1,241 @@
+//! Simplification of a closed surface by clustering its vertices (Rossignac & Borrel, *Multi-resolution 3D approximations for rendering
+//! complex scenes*, 1993), here with the topology kept.
+
+use crate::math::{IVec3, Vec3};
+use crate::mesh::{Groups, TriangleMesh};
+
+/// The cosine of the largest angle by which a triangle may turn.
+const LARGEST_TURN: f32 = 0.5;
+
+/// A vertex has at least this many triangles.
+const LEAST_VALENCE: u32 = 3;
+
+/// A closed surface with the vertices of each cell that edges connect within it merged at their mean, where that neither changes the
+/// topology nor turns a triangle far, and none of them is further than `furthest` from it along its normal. Only positions and triangles are
+/// kept.
+pub fn clustered(mesh: &TriangleMesh, furthest: f32, cell: impl Fn(Vec3) -> IVec3) -> TriangleMesh {
+    let mut clusters = Clusters::new(mesh, cell);
+    clusters.keep_contractible(mesh);
+    clusters.keep_flat(mesh, furthest);
+    loop {
+        let merged = clusters.merge(mesh);
+        if !clusters.dissolve_where_wrong(mesh, &merged) {
+            return compact(merged);
+        }
+    }
+}
+
+/// The mesh without positions that no triangle has.
+fn compact(mut mesh: TriangleMesh) -> TriangleMesh {
+    const UNUSED: u32 = u32::MAX;
+    let mut names = vec![UNUSED; mesh.positions.len()];
+    let mut positions = Vec::new();
+    for corner in mesh.triangles.iter_mut().flatten() {
+        let name = &mut names[*corner as usize];
+        if *name == UNUSED {
+            *name = positions.len() as u32;
+            positions.push(mesh.positions[*corner as usize]);
+        }
+        *corner = *name;
+    }
+    TriangleMesh { positions, triangles: mesh.triangles, ..TriangleMesh::default() }
+}
+
+/// Disjoint connected sets of vertices.
+struct Clusters {
+    /// The lowest vertex of the cluster of each vertex.
+    first: Vec<u32>,
+}
+
+impl Clusters {
+    fn new(mesh: &TriangleMesh, cell: impl Fn(Vec3) -> IVec3) -> Self {
+        let cells: Vec<IVec3> = mesh.positions.iter().map(|&p| cell(p)).collect();
+        let mut groups = Groups::new(cells.len());
+        for [u, v] in edges(mesh) {
+            if cells[u] == cells[v] {
+                groups.join(u, v);
+            }
+        }
+        Self { first: (0..cells.len()).map(|v| groups.find(v) as u32).collect() }
+    }
+
+    /// Dissolves clusters with a vertex further from the mean along its normal.
+    fn keep_flat(&mut self, mesh: &TriangleMesh, furthest: f32) {
+        let means = self.merge(mesh).positions;
+        let normals = mesh.vertex_normals();
+        let mut is_bent = vec![false; self.first.len()];
+        for ((p, n), &c) in mesh.positions.iter().zip(&normals).zip(&self.first) {
+            is_bent[c as usize] |= (means[c as usize] - *p).dot(*n).abs() > furthest;
+        }
+        self.dissolve(|c| is_bent[c as usize]);
+    }
+
+    fn of(&self, vertices: [u32; 3]) -> [u32; 3] {
+        vertices.map(|v| self.first[v as usize])
+    }
+
+    /// Dissolves clusters with a loop, or of a whole component: merging any others does not change the topology.
+    fn keep_contractible(&mut self, mesh: &TriangleMesh) {
+        let mut euler = vec![0; self.first.len()];
+        self.first.iter().for_each(|&c| euler[c as usize] += 1);
+        for [u, v] in edges(mesh) {
+            euler[self.first[u] as usize] -= i32::from(self.first[u] == self.first[v]);
+        }
+        for [a, b, c] in mesh.triangles.iter().map(|&t| self.of(t)) {
+            euler[a as usize] += i32::from(a == b && b == c);
+        }
+        self.dissolve(|c| euler[c as usize] != 1);
+    }
+
+    /// Dissolves clusters, named by their lowest vertex; returns whether one of them had more than one vertex.
+    fn dissolve(&mut self, goes: impl Fn(u32) -> bool) -> bool {
+        let mut any = false;
+        for (v, c) in (0u32..).zip(&mut self.first).filter(|(v, c)| v != *c && goes(**c)) {
+            *c = v;
+            any = true;
+        }
+        any
+    }
+
+    fn merge(&self, mesh: &TriangleMesh) -> TriangleMesh {
+        let mut positions = vec![Vec3::ZERO; mesh.positions.len()];
+        let mut members = vec![0u32; mesh.positions.len()];
+        for (&p, &c) in mesh.positions.iter().zip(&self.first) {
+            positions[c as usize] += p;
+            members[c as usize] += 1;
+        }
+        positions.iter_mut().zip(&members).filter(|(_, n)| **n > 0).for_each(|(p, &n)| *p /= n as f32);
+        let triangles = mesh.triangles.iter().map(|&t| self.of(t)).filter(is_triangle).collect();
+        TriangleMesh { positions, triangles, ..TriangleMesh::default() }
+    }
+
+    /// Dissolves the clusters at edges of more than two triangles, at vertices of less than three, and at triangles that turned far; returns
+    /// whether there were any.
+    fn dissolve_where_wrong(&mut self, mesh: &TriangleMesh, merged: &TriangleMesh) -> bool {
+        let mut is_wrong = vec![false; self.first.len()];
+        for corner in doubled_edges(merged).into_iter().flatten() {
+            is_wrong[corner as usize] = true;
+        }
+        for (v, valence) in valences(merged).into_iter().enumerate() {
+            is_wrong[v] |= valence < LEAST_VALENCE;
+        }
+        for &triangle in &mesh.triangles {
+            let corners = self.of(triangle);
+            if !is_triangle(&corners) {
+                continue;
+            }
+            let before = normal(triangle.map(|v| mesh.positions[v as usize]));
+            let after = normal(corners.map(|v| merged.positions[v as usize]));
+            if before.dot(after) < LARGEST_TURN * before.length() * after.length() {
+                corners.iter().for_each(|&v| is_wrong[v as usize] = true);
+            }
+        }
+        self.dissolve(|c| is_wrong[c as usize])
+    }
+}
+
+fn is_triangle([a, b, c]: &[u32; 3]) -> bool {
+    a != b && b != c && c != a
+}
+
+fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
+    (b - a).cross(c - a)
+}
+
+/// The number of triangles at each vertex.
+fn valences(mesh: &TriangleMesh) -> Vec<u32> {
+    let mut valences = vec![0; mesh.positions.len()];
+    mesh.triangles.iter().flatten().for_each(|&v| valences[v as usize] += 1);
+    valences
+}
+
+fn directed_edges(mesh: &TriangleMesh) -> impl Iterator<Item = [u32; 2]> + '_ {
+    mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+}
+
+/// The edges of a closed surface.
+fn edges(mesh: &TriangleMesh) -> impl Iterator<Item = [usize; 2]> + '_ {
+    directed_edges(mesh).filter(|[u, v]| u < v).map(|edge| edge.map(|v| v as usize))
+}
+
+/// The edges that more than one triangle has in the same direction.
+fn doubled_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
+    let mut directed: Vec<[u32; 2]> = directed_edges(mesh).collect();
+    directed.sort_unstable();
+    directed.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Mesh;
+    use crate::volume::{Grid, marching_cubes};
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn whole(p: Vec3) -> IVec3 {
+        p.round().as_ivec3()
+    }
+
+    /// The contour of a shape in a grid of 24 voxels along each side.
+    fn contour(depth: impl Fn(Vec3) -> f32) -> TriangleMesh {
+        let n = 24;
+        let at = |k: usize| Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32) - 11.5;
+        let values = (0..n * n * n).map(|k| depth(at(k))).collect();
+        marching_cubes(&Grid { dims: [n; 3], values }, 0.0).unwrap()
+    }
+
+    fn sound(mesh: &TriangleMesh) -> Mesh {
+        let mesh = Mesh::from_triangles(mesh).unwrap();
+        assert_eq!(mesh.check(), Ok(()));
+        mesh
+    }
+
+    #[test]
+    fn a_torus_keeps_its_handle_and_a_quarter_of_its_vertices_go() {
+        let torus = contour(|p| 2.5 - Vec3::new(p.truncate().length() - 6.5, p.z, 0.0).length());
+        let merged = clustered(&torus, f32::INFINITY, whole);
+        assert_eq!(sound(&merged).euler(), 0);
+        let [before, after] = [&torus, &merged].map(|mesh| mesh.positions.len());
+        assert!(4 * after < 3 * before, "{after} of {before}");
+        let length = |p: &Vec3| Vec3::new(p.truncate().length() - 6.5, p.z, 0.0).length();
+        for p in merged.positions.iter().map(|p| *p - 11.5) {
+            assert!((length(&p) - 2.5).abs() < 0.3, "{p} is off the torus");
+        }
+    }
+
+    #[test]
+    fn what_bends_within_a_cell_stays() {
+        let off_axis = |p: Vec3| Vec3::new(p.y - 0.5, p.z - 0.5, 0.0).length();
+        let tube = contour(|p| (1.3 - off_axis(p)).min(8.0 - p.x.abs()));
+        let [near, rough] = [0.03, f32::INFINITY].map(|furthest| clustered(&tube, furthest, whole));
+        let thinnest = |mesh: &TriangleMesh| {
+            let inner = mesh.positions.iter().map(|p| *p - 11.5).filter(|p| p.x.abs() < 7.0);
+            inner.map(off_axis).fold(f32::INFINITY, f32::min)
+        };
+        assert!(thinnest(&near) > thinnest(&tube) - 0.04, "{} of {}", thinnest(&near), thinnest(&tube));
+        assert!(near.positions.len() > rough.positions.len());
+    }
+
+    /// Cells of a noisy shape hold tubes, walls of both sides and whole components.
+    #[test]
+    fn noise_keeps_its_components_and_handles() {
+        for seed in 0..40 {
+            let random = std::cell::RefCell::new(crate::math::Random::new(seed));
+            let noisy = contour(|p| 8.0 - p.length() + 6.0 * (random.borrow_mut().unit() as f32 - 0.5));
+            let merged = clustered(&noisy, f32::INFINITY, whole);
+            let (before, after) = (sound(&noisy), sound(&merged));
+            assert_eq!(after.euler(), before.euler(), "seed {seed}");
+            assert_eq!(after.component_count(), before.component_count(), "seed {seed}");
+            assert!(after.vertex_count() < before.vertex_count());
+        }
+    }
+
+    #[test]
+    fn nothing_is_left_of_nothing_and_large_cells_leave_closed_surfaces() {
+        assert!(clustered(&TriangleMesh::default(), f32::INFINITY, whole).triangles.is_empty());
+        let ball = contour(|p| 8.0 - p.length());
+        let merged = clustered(&ball, f32::INFINITY, |p| (p / 8.0).round().as_ivec3());
+        assert_eq!(sound(&merged).euler(), 2);
+    }
+}
