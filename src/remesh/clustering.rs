@@ -113,11 +113,12 @@ impl Clusters {
     /// whether there were any.
     fn dissolve_where_wrong(&mut self, mesh: &TriangleMesh, merged: &TriangleMesh) -> bool {
         let mut is_wrong = vec![false; self.first.len()];
-        for corner in doubled_edges(merged).into_iter().flatten() {
-            is_wrong[corner as usize] = true;
+        let valences = valences(merged);
+        for (v, &valence) in valences.iter().enumerate() {
+            is_wrong[v] = valence < LEAST_VALENCE;
         }
-        for (v, valence) in valences(merged).into_iter().enumerate() {
-            is_wrong[v] |= valence < LEAST_VALENCE;
+        for corner in doubled_edges(merged, &valences).into_iter().flatten() {
+            is_wrong[corner as usize] = true;
         }
         for &triangle in &mesh.triangles {
             let corners = self.of(triangle);
@@ -158,11 +159,27 @@ fn edges(mesh: &TriangleMesh) -> impl Iterator<Item = [usize; 2]> + '_ {
     directed_edges(mesh).filter(|[u, v]| u < v).map(|edge| edge.map(|v| v as usize))
 }
 
-/// The edges that more than one triangle has in the same direction.
-fn doubled_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
-    let mut directed: Vec<[u32; 2]> = directed_edges(mesh).collect();
-    directed.sort_unstable();
-    directed.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect()
+/// The edges that more than one triangle has in the same direction, by the valences of the vertices.
+fn doubled_edges(mesh: &TriangleMesh, valences: &[u32]) -> Vec<[u32; 2]> {
+    let mut ends = vec![0u32; directed_edges(mesh).count()];
+    // The edges from each vertex, in one range of `ends` each.
+    let mut filled: Vec<u32> = Vec::with_capacity(valences.len());
+    let mut begin = 0;
+    for valence in valences {
+        filled.push(begin);
+        begin += valence;
+    }
+    let mut doubled = Vec::new();
+    let begins = filled.clone();
+    for [u, v] in directed_edges(mesh) {
+        let (begin, end) = (begins[u as usize] as usize, filled[u as usize] as usize);
+        if ends[begin..end].contains(&v) {
+            doubled.push([u, v]);
+        }
+        ends[end] = v;
+        filled[u as usize] += 1;
+    }
+    doubled
 }
 
 #[cfg(test)]
