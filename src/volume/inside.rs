@@ -1,37 +1,32 @@
 //! Which voxels a closed surface encloses.
 
-use super::VolumeError;
-use super::error::reserve;
 use crate::math::predicates::orient2d;
 use crate::math::{DVec2, Vec3};
 use crate::mesh::TriangleMesh;
+use fixedbitset::FixedBitSet;
 
 /// For each voxel of a grid of `dims`, x fastest, whether its centre is inside the closed `surface`, whose positions are voxel
 /// indices: whether a ray along x has passed the surface an odd number of times.
 ///
 /// Exact but for centres within rounding of the surface: rays through edges and corners are decided by exact predicates.
-///
-/// # Errors
-/// [`VolumeError::TooLarge`].
-pub fn voxels_inside(surface: &TriangleMesh, dims: [usize; 3]) -> Result<Vec<bool>, VolumeError> {
+pub fn voxels_inside(surface: &TriangleMesh, dims: [usize; 3]) -> FixedBitSet {
     let count = dims.iter().product();
-    let mut inside = reserve(count)?;
-    inside.resize(count, false);
+    let mut passed = FixedBitSet::with_capacity(count);
     for [a, b, c] in &surface.triangles {
-        pass_triangle(&surface.positions, [*a, *b, *c], dims, &mut inside);
+        pass_triangle(&surface.positions, [*a, *b, *c], dims, &mut passed);
     }
-    for row in inside.chunks_exact_mut(dims[0].max(1)) {
-        let mut is_inside = false;
-        for voxel in row {
-            is_inside ^= *voxel;
-            *voxel = is_inside;
-        }
+    let mut inside = FixedBitSet::with_capacity(count);
+    let mut ahead = passed.ones().peekable();
+    while let Some(first) = ahead.next() {
+        let end_of_row = (first / dims[0] + 1) * dims[0];
+        let end = ahead.next_if(|next| *next < end_of_row).unwrap_or(end_of_row);
+        inside.insert_range(first..end);
     }
-    Ok(inside)
+    inside
 }
 
 /// Notes, for each row of voxels that passes the triangle, the first voxel beyond it.
-fn pass_triangle(positions: &[Vec3], corners: [u32; 3], dims: [usize; 3], passed: &mut [bool]) {
+fn pass_triangle(positions: &[Vec3], corners: [u32; 3], dims: [usize; 3], passed: &mut FixedBitSet) {
     let [a, b, c] = corners.map(|v| positions[v as usize].as_dvec3());
     let normal = (b - a).cross(c - a);
     let span = |axis: usize| {
@@ -49,7 +44,7 @@ fn pass_triangle(positions: &[Vec3], corners: [u32; 3], dims: [usize; 3], passed
             let x = a.x - (normal.y * (at.x - a.y) + normal.z * (at.y - a.z)) / normal.x;
             let first = x.ceil().max(0.0) as usize;
             if first < dims[0] {
-                passed[first + dims[0] * (y + dims[1] * z)] ^= true;
+                passed.toggle(first + dims[0] * (y + dims[1] * z));
             }
         }
     }
@@ -84,8 +79,8 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     fn check(surface: &TriangleMesh, dims: [usize; 3], expected: impl Fn(Vec3) -> Option<bool>) {
-        let inside = voxels_inside(surface, dims).unwrap();
-        for (i, inside) in inside.into_iter().enumerate() {
+        let inside = voxels_inside(surface, dims);
+        for (i, inside) in (0..dims.iter().product()).map(|i| (i, inside.contains(i))) {
             let p = [i % dims[0], i / dims[0] % dims[1], i / dims[0] / dims[1]].map(|k| k as f32);
             if let Some(expected) = expected(Vec3::from(p)) {
                 assert_eq!(inside, expected, "at {p:?}");
@@ -127,12 +122,12 @@ mod tests {
     #[test]
     fn a_surface_beyond_the_grid_is_cut_off() {
         let surface = moved(torus(6.0, 2.0, 24, 12), Vec3::new(0.1, 0.2, 3.1));
-        let inside = voxels_inside(&surface, [5, 7, 6]).unwrap();
-        let turned = voxels_inside(&moved(surface, Vec3::new(20.0, 20.0, 20.0)), [40, 40, 40]).unwrap();
-        for (i, inside) in inside.into_iter().enumerate() {
+        let inside = voxels_inside(&surface, [5, 7, 6]);
+        let turned = voxels_inside(&moved(surface, Vec3::new(20.0, 20.0, 20.0)), [40, 40, 40]);
+        for i in 0..5 * 7 * 6 {
             let [x, y, z] = [i % 5, i / 5 % 7, i / 35];
-            assert_eq!(inside, turned[x + 20 + 40 * (y + 20 + 40 * (z + 20))]);
+            assert_eq!(inside.contains(i), turned.contains(x + 20 + 40 * (y + 20 + 40 * (z + 20))));
         }
-        assert!(voxels_inside(&TriangleMesh::default(), [2, 2, 2]).unwrap().iter().all(|inside| !inside));
+        assert!(voxels_inside(&TriangleMesh::default(), [2, 2, 2]).is_clear());
     }
 }

@@ -15,6 +15,7 @@ use crate::methods::{MethodError, StepReport, Times};
 use crate::remesh::Changes;
 use crate::spatial::{CellSet, TriangleTree};
 use crate::volume::{Grid, marching_cubes, voxels_inside};
+use fixedbitset::FixedBitSet;
 
 /// Voxels nearer to the mesh than this, in voxels of the level, are left to it. With less, seeds would touch it; with more, thin
 /// parts beside it are not found.
@@ -113,18 +114,14 @@ impl DeformableModel {
     fn missing_parts(&self) -> Result<[TriangleMesh; 2], MethodError> {
         let image = &self.pyramid.levels[self.level];
         let object = ObjectIs::by(&self.params);
-        let contour = contour(image, self.level_iso, object, self.params.smallest_part)?;
-        let [contour, surface] =
-            [contour, self.mesh.to_triangles()].map(|mesh| placed(mesh, |p| image.index(p)));
         let dims = image.grid().0.dims;
-        let comparison = Comparison {
-            image,
-            iso: self.level_iso,
-            object,
-            in_contour: voxels_inside(&contour, dims)?,
-            in_mesh: voxels_inside(&surface, dims)?,
-            surface,
-        };
+        let indexed = |mesh| placed(mesh, |p| image.index(p));
+        // The contour of a large image is the larger of the two, and is gone before the other is made.
+        let contour = contour(image, self.level_iso, object, self.params.smallest_part)?;
+        let in_contour = voxels_inside(&indexed(contour), dims);
+        let surface = indexed(self.mesh.to_triangles());
+        let in_mesh = voxels_inside(&surface, dims);
+        let comparison = Comparison { image, iso: self.level_iso, object, in_contour, in_mesh, surface };
         let smallest = SMALLEST_SEED * self.params.smallest_part;
         Ok([comparison.parts(Missing::Matter, smallest)?, comparison.parts(Missing::Hollow, smallest)?])
     }
@@ -136,9 +133,9 @@ struct Comparison<'a> {
     iso: f32,
     object: ObjectIs,
     /// Whether each voxel is inside the contour; closed parts that are too small are no part of that.
-    in_contour: Vec<bool>,
+    in_contour: FixedBitSet,
     /// Whether each voxel is inside the mesh.
-    in_mesh: Vec<bool>,
+    in_mesh: FixedBitSet,
     /// The mesh in voxels of the level.
     surface: TriangleMesh,
 }
@@ -166,7 +163,7 @@ impl Comparison<'_> {
 
     /// Whether the contour has a voxel on the side where something of this kind is.
     fn is_of(&self, kind: Missing, voxel: usize) -> bool {
-        self.in_contour[voxel] == (kind == Missing::Matter)
+        self.in_contour.contains(voxel) == (kind == Missing::Matter)
     }
 
     /// Voxels on the wrong side of the mesh and clear of it, in order.
@@ -188,11 +185,12 @@ impl Comparison<'_> {
         let is_inside = kind == Missing::Hollow;
         let dims = self.image.grid().0.dims;
         let is_misplaced = |&voxel: &usize| {
-            self.in_mesh[voxel] == is_inside
-                && self.is_of(kind, voxel)
-                && faces(dims, voxel).all(|w| w.map_or(!is_inside, |w| self.in_mesh[w] == is_inside))
+            self.is_of(kind, voxel)
+                && faces(dims, voxel).all(|w| w.map_or(!is_inside, |w| self.in_mesh.contains(w) == is_inside))
         };
-        (0..self.in_mesh.len()).filter(is_misplaced).collect()
+        let mut differing = self.in_mesh.clone();
+        differing.symmetric_difference_with(&self.in_contour);
+        differing.ones().filter(is_misplaced).collect()
     }
 
     /// The triangles that may be within [`CLEARANCE`] of some places.
