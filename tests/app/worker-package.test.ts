@@ -57,11 +57,11 @@ test('two hundred steps end in the bits that the core gives natively, and the pa
     requestAnimationFrame(count);
     let during = 0;
     class Watched extends DeformableModel {
-      // All steps at once: in the page itself there would be no frame.
+      // The two hundred steps at once: in the page itself there would be no frame.
       async step(iterations) {
         const before = frames;
         const report = await super.step(iterations);
-        during = frames - before;
+        during = Math.max(during, frames - before);
         return report;
       }
     }
