@@ -190,7 +190,8 @@ impl DeformableModel {
         let added = self.mesh.append(&renewal.fresh)?;
         self.welcome(&added);
         self.resolve_contour()?;
-        self.rest.began_on_contour = true;
+        // What stays began there, too, unless the run started elsewhere.
+        self.rest.began_on_contour = self.from_contour;
         self.mark_checked();
         Ok(())
     }
