@@ -131,12 +131,15 @@ impl DeformableModel {
         let mut runs = 0;
         loop {
             self.resolver.test_in((runs < MOST_RUNS).then(|| tested.clone()));
-            self.resolve_sized()?;
+            let resolved = self.resolve_sized();
+            // Without a contour to go back to, all edits are tested, also after an error.
             self.resolver.test_in(None);
+            resolved?;
             let sampling = self.sampling();
             let guard = self.resolver.guard(&self.mesh, sampling);
             let crossing = guard.crossing(&self.mesh);
             if crossing.is_empty() || guard.separate(&mut self.mesh, &crossing) {
+                self.rest.began_on_contour = self.from_contour;
                 return Ok(());
             }
             if runs == MOST_RUNS {
