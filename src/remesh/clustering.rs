@@ -1,11 +1,12 @@
 //! Simplification of a closed surface by clustering its vertices (Rossignac & Borrel, *Multi-resolution 3D approximations for rendering
 //! complex scenes*, 1993), here with the topology kept.
 
+use crate::math::triangle::area_vector;
 use crate::math::{IVec3, Vec3};
 use crate::mesh::{Groups, TriangleMesh};
 
 /// The cosine of the largest angle by which a triangle may turn.
-const LARGEST_TURN: f32 = 0.5;
+const LARGEST_TURN: f64 = 0.5;
 
 /// A vertex has at least this many triangles.
 const LEAST_VALENCE: u32 = 3;
@@ -20,25 +21,9 @@ pub fn clustered(mesh: &TriangleMesh, furthest: f32, cell: impl Fn(Vec3) -> IVec
     loop {
         let merged = clusters.merge(mesh);
         if !clusters.dissolve_where_wrong(mesh, &merged) {
-            return compact(merged);
+            return merged.parts_where(|_| true);
         }
     }
-}
-
-/// The mesh without positions that no triangle has.
-fn compact(mut mesh: TriangleMesh) -> TriangleMesh {
-    const UNUSED: u32 = u32::MAX;
-    let mut names = vec![UNUSED; mesh.positions.len()];
-    let mut positions = Vec::new();
-    for corner in mesh.triangles.iter_mut().flatten() {
-        let name = &mut names[*corner as usize];
-        if *name == UNUSED {
-            *name = positions.len() as u32;
-            positions.push(mesh.positions[*corner as usize]);
-        }
-        *corner = *name;
-    }
-    TriangleMesh { positions, triangles: mesh.triangles, ..TriangleMesh::default() }
 }
 
 /// Disjoint connected sets of vertices.
@@ -59,9 +44,9 @@ impl Clusters {
         Self { first: (0..cells.len()).map(|v| groups.find(v) as u32).collect() }
     }
 
-    /// Dissolves clusters with a vertex further from the mean along its normal.
+    /// Dissolves clusters with a vertex further than `furthest` from the mean along its normal.
     fn keep_flat(&mut self, mesh: &TriangleMesh, furthest: f32) {
-        let means = self.merge(mesh).positions;
+        let means = self.means(mesh);
         let normals = mesh.vertex_normals();
         let mut is_bent = vec![false; self.first.len()];
         for ((p, n), &c) in mesh.positions.iter().zip(&normals).zip(&self.first) {
@@ -97,16 +82,21 @@ impl Clusters {
         any
     }
 
-    fn merge(&self, mesh: &TriangleMesh) -> TriangleMesh {
-        let mut positions = vec![Vec3::ZERO; mesh.positions.len()];
+    /// The mean position of each cluster, at its lowest vertex.
+    fn means(&self, mesh: &TriangleMesh) -> Vec<Vec3> {
+        let mut means = vec![Vec3::ZERO; mesh.positions.len()];
         let mut members = vec![0u32; mesh.positions.len()];
         for (&p, &c) in mesh.positions.iter().zip(&self.first) {
-            positions[c as usize] += p;
+            means[c as usize] += p;
             members[c as usize] += 1;
         }
-        positions.iter_mut().zip(&members).filter(|(_, n)| **n > 0).for_each(|(p, &n)| *p /= n as f32);
+        means.iter_mut().zip(&members).filter(|(_, n)| **n > 0).for_each(|(p, &n)| *p /= n as f32);
+        means
+    }
+
+    fn merge(&self, mesh: &TriangleMesh) -> TriangleMesh {
         let triangles = mesh.triangles.iter().map(|&t| self.of(t)).filter(is_triangle).collect();
-        TriangleMesh { positions, triangles, ..TriangleMesh::default() }
+        TriangleMesh { positions: self.means(mesh), triangles, ..TriangleMesh::default() }
     }
 
     /// Dissolves the clusters at edges of more than two triangles, at vertices of less than three, and at triangles that turned far; returns
@@ -125,8 +115,8 @@ impl Clusters {
             if !is_triangle(&corners) {
                 continue;
             }
-            let before = normal(triangle.map(|v| mesh.positions[v as usize]));
-            let after = normal(corners.map(|v| merged.positions[v as usize]));
+            let before = area_vector(triangle.map(|v| mesh.positions[v as usize]));
+            let after = area_vector(corners.map(|v| merged.positions[v as usize]));
             if before.dot(after) < LARGEST_TURN * before.length() * after.length() {
                 corners.iter().for_each(|&v| is_wrong[v as usize] = true);
             }
@@ -137,10 +127,6 @@ impl Clusters {
 
 fn is_triangle([a, b, c]: &[u32; 3]) -> bool {
     a != b && b != c && c != a
-}
-
-fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
-    (b - a).cross(c - a)
 }
 
 /// The number of triangles at each vertex.

@@ -8,12 +8,12 @@ use crate::methods::MethodError;
 use crate::remesh::clustered;
 use crate::volume::{Grid, marching_cubes};
 
-/// δ in voxels below which clusters of a voxel would be too large.
+/// δ, in voxels, below which clusters the size of a voxel would be too coarse.
 const LEAST_SIDE: f32 = 0.7;
 
-/// How far, in voxels, a vertex may be from that which stands for it, along its normal. Without a bound a tube of radius 1.2
-/// had four sides.
-const FLAT: f32 = 0.15;
+/// The largest distance along its normal, in voxels, between a vertex and the mean of its cluster. Without this bound, a tube of radius 1.2
+/// became a square prism.
+const FLATNESS: f32 = 0.15;
 
 /// Which side of the iso value the object is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,15 +67,15 @@ pub(super) fn contour(
     Ok(placed(surface, position).without_parts_below(smallest_part))
 }
 
-/// A contour less the vertices that a mesh of edges of at least δ has no room for: one in a voxel is left, or in a cube of side δ where that
-/// is larger. It spares more than half of the edits that bring edges within bounds.
+/// A contour simplified by clustering: connected vertices in a voxel, or in a cube of side δ if that is larger, are merged. This saves more than
+/// half of the edits that bring edges within bounds.
 pub(super) fn simplified(contour: TriangleMesh, image: &LevelImage, delta: f32) -> TriangleMesh {
     let side = delta * image.voxels_per_unit();
-    if side < LEAST_SIDE || contour.triangles.is_empty() {
+    if side < LEAST_SIDE {
         return contour;
     }
     let side = if side > 1.0 { side } else { 1.0 };
-    clustered(&contour, FLAT / image.voxels_per_unit(), |p| (image.index(p) / side).round().as_ivec3())
+    clustered(&contour, FLATNESS / image.voxels_per_unit(), |p| (image.index(p) / side).round().as_ivec3())
 }
 
 /// The surface with its positions in the space of the model.

@@ -141,8 +141,8 @@ struct Keys {
     still: ScalarKey,
     /// The number of iterations since an edit made or displaced the vertex.
     calm: ScalarKey,
-    /// The number of times that the vertex turned back lately.
-    swings: ScalarKey,
+    /// The count of recent reversals of the velocity along the normal.
+    reversals: ScalarKey,
     /// The size of edges at the vertex, in δ, less 1.
     size: ScalarKey,
 }
@@ -211,7 +211,7 @@ impl DeformableModel {
             checked: mesh.add_vector(),
             still: mesh.add_scalar(),
             calm: mesh.add_scalar(),
-            swings: mesh.add_scalar(),
+            reversals: mesh.add_scalar(),
             size: mesh.add_scalar(),
         };
         let mut model = Self {
@@ -240,8 +240,7 @@ impl DeformableModel {
         model.watch_output();
         model.prepare_level()?;
         if model.from_contour {
-            model.resolve_contour()?;
-            model.rest.began_on_contour = true;
+            model.resolve_contour()?
         } else {
             model.reorder()
         }

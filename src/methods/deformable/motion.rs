@@ -35,11 +35,11 @@ const WAKING: f32 = 4.0;
 const BENDING_STIFFNESS: f32 = 1.3;
 const STRETCHING_STIFFNESS: f32 = 6.0;
 
-/// A vertex that turns back swings if its speed is more than this share of that before; with less it soon comes to rest by itself.
-const SWINGING: f32 = 0.5;
+/// A reversal of a vertex counts if it keeps more than this share of its speed; weaker oscillations decay by themselves.
+const UNDAMPED: f32 = 0.5;
 
-/// What an iteration in which a vertex goes on takes from its swings: those of up to eight iterations add up.
-const LESS_SWINGS: f32 = 0.25;
+/// The decay of the count of reversals in an iteration without one; so oscillations with periods of up to eight iterations are counted.
+const REVERSAL_DECAY: f32 = 0.25;
 
 /// External forces and constraints.
 pub(super) struct World<'a> {
@@ -116,23 +116,23 @@ impl Motion {
     /// Linearly implicit Euler with a long time step, v ← (m v + Δt f) / (m + Δt γ + Δt² k), for each vertex by itself; k is the stiffness of the
     /// forces against a move along the normal.
     ///
-    /// Vertices around a step of the image, or moved by edits again and again, would swing without end: with n swings a vertex takes the
-    /// (n + 1)-th part of its way, and settles at the mean (Kesten, *Accelerated stochastic approximation*, 1958).
+    /// Near steps of the image, or where edits displace them repeatedly, vertices would oscillate for ever. After n recent reversals a vertex
+    /// moves by 1/(n + 1) of its displacement, so it settles at the mean (Kesten, *Accelerated stochastic approximation*, 1958).
     fn implicit(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
         self.act(mesh, mesh.positions(), mesh.vector(keys.velocity), world);
         let &DeformableParams { mass, damping, rigidity, stiffness, .. } = world.params;
         let (step, mass, damping) = (world.params.step_length() as f32, mass as f32, damping as f32);
         let internal = BENDING_STIFFNESS * rigidity as f32 + STRETCHING_STIFFNESS * stiffness as f32;
         let pull = world.field.scale.pull();
-        let (velocities, swings) = mesh.vector_and_scalar_mut(keys.velocity, keys.swings);
+        let (velocities, reversals) = mesh.vector_and_scalar_mut(keys.velocity, keys.reversals);
         for i in self.awake.moving.iter().map(|v| v.index()) {
             let k = pull * self.forces.slope[i] + internal;
             let before = velocities[i];
             let velocity = (before * mass + self.forces.force[i] * step)
                 * (1.0 / (mass + step * damping + step * step * k));
             let normal = self.forces.normal[i];
-            swings[i] = count_swings(swings[i], before.dot(normal), velocity.dot(normal));
-            velocities[i] = velocity * (1.0 / (1.0 + swings[i]));
+            reversals[i] = count_reversals(reversals[i], before.dot(normal), velocity.dot(normal));
+            velocities[i] = velocity * (1.0 / (1.0 + reversals[i]));
             self.displacements[i] = velocities[i] * step;
         }
     }
@@ -237,13 +237,13 @@ impl Motion {
     }
 }
 
-/// The swings counted of a vertex whose speed along its normal was `before` and is to be `after`.
-fn count_swings(swings: f32, before: f32, after: f32) -> f32 {
+/// Updates the count of recent reversals of a vertex by its speeds along the normal before and after a step.
+fn count_reversals(reversals: f32, before: f32, after: f32) -> f32 {
     if before * after >= 0.0 {
-        return higher(swings - LESS_SWINGS, 0.0);
+        return higher(reversals - REVERSAL_DECAY, 0.0);
     }
-    let is_undamped = after.abs() > SWINGING * before.abs();
-    if is_undamped { swings + 1.0 } else { swings }
+    let is_undamped = after.abs() > UNDAMPED * before.abs();
+    if is_undamped { reversals + 1.0 } else { reversals }
 }
 
 /// Wakes a moving vertex and its neighbours.

@@ -39,7 +39,8 @@ pub(super) struct Rest {
     searches: u32,
     /// Whether edges have been sized.
     pub(super) sized: bool,
-    /// Whether the surface was on the contour when this level began, and is still to go there: no front has a way to go then.
+    /// Whether the surface was on the contour of this level at its beginning, and parameters have not changed since; then there are no
+    /// fronts to wait for.
     pub(super) began_on_contour: bool,
     /// The iteration after which this level began.
     pub(super) began: u32,
@@ -69,7 +70,7 @@ impl DeformableModel {
     /// Wakes all vertices after a change that may move them.
     pub(super) fn wake_all(&mut self) {
         self.mesh.scalar_mut(self.keys.still).fill(0.0);
-        self.mesh.scalar_mut(self.keys.swings).fill(0.0);
+        self.mesh.scalar_mut(self.keys.reversals).fill(0.0);
         self.rest = Rest { began: self.rest.began, ..Rest::default() };
     }
 
@@ -159,16 +160,11 @@ impl DeformableModel {
         let begin = (self.clock)();
         let renewal = if self.seeds_levels() { self.renewal()? } else { Renewal::default() };
         let seeds = renewal.fresh.component_count() as u32;
-        let (level, coarse, waiting) = (self.level, self.mesh.clone(), self.resolver.waiting());
-        let is_renewed = seeds > 0 && self.descend_renewed(&renewal).is_ok();
+        let is_renewed = seeds > 0 && self.try_to_renew(&renewal);
         times.add("renewal", (self.clock)() - begin);
         if is_renewed {
             return Ok(Changes { seeds, ..Changes::default() });
         }
-        let partly = std::mem::replace(&mut self.mesh, coarse);
-        self.mesh.count_on_from(&partly);
-        self.resolver.set_waiting(waiting);
-        self.level = level;
         self.descend_refined()?;
         self.reorder();
         self.mark_checked();
@@ -179,6 +175,19 @@ impl DeformableModel {
         Ok(changes)
     }
 
+    /// As [`Self::descend_renewed`]; if that fails, the model is as it was on this level.
+    fn try_to_renew(&mut self, renewal: &Renewal) -> bool {
+        let (level, coarse, waiting) = (self.level, self.mesh.clone(), self.resolver.waiting());
+        let is_renewed = self.descend_renewed(renewal).is_ok();
+        if !is_renewed {
+            let failed = std::mem::replace(&mut self.mesh, coarse);
+            self.mesh.count_on_from(&failed);
+            self.resolver.set_waiting(waiting);
+            self.level = level;
+        }
+        is_renewed
+    }
+
     /// Descends with some components replaced by parts of the finer contour, all of it resolved like a start.
     ///
     /// # Errors
@@ -186,12 +195,10 @@ impl DeformableModel {
     fn descend_renewed(&mut self, renewal: &Renewal) -> Result<(), MethodError> {
         renewal.stale.iter().for_each(|&v| _ = self.mesh.remove_component(v));
         self.descend_refined()?;
-        self.test_room_for(&renewal.fresh)?;
+        self.check_vertex_limit(&renewal.fresh)?;
         let added = self.mesh.append(&renewal.fresh)?;
         self.welcome(&added);
         self.resolve_contour()?;
-        // What stays began there, too, unless the run started elsewhere.
-        self.rest.began_on_contour = self.from_contour;
         self.mark_checked();
         Ok(())
     }

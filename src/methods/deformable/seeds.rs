@@ -72,7 +72,7 @@ impl DeformableModel {
     /// # Errors
     /// [`MethodError::TooManyVertices`]; nothing is added then.
     pub(super) fn add_components(&mut self, parts: &Mesh) -> Result<(Changes, Vec<VertexId>), MethodError> {
-        self.test_room_for(parts)?;
+        self.check_vertex_limit(parts)?;
         let sampling = self.sampling();
         let guard = self.resolver.guard(&self.mesh, sampling);
         let (mut added, crossing) = guard.append(&mut self.mesh, parts)?;
@@ -90,7 +90,11 @@ impl DeformableModel {
         Ok((Changes { seeds: count as u32, ..Changes::default() }, added))
     }
 
-    pub(super) fn test_room_for(&self, parts: &Mesh) -> Result<(), MethodError> {
+    /// Whether components can be added without exceeding the largest number of vertices.
+    ///
+    /// # Errors
+    /// [`MethodError::TooManyVertices`].
+    pub(super) fn check_vertex_limit(&self, parts: &Mesh) -> Result<(), MethodError> {
         let most = self.resolver.most_vertices();
         let fits = self.mesh.vertex_count() + parts.vertex_count() <= most;
         if fits { Ok(()) } else { Err(MethodError::TooManyVertices { most }) }
@@ -103,7 +107,7 @@ impl DeformableModel {
             self.mesh.vector_mut(keys.velocity)[v] = Vec3::ZERO;
             self.mesh.scalar_mut(keys.still)[v] = 0.0;
             self.mesh.scalar_mut(keys.calm)[v] = 0.0;
-            self.mesh.scalar_mut(keys.swings)[v] = 0.0;
+            self.mesh.scalar_mut(keys.reversals)[v] = 0.0;
             self.mesh.scalar_mut(keys.size)[v] = 0.0;
             let (positions, checked) = self.mesh.positions_and_vector_mut(keys.checked);
             checked[v] = positions[v];
