@@ -224,3 +224,47 @@ impl DeformableModel {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{DAffine3, Random, Vec3};
+    use crate::methods::deformable::DeformableOptions;
+    use crate::volume::{Space, Volume, VolumeInit, Voxels};
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// A ball in noise, of which single vertices move long after the rest has settled.
+    fn model() -> DeformableModel {
+        let n = 32;
+        let mut random = Random::new(1);
+        let mut voxel = |k: usize| {
+            let p = Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32) - 15.5;
+            (0.5 + 0.2 * (11.0 - p.length()) + 0.8 * (random.unit() as f32 - 0.5)).clamp(0.0, 1.0)
+        };
+        let volume = Volume::new(VolumeInit {
+            voxels: Voxels::F32((0..n * n * n).map(&mut voxel).collect()),
+            dims: [n, n, n, 1],
+            affine: DAffine3::IDENTITY,
+            slope: 1.0,
+            intercept: 0.0,
+            frame_seconds: 0.0,
+            space: Space::Ras,
+        })
+        .unwrap();
+        let params = DeformableParams { iso: 0.5, ..DeformableParams::for_volume(&volume) };
+        let options = DeformableOptions { params: Some(params), ..Default::default() };
+        DeformableModel::new(&volume, options).unwrap()
+    }
+
+    #[test]
+    fn the_fastest_vertex_counts_again_once_a_parameter_was_set() {
+        let mut model = model();
+        while !model.step().unwrap().done {}
+        assert!(model.movement.energy < model.params.energy_tolerance);
+        assert!(model.movement.fastest > model.rest_speed(), "nothing moved on: {}", model.movement.fastest);
+        model.set_params(model.params.clone()).unwrap();
+        while !model.step().unwrap().done {}
+        assert!(model.movement.fastest < model.rest_speed(), "{} at the end", model.movement.fastest);
+    }
+}
