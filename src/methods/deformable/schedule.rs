@@ -263,7 +263,7 @@ mod tests {
         while !model.step().unwrap().done {}
         assert!(model.movement.energy < model.params.energy_tolerance);
         assert!(model.movement.fastest > model.rest_speed(), "nothing moved on: {}", model.movement.fastest);
-        model.set_params(model.params.clone()).unwrap();
+        model.set_params(DeformableParams { iso: 0.3, ..model.params.clone() }).unwrap();
         while !model.step().unwrap().done {}
         assert!(model.movement.fastest < model.rest_speed(), "{} at the end", model.movement.fastest);
     }
