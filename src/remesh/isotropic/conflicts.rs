@@ -1,7 +1,7 @@
 //! Regions of the input surface where unchecked edits made triangles intersect.
 
 use crate::math::Vec3;
-use crate::mesh::{Mesh, VertexId, crossing_pairs};
+use crate::mesh::{Mesh, VertexId};
 use std::collections::BTreeSet;
 
 /// The radius around intersections in which the surface is left unchanged, in the target edge. With a smaller one edits beside it intersect
@@ -41,27 +41,10 @@ impl<'a> ConflictMask<'a> {
         wider
     }
 
-    /// Adds the surroundings of intersecting triangles of `mesh`; `anchor` gives a nearby vertex of the surface.
-    pub fn add_intersections(
-        &mut self,
-        mesh: &Mesh,
-        target_edge: f32,
-        anchor: impl Fn(VertexId) -> VertexId,
-    ) {
-        for v in intersecting_vertices(mesh) {
-            mark_around(self.surface, anchor(v), mesh.position(v), REACH * target_edge, &mut self.marked);
-        }
+    /// Adds the surroundings of a vertex of an intersecting triangle, at `position` near the vertex `anchor` of the surface.
+    pub fn add(&mut self, anchor: VertexId, position: Vec3, target_edge: f32) {
+        mark_around(self.surface, anchor, position, REACH * target_edge, &mut self.marked);
     }
-}
-
-/// The corners of all triangles that intersect another.
-fn intersecting_vertices(mesh: &Mesh) -> BTreeSet<VertexId> {
-    let triangles = mesh.to_triangles();
-    // Both are in slot order.
-    let names: Vec<VertexId> = mesh.vertices().collect();
-    let pairs = crossing_pairs(&triangles);
-    let corners = pairs.iter().flatten().flat_map(|&t| triangles.triangles[t as usize]);
-    corners.map(|v| names[v as usize]).collect()
 }
 
 /// Marks `seed` and the vertices connected to it within `reach` of `centre`.

@@ -7,8 +7,9 @@
 //! bounds (lower bounds may be violated where shape, topology or another sheet is in the way), no angle below 33°, and a surface within half
 //! an edge of the input.
 //!
-//! Edits are unchecked at first, since checks take most of the time and intersections are rare; the result is checked as a whole. A second
-//! run from the start leaves regions with intersections unchanged (`conflicts`); these are then remeshed with checked edits.
+//! Edits are unchecked at first, since checks take most of the time and intersections are rare; the result is checked as a whole. Sheets
+//! that intersect a little are separated, and remeshed there with checked edits (`conflicts`). Where that fails, another run from the start
+//! leaves the region unchanged for the checked edits.
 
 mod closest_point;
 mod conflicts;
@@ -45,8 +46,8 @@ const INPUT_TESTED: usize = 1;
 
 /// Brings edges within bounds and valences near six, preserving shape, components and χ; returns the changes made. Vertices are renumbered.
 ///
-/// Edges become about √(min max) long, and vertices lie on the input surface. No self-intersections are added; where the input has some,
-/// edges may stay out of bounds. Attributes are blended by collapses and splits; moves do not change them.
+/// Edges become about √(min max) long, and vertices lie on the input surface, or within a fifth of an edge of it where sheets would
+/// intersect otherwise. No self-intersections are added; where the input has some, edges may stay out of bounds. Attributes are blended by collapses and splits; moves do not change them.
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice as much;
@@ -81,13 +82,20 @@ fn in_bounds(mesh: &mut Mesh, bounds: EdgeBounds) -> Changes {
         let mut session = Session::new(&surface, target_edge, conflicts.complement(), Unchecked);
         let mut changes = rounds(mesh, bounds, &mut session);
         let mut embedding = followed(mesh, bounds.max);
-        if embedding.is_embedded(mesh) {
-            if !conflicts.is_empty() {
-                changes += rounds(mesh, bounds, &mut session.with(conflicts.dilated(target_edge), embedding));
+        let intersecting = embedding.crossing(mesh);
+        let is_separated = intersecting.is_empty() || embedding.separate(mesh, &intersecting);
+        let left_out = !conflicts.is_empty();
+        let near = if is_separated { intersecting } else { embedding.crossing(mesh) };
+        near.into_iter().for_each(|v| conflicts.add(session.anchor(v), mesh.position(v), target_edge));
+        if is_separated {
+            let mut checked = session.with(conflicts.dilated(target_edge), embedding);
+            if left_out {
+                changes += rounds(mesh, bounds, &mut checked);
+            } else if !conflicts.is_empty() {
+                changes += last_round(mesh, bounds, &mut checked);
             }
             return changes;
         }
-        conflicts.add_intersections(mesh, target_edge, |v| session.anchor(v));
         mesh.clone_from(&surface);
         if run == INPUT_TESTED && !followed(mesh, mesh.longest_edge()).is_embedded(mesh) {
             break;
@@ -117,7 +125,13 @@ fn rounds<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Sess
             break;
         }
     }
-    changes += pass(mesh, bounds, session);
+    changes += last_round(mesh, bounds, session);
+    changes
+}
+
+/// Brings the last edges within bounds, and improves the worst angles.
+fn last_round<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
+    let mut changes = pass(mesh, bounds, session);
     changes += improve_angles(mesh, bounds, session);
     changes
 }
