@@ -26,6 +26,9 @@ impl TriangleMesh {
     pub(crate) fn parts_where(&self, mut keeps: impl FnMut(u32) -> bool) -> Self {
         let mut slots = vec![u32::MAX; self.positions.len()];
         let mut kept = Self::default();
+        // As large as what they come from, without growing past it.
+        kept.positions.reserve_exact(self.positions.len());
+        kept.triangles.reserve_exact(self.triangles.len());
         for triangle in self.triangles.iter().filter(|t| keeps(t[0])) {
             kept.triangles.push(triangle.map(|v| {
                 let slot = &mut slots[v as usize];

@@ -9,6 +9,7 @@ use super::error::VolumeError;
 use super::{Grid, Volume};
 use crate::math::{DAffine3, Vec3};
 use crate::mesh::TriangleMesh;
+use std::collections::TryReserveError;
 
 /// Least distance of a vertex from the ends of its grid edge, in voxels. At 0 triangles around a voxel that equals
 /// the iso value have no area; much smaller and `f32` positions of a large volume fall together. The surface moves
@@ -45,6 +46,15 @@ pub fn marching_cubes(grid: &Grid, iso: f32) -> Result<TriangleMesh, VolumeError
         march.layer(z)?;
     }
     Ok(march.mesh)
+}
+
+/// Makes room for more elements, by a quarter at least: doubling the arrays of a large surface would take more memory than the rest of a run.
+fn grow<T>(vector: &mut Vec<T>, additional: usize) -> Result<(), TryReserveError> {
+    if vector.capacity() - vector.len() >= additional {
+        return Ok(());
+    }
+    let quarter = vector.len() / 4;
+    vector.try_reserve_exact(if additional > quarter { additional } else { quarter })
 }
 
 /// Maps positions to world, and turns triangles over where the map is a reflection.
@@ -145,7 +155,7 @@ impl<'a> March<'a> {
         if mesh.positions.len() + vertices > u32::MAX as usize {
             return Err(too_large);
         }
-        let room = mesh.positions.try_reserve(vertices).and_then(|()| mesh.triangles.try_reserve(triangles));
+        let room = grow(&mut mesh.positions, vertices).and_then(|()| grow(&mut mesh.triangles, triangles));
         room.map_err(|_| too_large)
     }
 
