@@ -73,7 +73,7 @@ use forces::{Field, ForceScale, Pull};
 use image::Pyramid;
 use motion::{Motion, Movement, World};
 use schedule::Rest;
-use start::Frame;
+use start::{Frame, on_contour};
 use std::ops::RangeInclusive;
 
 /// The setup of a [`DeformableModel`].
@@ -202,9 +202,15 @@ impl DeformableModel {
             sampling: Sampling::new(delta),
             may_be_empty: params.yields_to_image() && params.seeding != Seeding::Off,
         };
-        let mut mesh = {
-            let guide = contact::guide(frame.image, frame.iso, &params);
-            options.start.make(&frame, |value| pyramid.normalised(value), &*guide)?
+        let from_contour = options.start == Start::Contour;
+        let contour = if from_contour { on_contour(&frame)? } else { None };
+        let begins_on_contour = contour.is_some();
+        let mut mesh = match contour {
+            Some(mesh) => mesh,
+            None => {
+                let guide = contact::guide(frame.image, frame.iso, &params);
+                options.start.make(&frame, |value| pyramid.normalised(value), &*guide)?
+            }
         };
         let keys = Keys {
             velocity: mesh.add_vector(),
@@ -222,7 +228,7 @@ impl DeformableModel {
             voxel,
             params,
             attractors: Vec::new(),
-            from_contour: options.start == Start::Contour,
+            from_contour,
             finest_delta,
             level: options.levels,
             level_iso: 0.0,
@@ -239,7 +245,7 @@ impl DeformableModel {
         };
         model.watch_output();
         model.prepare_level()?;
-        if model.from_contour {
+        if begins_on_contour {
             model.resolve_contour()?
         } else {
             model.reorder()

@@ -234,16 +234,10 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// A ball in noise, of which single vertices move long after the rest has settled.
-    fn model() -> DeformableModel {
-        let n = 32;
-        let mut random = Random::new(1);
-        let mut voxel = |k: usize| {
-            let p = Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32) - 15.5;
-            (0.5 + 0.2 * (11.0 - p.length()) + 0.8 * (random.unit() as f32 - 0.5)).clamp(0.0, 1.0)
-        };
-        let volume = Volume::new(VolumeInit {
-            voxels: Voxels::F32((0..n * n * n).map(&mut voxel).collect()),
+    fn volume(n: usize, mut value: impl FnMut(Vec3) -> f32) -> Volume {
+        let at = |k: usize| Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32);
+        Volume::new(VolumeInit {
+            voxels: Voxels::F32((0..n * n * n).map(|k| value(at(k))).collect()),
             dims: [n, n, n, 1],
             affine: DAffine3::IDENTITY,
             slope: 1.0,
@@ -251,10 +245,31 @@ mod tests {
             frame_seconds: 0.0,
             space: Space::Ras,
         })
-        .unwrap();
+        .unwrap()
+    }
+
+    /// A ball in noise, of which single vertices move long after the rest has settled.
+    fn model() -> DeformableModel {
+        let mut random = Random::new(1);
+        let volume = volume(32, |p| {
+            let ball = 0.5 + 0.2 * (11.0 - (p - 15.5).length());
+            (ball + 0.8 * (random.unit() as f32 - 0.5)).clamp(0.0, 1.0)
+        });
         let params = DeformableParams { iso: 0.5, ..DeformableParams::for_volume(&volume) };
         let options = DeformableOptions { params: Some(params), ..Default::default() };
         DeformableModel::new(&volume, options).unwrap()
+    }
+
+    /// Without a contour the run starts from a surface around the image, which has far to go.
+    #[test]
+    fn only_a_start_on_the_contour_begins_on_it() {
+        let speck = volume(32, |p| if (p - 15.5).length() < 2.0 { 1.0 } else { 0.0 });
+        for (iso, on_contour) in [(0.9, false), (0.05, true)] {
+            let params = DeformableParams { iso, smallest_part: 0.0, ..DeformableParams::of_paper(&speck) };
+            let options = DeformableOptions { levels: 2, params: Some(params), ..Default::default() };
+            let model = DeformableModel::new(&speck, options).unwrap();
+            assert_eq!(model.rest.began_on_contour, on_contour, "iso {iso}");
+        }
     }
 
     #[test]

@@ -91,7 +91,7 @@ const MOST_RUNS: usize = 2;
 const MOST_CALLS: usize = 20;
 
 impl Start {
-    /// The start mesh with its edges within bounds, and no two parts in contact; of a contour, as it is in the image.
+    /// The start mesh with its edges within bounds, and no two parts in contact; for a contour, what replaces an empty one.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] where a sphere is too small for the sampling or two overlap, or the iso-surface
@@ -103,8 +103,7 @@ impl Start {
         guide: &dyn TopologyGuide,
     ) -> Result<Mesh, MethodError> {
         let mut mesh = match self {
-            Self::Contour => return on_contour(frame),
-            Self::Enclosing => enclosing(frame)?,
+            Self::Contour | Self::Enclosing => enclosing(frame)?,
             Self::Bubbles(n) => bubbles(frame, *n)?,
             Self::Seeds { points, radius } => seeds(frame, points, *radius)?,
             Self::MarchingCubes(value) => iso_surface(frame, iso(*value))?,
@@ -341,17 +340,14 @@ fn largest(spacing: [f64; 3]) -> f64 {
     spacing.into_iter().fold(0.0, f64::max)
 }
 
-/// The contour that the model looks for, of the level it starts on.
-fn on_contour(frame: &Frame) -> Result<Mesh, MethodError> {
+/// The contour that the model looks for, of the level it starts on; `None` where there is none, and finer levels are not searched.
+pub(super) fn on_contour(frame: &Frame) -> Result<Option<Mesh>, MethodError> {
     let surface = contour(frame.image, frame.iso, frame.object, frame.smallest_part)?;
-    match (surface.triangles.is_empty(), frame.may_be_empty) {
-        (false, _) => {
-            let surface = simplified(surface, frame.image, frame.sampling.shortest());
-            Ok(Mesh::from_triangles(&surface)?)
-        }
-        (true, true) => Ok(Mesh::default()),
-        (true, false) => enclosing(frame),
+    if surface.triangles.is_empty() {
+        return Ok(frame.may_be_empty.then(Mesh::default));
     }
+    let surface = simplified(surface, frame.image, frame.sampling.shortest());
+    Ok(Some(Mesh::from_triangles(&surface)?))
 }
 
 fn iso_surface(frame: &Frame, iso: f32) -> Result<Mesh, MethodError> {
