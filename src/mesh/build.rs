@@ -228,8 +228,8 @@ const ICOSAHEDRON_CORNERS: [[f32; 3]; 12] = [
     [-2.0, 0.0, -1.0],
     [-2.0, 0.0, 1.0],
 ];
-/// The one-rings of the vertices of an icosahedron, counter-clockwise seen from outside.
 
+/// The one-rings of the vertices of an icosahedron, counter-clockwise seen from outside.
 const ICOSAHEDRON_RINGS: [[u32; 5]; 12] = [
     [11, 5, 1, 7, 10],
     [5, 9, 8, 7, 0],
