@@ -38,7 +38,7 @@ export interface DeformableParams {
   timeStep?: number;
   /** Largest displacement of a vertex in one iteration, as a fraction of δ. */
   maxMove?: number;
-  /** Kinetic energy below which a level has converged, ε. */
+  /** Mean kinetic energy along the normals below which a level has converged, ε. */
   energyTolerance?: number;
   /** Whether the surface may split and merge. */
   topology?: 'adaptive' | 'fixed';
