@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
-/// Numbers of edits, by the papers' names.
+/// Numbers of edits made to a mesh in one call, named as in the papers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Changes {
     /// Edges split.
@@ -16,14 +16,14 @@ pub struct Changes {
     pub axial: u32,
     /// Necks cut.
     pub annular: u32,
-    /// Components added for parts that the mesh left out.
+    /// Components added for regions of the image that the mesh does not cover.
     pub seeds: u32,
-    /// Components that vanished.
+    /// Components removed.
     pub vanished: u32,
 }
 
 impl Changes {
-    /// Whether topology changed, not only sampling.
+    /// Returns whether any edit changed the topology, not only the sampling.
     pub fn changed_topology(self) -> bool {
         self.axial + self.annular + self.seeds + self.vanished > 0
     }
