@@ -133,8 +133,8 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * Current ellipsoids, between their previous positions and their goals; a copy. Removed ellipsoids that are still
-   * shrinking are not among them.
+   * Current ellipsoids, between their previous positions and their goals; a copy. Removed ones that are still shrinking
+   * come last.
    */
   get ellipsoids(): ControlEllipsoid[] {
     return unpackedEllipsoids(this.#handle.use((raw) => raw.ellipsoids()));
@@ -172,9 +172,9 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * Sets new goals for the ellipsoids, by index; each step moves them by half a semi-axis. Additional ellipsoids grow
-   * from size zero, or out of the nearest existing one if they lie outside the surface; those omitted shrink and
-   * vanish.
+   * Sets new goals for the ellipsoids, by index; each step moves them by at most half of their shortest semi-axis.
+   * Additional ellipsoids grow from a fraction of their size, or out of the nearest existing one if they lie outside the
+   * surface; those omitted shrink and vanish.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the ellipsoid; nothing has changed then.
    */

@@ -27,15 +27,15 @@ export type FunctionName = Exclude<
 /** Any object of the library, as it exists in the worker. */
 export type Own = Library[ClassName]['prototype'];
 
-/** A {@link vesicle.Volume} in the worker. */
+/** A `Mesh` of the library, in the worker. */
 export interface Volume extends Remote<vesicle.Volume> {}
-/** A {@link vesicle.Mesh} in the worker. */
+/** A `DeformableModel` of the library, in the worker. */
 export interface Mesh extends Remote<vesicle.Mesh> {}
-/** A {@link vesicle.DeformableModel} in the worker. */
+/** An `ImplicitSurface` of the library, in the worker. */
 export interface DeformableModel extends Remote<vesicle.DeformableModel> {}
-/** An {@link vesicle.ImplicitSurface} in the worker. */
+/** A `MultiresolutionModel` of the library, in the worker. */
 export interface ImplicitSurface extends Remote<vesicle.ImplicitSurface> {}
-/** A {@link vesicle.MultiresolutionModel} in the worker. */
+/** A `SurfaceTracker` of the library, in the worker. */
 export interface MultiresolutionModel extends Remote<vesicle.MultiresolutionModel> {}
 /** A {@link vesicle.SurfaceTracker} in the worker. */
 export interface SurfaceTracker extends Remote<vesicle.SurfaceTracker> {}

@@ -26,8 +26,8 @@
  *
  * **Runs.** `run({ signal, onStep })` calls `onStep` on the page, with reports of finished steps while the worker
  * continues. When the signal aborts, or `onStep` throws, the worker stops after its current step, so it may be some
- * steps ahead of the last report; the promise then rejects with `signal.reason`, or with the error thrown. `coverage({
- * signal, onProgress })` works the same way.
+ * steps ahead of the last report; the promise then rejects with `signal.reason`, or with the error thrown.
+ * `coverage({ signal, onProgress })` works the same way.
  *
  * **Arrays.** Typed arrays are copied, once; {@link transfer} transfers them instead. Those of results are transferred
  * by the worker. `mesh.copyTo(out)` transfers the buffers of `out` there and back: `out` has empty arrays until the
