@@ -75,7 +75,7 @@ pub(super) fn gain(
     [turned / stiffness, rigid].into_iter().fold(MOST_GAIN, f32::min).max(1.0)
 }
 
-/// Returns the rest of a level's factor `gain` on α_I after a number of iterations on that level.
+/// Returns the factor on α_I that is left of a level's `gain` after a number of iterations on that level.
 pub(super) fn left_of(gain: f32, iterations: u32) -> f32 {
     let times = iterations.saturating_sub(FULL).div_ceil(HALVED);
     // Eight halvings reduce any gain up to 256 to 1.

@@ -27,8 +27,8 @@ const BLUR: f32 = 0.15;
 /// voxels.
 const WITHIN: f32 = 0.35;
 
-/// A topology guide that allows only changes that agree with the image: sheets are joined where there is no object or
-/// no background between them, necks are cut where the image separates the parts.
+/// A topology guide that allows only changes that agree with the image: sheets are joined where all between them is
+/// object (a gap) or background (a wall), and necks are cut where the image separates the parts.
 #[derive(Clone, Copy)]
 pub(super) struct ImageGuide<'a> {
     pub(super) image: &'a LevelImage,
@@ -56,7 +56,7 @@ impl<'a> ImageGuide<'a> {
     }
 
     /// Returns the largest difference of intensity over [`BLUR`] along the normals of some vertices. It vanishes inside
-    /// object or background; on the contour it is what a settled vertex may be off by.
+    /// object or background; on the contour it is the tolerance for settled vertices off the contour.
     fn tolerance(&self, mesh: &Mesh, vertices: &[VertexId]) -> f32 {
         vertices.iter().fold(0.0, |most, &v| {
             let (p, half) = (mesh.position(v), mesh.area_normal(v).normalize_or_zero() * 0.5);
@@ -79,9 +79,9 @@ pub(super) fn guide<'a>(
 }
 
 impl TopologyGuide for ImageGuide<'_> {
-    /// Across a gap, where the outward sides of the vertices face each other, if all samples in between are object;
-    /// across a wall, where their inward sides do, if all are background. Two vertices that do not face each other are
-    /// on one sheet.
+    /// Allows a tube across a gap, where the outward sides of the vertices face each other, if all samples in between
+    /// are object; and across a wall, where their inward sides do, if all are background. Two vertices that do not face
+    /// each other are on one sheet and are not joined.
     fn may_join(&self, mesh: &Mesh, [u, v]: [VertexId; 2]) -> bool {
         let (p, way) = (mesh.position(u), mesh.position(v) - mesh.position(u));
         let [m, n] = [u, v].map(|w| way.normalize_or_zero().dot(mesh.area_normal(w).normalize_or_zero()));
@@ -93,7 +93,7 @@ impl TopologyGuide for ImageGuide<'_> {
         self.are_all(is_gap, &SAMPLES.map(|share| p + way * share), self.tolerance(mesh, &[u, v]))
     }
 
-    /// A strand may be cut if its middle is background, a tunnel if its middle is object.
+    /// Allows a cut through a strand if its middle is background, and through a tunnel if its middle is object.
     fn may_cut(&self, mesh: &Mesh, ring: [VertexId; 3]) -> bool {
         let corners = ring.map(|w| mesh.position(w));
         let middle = (corners[0] + corners[1] + corners[2]) * (1.0 / 3.0);
@@ -103,7 +103,7 @@ impl TopologyGuide for ImageGuide<'_> {
         self.are_all(!is_strand, &[middle], self.tolerance(mesh, &ring))
     }
 
-    /// An edge through a wall or across a gap may not be collapsed if the image confirms the wall or the gap: the two
+    /// Forbids collapsing an edge through a wall or across a gap if the image confirms the wall or the gap: the two
     /// sides would merge, and at a rim the next pair of vertices, too.
     fn may_collapse(&self, mesh: &Mesh, [u, v]: [VertexId; 2]) -> bool {
         let [m, n] = [u, v].map(|w| mesh.area_normal(w).normalize_or_zero());
