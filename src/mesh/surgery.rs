@@ -8,7 +8,7 @@ use crate::math::Vec3;
 /// The two triangles that cap the surface after [`Mesh::cut`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {
-    /// The original vertices, which now bound the left side of the directed cycle.
+    /// The original vertices, which bound the left side of the directed cycle.
     pub kept: [VertexId; 3],
     /// Their copies, in the same order, which bound the right side.
     pub copies: [VertexId; 3],
@@ -105,8 +105,8 @@ impl Mesh {
         Ok(Joint { first, second })
     }
 
-    /// Opens a hole around `centre`: inserts a rim of new vertices on its edges, deletes it, and returns the rim in the
-    /// order of its ring.
+    /// Opens a hole around `centre`: inserts a rim of new vertices on its edges, deletes `centre`, and returns the rim in
+    /// the order of its ring.
     ///
     /// ```text
     ///   n1-----n0             n1-----n0

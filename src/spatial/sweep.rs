@@ -9,16 +9,16 @@
 use super::vertex_grid::{Proximity, VertexBall};
 use crate::math::order::{by_both, rank, sort_by_rank};
 
-/// The bound of the radii in the first class, in median radii. If smaller, the few long edges of an ordinary mesh need
-/// a class of their own; if larger, they make all columns of the first class wide.
+/// The radius bound of the first class, as a multiple of the median radius. If smaller, the few long edges of an
+/// ordinary mesh need a class of their own; if larger, they make all columns of the first class wide.
 const FIRST: f32 = 1.6;
 
 /// The ratio of the radius bounds of consecutive classes. If smaller, there are more classes; if larger, more pairs are
 /// tested and rejected.
 const FACTOR: f32 = 4.0;
 
-/// The width of columns, in search distances of their class; above 1, so that balls in non-adjacent columns are out of
-/// reach in spite of rounding.
+/// The width of columns, as a multiple of the search distance of their class; above 1, so that balls in non-adjacent
+/// columns are out of reach in spite of rounding.
 const WIDER: f64 = 1.001;
 
 /// The largest absolute column index, so that adjacent indices do not overflow. At this distance from the origin,
@@ -100,8 +100,7 @@ impl Width {
     }
 }
 
-/// Returns the largest integer not above `x`. `f64::floor` is slow if compiled for processors older than the actual
-/// one.
+/// Returns the largest integer not above `x`; faster than `f64::floor` when compiled for an older instruction set.
 #[inline]
 fn floor(x: f64) -> i32 {
     let whole = x as i32;

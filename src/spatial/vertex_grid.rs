@@ -232,7 +232,7 @@ impl VertexGrid {
     }
 
     /// Calls `found` with every vertex whose distance from the box, in each axis, is at most `share` times its longest
-    /// edge, and with some vertices slightly further away.
+    /// edge, and with some vertices further away.
     ///
     /// With a share of 1/√3, these include a corner of every triangle that intersects the box: no point of a triangle
     /// is further from its nearest corner, relative to the longest edge.
@@ -241,14 +241,14 @@ impl VertexGrid {
         self.search(bounds, radius, &mut |ball: &VertexBall| found(ball.vertex));
     }
 
-    /// Calls `found` with every vertex within `radius` of `p`, and with some vertices slightly further away.
+    /// Calls `found` with every vertex within `radius` of `p`, and with some vertices further away.
     pub fn near_point(&self, p: Vec3, radius: f32, mut found: impl FnMut(VertexId)) {
         let point = Bounds { min: p, max: p };
         self.search(&point, |_| radius, &mut |ball: &VertexBall| found(ball.vertex));
     }
 
     /// Collects into `found` the balls near a box of query vertices whose longest edges are at most `longest`: all
-    /// whose distance from the box, in each axis, is at most [`Proximity::between`], and some slightly further away.
+    /// whose distance from the box, in each axis, is at most [`Proximity::between`], and some further away.
     pub fn near_balls(&self, bounds: &Bounds, longest: f32, near: Proximity, found: &mut Vec<VertexBall>) {
         found.clear();
         let radius = |other: f32| near.between(longest, other + 2.0 * self.blur) + self.blur;
@@ -261,8 +261,8 @@ impl VertexGrid {
         self.entries[v.index()].key
     }
 
-    /// Calls `found` with every vertex that may be within `radius` of the box, in each axis. `radius` is a function of the
-    /// longest edge; with cells filled, it is evaluated only for the largest ball of each level.
+    /// Calls `found` with every vertex that may be within `radius` of the box, in each axis. `radius` is a function of
+    /// the longest edge; with cells filled, it is evaluated only for the largest ball of each level.
     #[inline]
     fn search(&self, bounds: &Bounds, radius: impl Fn(f32) -> f32, found: &mut impl FnMut(&VertexBall)) {
         if !self.filled {
@@ -353,8 +353,7 @@ impl VertexGrid {
     }
 }
 
-/// Returns the largest integer not above `x`. `f32::floor` is slow if compiled for processors older than the actual
-/// one.
+/// Returns the largest integer not above `x`; faster than `f32::floor` when compiled for an older instruction set.
 #[inline]
 fn floor(x: f32) -> i32 {
     let whole = x as i32;
