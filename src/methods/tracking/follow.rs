@@ -149,7 +149,8 @@ impl Follower {
     }
 
     /// Corrects the bias of the fitted planes on curved surfaces: a plane lies on the inner side by the variance of the
-    /// points along it, R²/8 for θ = exp(−4r²/R²), times the mean curvature. Vertices move outwards by as much.
+    /// points along it, R²/8 for θ = exp(−4r²/R²), times the mean curvature. Vertices move along their normals by as
+    /// much, outwards where the surface is convex.
     fn unbend(&mut self, mesh: &mut Mesh, going: &Going, facts: &mut FrameFacts) {
         let spread = (going.params.radius * going.params.radius / 8.0) as f32;
         let most = (MOST_UNBENT * going.region.spacing.min_element()) as f32;
