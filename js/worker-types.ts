@@ -27,17 +27,17 @@ export type FunctionName = Exclude<
 /** Any object of the library, as it exists in the worker. */
 export type Own = Library[ClassName]['prototype'];
 
-/** A `Mesh` of the library, in the worker. */
+/** A `Volume` of the library, in the worker. */
 export interface Volume extends Remote<vesicle.Volume> {}
-/** A `DeformableModel` of the library, in the worker. */
+/** A `Mesh` of the library, in the worker. */
 export interface Mesh extends Remote<vesicle.Mesh> {}
-/** An `ImplicitSurface` of the library, in the worker. */
+/** A `DeformableModel` of the library, in the worker. */
 export interface DeformableModel extends Remote<vesicle.DeformableModel> {}
-/** A `MultiresolutionModel` of the library, in the worker. */
+/** An `ImplicitSurface` of the library, in the worker. */
 export interface ImplicitSurface extends Remote<vesicle.ImplicitSurface> {}
-/** A `SurfaceTracker` of the library, in the worker. */
+/** A `MultiresolutionModel` of the library, in the worker. */
 export interface MultiresolutionModel extends Remote<vesicle.MultiresolutionModel> {}
-/** A {@link vesicle.SurfaceTracker} in the worker. */
+/** A `SurfaceTracker` of the library, in the worker. */
 export interface SurfaceTracker extends Remote<vesicle.SurfaceTracker> {}
 /** Interface that all four models in the worker implement. */
 export interface Stepper extends Remote<vesicle.Stepper> {}
