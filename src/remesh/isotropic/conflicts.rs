@@ -1,21 +1,21 @@
-//! Regions of the input surface where unchecked edits made triangles intersect.
+//! Regions of the input surface where unchecked edits caused self-intersections.
 
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId, crossing_pairs};
 use std::collections::BTreeSet;
 
-/// The radius around intersections in which the surface is left unchanged, in the target edge. With a smaller one edits beside it intersect
-/// in the next run; a larger one needs more checked edits.
+/// The radius around intersections in which the surface is left unchanged, in units of the target edge. With a smaller
+/// one, edits next to the region cause intersections in the next run; a larger one needs more checked edits.
 const REACH: f32 = 3.0;
 
-/// A set of vertices of the input surface.
+/// The set of vertices of the input surface near self-intersections found so far, which the next run leaves unchanged.
 pub(super) struct ConflictMask<'a> {
     surface: &'a Mesh,
     marked: Vec<bool>,
 }
 
 impl<'a> ConflictMask<'a> {
-    /// The empty set.
+    /// Creates an empty set.
     pub fn new(surface: &'a Mesh) -> Self {
         Self { surface, marked: vec![false; surface.slots()] }
     }
@@ -24,12 +24,12 @@ impl<'a> ConflictMask<'a> {
         !self.marked.contains(&true)
     }
 
-    /// The complement, by slot.
+    /// Returns the complement of the set, by slot.
     pub fn complement(&self) -> Vec<bool> {
         self.marked.iter().map(|marked| !marked).collect()
     }
 
-    /// The set dilated by `reach` along the surface, by slot.
+    /// Returns the set dilated by `reach` along the surface, by slot.
     pub fn dilated(&self, reach: f32) -> Vec<bool> {
         let mut wider = self.marked.clone();
         let is_marked = |v: VertexId| self.marked[v.index()];
@@ -41,7 +41,7 @@ impl<'a> ConflictMask<'a> {
         wider
     }
 
-    /// Adds the surroundings of intersecting triangles of `mesh`; `anchor` gives a nearby vertex of the surface.
+    /// Adds the vertices near intersecting triangles of `mesh`; `anchor` returns a nearby vertex of the input surface.
     pub fn add_intersections(
         &mut self,
         mesh: &Mesh,
@@ -54,7 +54,7 @@ impl<'a> ConflictMask<'a> {
     }
 }
 
-/// The corners of all triangles that intersect another.
+/// Returns the corners of all triangles that intersect another.
 fn intersecting_vertices(mesh: &Mesh) -> BTreeSet<VertexId> {
     let triangles = mesh.to_triangles();
     // Both are in slot order.
