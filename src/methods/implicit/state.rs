@@ -62,7 +62,7 @@ struct Surface {
 }
 
 impl ImplicitSurface {
-    /// Returns the run as bytes, without points and options, to continue from with [`Self::restore`].
+    /// Returns the run as bytes for [`Self::restore`], without points and options.
     pub fn save(&self) -> Vec<u8> {
         let mesh = &self.mesh;
         sealed(
