@@ -10,8 +10,7 @@ use crate::mesh::{Mesh, VertexId, curvature, measure};
 use crate::remesh::{Changes, EdgeBounds, Embedding, restructure};
 use serde::{Deserialize, Serialize};
 
-/// Smoothing passes over the mesh for predictions and curvature corrections: without them, predictions increase the
-/// error.
+/// Smoothing passes over the mesh for predictions and curvature corrections: raw, either is worse than none.
 const SMOOTHINGS: usize = 5;
 
 /// Largest curvature correction of a vertex, in the shortest side of a voxel; larger ones occur at sharp corners.
