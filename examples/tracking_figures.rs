@@ -1,14 +1,14 @@
 //! Figures of slice enrichment and tracking.
 //!
 //! - `<files>`: errors of enrichment on slices left out, of the 4D volumes named and of a synthetic heart.
-//! - `CENTER=x,y,z,mm <files>`: tracks the surface nearest to a voxel, in a box that extends `mm` world units from it on
-//!   all sides. `LARGEST=1` tracks the largest surface in the box instead; `OUT=<folder>` writes the meshes as PLY.
-//! - `TRACK=<beats>`: tracks a synthetic heart of the paper's size and compares it with its truth; `TRACK=small` one of a
-//!   few voxels.
+//! - `CENTER=x,y,z,mm <files>`: tracks the surface nearest to a voxel, in a box that extends `mm` world units from it
+//!   on all sides. `LARGEST=1` tracks the largest surface in the box instead; `OUT=<folder>` writes the meshes as PLY.
+//! - `TRACK=<beats>`: tracks a synthetic heart of the paper's size and compares it with its truth; `TRACK=small` one of
+//!   a few voxels.
 //!
-//! Parameters of the tracker are `TH`, `RADIUS` and `SCALE` (these two in pixels for `TRACK`) and, for `TRACK`, `FRAMES`
-//! and `PREDICTION=0` (none); `PLAIN=1` skips enrichment for `TRACK`. For files, `BOX=<first and last voxel>` gives the
-//! box, and `BIN=<n>` first averages blocks of n × n voxels in each slice.
+//! Parameters of the tracker are `TH`, `RADIUS` and `SCALE` (these two in pixels for `TRACK`) and, for `TRACK`,
+//! `FRAMES` and `PREDICTION=0` (none); `PLAIN=1` skips enrichment for `TRACK`. For files, `BOX=<first and last voxel>`
+//! gives the box, and `BIN=<n>` first averages blocks of n × n voxels in each slice.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program for the terminal")]
 
 #[path = "../tests/common/mod.rs"]

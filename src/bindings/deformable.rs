@@ -56,7 +56,7 @@ impl RawStart {
     }
 }
 
-/// A deformable model, shared with its live mesh.
+/// Handle of a deformable model, which it shares with its live mesh.
 #[wasm_bindgen]
 pub struct RawDeformable(Rc<RefCell<DeformableModel>>);
 

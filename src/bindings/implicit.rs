@@ -74,7 +74,7 @@ impl RawCameras {
     }
 }
 
-/// An implicit surface, shared with its live mesh.
+/// Handle of an implicit surface, which it shares with its live mesh.
 #[wasm_bindgen]
 pub struct RawImplicit(Rc<RefCell<ImplicitSurface>>);
 

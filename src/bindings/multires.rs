@@ -15,7 +15,7 @@ use crate::methods::multires::{
     ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, param_specs,
 };
 
-/// A multiresolution model, shared with its live meshes.
+/// Handle of a multiresolution model, which it shares with its live meshes.
 #[wasm_bindgen]
 pub struct RawMultires(Rc<RefCell<MultiresolutionModel>>);
 

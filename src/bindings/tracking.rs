@@ -18,7 +18,7 @@ use crate::methods::tracking::{
     Bounds, Component, FrameFacts, SurfaceTracker, TrackingOptions, TrackingParams, param_specs,
 };
 
-/// A surface tracker, shared with its live mesh.
+/// Handle of a surface tracker, which it shares with its live mesh.
 #[wasm_bindgen]
 pub struct RawTracker(Rc<RefCell<SurfaceTracker>>);
 
@@ -120,7 +120,7 @@ impl RawTracker {
         self.0.borrow().volumes()
     }
 
-    /// Returns further results: the image noise, the closure error of a cycle, and the facts of each frame.
+    /// Returns further results: the image noise, the closure error of a cycle, and the statistics of each frame.
     pub fn facts(&self) -> Result<JsValue, JsValue> {
         let tracker = self.0.borrow();
         let facts = Facts { noise: tracker.noise(), closing: tracker.closing(), frames: tracker.facts() };

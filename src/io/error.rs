@@ -10,7 +10,7 @@ pub enum FormatError {
         format: &'static str,
         /// Header field or part of the file.
         field: String,
-        /// What was found and what is accepted.
+        /// The value found, and the values accepted.
         problem: String,
     },
     /// The file is valid, but uses a feature that the reader does not support.
@@ -20,9 +20,9 @@ pub enum FormatError {
         format: &'static str,
         /// Header field or part of the file.
         field: String,
-        /// What the file uses.
+        /// Feature that the file uses.
         found: String,
-        /// What can be read.
+        /// Alternatives that are supported.
         accepted: &'static str,
     },
     /// The file ends too early.
@@ -37,7 +37,7 @@ pub enum FormatError {
         /// Number of bytes present.
         found: u64,
     },
-    /// The content does not fit into memory.
+    /// The content does not fit in memory.
     #[error("{format}: {field}: needs {needed} bytes, more than can be had")]
     TooLarge {
         /// Name of the file format.

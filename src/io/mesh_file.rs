@@ -124,7 +124,7 @@ pub(super) fn is_text(bytes: &[u8]) -> bool {
     !bytes.iter().take(4096).any(|&b| b < b' ' && !b.is_ascii_whitespace() && b != 0x0b)
 }
 
-/// Returns the error for bytes in no accepted format, which names the format if it can be told.
+/// Returns the error for bytes in no accepted format, which names the format if it is recognised.
 fn unknown(bytes: &[u8]) -> FormatError {
     const ACCEPTED: &str = "GLB, PLY, STL and OBJ";
     let unsupported = |found: &str| FormatError::unsupported("mesh file", "format", found, ACCEPTED);

@@ -23,7 +23,7 @@ pub(super) fn is_metaimage(bytes: &[u8]) -> bool {
         .any(|key| start.strip_prefix(*key).is_some_and(|rest| rest.trim_ascii_start().starts_with(b"=")))
 }
 
-/// Reads a volume; `detached` is the payload if the header refers to a data file.
+/// Reads a MetaImage volume; `detached` is the payload if the header refers to a data file.
 ///
 /// # Errors
 /// [`FormatError`] naming the header field.

@@ -36,7 +36,7 @@ fn version(four: [u8; 4]) -> Option<(u8, bool)> {
     little.or_else(|| known(u32::from_be_bytes(four)).map(|v| (v, true)))
 }
 
-/// Reads a volume; `detached` is the .img of a pair. Either may be gzipped.
+/// Reads a NIfTI volume; `detached` is the .img file of a pair. Either may be gzipped.
 ///
 /// # Errors
 /// [`FormatError`] naming the header field.

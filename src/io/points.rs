@@ -35,10 +35,10 @@ pub struct PointCloud {
 /// Without names, the number of columns determines their meaning:
 ///
 /// - three columns: x y z;
-/// - four: x y z and an intensity, which is passed over;
-/// - six: x y z and normals where all are of unit length within 1 %, else colours;
+/// - four: x y z and an intensity, which is ignored;
+/// - six: x y z and normals if all are of unit length within 1 %, else colours;
 /// - seven: x y z, an intensity, a colour;
-/// - nine: x y z, a colour and a normal, or the normal first: again, normals are of unit length.
+/// - nine: x y z, a colour and a normal, or the normal first; normals are again recognised by their unit length.
 ///
 /// Lines `p x y z` are points as well; between them, only lines that start with `d`, `s` or `g` are allowed, and
 /// ignored.

@@ -83,6 +83,7 @@ pub(super) fn parse_text(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     Ok(from_corners(corners))
 }
 
+/// Parses the coordinates of a vertex line.
 fn text_point<'a>(words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<Vec3, FormatError> {
     let mut numbers = words.map(|word| std::str::from_utf8(word).ok()?.parse::<f32>().ok());
     let mut next = || numbers.next().flatten();

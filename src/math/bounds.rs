@@ -7,9 +7,9 @@ use smallvec::SmallVec;
 /// A closed axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// The lowest corner.
+    /// Corner with the smallest coordinates.
     pub min: Vec3,
-    /// The highest corner.
+    /// Corner with the largest coordinates.
     pub max: Vec3,
 }
 

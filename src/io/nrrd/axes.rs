@@ -84,7 +84,7 @@ impl Axes {
         }
     }
 
-    /// Returns the seconds between frames; 0 if the file does not say.
+    /// Returns the seconds between frames; 0 if the file does not give the time.
     pub(super) fn frame_seconds(&self) -> f64 {
         let Some(axis) = self.of_frames().filter(|axis| axis.size > 1) else { return 0.0 };
         let step = axis.direction.map_or(axis.spacing, |direction| direction.time);

@@ -28,12 +28,12 @@ use frames::one_after_the_other;
 const FORMAT: &str = "NRRD";
 const DATA: Place = Place { format: FORMAT, field: "voxel data" };
 
-/// Returns whether the bytes start with the signature of NRRD.
+/// Returns whether the bytes start with the signature of NRRD, to detect the format.
 pub(super) fn is_nrrd(bytes: &[u8]) -> bool {
     bytes.starts_with(b"NRRD")
 }
 
-/// Reads a volume; `detached` is the payload if the header refers to a data file.
+/// Reads an NRRD volume; `detached` is the payload if the header refers to a data file.
 ///
 /// # Errors
 /// [`FormatError`] naming the header field.

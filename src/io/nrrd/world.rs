@@ -17,7 +17,7 @@ pub(super) struct World {
     pub(super) flip_x: bool,
     /// Whether its name declares time as fourth dimension.
     pub(super) timed: bool,
-    /// Number of components of a vector, if the file says.
+    /// Number of components of a vector, if the header gives it.
     dimension: Option<usize>,
 }
 
