@@ -11,10 +11,10 @@ const LARGEST_TURN: f64 = 0.5;
 /// The smallest valence of a vertex of the result.
 const LEAST_VALENCE: u32 = 3;
 
-/// Returns a closed surface simplified by vertex clustering: vertices in the same cell that are connected by edges
-/// within it are merged at their mean. A cluster is merged only if this neither changes the topology nor turns a
-/// triangle by more than 60°, and if each of its vertices is within `furthest` of the mean along its normal. Only
-/// positions and triangles are kept.
+/// Returns a closed surface simplified by vertex clustering; used to thin out the iso-surface from which a deformable
+/// model starts. Vertices in the same cell that are connected by edges within it are merged at their mean. A cluster is
+/// merged only if this neither changes the topology nor turns a triangle by more than 60°, and if each of its vertices
+/// is within `furthest` of the mean along its normal. Only positions and triangles are kept.
 pub fn clustered(mesh: &TriangleMesh, furthest: f32, cell: impl Fn(Vec3) -> IVec3) -> TriangleMesh {
     let mut clusters = Clusters::new(mesh, cell);
     clusters.keep_contractible(mesh);

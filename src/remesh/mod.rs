@@ -1,5 +1,5 @@
-//! Passes that keep a moving mesh well sampled and change its topology on contact (Lachaud & Montanvert, sections
-//! 3.2, 3.3 and figure 9).
+//! Algorithms that keep a moving mesh well sampled and change its topology on contact (Lachaud & Montanvert, sections
+//! 3.2, 3.3 and figure 9), and remeshing of static meshes.
 //!
 //! [`Resolver::resolve`] repeats these steps until all bounds hold: edges out of bounds are split, flipped or collapsed
 //! (`edges`), necks that block a collapse are cut (`necks`), vertices in contact are joined (`contact`). After eight

@@ -1,4 +1,4 @@
-//! Necks thinner than the lower bound of edges: the annular change of figure 5.
+//! Cuts necks thinner than the lower bound of edges: the annular change of figure 5.
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::Vec3;

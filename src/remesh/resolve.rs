@@ -19,7 +19,8 @@ const PASSES: usize = 8;
 const EFFORT_PER_VERTEX: u64 = 400;
 const LEAST_EFFORT: u64 = 100_000;
 
-/// Keeps a moving mesh within the bounds of a [`Sampling`] and free of self-intersections.
+/// Keeps a moving mesh within the bounds of a [`Sampling`] and free of self-intersections; the deformable model runs it
+/// after moves.
 #[derive(Clone, Debug)]
 pub struct Resolver {
     most_vertices: usize,
@@ -27,7 +28,7 @@ pub struct Resolver {
     /// The cells in which splits, flips and collapses are tested in full for self-intersections; everywhere if `None`.
     pub(super) tested: Option<CellSet>,
     full: bool,
-    /// The [`Embedding::effort`] at which this call ends.
+    /// The value of [`Embedding::effort`] at which this call ends.
     pub(super) most_effort: u64,
     queue: VecDeque<VertexId>,
     queued: Vec<bool>,
@@ -313,7 +314,7 @@ impl Resolver {
     }
 }
 
-/// Sets a flag; returns whether it was clear.
+/// Sets the flag of a vertex; returns whether it was clear.
 fn mark(flags: &mut Vec<bool>, v: VertexId) -> bool {
     if v.index() >= flags.len() {
         flags.resize(v.index() + 1, false);

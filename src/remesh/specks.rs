@@ -17,7 +17,7 @@ const SMALLEST_BALL: f32 = 2.18;
 pub(super) struct SmallParts {
     /// A vertex of each component, and whether it is solid, with a positive volume.
     parts: Vec<(VertexId, bool)>,
-    /// The topology version of the mesh they were found in.
+    /// The topology version of the mesh for which the list is valid.
     topology_version: Option<u32>,
 }
 
@@ -86,9 +86,9 @@ impl Resolver {
     /// Removes small components that were crushed or inverted by a move.
     ///
     /// When two sides press against each other, vertices are held, no edge becomes short, and a component would persist
-    /// for ever; so it is removed if it is flat, or if none of its vertices could move. A component this small can also
-    /// be inverted between two states without self-intersections, as when the apex of a tetrahedron passes through its
-    /// base.
+    /// for ever. So it is removed if it is flat, if none of its vertices could move, or if more than half of them could
+    /// not and `guide` finds it empty. A component this small can also be inverted between two states without
+    /// self-intersections, as when the apex of a tetrahedron passes through its base.
     pub(super) fn remove_crushed(
         &mut self,
         mesh: &mut Mesh,
@@ -364,7 +364,7 @@ mod tests {
         assert!(both.vertices().all(|v| both.position(v).x > 1.0));
     }
 
-    /// The inner component is in the list of small parts after the one it is removed with.
+    /// The inner component is listed after the one with which it is removed.
     #[test]
     fn parts_that_vanished_with_others_are_not_asked_for_again() {
         let (mut both, hollow) = nested();

@@ -94,7 +94,7 @@ impl Grid {
 
     /// Returns the Sobel gradient in intensity per voxel: central differences over two voxels, smoothed by [1 2 1] in
     /// the two other directions and divided by 32, so that the gradient of a linear ramp is its slope. The border is
-    /// replicated.
+    /// replicated. Used by the gradient force of the deformable model.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].

@@ -6,7 +6,8 @@ use crate::mesh::TriangleMesh;
 use fixedbitset::FixedBitSet;
 
 /// Returns, for each voxel of a grid of `dims`, x fastest, whether its centre is inside the closed `surface`, whose
-/// positions are voxel indices: whether a ray along x has crossed the surface an odd number of times before it.
+/// positions are voxel indices: whether a ray along x has crossed the surface an odd number of times before it. Used to
+/// find regions that a deformable model does not cover.
 ///
 /// Exact except for centres within rounding of the surface: exact predicates decide rays through edges and vertices.
 pub fn voxels_inside(surface: &TriangleMesh, dims: [usize; 3]) -> FixedBitSet {

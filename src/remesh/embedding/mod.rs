@@ -228,8 +228,8 @@ impl Embedding {
         self.effort
     }
 
-    /// Appends the components of another mesh; returns the new vertices, and the corners of all intersecting triangles
-    /// that this causes, sorted.
+    /// Appends the components of another mesh; returns the new vertices, and the corners of all triangles that
+    /// intersect one of those components, sorted.
     ///
     /// # Errors
     /// As [`Mesh::append`].

@@ -81,7 +81,7 @@ impl Embedding {
         self.travelled.resize(mesh.slots(), 0.0);
         let mut touched = std::mem::take(&mut self.touched);
         for (v, from) in moved {
-            // The displacement after rounding.
+            // The displacement after rounding of the position.
             let to = mesh.position(v);
             if from != to {
                 let displacement = higher(FINEST, to.distance(from));

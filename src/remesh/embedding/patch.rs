@@ -26,7 +26,7 @@ impl Embedding {
     pub(super) fn changes_intersect(&mut self, mesh: &Mesh, names: &[[VertexId; 3]]) -> bool {
         let edited: Vec<Changed> =
             names.iter().map(|&names| changed(mesh.facet(names), self.output.as_ref())).collect();
-        // Rejections by the tests below are cheap, not free.
+        // Counted even if the cheap tests below reject the edit.
         self.effort += 1;
         self.any_one_ring_intersects(mesh, names)
             || intersect_each_other(&edited, self.output.as_ref())

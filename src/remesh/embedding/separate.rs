@@ -20,8 +20,9 @@ const MOST: usize = 4000;
 type Moves = Vec<(VertexId, Vec3)>;
 
 impl Embedding {
-    /// Moves corners of intersecting triangles slightly until none intersect, one spatial cluster after the other.
-    /// Returns whether none intersect afterwards; if some do, other clusters may have been changed.
+    /// Moves corners of intersecting triangles slightly until none intersect, one spatial cluster after the other; used
+    /// at the start from a contour. Returns whether none intersect afterwards; if some do, other clusters may have been
+    /// changed.
     ///
     /// `crossing` must contain all corners of intersecting triangles, as returned by [`Self::crossing`].
     pub fn separate(&mut self, mesh: &mut Mesh, crossing: &[VertexId]) -> bool {

@@ -1,8 +1,8 @@
 //! Sparse storage of values at the nodes of a large lattice, in blocks of 8 × 8 × 8 that are allocated on demand.
 //!
-//! The lattice is padded by one layer of nodes that are outside, so lattice node (i, j, k) is node (i + 1, j + 1, k +
-//! 1) here. A cell is identified by its corner of lowest coordinates. A slot is the index of a node, or of the cell
-//! that starts there, in the allocated blocks.
+//! The lattice is padded by one layer of outside nodes, so node (i, j, k) of the lattice is node (i + 1, j + 1, k + 1)
+//! here. A cell is identified by its corner of lowest coordinates. A slot is the index of a node, or of the cell that
+//! starts there, in the allocated blocks.
 
 use super::super::cube_cases::corner;
 use super::super::error::{VolumeError, reserve};

@@ -20,7 +20,7 @@ const BATCH: usize = 4096;
 struct Line {
     from: Node,
     axis: usize,
-    /// Coordinate of the other end.
+    /// Coordinate of the other end along `axis`.
     to: usize,
     inside: [bool; 2],
 }
