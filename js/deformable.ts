@@ -61,7 +61,7 @@ export interface DeformableParams {
 export interface Attractor {
   /** Position in world space. */
   point: Vec3;
-  /** Spring constant. */
+  /** Spring constant; negative values push the surface away. */
   strength: number;
   /** Radius of influence, world units. */
   radius: number;
@@ -106,7 +106,7 @@ export interface DeformableOptions {
   levels?: number;
   /** Target edge length at the finest level, world units; default from the voxel size. */
   edge?: number;
-  /** Any subset; the others have their defaults. */
+  /** Parameters: any subset; the others have their defaults. */
   params?: DeformableParams;
 }
 

@@ -70,7 +70,7 @@ export interface ImplicitOptions {
   maxPoints?: number;
   /** Removes outliers: keeps the n largest connected clusters; default all. */
   keepComponents?: number;
-  /** Any subset; the others have their defaults. */
+  /** Parameters: any subset; the others have their defaults. */
   params?: ImplicitParams;
 }
 

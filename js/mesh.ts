@@ -5,11 +5,11 @@ import { type Vec3, type Volume, volumeHandle } from './volume.js';
 
 /** Vertices and triangles of a mesh as packed arrays. */
 export interface MeshArrays {
-  /** xyz of each vertex. */
+  /** Position of each vertex, packed xyz. */
   positions: Float32Array;
   /** Unit outward normal of each vertex. */
   normals: Float32Array;
-  /** abc of each triangle, counter-clockwise seen from outside. */
+  /** Vertex indices of each triangle, packed abc, counter-clockwise seen from outside. */
   indices: Uint32Array;
   /**
    * Texture coordinates of each vertex, if the mesh has them; at a seam those of one side: see
@@ -39,9 +39,9 @@ export interface MeshInfo {
   vertices: number;
   triangles: number;
   components: number;
-  /** Vertices - edges + triangles. */
+  /** Euler characteristic: vertices - edges + triangles. */
   euler: number;
-  /** Sum over components; closed orientable, so euler = 2 * components - 2 * genus. */
+  /** Genus, summed over components; closed orientable, so euler = 2 * components - 2 * genus. */
   genus: number;
   /** Surface area, world units squared. */
   area: number;
@@ -60,17 +60,17 @@ export interface MeshInfo {
 
 /** Result of {@link Mesh.check}; a valid mesh is closed, oriented and has all counts at 0. */
 export interface MeshReport {
-  /** Every edge has two triangles. */
+  /** Whether every edge has two triangles. */
   closed: boolean;
-  /** Neighbouring triangles have the same orientation. */
+  /** Whether all neighbouring triangles have the same orientation. */
   oriented: boolean;
-  /** Edges with more than two triangles. */
+  /** Number of edges with more than two triangles. */
   nonManifoldEdges: number;
-  /** Vertices whose triangles form more than one fan. */
+  /** Number of vertices whose triangles form more than one fan. */
   nonManifoldVertices: number;
-  /** Triangles with zero area. */
+  /** Number of triangles with zero area. */
   degenerateTriangles: number;
-  /** Pairs of triangles that intersect, counted with exact predicates. */
+  /** Number of pairs of triangles that intersect, counted with exact predicates. */
   selfIntersections: number;
 }
 
@@ -91,22 +91,22 @@ export interface MeshHit {
 
 /** Kind of curvature; κ₁ and κ₂ are the principal curvatures. */
 export type CurvatureKind =
-  /** H = (κ₁ + κ₂) / 2. */
+  /** Mean curvature, H = (κ₁ + κ₂) / 2. */
   | 'mean'
-  /** K = κ₁ κ₂. */
+  /** Gaussian curvature, K = κ₁ κ₂. */
   | 'gaussian';
 
 /** Distances between two surfaces, world units. The summaries cover both directions and are symmetric. */
 export interface SurfaceDistance {
   /** Distance from each vertex of the mesh to the closest point of the other surface; not negative. */
   perVertex: Float32Array;
-  /** Mean of the two one-way means. */
+  /** Mean distance: the mean of the two one-way means. */
   mean: number;
-  /** Root of the mean of the two one-way mean squares. */
+  /** Root mean square distance: root of the mean of the two one-way mean squares. */
   rms: number;
-  /** The larger of the two one-way 95th percentiles. */
+  /** 95th percentile: the larger of the two one-way percentiles. */
   p95: number;
-  /** The largest of all distances, in both directions. */
+  /** Hausdorff distance: the largest of all distances, in both directions. */
   hausdorff: number;
 }
 
@@ -289,8 +289,8 @@ export class Mesh {
   }
 
   /**
-   * Checks that the mesh is a closed oriented 2-manifold and counts its self-intersections, from its arrays alone,
-   * independently of the code that edits it.
+   * Reports whether the mesh is closed and oriented, and counts non-manifold elements, degenerate triangles and
+   * self-intersections, from its arrays alone, independently of the code that edits it.
    */
   check(): MeshReport {
     return this.#handle.use((raw) => raw.check() as MeshReport);

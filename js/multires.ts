@@ -24,7 +24,7 @@ export interface MultiresParams {
   edgeMin?: number;
   /** ε_max: longer edges are split; more than twice `edgeMin`. */
   edgeMax?: number;
-  /** Levels of the solver above the target resolution. */
+  /** Number of levels of the multi-level solver above the target resolution. */
   levels?: number;
   /** q: factor by which edge bounds shrink from one level to the next finer one. */
   refineFactor?: number;
@@ -52,9 +52,9 @@ export interface MultiresOptions {
    * smoothing and coarsening.
    */
   base?: Mesh;
-  /** At least one; one of them has to touch the base. */
+  /** Initial control ellipsoids: at least one, of which one has to touch the base. */
   ellipsoids: ControlEllipsoid[];
-  /** Any subset; the others have their defaults. */
+  /** Parameters: any subset; the others have their defaults. */
   params?: MultiresParams;
 }
 
@@ -114,7 +114,7 @@ export class MultiresolutionModel implements Stepper {
     return this.#meshes[0] as Mesh;
   }
 
-  /** The deformed low-frequency surface; live. */
+  /** The deformed low-frequency surface without the detail; live. */
   get baseMesh(): Mesh {
     return this.#meshes[1] as Mesh;
   }

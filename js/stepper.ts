@@ -3,7 +3,7 @@ import type { Mesh } from './mesh.js';
 
 /** State of a method after one step, or several together, and the events during them. */
 export interface StepReport {
-  /** Iterations since the start. */
+  /** Number of iterations since the start. */
   iteration: number;
   /** Whether the method has finished. */
   done: boolean;
@@ -18,7 +18,7 @@ export interface StepReport {
   vertices: number;
   triangles: number;
   components: number;
-  /** Vertices - edges + triangles. */
+  /** Euler characteristic: vertices - edges + triangles. */
   euler: number;
   /**
    * Counts of mesh edits since the last report. `axial`: joins (or splits) by contact; `annular`: necks cut; `seeds`:

@@ -57,7 +57,7 @@ export interface TrackingOptions {
    * it.
    */
   start?: Mesh;
-  /** Any subset; the others are derived from the volume. */
+  /** Parameters: any subset; the others are derived from the volume. */
   params?: TrackingParams;
 }
 

@@ -57,7 +57,7 @@ export interface TrackFigures {
 
 export interface StepRow {
   vertices: number;
-  /** Nanoseconds per vertex. */
+  /** Duration of a step per vertex, nanoseconds. */
   step: number;
   topology: number;
 }

@@ -14,7 +14,7 @@ export interface AttractorEvents {
   onChange: (attractors: Attractor[], what: string, tuning: boolean) => void;
   /** Called when placing attractors by clicks in the views is switched on or off. */
   onPlacing: (placing: boolean) => void;
-  /** Shows a position in the slices. */
+  /** Called to show a position in the slices. */
   onGoTo: (point: Vec3) => void;
   /** Returns the point where the slices intersect. */
   crosshair: () => Vec3;

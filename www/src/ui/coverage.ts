@@ -11,7 +11,7 @@ export interface CoverageEvents {
   onStart: () => void;
   onCancel: () => void;
   onSeed: () => void;
-  /** Shows a position in the slices and in the 3D view. */
+  /** Called to show a position in the slices and in the 3D view. */
   onGoTo: (point: Vec3) => void;
   /** Called with the regions to mark in the views. */
   onMark: (parts: readonly UncoveredPart[]) => void;

@@ -58,7 +58,7 @@ export async function readFiles(files: File[]): Promise<NamedBytes[]> {
   return Promise.all(files.map(async (file) => ({ name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) })));
 }
 
-/** Offers bytes as a download. */
+/** Downloads bytes as a file with the given name and media type. */
 export function download(name: string, bytes: Uint8Array, type: string): void {
   const url = URL.createObjectURL(new Blob([bytes as Uint8Array<ArrayBuffer>], { type }));
   const link = h('a', { href: url, download: name });

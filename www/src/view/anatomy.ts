@@ -16,9 +16,9 @@ export interface Side {
 export interface SliceFrame {
   axis: Axis;
   name: 'Sagittal' | 'Coronal' | 'Axial';
-  /** Left to right. */
+  /** The side that runs from left to right. */
   horizontal: Side;
-  /** Top to bottom. */
+  /** The side that runs from top to bottom. */
   vertical: Side;
   labels: { left: string; right: string; top: string; bottom: string };
 }

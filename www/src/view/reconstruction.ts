@@ -32,7 +32,7 @@ export interface CloudViewOptions {
 /** Points to show, and their orientation. */
 export interface ShownCloud {
   points: Float32Array;
-  /** rgb of each, 0..1. */
+  /** rgb of each point, 0..1. */
   colors?: Float32Array | undefined;
   cameras: readonly PinholeCamera[];
   up: 'y' | 'z';

@@ -44,7 +44,7 @@ export function buildModel(volume: Volume, setup: Setup): DeformableModel {
  * one in `view/shading`.
  */
 const SHADES: Record<Shade, (model: DeformableModel) => Float32Array> = {
-  /** In δ per iteration. */
+  /** Speed along the normal, δ per iteration. */
   speed: (model) => {
     const factor = model.params.timeStep / model.delta;
     return model.speeds().map((speed) => speed * factor);
