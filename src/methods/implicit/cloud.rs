@@ -18,7 +18,7 @@ pub struct Cloud {
     pub colors: Option<Vec<Vec3>>,
 }
 
-/// Least number of distinct points: fewer span no volume.
+/// Minimum number of distinct points: fewer span no volume.
 pub const LEAST_POINTS: usize = 4;
 /// Ratio of thickness to length up to which a cloud counts as flat.
 const FLAT: f64 = 1e-6;
@@ -120,7 +120,7 @@ impl Cloud {
     }
 }
 
-/// Largest number of points in a system: their matrix takes about 2 GB.
+/// Maximum number of points in a system: their matrix takes about 2 GB.
 pub const MOST_POINTS: usize = 100_000;
 
 /// Checks that `count` points are not too many for a system.
@@ -152,7 +152,7 @@ pub fn check_finite(name: &'static str, values: &[Vec3]) -> Result<(), MethodErr
 const LEAST_SIZE: f64 = 1e-27;
 /// Largest accepted size of a cloud, the longest side of its bounding box in world units; limited by single precision.
 const MOST_SIZE: f64 = 1e38;
-/// Largest distance of the points from the origin, in longest sides of their bounding box: a cell of 1/30 of a side is
+/// Maximum distance of the points from the origin, in longest sides of their bounding box: a cell of 1/30 of a side is
 /// still as exact as needed there.
 const MOST_AWAY: f64 = 240.0;
 

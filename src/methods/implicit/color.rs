@@ -254,7 +254,7 @@ impl DepthBuffer {
     /// direction to the camera, times alpha, at a silhouette times [`RIM`]. `None` if the camera does not see the
     /// point.
     ///
-    /// Of the four surrounding pixels, only those that show the surface near the point are blended. If one shows
+    /// Only those of the four surrounding pixels that show the surface near the point are blended. If one shows
     /// something nearer, the point counts as hidden.
     fn look(&self, camera: &Camera, p: DVec3, normal: DVec3) -> Option<(Vec3, f32)> {
         let to_camera = camera.centre() - p;

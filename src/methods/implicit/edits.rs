@@ -20,7 +20,7 @@ pub struct Edits {
     pub outside: Vec<Vec3>,
 }
 
-/// Largest distance, along each axis, of added points from the centre of the input points' bounding box, in half its
+/// Maximum distance, along each axis, of added points from the centre of the input points' bounding box, in half its
 /// longest side.
 pub const REACH: f32 = 3.0;
 

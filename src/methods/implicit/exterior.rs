@@ -14,16 +14,16 @@ const ON_SPHERE: usize = 16;
 const SPHERE: f64 = 1.2;
 /// Number of surface points per exterior point near the surface.
 const SURFACE_POINTS: usize = 10;
-/// Least number of exterior points near the surface, for small clouds.
+/// Minimum number of exterior points near the surface, for small clouds.
 const LEAST: usize = 30;
 /// Distance of exterior points from the surface, in mean spacings of the points. At 1 they constrain less than noise
 /// does, at 6 they fall into cavities.
 const OFFSET: f32 = 3.0;
-/// Least distance of exterior points from the surface, in standard deviations of the noise.
+/// Minimum distance of exterior points from the surface, in standard deviations of the noise.
 const NOISE: f32 = 4.0;
-/// Least distance of exterior points from the surface, in box units: dense clouds are not less noisy.
+/// Minimum distance of exterior points from the surface, in box units: dense clouds are not less noisy.
 const LEAST_OFFSET: f32 = 0.04;
-/// Least distance of an exterior point from all surface points, as a share of the distance at which it was made: a
+/// Minimum distance of an exterior point from all surface points, as a share of the distance at which it was made: a
 /// nearer one may be inside.
 const CLEAR: f32 = 0.8;
 
@@ -51,7 +51,8 @@ impl Exterior {
     }
 }
 
-/// Number of offsets from all surface points beyond which an exterior point has lost the point it was made from.
+/// Exterior points farther than this many offsets from all surface points are dropped: those they were made from were
+/// removed.
 const LOST: f32 = 1.25;
 
 /// Returns `given` exterior points, in box units, with those on the bounding sphere.
@@ -108,7 +109,7 @@ fn ways_out(cloud: &Cloud, cameras: &[Camera], places: usize, spacing: f32, seed
     Ways { directions, noise: normals.noise }
 }
 
-/// Least number of points whose normals are estimated: with fewer, neighbours on thin parts lie on different sides.
+/// Minimum number of points whose normals are estimated: with fewer, neighbours on thin parts lie on different sides.
 const ORIENTED: usize = 3000;
 
 /// Returns the directions from each surface point to the cameras that are on the outer side of its normal and not
@@ -154,9 +155,9 @@ fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
 /// Edge length of an occlusion voxel, in mean spacings: with 1.5 rays pass through the gaps of stereo data, with 6 legs
 /// merge.
 const VOXEL: f32 = 3.5;
-/// Length of the part of a ray around its own point that is not tested for occlusion, in voxels.
+/// Length, in voxels, of the start of a ray that is not tested for occlusion: the neighbourhood of its own point.
 const OWN: f32 = 1.5;
-/// Largest number of occlusion voxels along an axis.
+/// Maximum number of occlusion voxels along an axis.
 const MOST_VOXELS: f32 = 256.0;
 
 /// Voxels that contain points, to decide whether a camera sees a point.

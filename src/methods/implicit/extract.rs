@@ -10,7 +10,7 @@ use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::volume::{Follower, Lattice};
 
-/// Least and largest default number of cells along the longest side of the points' bounding box.
+/// Minimum and maximum default number of cells along the longest side of the points' bounding box.
 const CELLS: [f64; 2] = [64.0, 160.0];
 /// Default edge length of a cell, in mean spacings of the points: finer detail comes from the kernel alone.
 const CELL: f64 = 0.5;
@@ -49,7 +49,7 @@ pub fn default_cell(map: &BoxMap, spacing: f64) -> f64 {
     if cell > least { cell } else { least }
 }
 
-/// Largest distance of a default lattice from the world's origin, in cell edges: a little less than [`Lattice`] allows.
+/// Maximum distance of a default lattice from the world's origin, in cell edges: a little less than [`Lattice`] allows.
 const MOST_EDGES_AWAY: f64 = 8100.0;
 
 impl Extraction {

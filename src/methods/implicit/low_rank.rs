@@ -12,7 +12,7 @@ pub struct LowRank<T> {
     pub rows: Vec<T>,
 }
 
-/// Largest rank of an approximation, whatever its error; blocks between separated clusters stay far below it.
+/// Maximum rank of an approximation, whatever its error; blocks between separated clusters stay far below it.
 const MOST_RANK: usize = 64;
 
 /// Approximates a block of `height` by `width` entries as a low-rank product, to a relative error of about `tolerance`.

@@ -76,14 +76,14 @@ use solve::{ByPlace, Constraints, Solution, Solver};
 /// Options of an [`ImplicitSurface`], beside its points.
 #[derive(Clone, Debug)]
 pub struct ImplicitOptions {
-    /// Points known to be outside, in world units (those of the input points); without them, exterior points are made
+    /// Points known to be outside, in world units (those of the input points); if `None`, exterior points are made
     /// from cameras, normals or the points alone.
     pub exterior: Option<Vec<Vec3>>,
     /// Cameras from which the points were made; their images colour the surface.
     pub cameras: Vec<Camera>,
-    /// Largest number of points that become surface constraints; more are subsampled.
+    /// Maximum number of points that become surface constraints; more are subsampled.
     pub max_points: usize,
-    /// Number of clusters to keep, largest first, which discards outliers; all without it.
+    /// Number of clusters to keep, largest first, which discards outliers; `None` keeps all.
     pub keep_components: Option<usize>,
     /// Parameters of kernel, regularisation, solver and extraction.
     pub params: ImplicitParams,

@@ -10,9 +10,9 @@ use crate::spatial::PointGrid;
 const CLUSTER_CELL: f64 = 2.0;
 /// Points visited in a slice of work: about ten milliseconds.
 const SLICE: usize = 50_000;
-/// Largest number of radii that are tried.
+/// Maximum number of sampling radii that are tried.
 const ROUNDS: u32 = 16;
-/// Share of the wanted number of samples that is accepted.
+/// Share of the wanted number of samples from which a radius is accepted.
 const NEARLY: f64 = 0.97;
 
 /// The sampled points, which become surface constraints.
@@ -84,11 +84,11 @@ struct Thinning {
     most: usize,
     round: u32,
     radius: f32,
-    /// Bounds of the search: the largest radius known to leave too many, and the smallest known to leave few enough; 0
-    /// if there is none.
+    /// Bounds of the search for the radius: the largest known to leave too many points, and the smallest known to leave
+    /// few enough; 0 if there is none.
     small: f32,
     large: f32,
-    /// The points kept at the latter.
+    /// The points kept with the smallest radius known to leave few enough.
     best: Vec<u32>,
     /// Progress with the current radius: number of points visited, points kept, and the positions of the latter.
     looked_at: usize,
@@ -161,7 +161,7 @@ impl Thinning {
     }
 
     /// Returns the next radius to try. On a surface the number of samples falls with the square of the radius; if the
-    /// radius predicted by that is outside the bounds, their midpoint is used.
+    /// radius predicted by that is outside the bounds, their midpoint is used, or twice the lower one if there is no upper.
     fn next_radius(&self, count: usize) -> f32 {
         let wanted = 0.5 * (1.0 + NEARLY as f32) * self.most as f32;
         let guess = self.radius * (count as f32 / wanted).sqrt();

@@ -79,7 +79,7 @@ impl Chebyshev {
     }
 
     /// Interpolates values at the nodes of a cube at the nodes of one of its octants (the local-to-local translation);
-    /// `half` tells the side of the octant, 0 or 1, along each axis.
+    /// `half` is the side of the octant, 0 or 1, along each axis.
     pub fn to_half(&self, whole: &Nodal, half: [usize; 3]) -> Nodal {
         let mut values = whole.map(f64::from);
         for (axis, side) in half.into_iter().enumerate() {

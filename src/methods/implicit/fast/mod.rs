@@ -18,7 +18,7 @@ use translate::{Translations, Turns};
 /// Approximate number of terms in a finest cube. With more, sums of near terms take longer; with fewer, there are more
 /// cubes.
 const TERMS_A_CUBE: usize = 24;
-/// Largest depth of the octree of cubes: tables of the finest level have 8^this entries.
+/// Maximum depth of the octree of cubes: tables of the finest level have 8^this entries.
 const MOST_LEVELS: usize = 6;
 /// Marks a cube that does not exist or is not computed yet, in place of its number.
 const NONE: u32 = u32::MAX;
@@ -174,7 +174,7 @@ impl FastField {
         ((p - self.origin) / self.cube_edge(level) - middle) * 2.0
     }
 
-    /// Adds levels until the finest cubes with terms contain few of them.
+    /// Adds levels until the finest cubes that contain terms contain few each.
     fn choose_levels(&mut self) {
         for depth in 0..=MOST_LEVELS {
             self.levels.push(Level::new(1 << depth));

@@ -3,7 +3,8 @@
 use crate::math::order::{by_both, rank};
 use crate::math::{Bounds, Vec3};
 
-/// Largest number of centres in a leaf. 32 doubles the number of blocks, 128 the numbers that are stored in full.
+/// Maximum number of centres in a leaf of the cluster tree. 32 doubles the number of blocks, 128 the numbers that are
+/// stored in full.
 const LEAF: usize = 64;
 
 /// A binary tree over points: each cluster is a range of [`ClusterTree::order`], each child about half of it.

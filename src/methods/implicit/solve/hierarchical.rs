@@ -45,7 +45,7 @@ struct Store<T> {
     chunks: Vec<Vec<T>>,
 }
 
-/// Largest number of entries in a chunk; a longer span gets a chunk of its own.
+/// Maximum number of entries in a chunk of the store; a longer span gets a chunk of its own.
 const CHUNK: usize = 1 << 20;
 
 impl<T: Copy> Store<T> {

@@ -37,13 +37,14 @@ pub struct Singular;
 
 /// Share of the tolerance at which iterations stop, since the true residual is a little larger than theirs.
 const ITERATE_TO: f64 = 0.5;
-/// Largest number of iterations in a round. A system that can be solved needs a few dozen.
+/// Maximum number of iterations in a round. A system that can be solved needs a few dozen.
 const MOST_ITERATIONS: u32 = 500;
-/// Share of the residual that a round may leave; if it leaves more, rounding limits it.
+/// Share of the residual that a round of iterations may leave; if it leaves more, rounding limits it, and the solve
+/// fails.
 const LEAST_GAIN: f64 = 0.7;
-/// Largest number of rounds of iterations, each from a recomputed residual.
+/// Maximum number of rounds of iterations, each from a recomputed residual.
 const MOST_ROUNDS: u32 = 6;
-/// Number of rows, at most, from which the true residual is estimated. From a thousand, it is known to some 3 %.
+/// Maximum number of rows from which the true residual is estimated. From a thousand, it is known to some 3 %.
 const CHECKED_ROWS: usize = 1024;
 
 /// Solver of a linear system, slice by slice. Its vectors are in the order of the rows of [`System`].

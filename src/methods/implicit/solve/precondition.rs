@@ -25,7 +25,7 @@ pub struct SparseInverse {
     weights: Vec<f64>,
 }
 
-/// Centres in order, each with some of its predecessors, its neighbours.
+/// The centres in their order, each with some of its predecessors, called its neighbours.
 #[derive(Clone, Debug, Default)]
 struct Rows {
     centres: Vec<u32>,
@@ -168,7 +168,7 @@ fn row(
     out.extend(b.iter().map(|x| -x * scale));
 }
 
-/// Smallest pivot, as a share of its diagonal entry: anything less is rounding.
+/// Smallest pivot of a Cholesky factorisation, as a share of its diagonal entry: anything less is rounding.
 const LEAST_PIVOT: f64 = 1e-12;
 
 /// Replaces the lower triangle of a positive definite `n` by `n` matrix by its Cholesky factor.
@@ -210,15 +210,15 @@ fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// Distance between the centres taken in the first round, in box units.
+/// Minimum distance between the centres taken in the first round of the ordering, in box units.
 const FIRST_SPACING: f32 = 2.0;
-/// Ratio of the distance of one round to that of the round before.
+/// Ratio of the minimum distance of one round of the ordering to that of the round before.
 const RATIO: f32 = std::f32::consts::FRAC_1_SQRT_2;
-/// Distance below which centres are taken in their given order.
+/// Minimum distance of a round below which centres are taken in their given order.
 const LEAST_SPACING: f32 = 1e-6;
-/// Edge length of the grid's cells, in distances of the round.
+/// Edge length of the cells of the grid of taken centres, in minimum distances of the round.
 const CELL: f32 = 3.6;
-/// Radius in which neighbours are searched first, in distances of the round.
+/// Radius in which predecessors are searched first, in minimum distances of the round.
 const REACH: f32 = 3.6;
 
 /// An ordering of centres from coarse to fine (approximately maximin), in progress, each with its nearest predecessors.
@@ -250,7 +250,7 @@ impl Plan {
         }
     }
 
-    /// Tests up to `count` centres. Returns whether all are ordered.
+    /// Tests up to `count` centres for the rounds of the ordering. Returns whether all are ordered.
     fn extend(&mut self, count: usize, rows: &mut Rows) -> bool {
         for _ in 0..count {
             while self.waiting.is_empty() {

@@ -20,10 +20,10 @@ const FAR_ERROR: f64 = 0.1;
 const USUAL_CONSTRAINTS: f64 = 25_000.0;
 /// Relative error of far blocks for kernels that are only conditionally positive definite, whose large values cancel.
 const CONDITIONAL_ERROR: f64 = 1e-11;
-/// Largest number of constraints whose matrix is stored in double precision; beyond, memory matters more.
+/// Maximum number of constraints whose matrix is stored in double precision; beyond, memory matters more.
 const DOUBLE_BELOW: usize = 6000;
-/// Largest number of constraints that may be added, and of those removed, before the system is rebuilt. Each added one
-/// costs a row of the full matrix.
+/// Maximum number of constraints added, and of constraints removed, for which the system is revised and not rebuilt.
+/// Each added one costs a row of the full matrix.
 const MOST_CHANGES: usize = 256;
 /// Marks a row whose constraint was removed, in place of the constraint's index.
 const GONE: u32 = u32::MAX;
@@ -107,8 +107,8 @@ impl System {
         }
     }
 
-    /// Returns whether [`Self::revise`] pays: only a few of the constraints differ from those for which the matrix was
-    /// computed.
+    /// Returns whether [`Self::revise`] is worthwhile: only a few of the constraints differ from those for which the
+    /// matrix was computed.
     pub fn is_near(&self, constraints: &Constraints) -> bool {
         let known = ByPlace::new(&constraints.centres);
         let own = self.own_centres();
