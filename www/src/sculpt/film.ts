@@ -29,8 +29,8 @@ function keyedAt(keys: ControlEllipsoid[][], step: number, frame: number): Contr
 }
 
 /**
- * Largest displacement of an ellipsoid per frame of a glide, as a share of its shortest semi-axis. The model's own
- * steps are longer.
+ * Largest displacement of an ellipsoid per frame of a glide, as a share of its shortest semi-axis, unless `MOST_GLIDES`
+ * limits the number of frames. The model's own steps are longer.
  */
 const GLIDE = 0.4;
 /** Most frames of a glide: one small ellipsoid that moves far should not delay all others. */

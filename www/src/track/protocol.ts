@@ -1,6 +1,5 @@
 /**
- * Messages between the page and the worker of the Track lab. Both sides import this file, and neither imports the
- * other's code.
+ * Messages between the page and the worker of the Track lab. Both sides import this file.
  *
  * As in the other labs: each request gets exactly one reply, the worker sends events of its own accord, and a
  * cancellation is not an error.
