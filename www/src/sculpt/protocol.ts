@@ -95,7 +95,7 @@ export interface Stage {
 /** A quantity computed at each vertex to colour the surface by; the names appear in the interface. */
 export type SculptShade = 'area distortion' | 'angle distortion' | 'mean curvature';
 
-/** What each frame is to include. */
+/** Data requested for each frame. */
 export interface Shown {
   layout: Layout;
   shade: SculptShade | undefined;
