@@ -1,4 +1,4 @@
-//! Figures of remeshing: for each mesh file named, at three targets.
+//! Figures of remeshing: for each mesh file named, at three target edge lengths.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program for the terminal")]
 
 #[path = "../tests/common/mod.rs"]
@@ -12,6 +12,7 @@ use vesicle::mesh::{Mesh, TriangleMesh, count_crossings, measure};
 use vesicle::remesh::{EdgeBounds, remesh};
 use vesicle::spatial::surface_distance;
 
+/// Returns the mesh with each triangle split into four, `times` times.
 fn finer(mesh: &TriangleMesh, times: usize) -> TriangleMesh {
     let mut out = mesh.clone();
     out.normals = None;
@@ -127,6 +128,7 @@ fn main() {
     println!("median smallest angle {:?}", all_angles.get(all_angles.len() / 2));
 }
 
+/// Returns the smallest angle of a triangle in degrees.
 fn smallest([a, b, c]: [Vec3; 3]) -> f32 {
     [(a, b, c), (b, c, a), (c, a, b)]
         .into_iter()

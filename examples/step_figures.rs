@@ -1,6 +1,7 @@
-//! Figures of a step of the deformable model while every vertex moves, at several sizes: JSON, a row for each.
+//! Timings of a step of the deformable model while every vertex moves, at several mesh sizes, printed as JSON with a
+//! row for each.
 //!
-//! The same work as `bench/steps.mjs`, which is in the package's language; `npm run bench -- steps` puts them side by side.
+//! `bench/steps.mjs` does the same work through the npm package; `npm run bench -- steps` compares the two.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program for the terminal")]
 #![allow(clippy::disallowed_methods, reason = "it measures time")]
 
@@ -14,41 +15,45 @@ use vesicle::math::{DVec3, Vec3};
 use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Start};
 use vesicle::volume::Volume;
 
-/// Voxels along each side, the radius of the ball in the middle and of the sphere that closes in on it.
+/// Voxels along each side of the volume, and, in voxels, the radius of the ball at its centre and of the sphere that
+/// shrinks onto it.
 const SIDE: usize = 256;
 const BALL: f32 = 96.0;
 const SPHERE: f64 = 112.0;
 
-/// Mean edges. The spheres have 7,000, 66,000 and 1.7 million vertices: sizes go in steps of three.
+/// Mean edge lengths in voxels. The spheres have 7,000, 66,000 and 1.7 million vertices: edges shrink in steps of about
+/// three.
 const EDGES: [f64; 3] = [4.6, 1.6, 0.46];
 
-/// Steps that are not counted, while the sphere takes up speed, and steps that are.
+/// Number of steps that are not timed, while the sphere accelerates, and of steps that are.
 const BEFORE: usize = 4;
 const COUNTED: usize = 6;
 
-/// Runs of each size.
+/// Number of runs for each size.
 const RUNS: [usize; 3] = [6, 3, 1];
 
-/// Of one size.
+/// Timings of one size.
 struct Row {
     vertices: u32,
-    /// Nanoseconds of a step for each vertex: the best.
+    /// Shortest time of a step in nanoseconds per vertex.
     step: f64,
-    /// Milliseconds of its topology: the best.
+    /// Shortest time of a step's topology in milliseconds.
     topology: f64,
 }
 
+/// Returns the milliseconds since the first call, as clock of the model.
 fn milliseconds() -> f64 {
     static BEGAN: OnceLock<Instant> = OnceLock::new();
     BEGAN.get_or_init(Instant::now).elapsed().as_secs_f64() * 1e3
 }
 
+/// Returns a volume with a ball at its centre.
 fn ball() -> Volume {
     let middle = Vec3::splat(0.5 * (SIDE as f32 - 1.0));
     scenes::volume([SIDE; 3], |p| (128.0 - 32.0 * (p.distance(middle) - BALL)).clamp(0.0, 255.0).floor())
 }
 
-/// The best of all counted steps of one run.
+/// Returns the shortest times of all timed steps of one run.
 fn row(volume: &Volume, edge: f64) -> Row {
     let params =
         DeformableParams { iso: 128.0, iso_force: -1.0, rigidity: 0.2, ..DeformableParams::default() };
@@ -74,6 +79,7 @@ fn row(volume: &Volume, edge: f64) -> Row {
     row
 }
 
+/// Returns the shortest times of several runs as JSON.
 fn best(volume: &Volume, edge: f64, runs: usize) -> String {
     let rows: Vec<Row> = (0..runs).map(|_| row(volume, edge)).collect();
     let least = |of: fn(&Row) -> f64| rows.iter().map(of).fold(f64::INFINITY, f64::min);
@@ -85,7 +91,7 @@ fn best(volume: &Volume, edge: f64, runs: usize) -> String {
 
 fn main() {
     let volume = ball();
-    // As in the package, where code is compiled while it runs.
+    // Warm-up, as in the package, where code is compiled while it runs.
     row(&volume, EDGES[1]);
     let rows: Vec<String> = EDGES.iter().zip(RUNS).map(|(&edge, runs)| best(&volume, edge, runs)).collect();
     println!("[{}]", rows.join(", "));

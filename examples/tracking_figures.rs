@@ -1,10 +1,14 @@
-//! Figures of enrichment and tracking.
+//! Figures of slice enrichment and tracking.
 //!
-//! `<files>`: enrichment of the 4D volumes named, on slices left out, and of a synthetic heart.
-//! `CENTER=x,y,z,mm <files>`: what is nearest to a voxel is followed in a box of so many mm around it.
-//! `TRACK=<beats>`: a synthetic heart of the paper's size against its truth, or `TRACK=small` one of a few voxels.
-//! `TH`, `RADIUS`, `SCALE`, `FRAMES` are parameters of the tracker (the middle two in pixels for `TRACK`), `PREDICTION=0` goes
-//! without, `PLAIN=1` does not enrich, `BOX=<first and last voxel>` is looked at in files, `BIN=<n>` takes means of n × n voxels of a slice first.
+//! - `<files>`: errors of enrichment on slices left out, of the 4D volumes named and of a synthetic heart.
+//! - `CENTER=x,y,z,mm <files>`: tracks the surface nearest to a voxel, in a box that extends `mm` world units from it
+//!   on all sides. `LARGEST=1` tracks the largest surface in the box instead; `OUT=<folder>` writes the meshes as PLY.
+//! - `TRACK=<beats>`: tracks a synthetic heart of the paper's size and compares it with its truth; `TRACK=small` one of
+//!   a few voxels.
+//!
+//! Parameters of the tracker are `TH`, `RADIUS` and `SCALE` (these two in pixels for `TRACK`) and, for `TRACK`,
+//! `FRAMES` and `PREDICTION=0` (none); `PLAIN=1` skips enrichment for `TRACK`. For files, `BOX=<first and last voxel>`
+//! gives the box, and `BIN=<n>` first averages blocks of n × n voxels in each slice.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program for the terminal")]
 
 #[path = "../tests/common/mod.rs"]
@@ -19,7 +23,7 @@ use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOpti
 use vesicle::spatial::surface_distance;
 use vesicle::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
 
-/// Every other slice, so that the others are known.
+/// Returns the volume with every other slice, so that the rest are the ground truth.
 fn every_other(volume: &Volume) -> Volume {
     let [nx, ny, nz] = volume.dims();
     let mut values = Vec::new();
@@ -40,7 +44,7 @@ fn every_other(volume: &Volume) -> Volume {
     .unwrap()
 }
 
-/// Root of the mean squared difference on the slices left out.
+/// Returns the root mean square error on the slices that were left out.
 fn left_out_error(given: &Volume, volume: &Volume, method: Enrichment) -> f64 {
     let made = every_other(given).enrich_slices(Some(2), method).unwrap();
     let [mut sum, mut count] = [0.0, 0.0];
@@ -54,6 +58,7 @@ fn left_out_error(given: &Volume, volume: &Volume, method: Enrichment) -> f64 {
     (sum / count).sqrt()
 }
 
+/// Prints the errors of enrichment by optical flow and by linear interpolation.
 fn tell_enrichment(given: &Volume, truth: &Volume) {
     let began = Instant::now();
     let flow = left_out_error(given, truth, Enrichment::Flow);
@@ -62,6 +67,7 @@ fn tell_enrichment(given: &Volume, truth: &Volume) {
     println!("  left out: flow {flow:.3}, linear {linear:.3}, ratio {:.3}; {took:.2} s", flow / linear);
 }
 
+/// Tracks a synthetic heart and prints the errors of each frame against the truth.
 fn track(cine: &Cine) {
     let began = Instant::now();
     let mut volume = cine.volume();
@@ -137,7 +143,7 @@ fn track(cine: &Cine) {
     println!("tracked in {:.1} s", began.elapsed().as_secs_f64());
 }
 
-/// The worst of all frames.
+/// The largest errors of all frames.
 #[derive(Default)]
 struct Worst {
     mean: f64,
@@ -145,9 +151,9 @@ struct Worst {
     folds: f64,
     areas: Vec<f64>,
     crossings: usize,
-    /// In the mean of the frames.
+    /// Mean number of steps per frame.
     steps: f64,
-    /// By frame, found and true.
+    /// Measured and true volume of each frame.
     volumes: Vec<[f64; 2]>,
     times: Vec<f64>,
     votes: f64,
@@ -178,7 +184,7 @@ impl Worst {
     }
 }
 
-/// Follows what is nearest to a voxel, in a box of `reach` world units around it.
+/// Tracks the surface nearest to a voxel, in a box that extends `reach` world units from it on all sides.
 fn follow_file(volume: &Volume, voxel: DVec3, reach: f64) {
     let affine = volume.affine();
     let center = affine.transform_point3(voxel);
@@ -196,7 +202,7 @@ fn follow_file(volume: &Volume, voxel: DVec3, reach: f64) {
     let component =
         if std::env::var("LARGEST").is_ok() { Component::Largest } else { Component::Nearest(center) };
     let corners = [center - reach, center + reach];
-    // In voxels of the file, which are fewer or more now.
+    // `BOX` is in voxels of the file; binning and enrichment change their number.
     let voxels = |box_: String| {
         let n: Vec<f64> = box_.split(',').map(|x| x.parse().unwrap()).collect();
         let now = |k: usize| {

@@ -4,17 +4,19 @@ import { call } from './runtime.js';
 import { RawAnimation } from './vesicle.js';
 
 /**
- * Meshes one after the other as an animated glb (binary glTF). They may have nothing in common; each has its normals,
- * texture coordinates, colours and texture. Viewers that play animations show one at a time, others the first.
+ * Encodes a sequence of meshes as an animated glb (binary glTF), one mesh a frame. The meshes need not have the same
+ * connectivity; each keeps its normals, texture coordinates, colours and texture. Viewers that play animations show one
+ * frame at a time, others the first.
  *
- * Frames that are equal to the one before are not stored again, nor are equal textures. Each frame that is stored takes
- * 24 bytes a vertex and 12 a triangle, with texture coordinates 8 and with colours 12 a vertex more; all of it is in
- * memory twice at the end.
+ * Frames equal to the previous one are stored once, and so are equal textures. Each stored frame takes 24 bytes a
+ * vertex and 12 a triangle, plus 8 bytes a vertex with texture coordinates and 12 with colours; all of it is in memory
+ * twice at the end.
  *
- * @param frames - At least one. The mesh of a model is as it is now wherever it is named: `clone()` it as it moves.
- * @param options - `frameSeconds`: how long each frame is seen, 0.001 to 1000; default 0.1.
- * @throws {@link VesicleError} `invalid-argument`: no frames, one that is no mesh or has no triangles, a time out of
- *   range; `too-large`: more than there is memory for, or than a glb can hold, 4 GiB; `freed`.
+ * @param frames - At least one. The live mesh of a model is encoded in its present state wherever it occurs: `clone()`
+ *   it while the model runs.
+ * @param options - `frameSeconds`: duration of each frame, 0.001 to 1000; default 0.1.
+ * @throws {@link VesicleError} `invalid-argument`: no frames, an entry that is no mesh or has no triangles, a duration
+ *   out of range; `too-large`: more than there is memory for, or than a glb can hold, 4 GiB; `freed`.
  */
 export function animationGlb(frames: readonly Mesh[], options: { frameSeconds?: number } = {}): Uint8Array {
   const { frameSeconds = 0.1 } = knownOnly('options', options, ['frameSeconds']);

@@ -1,38 +1,38 @@
-// Checks of arguments. Each gives the value back, or throws `invalid-argument` naming the parameter and saying
-// what is accepted.
+// Validation of arguments. Each function returns the value, or throws `invalid-argument` naming the parameter and what
+// is accepted.
 import { VesicleError } from './error.js';
 
-/** The error for one parameter. */
+/** Returns the `invalid-argument` error for one parameter. */
 export function invalid(parameter: string, problem: string): VesicleError {
   return new VesicleError('invalid-argument', `${parameter}: ${problem}`);
 }
 
-/** A value as it can be shown in a message. */
+/** Formats a value for an error message. */
 function shown(value: unknown): string {
   if (typeof value === 'string') return `'${value}'`;
   if (value !== null && typeof value === 'object') return `${value.constructor?.name ?? 'object'}`;
   return String(value);
 }
 
-/** What a number has to satisfy. */
+/** Inclusive bounds of a number. */
 interface Bounds {
   min?: number;
   max?: number;
 }
 
-/** A finite number between bounds. */
+/** Returns `value` if it is a finite number within the bounds, else throws `invalid-argument`. */
 export function number(parameter: string, value: unknown, { min = -Infinity, max = Infinity }: Bounds = {}): number {
   if (typeof value === 'number' && Number.isFinite(value) && value >= min && value <= max) return value;
   throw invalid(parameter, `${shown(value)}; ${wanted('a finite number', min, max)} is needed`);
 }
 
-/** A finite number above 0. */
+/** Returns `value` if it is a finite number above 0, else throws `invalid-argument`. */
 export function positive(parameter: string, value: unknown): number {
   if (number(parameter, value) > 0) return value as number;
   throw invalid(parameter, `${shown(value)}; a number above 0 is needed`);
 }
 
-/** A whole number between bounds; 0 to 2^32 - 1 where none are given. */
+/** Returns `value` if it is an integer within the bounds (default 0 to 2^32 - 1), else throws `invalid-argument`. */
 export function whole(parameter: string, value: unknown, { min = 0, max = 0xffffffff }: Bounds = {}): number {
   if (Number.isInteger(value) && (value as number) >= min && (value as number) <= max) return value as number;
   throw invalid(parameter, `${shown(value)}; ${wanted('a whole number', min, max)} is needed`);
@@ -44,13 +44,16 @@ function wanted(kind: string, min: number, max: number): string {
   return max < Infinity ? `${kind} of at most ${max}` : kind;
 }
 
-/** One of some words. */
+/** Returns `value` if it is one of `choices`, else throws `invalid-argument`. */
 export function choice<T extends string>(parameter: string, value: unknown, choices: readonly T[]): T {
   if (choices.includes(value as T)) return value as T;
   throw invalid(parameter, `${shown(value)}; one of ${choices.map(shown).join(', ')} is needed`);
 }
 
-/** Finite numbers, so many of them, in an array of any kind. */
+/**
+ * Copies an array of any kind into a `Float64Array`; throws `invalid-argument` unless all entries are finite numbers
+ * and the length is one of `lengths`.
+ */
 export function numbers(parameter: string, value: unknown, ...lengths: number[]): Float64Array<ArrayBuffer> {
   const list = value as ArrayLike<number>;
   if (value === null || typeof value !== 'object' || !lengths.includes(list.length)) {
@@ -59,7 +62,7 @@ export function numbers(parameter: string, value: unknown, ...lengths: number[])
   return Float64Array.from(list, (entry) => number(parameter, entry));
 }
 
-/** Three finite numbers. */
+/** Copies three finite numbers into a `Float64Array`; throws `invalid-argument` for anything else. */
 export const vec3 = (parameter: string, value: unknown): Float64Array<ArrayBuffer> => numbers(parameter, value, 3);
 
 function lengthOf(value: unknown): string {
@@ -67,7 +70,10 @@ function lengthOf(value: unknown): string {
   return typeof length === 'number' && typeof value === 'object' ? ` of length ${length}` : '';
 }
 
-/** A typed array of one kind, its length a multiple of `stride`. */
+/**
+ * Returns `value` if it is a readable typed array of class `kind` with a length that is a multiple of `stride`, else
+ * throws `invalid-argument`.
+ */
 export function typed<T extends { readonly length: number }>(
   parameter: string,
   value: unknown,
@@ -81,7 +87,7 @@ export function typed<T extends { readonly length: number }>(
   throw invalid(parameter, `length ${value.length} is not a multiple of ${stride}`);
 }
 
-/** Whether a typed array's memory is elsewhere: its length is 0 then, like that of one that is only empty. */
+/** Whether a typed array is detached or out of bounds; its length is then 0, as if it were only empty. */
 function isGone(array: { readonly length: number }): boolean {
   try {
     if (array.length === 0 && ArrayBuffer.isView(array)) (array as unknown as Uint8Array).at(0);
@@ -91,7 +97,10 @@ function isGone(array: { readonly length: number }): boolean {
   }
 }
 
-/** Packed numbers, all finite, their count a multiple of `stride`. */
+/**
+ * Returns `value` if it is a `Float32Array` of finite numbers with a length that is a multiple of `stride`, else throws
+ * `invalid-argument`.
+ */
 export function finite(parameter: string, value: unknown, stride: number): Float32Array {
   const array = typed(parameter, value, Float32Array, stride);
   const wrong = array.findIndex((entry) => !Number.isFinite(entry));
@@ -99,7 +108,10 @@ export function finite(parameter: string, value: unknown, stride: number): Float
   throw invalid(parameter, `${array[wrong]} at index ${wrong}; all numbers must be finite`);
 }
 
-/** An object that has no other properties than those named; `{}` where it is left out. */
+/**
+ * Returns `value` if it is an object without properties other than `names`, and `{}` if it is undefined; else throws
+ * `invalid-argument`, so that misspelled options are found.
+ */
 export function knownOnly<T extends object>(
   parameter: string,
   value: T | undefined,
@@ -114,13 +126,16 @@ export function knownOnly<T extends object>(
   return value;
 }
 
-/** An array of things, holes among them as `undefined`, which `map` would leave out. */
+/** Copies an array; holes become `undefined`, so that `map` visits them, too. */
 export function list<T>(parameter: string, value: readonly T[]): readonly T[] {
   if (Array.isArray(value)) return Array.from(value);
   throw invalid(parameter, `${shown(value)}; an array is needed`);
 }
 
-/** A copy of an object, so that getters and proxies run their own code here and not in the middle of a call into the module. */
+/**
+ * Returns a shallow copy of an options object, so that getters and proxies run their code here and not during a call
+ * into the WebAssembly module.
+ */
 export function plain<T extends object>(parameter: string, value: T): T {
   if (value === null || typeof value !== 'object' || Array.isArray(value))
     throw invalid(parameter, 'an object is needed');

@@ -6,78 +6,81 @@ import { inSlices, Runner, type RunOptions, type Stepper, type StepReport } from
 import { RawDeformable, RawStart } from './vesicle.js';
 import { type Vec3, type Volume, volumeHandle } from './volume.js';
 
-/** Parameters of the deformable model; `paramSpecs('deformable')` has ranges, defaults and a sentence on each. */
+/** Parameters of the deformable model; `paramSpecs('deformable')` has their ranges, defaults and descriptions. */
 export interface DeformableParams {
-  /** Intensity of the surface, πI, in intensity units of the volume; default the middle of its range. */
+  /** Iso value, πI: intensity at the surface, in intensity units of the volume; default the middle of its range. */
   iso?: number;
-  /** Strength of the iso force, αI; negative where the object is brighter than iso. */
+  /** Strength of the iso force, αI; negative where the object is brighter than `iso`. */
   isoForce?: number;
-  /** Strength of the gradient force along the normal, αg. */
+  /** Strength of the gradient force's normal component, αg. */
   gradientNormal?: number;
-  /** Strength of the gradient force along the tangent plane, βg. */
+  /** Strength of the gradient force's tangential component, βg. */
   gradientTangent?: number;
-  /** Longest gradient that counts. */
+  /** Upper bound of the gradient's magnitude; longer gradients are clamped to it. */
   gradientBound?: number;
-  /** Resistance against bending, αc. */
+  /** Resistance to bending, αc. */
   rigidity?: number;
-  /** Resistance against stretching, αe. */
+  /** Resistance to stretching, αe. */
   stiffness?: number;
-  /** Length at which edges rest: no length, the mean length, or a length in world units. */
+  /** Rest length of the edge springs: zero, the mean edge length, or a length in world units. */
   restLength?: 'zero' | 'mean' | number;
   /** Mass of a vertex, m. */
   mass?: number;
-  /** Friction, γ. */
+  /** Damping of the velocity, γ. */
   damping?: number;
   /**
-   * How the motion is integrated: 'implicit' (the default) takes long steps and needs the fewest; 'euler' is the paper's
-   * and needs `rigidity` up to 0.4; 'runge-kutta' evaluates the forces four times and holds up to 3.
+   * Integrator of the equation of motion: 'implicit' (the default) takes long steps and needs the fewest; 'euler' is
+   * the paper's and needs `rigidity` up to 0.4; 'runge-kutta' evaluates the forces four times and remains stable up to
+   * 3.
    */
   integrator?: 'euler' | 'runge-kutta' | 'implicit';
-  /** Time of one iteration, Δt. */
+  /** Time step of one iteration, Δt. */
   timeStep?: number;
-  /** Fraction of δ a vertex may move in one iteration. */
+  /** Largest displacement of a vertex in one iteration, as a fraction of δ. */
   maxMove?: number;
-  /** Kinetic energy below which a level has converged, ε. */
+  /** Mean kinetic energy along the normals below which a level has converged, ε. */
   energyTolerance?: number;
-  /** Whether the surface may split and join. */
+  /** Whether the surface may split and merge. */
   topology?: 'adaptive' | 'fixed';
   /**
-   * How far the surface adapts to the image locally, 0..1; default 1: walls and gaps that the image shows are kept, however
-   * thin. 0 is the paper: whatever comes nearer than the contact distance is joined.
+   * Local adaptation of the surface to the image, 0..1; default 1: walls and gaps visible in the image are kept,
+   * however thin. 0 is the paper's behaviour: sheets closer than the contact distance are joined.
    */
   adaptivity?: number;
   /**
-   * Whether parts and hollows that a level shows and the surface leaves out are added to it: 'auto' (the default) in runs
-   * that start from the contour, 'on' in all, 'off' never. {@link DeformableModel.seed} does it on demand.
+   * Whether components and cavities that the image of a level shows but the surface lacks are added to it: 'auto' (the
+   * default) in runs that start from the contour, 'on' in all, 'off' never. {@link DeformableModel.seed} adds them on
+   * demand.
    */
   seeding?: 'auto' | 'on' | 'off';
-  /** Separate parts and hollows that enclose fewer voxels than this are left out as noise; default 64. */
+  /** Separate components and cavities that enclose fewer voxels than this are ignored as noise; default 64. */
   smallestPart?: number;
 }
 
-/** A place that pulls the surface within `radius`. */
+/** A spring that pulls the surface within `radius` of a point towards it. */
 export interface Attractor {
-  /** World position. */
+  /** Position in world space. */
   point: Vec3;
-  /** Spring constant. */
+  /** Spring constant; negative values push the surface away. */
   strength: number;
-  /** Reach, world units. */
+  /** Radius of influence, world units. */
   radius: number;
 }
 
 /**
- * The first surface.
+ * The initial surface of a {@link DeformableModel}.
  *
- * - `'contour'`, for real data: the iso-surface of the coarsest level at `iso`, with its hollows, less what encloses fewer
- *   voxels than `smallestPart`. Where there is none: nothing (parts come with finer levels, or with another `iso`), or the
- *   enclosing surface if `seeding` is 'off' or `adaptivity` 0.
- * - `'enclosing'`: around all that is brighter than `iso`, as it is when the model is made (around the whole volume where
- *   nothing is, or where `isoForce` is not negative). This, bubbles and seeds are for teaching, and for objects without a
- *   usable iso-surface.
- * - `{ bubbles }`: n by n by n of them, which grow and join.
- * - `{ seeds, radius }`: spheres at packed world points.
- * - `{ marchingCubes }`: the iso-surface of the volume itself at an intensity.
- * - A closed mesh that does not cross itself, in world space; it is copied.
+ * - `'contour'`, for real data: the iso-surface of the coarsest level at `iso`, with its cavities, without components
+ *   and cavities that enclose fewer voxels than `smallestPart`. If there is none, the model starts empty (components
+ *   appear on finer levels, or with another `iso`), or from the enclosing surface if `seeding` is 'off' or `adaptivity`
+ *   0.
+ * - `'enclosing'`: a surface around everything brighter than `iso` at construction (around the whole volume if nothing
+ *   is, or if `isoForce` is not negative). This, bubbles and seeds are for teaching, and for objects without a usable
+ *   iso-surface.
+ * - `{ bubbles }`: a grid of n × n × n spheres, which grow and merge.
+ * - `{ seeds, radius }`: spheres around packed points in world space.
+ * - `{ marchingCubes }`: the iso-surface of the volume itself at the given intensity.
+ * - A closed mesh without self-intersections, in world space; it is copied.
  */
 export type DeformableStart =
   | 'contour'
@@ -87,33 +90,36 @@ export type DeformableStart =
   | { marchingCubes: number }
   | Mesh;
 
-/** What a {@link DeformableModel} is made of. */
+/** Constructor options of a {@link DeformableModel}. */
 export interface DeformableOptions {
   /** The image; it may be freed once the model is made. */
   volume: Volume;
-  /** Of a 4D volume; default 0. */
+  /** Frame of a 4D volume; default 0. */
   frame?: number;
-  /** Default 'contour'. */
+  /** Initial surface; default 'contour'. */
   start?: DeformableStart;
   /**
-   * Pyramid levels above the volume itself; 0 (the default) = direct: the surface works on the volume from the first
-   * iteration. Each level halves the resolution; the surface starts on the coarsest and is refined on the way down.
+   * Number of pyramid levels above the volume itself. With 0 (the default) the surface works on the volume from the
+   * first iteration. Each level halves the resolution; the surface starts on the coarsest and is refined on each finer
+   * one.
    */
   levels?: number;
-  /** Target edge at the finest level, world units; default from the voxel size. */
+  /** Target edge length at the finest level, world units; default from the voxel size. */
   edge?: number;
-  /** Any of them; the others have their defaults. */
+  /** Parameters: any subset; the others have their defaults. */
   params?: DeformableParams;
 }
 
-/** Tested between two looks at the clock: some milliseconds of work. */
+/**
+ * Number of triangles tested between two checks of the clock during a coverage measurement: some milliseconds of work.
+ */
 const TRIANGLES_AT_ONCE = 512;
 
 const OPTIONS = ['volume', 'frame', 'start', 'levels', 'edge', 'params'];
 
 /**
- * A deformable model: a closed surface that moves onto the object in a volume under forces of the image and of its
- * own, and splits and joins on the way, coarse to fine.
+ * A deformable model: a closed surface that moves onto the object in a volume under image forces and internal forces,
+ * and splits and merges on the way, coarse to fine.
  *
  * After Lachaud and Montanvert, "Deformable meshes with automated topology changes for coarse-to-fine 3D surface
  * extraction". The surface is in the volume's world space.
@@ -127,10 +133,10 @@ export class DeformableModel implements Stepper {
   readonly #runner = new Runner();
 
   /**
-   * A model at its start shape, ready to step.
+   * Creates a model with its initial surface, ready to step.
    *
-   * @throws {@link VesicleError} `invalid-argument` naming the option or parameter; `not-closed` or
-   *   `self-intersecting` for a start mesh that is; `too-large`.
+   * @throws {@link VesicleError} `invalid-argument` naming the option or parameter; `not-closed` or `self-intersecting`
+   *   for a start mesh that is; `too-large`.
    */
   constructor(given: DeformableOptions) {
     const { volume, frame = 0, start = 'contour', levels = 0, edge, params: some = {} } = checked(given);
@@ -143,31 +149,31 @@ export class DeformableModel implements Stepper {
     this.#mesh = wrapMesh(this.#meshHandle, true);
   }
 
-  /** The surface: the same live object from start to end, in world space. It goes when the model is freed. */
+  /** The surface: the same live object from start to end, in world space. Freed with the model. */
   get mesh(): Mesh {
     return this.#mesh;
   }
 
-  /** Pyramid level now; 0 = the volume itself. */
+  /** Current pyramid level; 0 = the volume itself. */
   get level(): number {
     return this.#handle.use((raw) => raw.level());
   }
 
   /**
-   * The sampling distance δ now, world units: edges are between δ and 2.5 δ. Where voxels are not cubes, both hold in the
-   * mean of all directions.
+   * Current sampling distance δ, world units: edge lengths are between δ and 2.5 δ. With anisotropic voxels, both
+   * bounds hold in the mean over all directions.
    */
   get delta(): number {
     return this.#handle.use((raw) => raw.delta());
   }
 
-  /** All parameters as they are now; a copy. */
+  /** Current values of all parameters; a copy. */
   get params(): Required<DeformableParams> {
     return this.#handle.use((raw) => raw.params() as Required<DeformableParams>);
   }
 
   /**
-   * Attachment points the user places, in place of those before.
+   * Replaces all attractors: points placed by the user that pull the surface within their radius.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the entry.
    */
@@ -177,10 +183,10 @@ export class DeformableModel implements Stepper {
   }
 
   /**
-   * So many iterations at once, synchronous and deterministic; fewer where the end comes first.
+   * Runs up to `iterations` iterations, synchronous and deterministic; fewer if the model finishes earlier.
    *
-   * @returns The report of the last one, with the events of all.
-   * @throws {@link VesicleError} `invalid-argument` while a {@link DeformableModel.run} is under way.
+   * @returns The last report, with the events of all iterations.
+   * @throws {@link VesicleError} `invalid-argument` while a {@link DeformableModel.run} is in progress.
    */
   step(iterations = 1): StepReport {
     whole('iterations', iterations, { min: 1 });
@@ -189,11 +195,12 @@ export class DeformableModel implements Stepper {
   }
 
   /**
-   * To the end, yielding to the event loop between slices. Parameters and attractors may be changed meanwhile.
+   * Runs to the end, yielding to the event loop between slices. Parameters and attractors may be changed meanwhile.
    *
    * @returns The last report.
-   * @throws `signal.reason` when aborted, and the model stays usable; what `onStep` throws;
-   *   {@link VesicleError} `invalid-argument` while another run is under way, `freed` when the model is freed meanwhile.
+   * @throws `signal.reason` when aborted, and the model stays usable; any error thrown by `onStep`;
+   *   {@link VesicleError} `invalid-argument` while another run is in progress, `freed` when the model is freed
+   *   meanwhile.
    */
   run(given?: RunOptions): Promise<StepReport> {
     return this.#runner.run(() => this.#step(1), given);
@@ -204,11 +211,11 @@ export class DeformableModel implements Stepper {
   }
 
   /**
-   * Searches the current level for parts and hollows that the surface leaves out and adds them, whatever `seeding` says.
-   * A model that had reached its end can go on afterwards.
+   * Finds components and cavities of the current level's image that the surface lacks and adds them, whatever the value
+   * of `seeding`. A finished model can continue afterwards.
    *
    * @returns A report that counts them in `events.seeds`.
-   * @throws {@link VesicleError} `invalid-argument` while a {@link DeformableModel.run} is under way; `too-large`.
+   * @throws {@link VesicleError} `invalid-argument` while a {@link DeformableModel.run} is in progress; `too-large`.
    */
   seed(): StepReport {
     this.#runner.refuseWhileRunning('seed');
@@ -216,18 +223,18 @@ export class DeformableModel implements Stepper {
   }
 
   /**
-   * Measures how much of the volume's iso-surface the surface covers, as both are now, and where it does not. Yields to
-   * the event loop between slices; the model may move on meanwhile.
+   * Measures how much of the volume's iso-surface the surface covers, both in their present state, and lists the
+   * regions it does not cover. Yields to the event loop between slices; the model may be stepped meanwhile.
    *
-   * @throws `signal.reason` when aborted; what `onProgress` throws; {@link VesicleError} `invalid-argument` naming the
-   *   option, `freed` when the model is freed meanwhile, `too-large`.
+   * @throws `signal.reason` when aborted; any error thrown by `onProgress`; {@link VesicleError} `invalid-argument`
+   *   naming the option, `freed` when the model is freed meanwhile, `too-large`.
    */
   async coverage(given?: CoverageOptions): Promise<Coverage> {
     const { signal, onProgress } = checkedCoverage(given);
     signal?.throwIfAborted();
     const survey = this.#handle.use((raw) => new Handle('survey', () => raw.surveyCoverage()));
     const advance = () => {
-      // The survey has its own copy of the surface; a model that was freed has to end it all the same.
+      // The survey has its own copy of the surface, but freeing the model must still end it.
       const share = this.#handle.use(() => survey.use((raw) => raw.advance(TRIANGLES_AT_ONCE)));
       onProgress?.(share);
       return share < 1 ? undefined : survey.use((raw) => raw.finish() as Coverage);
@@ -240,7 +247,7 @@ export class DeformableModel implements Stepper {
   }
 
   /**
-   * Live parameters: any subset, validated as a whole before any of it is taken.
+   * Changes any subset of the parameters of the live model. All values are validated before any is set.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the parameter that is misspelled, of the wrong type or out
    *   of range; nothing has changed then.
@@ -251,23 +258,23 @@ export class DeformableModel implements Stepper {
   }
 
   /**
-   * Speed of each vertex along its outward normal, in the order of `mesh.arrays()`: world units per unit of time,
-   * negative inwards. A vertex that was just made has the speed of where it was made.
+   * Returns the speed of each vertex along its outward normal, in the order of `mesh.arrays()`: world units per unit of
+   * time, negative inwards. A newly created vertex has the speed of the surface at the point where it was created.
    */
   speeds(): Float32Array {
     return this.#handle.use((raw) => raw.speeds());
   }
 
-  /** The whole state, for {@link DeformableModel.restore} of a model made with the same volume and options. */
+  /** Saves the whole state, for {@link DeformableModel.restore} of a model made with the same volume and options. */
   save(): Uint8Array {
     return this.#handle.use((raw) => raw.save());
   }
 
   /**
-   * Back to a saved state, bit for bit.
+   * Restores a saved state, bit for bit.
    *
-   * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a model, which then stays as it was;
-   *   `invalid-argument` while a run is under way.
+   * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a model, which then stays unchanged;
+   *   `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
     typed('state', state, Uint8Array);
@@ -275,7 +282,7 @@ export class DeformableModel implements Stepper {
     this.#handle.use((raw) => raw.restore(state));
   }
 
-  /** Gives the memory back; the model and its live mesh cannot be used afterwards. */
+  /** Frees the memory; the model and its live mesh cannot be used afterwards. */
   free(): void {
     this.#meshHandle.free();
     this.#handle.free();
@@ -296,7 +303,7 @@ function checked(given: DeformableOptions): Partial<DeformableOptions> {
   return known;
 }
 
-// Made last, when nothing else can fail: whoever takes it frees it.
+// Created last, when nothing else can fail: the consumer of the raw start frees it.
 function rawStart(start: DeformableStart): RawStart {
   if (start === 'contour') return RawStart.contour();
   if (start === 'enclosing') return RawStart.enclosing();

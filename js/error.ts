@@ -1,28 +1,27 @@
-/** What kind of failure a {@link VesicleError} is. */
+/** The kinds of failure that a {@link VesicleError} reports. */
 export type ErrorCode =
   /** A parameter out of range, NaN, of the wrong length, missing or misspelled; the message names it. */
   | 'invalid-argument'
   /** A truncated, inconsistent or unsupported file; the message names the format and the field. */
   | 'bad-file'
-  /** A mesh with boundary or non-manifold edges where a closed one is needed. */
+  /** A mesh with boundary or non-manifold edges; a closed one is needed. */
   | 'not-closed'
-  /** A start mesh that crosses itself where an embedded one is needed. */
+  /** A start mesh with self-intersections; an embedded one is needed. */
   | 'self-intersecting'
   /** A linear system without a usable solution; the message names the likely cause. */
   | 'singular-system'
-  /** More memory than there is; the message says how much. */
+  /** More memory needed than there is; the message says how much. */
   | 'too-large'
-  /** Work that was called off. */
+  /** Work that was aborted. */
   | 'aborted'
-  /** An object used after its `free()`. */
+  /** Use of an object after its `free()`. */
   | 'freed';
 
 /**
- * Every failure the library can foresee. `message` says what was wrong and what is accepted, `code` what kind
- * of failure it is.
+ * An error the library can foresee. `message` says what was wrong and what is accepted, `code` is the kind of failure.
  */
 export class VesicleError extends Error {
-  /** What kind of failure this is. */
+  /** The kind of failure. */
   readonly code: ErrorCode;
 
   constructor(code: ErrorCode, message: string) {
@@ -33,8 +32,8 @@ export class VesicleError extends Error {
 }
 
 /**
- * A fault inside the library itself (a bug, or memory that ran out half-way). The WebAssembly instance and every
- * object made with it are lost. `await init()` starts a new instance, with which new objects can be made.
+ * A fault inside the library itself (a bug, or memory that ran out half-way). The WebAssembly instance and all objects
+ * created with it are lost. `await init()` starts a new instance, with which new objects can be created.
  */
 export class VesicleCrash extends Error {
   constructor(what: string, options?: ErrorOptions) {

@@ -5,88 +5,98 @@ import { Runner, type RunOptions, type Stepper, type StepReport } from './steppe
 import { RawCameras, RawImplicit, RawPoints } from './vesicle.js';
 import { type Vec3, type Volume, wrapVolume } from './volume.js';
 
-/** Parameters of the implicit surface; `paramSpecs('implicit')` has ranges, defaults and a sentence on each. Lengths but `cell` are in units of the box, in which the longest side of the points' bounds is 2. */
+/**
+ * Parameters of the implicit surface; `paramSpecs('implicit')` has their ranges, defaults and descriptions. All lengths
+ * except `cell` are in units of the normalised box, in which the longest side of the points' bounds is 2.
+ */
 export interface ImplicitParams {
-  /** The radial function, φ: the paper's, or one to compare it with: |r|³, −|r|, exp(−r²/2σ²). */
+  /**
+   * Radial basis function φ: the paper's multi-order function, or for comparison thin-plate |r|³, biharmonic −|r| or
+   * Gaussian exp(−r²/2σ²).
+   */
   kernel?: 'multi-order' | 'thin-plate' | 'biharmonic' | 'gaussian';
-  /** First-order smoothness, δ: more of it, a tighter surface. */
+  /** First-order smoothness, δ: larger values give a tighter surface. */
   delta?: number;
-  /** Third-order smoothness, τ: more of it, less detail. */
+  /** Third-order smoothness, τ: larger values give less detail. */
   tau?: number;
   /** Width of the Gaussian, σ. */
   sigma?: number;
-  /** λ of surface constraints; 0 interpolates. With more than 3,000 points it counts n/3,000 times. */
+  /**
+   * Regularisation λ of surface constraints; 0 interpolates. With more than 3,000 points it is multiplied by n/3,000.
+   */
   lambdaSurface?: number;
-  /** λ of exterior constraints. */
+  /** Regularisation λ of exterior constraints. */
   lambdaExterior?: number;
-  /** Relative residual of the solve. */
+  /** Relative residual at which the solver stops. */
   tolerance?: number;
-  /** Edge of an extraction cell in the points' units; 0, the default, takes it from their spacing. */
+  /** Edge of an extraction cell in the points' units; 0, the default, derives it from the points' spacing. */
   cell?: number;
-  /** The value of f that the surface is taken at: 0, or the mean of f over the surface constraints. */
+  /** The value of f at the extracted surface: 0, or the mean of f over the surface constraints. */
   level?: 'zero' | 'mean';
 }
 
-/** A camera that the points were made from. */
+/** A camera from which the points were reconstructed. */
 export interface Camera {
   /**
-   * 3x4 world to pixel, row-major: (x s, y s, s) = P (p, 1). x to the right, y down, the centre of the first pixel at
-   * (0, 0).
+   * Projection matrix, 3x4 world to pixel, row-major: (x s, y s, s) = P (p, 1). x to the right, y down, the centre of
+   * the first pixel at (0, 0).
    */
   projection: ArrayLike<number>;
-  /** Pixels of a row. */
+  /** Width of the image, pixels. */
   width: number;
-  /** Rows. */
+  /** Height of the image, pixels. */
   height: number;
-  /** rgba8, row by row from the top, for colouring the mesh; alpha 0 leaves a pixel out. */
+  /** Image for colouring the mesh, rgba8, row by row from the top; pixels with alpha 0 are ignored. */
   image?: Uint8ClampedArray;
 }
 
-/** What an {@link ImplicitSurface} is made of. Everything is copied. */
+/** Constructor options of an {@link ImplicitSurface}. Everything is copied. */
 export interface ImplicitOptions {
-  /** Packed xyz: near an unknown closed surface, at least four, not in one plane. */
+  /** Packed xyz of noisy points near the closed surface: at least four, not in one plane. */
   points: Float32Array;
-  /** Of each point, packed, outwards; of any length. */
+  /** Packed outward normals of the points; of any length. */
   normals?: Float32Array;
-  /** Of each point, above 0 and at most 1: λ is divided by it, so that unsure points bind less. */
+  /**
+   * Confidence of each point, above 0 and at most 1: its λ is divided by it, so that uncertain points constrain less.
+   */
   confidence?: Float32Array;
-  /** Of each point, packed rgb, 0..1: colours the mesh where no camera saw it. */
+  /** Packed rgb of each point, 0..1: colours vertices that no camera sees. */
   colors?: Float32Array;
-  /** Points known to be outside, packed. Else made from cameras, normals, or the points alone. */
+  /** Points known to be outside, packed. By default made from cameras, normals, or the points alone. */
   exterior?: Float32Array;
-  /** The cameras that the points were made from. */
+  /** The cameras from which the points were reconstructed. */
   cameras?: Camera[];
-  /** Poisson-disc subsample above this; 4 to 100,000, default 20,000. */
+  /** Largest number of points used; more are reduced to a Poisson-disc subsample. 4 to 100,000, default 20,000. */
   maxPoints?: number;
-  /** Outliers: keep the n largest connected clusters; default all. */
+  /** Removes outliers: keeps the n largest connected clusters; default all. */
   keepComponents?: number;
-  /** Any of them; the others have their defaults. */
+  /** Parameters: any subset; the others have their defaults. */
   params?: ImplicitParams;
 }
 
-/** What differs from the points as they were given. */
+/** Manual edits of the points of an {@link ImplicitSurface}. */
 export interface PointEdits {
-  /** More points near the surface, packed. */
+  /** Additional points near the surface, packed. */
   added?: Float32Array;
-  /** Points to leave out, by their index in those given. */
+  /** Points to leave out, by their index in the original points. */
   removed?: Uint32Array;
-  /** More points known to be outside, packed. */
+  /** Additional points known to be outside, packed. */
   outside?: Float32Array;
 }
 
-/** How well a surface fits its points, in their units. */
+/** Distances of the points from a surface, in the points' units, and its curvature. */
 export interface Fitness {
   /** Mean distance of all the original points from the surface. */
   mean: number;
-  /** Root of the mean squared distance. */
+  /** Root mean square distance. */
   rms: number;
-  /** The largest distance. */
+  /** Maximum distance. */
   max: number;
-  /** Mean of |H| over the vertices, per unit. */
+  /** Mean of |H| over the vertices, per unit of length of the points. */
   meanCurvature: number;
 }
 
-/** What there is to tell beside the contract. */
+/** Figures of an {@link ImplicitSurface} that are not part of the {@link StepReport}. */
 interface Facts {
   cell: number;
   spacing: number;
@@ -101,7 +111,7 @@ const OPTIONS = [
 ];
 
 /**
- * Points of a file: PLY, OBJ, XYZ, PTS or CSV, detected from the bytes. Colours are rgb, 0..1.
+ * Parses points from a file: PLY, OBJ, XYZ, PTS or CSV, detected from the bytes. Colours are rgb, 0..1.
  *
  * @throws {@link VesicleError} `bad-file` naming the format and the field or line.
  */
@@ -120,11 +130,13 @@ export function parsePoints(bytes: Uint8Array): {
 }
 
 /**
- * A smooth closed surface through sparse, noisy, uneven points with gaps: where a sum of radial functions is 0.
+ * A smooth closed surface through sparse, noisy, uneven points with gaps: the zero set of a sum of radial basis
+ * functions.
  *
- * After Dinh, Turk and Slabaugh, "Reconstructing surfaces by volumetric regularization using radial basis functions". Its
- * stages are the phases of the reports: subsample, constraints, solve, extract, colour; a step is a slice of some ten
- * milliseconds of one of them. The mesh is empty until the first surface is complete, and stays until the next one is.
+ * After Dinh, Turk and Slabaugh, "Reconstructing surfaces by volumetric regularization using radial basis functions".
+ * The stages are the phases of the reports: subsample, constraints, solve, extract, colour; a step is a slice of some
+ * ten milliseconds of one of them. The mesh is empty until the first surface is complete, and then stays until the next
+ * one is.
  *
  * @throws All methods: {@link VesicleError} `freed` after {@link ImplicitSurface.free}.
  */
@@ -135,10 +147,10 @@ export class ImplicitSurface implements Stepper {
   readonly #runner = new Runner();
 
   /**
-   * A surface before its first step.
+   * Creates a surface from points; the work begins with the first step.
    *
-   * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: fewer than four different points, all
-   *   in one plane, not finite, arrays of different lengths, values out of range.
+   * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: fewer than four different points,
+   *   all in one plane, not finite, arrays of different lengths, values out of range.
    */
   constructor(given: ImplicitOptions) {
     const known = checked(given);
@@ -147,37 +159,42 @@ export class ImplicitSurface implements Stepper {
     this.#mesh = wrapMesh(this.#meshHandle, true);
   }
 
-  /** The surface: the same live object from start to end, in the points' units. It goes when the model is freed. */
+  /** The surface: the same live object from start to end, in the points' units. Freed with the model. */
   get mesh(): Mesh {
     return this.#mesh;
   }
 
-  /** All parameters as they are now; a copy. */
+  /** Current values of all parameters; a copy. */
   get params(): Required<ImplicitParams> {
     return this.#handle.use((raw) => raw.params() as Required<ImplicitParams>);
   }
 
-  /** Edge of an extraction cell in the points' units; 0 until it is taken from their spacing. */
+  /** Edge of an extraction cell in the points' units; 0 until it is derived from their spacing. */
   get cell(): number {
     return this.#facts().cell;
   }
 
-  /** Mean distance from a point that takes part to the nearest other, in units of the box; 0 until they are chosen. */
+  /**
+   * Mean distance from a surface constraint to the nearest other one, in units of the normalised box; 0 until the
+   * constraints are chosen.
+   */
   get spacing(): number {
     return this.#facts().spacing;
   }
 
-  /** How many points were equal to others, and left out. */
+  /** Number of points left out as duplicates of others. */
   get duplicates(): number {
     return this.#facts().duplicates;
   }
 
-  /** How many pieces of the last surface no point is near. */
+  /** Number of spurious components of the last surface: those with no point near. */
   get strays(): number {
     return this.#facts().strays;
   }
 
-  /** What may go wrong with the parameters as they are, though they are accepted; `undefined` where nothing is known. */
+  /**
+   * Warning about a likely problem with the current parameters, though they are accepted; `undefined` if none is known.
+   */
   get warning(): string | undefined {
     return this.#facts().warning;
   }
@@ -187,11 +204,11 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * So many slices of work at once, synchronous and deterministic; fewer where the end comes first.
+   * Runs up to `iterations` slices of work, synchronous and deterministic; fewer if the surface is finished earlier.
    *
-   * @returns The report of the last one.
+   * @returns The last report.
    * @throws {@link VesicleError} `singular-system` naming the likely cause; `too-large`; `invalid-argument` while a
-   *   {@link ImplicitSurface.run} is under way. The last surface stays, and other parameters may be set.
+   *   {@link ImplicitSurface.run} is in progress. The last surface stays, and other parameters may be set.
    */
   step(iterations = 1): StepReport {
     whole('iterations', iterations, { min: 1 });
@@ -200,10 +217,11 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * To the end, yielding to the event loop between slices. Parameters may be changed meanwhile.
+   * Runs to the end, yielding to the event loop between slices. Parameters may be changed meanwhile.
    *
    * @returns The last report.
-   * @throws As {@link ImplicitSurface.step}; `signal.reason` when aborted, and the model stays usable; what `onStep` throws.
+   * @throws As {@link ImplicitSurface.step}; `signal.reason` when aborted, and the model stays usable; any error thrown
+   *   by `onStep`.
    */
   run(given?: RunOptions): Promise<StepReport> {
     return this.#runner.run(() => this.#step(1), given);
@@ -214,8 +232,8 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Live parameters: any subset, validated as a whole before any of it is taken. What does not depend on them is not done
-   * again: for `cell` and `level` the extraction alone, for the others the solve and what follows.
+   * Changes any subset of the parameters of the live model. All values are validated before any is set. Only dependent
+   * stages run again: for `cell` and `level` the extraction alone, for the others the solve and what follows.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the parameter; nothing has changed then.
    */
@@ -224,7 +242,7 @@ export class ImplicitSurface implements Stepper {
     this.#handle.use((raw) => raw.setParams(values));
   }
 
-  /** Points by hand as they are now; a copy. */
+  /** Current manual edits of the points; a copy. */
   get edits(): Required<PointEdits> {
     return this.#handle.use((raw) => ({
       added: raw.added(),
@@ -234,9 +252,10 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Takes points in and leaves some out, in place of all edits before; `{}` takes all back. Live: the surface stays until
-   * the new one is there. Up to some 250 of each change the system that was solved last, whose matrix and solution
-   * serve again; more are solved from the start. Where not all points take part, none takes the place of one left out.
+   * Replaces all manual edits of the points: some are added, some left out; `{}` discards all edits. Live: the surface
+   * stays until the new one is complete. Up to some 250 edits of each kind update the system solved last, reusing its
+   * matrix and solution; more are solved from the start. If only a subsample is used, a removed point is not replaced
+   * by another.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the list: not finite, farther from the others than their own
    *   size, no such index, too few points left, on the surface and outside at once; nothing has changed then.
@@ -251,8 +270,8 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * f at packed points: above 0 inside, 0 on the surface, below 0 outside. Summed term by term: some 3 ns for each pair of
-   * a point and a constraint.
+   * Evaluates f at packed points: above 0 inside, 0 on the surface, below 0 outside. Direct summation: some 3 ns for
+   * each pair of a point and a constraint.
    *
    * @throws {@link VesicleError} `invalid-argument` before the system is solved.
    */
@@ -261,19 +280,25 @@ export class ImplicitSurface implements Stepper {
     return this.#handle.use((raw) => raw.evaluate(points));
   }
 
-  /** ∇f at packed points, packed, per unit of theirs; it points inwards. Throws as {@link ImplicitSurface.evaluate}. */
+  /**
+   * Evaluates ∇f at packed points; packed vectors, per unit of length of the points, pointing inwards. Throws as
+   * {@link ImplicitSurface.evaluate}.
+   */
   gradient(points: Float32Array): Float32Array {
     finite('points', points, 3);
     return this.#handle.use((raw) => raw.gradient(points));
   }
 
-  /** The points that take part, and the exterior ones, packed; empty until they are chosen. */
+  /**
+   * Returns the surface constraints (the points used) and the exterior constraints, packed; empty until they are
+   * chosen.
+   */
   constraints(): { surface: Float32Array; exterior: Float32Array } {
     return this.#handle.use((raw) => ({ surface: raw.constraints(0), exterior: raw.constraints(1) }));
   }
 
   /**
-   * Distances of all points, with edits, from the surface, and its curvature.
+   * Measures distances of all points, with edits, from the surface, and its curvature.
    *
    * @throws {@link VesicleError} `invalid-argument` before there is a surface.
    */
@@ -281,13 +306,14 @@ export class ImplicitSurface implements Stepper {
     return this.#handle.use((raw) => raw.fitness() as Fitness);
   }
 
-  /** The surface that is being extracted, as far as it was followed: open where it goes on; empty in other phases. */
+  /** Returns the partial surface during extraction: open where the extraction continues; empty in other phases. */
   preview(): Mesh {
     return wrapMesh(new Handle('Mesh', () => this.#handle.use((raw) => raw.preview())));
   }
 
   /**
-   * f sampled on a grid around the points and the surface, so that the deformable model can take over with iso 0.
+   * Samples f on a grid around the points and the surface, so that the deformable model can continue from it with iso
+   * 0.
    *
    * @throws {@link VesicleError} `invalid-argument` before the system is solved, or below 2 voxels along an axis;
    *   `too-large`.
@@ -298,8 +324,8 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Colours the mesh from photographs: of the cameras that see a vertex the mean colour, weighted by the cosine between normal
-   * and viewing direction; unseen vertices take their neighbours'.
+   * Colours the mesh from photographs: each vertex gets the mean colour of the cameras that see it, weighted by the
+   * cosine between normal and viewing direction; unseen vertices take their neighbours' colours.
    *
    * @throws {@link VesicleError} `invalid-argument` before there is a surface, or where no camera has an image.
    */
@@ -308,17 +334,17 @@ export class ImplicitSurface implements Stepper {
     this.#handle.use((raw) => raw.colorize(rawCameras(given)));
   }
 
-  /** The whole state, for {@link ImplicitSurface.restore} of a surface made with the same points and options. */
+  /** Saves the whole state, for {@link ImplicitSurface.restore} of a surface made with the same points and options. */
   save(): Uint8Array {
     return this.#handle.use((raw) => raw.save());
   }
 
   /**
-   * Back to a saved state, bit for bit. Takes as long as choosing the points and the phase then under way had taken; while
-   * colouring, as long as the extraction, too.
+   * Restores a saved state, bit for bit. Takes as long as the choice of points and the phase in progress at the time of
+   * saving took; for a state saved while colouring, as long as the extraction, too.
    *
-   * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a surface, which then stays as it was;
-   *   `invalid-argument` while a run is under way.
+   * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a surface, which then stays unchanged;
+   *   `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
     typed('state', state, Uint8Array);
@@ -326,7 +352,7 @@ export class ImplicitSurface implements Stepper {
     this.#handle.use((raw) => raw.restore(state));
   }
 
-  /** Gives the memory back; the model and its live mesh cannot be used afterwards. */
+  /** Frees the memory; the model and its live mesh cannot be used afterwards. */
   free(): void {
     this.#meshHandle.free();
     this.#handle.free();
@@ -364,7 +390,7 @@ function checkedCameras(cameras: readonly Camera[]): Camera[] {
   });
 }
 
-// Made last, when nothing else can fail: whoever takes it frees it.
+// Created last, when nothing else can fail: the consumer of the raw cameras frees them.
 function rawCameras(cameras: readonly Camera[]): RawCameras {
   const raw = new RawCameras();
   try {

@@ -1,8 +1,8 @@
 /**
- * Vesicle grows living surfaces out of 3D data: closed triangle meshes that split, merge and refine themselves.
+ * Vesicle fits closed triangle meshes to 3D data; the meshes split, merge and refine themselves on the way.
  *
  * Points are packed xyz in a `Float32Array`, triangles packed abc in a `Uint32Array`, counter-clockwise seen from
- * outside. "World" is the volume's world space, in mm where the file says mm.
+ * outside. "World" is the volume's world space, in mm if the file says mm.
  *
  * @module vesicle
  */
@@ -58,7 +58,7 @@ export {
 } from './tracking.js';
 export { type Space, type Vec3, Volume, type VolumeInit, type VoxelArray } from './volume.js';
 
-/** The version of the library, as in its package. */
+/** Returns the version of the package. */
 export function version(): string {
   return call(rawVersion);
 }

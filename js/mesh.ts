@@ -3,107 +3,110 @@ import { call, Handle } from './runtime.js';
 import { type RawArrays, RawMesh, RawTexture } from './vesicle.js';
 import { type Vec3, type Volume, volumeHandle } from './volume.js';
 
-/** A mesh's vertices and triangles, packed. */
+/** Vertices and triangles of a mesh as packed arrays. */
 export interface MeshArrays {
-  /** xyz of each vertex. */
+  /** Position of each vertex, packed xyz. */
   positions: Float32Array;
-  /** Unit normal of each vertex, outwards. */
+  /** Unit outward normal of each vertex. */
   normals: Float32Array;
-  /** abc of each triangle, counter-clockwise seen from outside. */
+  /** Vertex indices of each triangle, packed abc, counter-clockwise seen from outside. */
   indices: Uint32Array;
-  /** Texture coordinates of each vertex, where the mesh has them; at a seam those of one side: see `splitAtSeams`. */
+  /**
+   * Texture coordinates of each vertex, if the mesh has them; at a seam those of one side: see
+   * {@link Mesh.splitAtSeams}.
+   */
   uvs?: Float32Array;
-  /** Colour of each vertex, rgb, 0..1, where the mesh has them. */
+  /** Colour of each vertex, rgb, 0..1, if the mesh has them. */
   colors?: Float32Array;
 }
 
-/** Encodings of a picture that {@link MeshTexture} may have. */
+/** Image formats of a {@link MeshTexture}, as media types. */
 export type TextureType = 'image/png' | 'image/jpeg' | 'image/webp';
 
 /**
- * The picture on a mesh, as an image file. Texture coordinates count from its upper left corner, u to the right and v
- * downwards, 1 at the far edges, and it repeats beyond, as in glTF: in three.js, with `flipY = false`.
+ * The texture of a mesh, as an image file. Texture coordinates start at its upper left corner, u to the right and v
+ * downwards, 1 at the far edges, and the image repeats beyond, as in glTF: in three.js, with `flipY = false`.
  */
 export interface MeshTexture {
-  /** How the picture is encoded. */
+  /** Format of the image file. */
   type: TextureType;
   /** The image file. */
   bytes: Uint8Array;
 }
 
-/** Measures of a mesh. Those of the enclosed solid mean something for a closed mesh only. */
+/** Measures of a mesh. Those of the enclosed solid are meaningful for a closed mesh only. */
 export interface MeshInfo {
   vertices: number;
   triangles: number;
   components: number;
-  /** Vertices - edges + triangles. */
+  /** Euler characteristic: vertices - edges + triangles. */
   euler: number;
-  /** Sum over components; closed orientable, so euler = 2 * components - 2 * genus. */
+  /** Genus, summed over components; closed orientable, so euler = 2 * components - 2 * genus. */
   genus: number;
-  /** World units squared. */
+  /** Surface area, world units squared. */
   area: number;
-  /** World units cubed. */
+  /** Enclosed volume, world units cubed. */
   volume: number;
-  /** Of the enclosed solid. */
+  /** Centroid of the enclosed solid. */
   centroid: Vec3;
   /** Second moments about the centroid of the enclosed solid, row-major 3x3. */
   inertia: number[];
-  /** Lengths, world units. */
+  /** Edge lengths, world units. */
   edge: { min: number; mean: number; max: number };
-  /** The sharpest corner of all triangles. */
+  /** Smallest angle of all triangles. */
   minAngleDegrees: number;
   bounds: { min: Vec3; max: Vec3 };
 }
 
-/** What an independent look at the mesh finds; a healthy one is closed, oriented and has all counts at 0. */
+/** Result of {@link Mesh.check}; a valid mesh is closed, oriented and has all counts at 0. */
 export interface MeshReport {
-  /** Every edge has two triangles. */
+  /** Whether every edge has two triangles. */
   closed: boolean;
-  /** Neighbouring triangles turn the same way. */
+  /** Whether all neighbouring triangles have the same orientation. */
   oriented: boolean;
-  /** Edges with more than two triangles. */
+  /** Number of edges with more than two triangles. */
   nonManifoldEdges: number;
-  /** Vertices whose triangles form more than one fan. */
+  /** Number of vertices whose triangles form more than one fan. */
   nonManifoldVertices: number;
-  /** Triangles without area. */
+  /** Number of triangles with zero area. */
   degenerateTriangles: number;
-  /** Pairs of triangles that cross, counted exactly. */
+  /** Number of pairs of triangles that intersect, counted with exact predicates. */
   selfIntersections: number;
 }
 
-/** File formats a mesh can be written in. */
+/** File formats that {@link Mesh.toBytes} writes. */
 export type MeshFormat = 'glb' | 'ply' | 'stl' | 'obj' | 'vtp' | 'mz3';
 
-/** Where a ray meets a mesh. */
+/** Intersection of a ray and a mesh. */
 export interface MeshHit {
   /** Index of the triangle in {@link MeshArrays.indices}. */
   triangle: number;
-  /** Weights of the triangle's corners; they sum to 1. */
+  /** Barycentric coordinates of the point in its triangle; they sum to 1. */
   barycentric: Vec3;
-  /** The point itself. */
+  /** The point of intersection. */
   point: Vec3;
-  /** From the ray's origin, world units. */
+  /** Distance from the ray's origin, world units. */
   distance: number;
 }
 
-/** Which curvature: κ₁ and κ₂ are the principal ones. */
+/** Kind of curvature; κ₁ and κ₂ are the principal curvatures. */
 export type CurvatureKind =
-  /** H = (κ₁ + κ₂) / 2. */
+  /** Mean curvature, H = (κ₁ + κ₂) / 2. */
   | 'mean'
-  /** K = κ₁ κ₂. */
+  /** Gaussian curvature, K = κ₁ κ₂. */
   | 'gaussian';
 
-/** How far two surfaces are from each other, world units. Summaries are of both ways, and the same both ways. */
+/** Distances between two surfaces, world units. The summaries cover both directions and are symmetric. */
 export interface SurfaceDistance {
-  /** From each vertex of the mesh to the nearest point of the other's surface; not negative. */
+  /** Distance from each vertex of the mesh to the closest point of the other surface; not negative. */
   perVertex: Float32Array;
-  /** Mean of the two one-way means. */
+  /** Mean distance: the mean of the two one-way means. */
   mean: number;
-  /** Root of the mean of the two one-way mean squares. */
+  /** Root mean square distance: root of the mean of the two one-way mean squares. */
   rms: number;
-  /** The larger of the two one-way 95th percentiles. */
+  /** 95th percentile: the larger of the two one-way percentiles. */
   p95: number;
-  /** The largest distance of all, both ways. */
+  /** Hausdorff distance: the largest of all distances, in both directions. */
   hausdorff: number;
 }
 
@@ -118,17 +121,20 @@ const TEXTURES: readonly TextureType[] = ['image/png', 'image/jpeg', 'image/webp
 
 const FORMATS: readonly MeshFormat[] = ['glb', 'ply', 'stl', 'obj', 'vtp', 'mz3'];
 
-/** The handle of a mesh; for the library's own modules. */
+/** Returns the handle of a mesh, for the other modules of the library. */
 export let meshHandle: (parameter: string, mesh: Mesh) => Handle<RawMesh>;
-/** A mesh of a raw one. A live one belongs to its model, which frees it. For the library's own modules. */
+/**
+ * Creates a mesh from a raw handle, for the other modules of the library. A live mesh belongs to its model, which frees
+ * it.
+ */
 export let wrapMesh: (handle: Handle<RawMesh>, live?: boolean) => Mesh;
 
 /**
  * A triangle mesh.
  *
- * Files and arrays may hold an open mesh, or one that crosses itself; {@link Mesh.check} says so, and what needs a
- * closed one refuses it with `not-closed`. The mesh of a model follows the model; it can be read and copied but not
- * edited.
+ * Files and arrays may contain an open mesh, or one with self-intersections; {@link Mesh.check} reports both, and
+ * methods that need a closed mesh throw `not-closed`. The mesh of a model is live: it follows the model, and can be
+ * read and copied but not edited.
  *
  * @throws All methods: {@link VesicleError} `freed` after {@link Mesh.free}.
  */
@@ -153,7 +159,7 @@ export class Mesh {
   }
 
   /**
-   * A sphere of nearly equal triangles with no edge longer than `maxEdge`.
+   * Creates a sphere of nearly equilateral triangles with no edge longer than `maxEdge`.
    *
    * @throws {@link VesicleError} `invalid-argument`; `too-large` for more triangles than there is memory for.
    */
@@ -165,13 +171,13 @@ export class Mesh {
   }
 
   /**
-   * A mesh of packed arrays, which are copied as they are.
+   * Creates a mesh from packed arrays, which are copied unchanged.
    *
    * @param positions - xyz of each vertex.
    * @param indices - abc of each triangle, counter-clockwise seen from outside.
-   * @param extra - `uvs`: texture coordinates of each vertex; `texture`: the picture they lie in.
-   * @throws {@link VesicleError} `invalid-argument`: a wrong length, a number that is not finite, an index of no vertex,
-   *   a texture without `uvs`, bytes that are no picture of the type that is named.
+   * @param extra - `uvs`: texture coordinates of each vertex; `texture`: the image they refer to.
+   * @throws {@link VesicleError} `invalid-argument`: a wrong length, a number that is not finite, an index out of
+   *   range, a texture without `uvs`, bytes that are no image of the stated type.
    */
   static fromArrays(
     positions: Float32Array,
@@ -190,13 +196,13 @@ export class Mesh {
   }
 
   /**
-   * The mesh in a file: glb, ply, stl or obj, detected from the bytes. Duplicate positions are welded.
+   * Parses a mesh file: glb, ply, stl or obj, detected from the bytes. Duplicate positions are welded.
    *
-   * A glb that has its base colour texture in it (png, jpeg or webp) brings it along as {@link Mesh.texture}. Texture
-   * coordinates are as in the file: v counts from above in glb, and from below in obj and ply.
+   * The base colour texture inside a glb (png, jpeg or webp) becomes {@link Mesh.texture}. Texture coordinates are
+   * those of the file: v points downwards in glb, and upwards in obj and ply.
    *
-   * @param options - `texture`: the picture for a file that has it beside it (obj, ply). Then v counts from above in all
-   *   of them: that of an obj or ply becomes 1 - v. It takes the place of a glb's own.
+   * @param options - `texture`: the image of a file that has it in a separate file (obj, ply). Then v points downwards
+   *   for all formats: that of an obj or ply becomes 1 - v. It replaces a glb's own texture.
    * @throws {@link VesicleError} `bad-file` naming the format and the field, also for a texture where the file has no
    *   texture coordinates; `too-large`; `invalid-argument`.
    */
@@ -208,10 +214,10 @@ export class Mesh {
   }
 
   /**
-   * Iso-surface of a volume in its world space, closed at the volume's border; topologically consistent. Inside is
-   * where the intensity is at least `iso`.
+   * Extracts the iso-surface of a volume by marching cubes, in its world space, closed at the volume's border;
+   * topologically consistent. Inside is where the intensity is at least `iso`.
    *
-   * @param options - `frame`: which one of a 4D volume; default 0.
+   * @param options - `frame`: frame of a 4D volume; default 0.
    * @throws {@link VesicleError} `invalid-argument`: no such frame; `too-large`.
    */
   static marchingCubes(volume: Volume, iso: number, options: { frame?: number } = {}): Mesh {
@@ -232,19 +238,17 @@ export class Mesh {
     return this.#handle.use((raw) => raw.triangleCount());
   }
 
-  /** Counts up when connectivity changes. */
+  /** Counter that increases when the connectivity changes. */
   get topologyVersion(): number {
     return this.#handle.use((raw) => raw.topologyVersion());
   }
 
-  /** Counts up when any vertex moves. */
+  /** Counter that increases when any vertex moves. */
   get geometryVersion(): number {
     return this.#handle.use((raw) => raw.geometryVersion());
   }
 
-  /**
-   * The picture on the mesh, a copy of the caller's own, or nothing. Edits take it away, as they do texture coordinates.
-   */
+  /** The texture of the mesh, as a copy, or undefined. Edits remove it together with the texture coordinates. */
   get texture(): MeshTexture | undefined {
     const raw = this.#handle.use((mesh) => mesh.texture());
     if (!raw) return undefined;
@@ -255,7 +259,7 @@ export class Mesh {
     }
   }
 
-  /** The mesh as it is now, in arrays of the caller's own. */
+  /** Returns the mesh in its present state as newly allocated arrays. */
   arrays(): MeshArrays {
     const arrays = { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() };
     this.copyTo(arrays);
@@ -263,10 +267,10 @@ export class Mesh {
   }
 
   /**
-   * Into the caller's buffers, which are replaced only when too small; returns the counts written. `uvs` and `colors`
-   * are set where the mesh has them, and deleted where it has none.
+   * Copies the mesh into the caller's arrays, which are replaced only when too small; returns the counts written. `uvs`
+   * and `colors` are set if the mesh has them, and deleted otherwise.
    *
-   * @throws {@link VesicleError} `invalid-argument` where `out` is no such object.
+   * @throws {@link VesicleError} `invalid-argument` if `out` is no such object.
    */
   copyTo(out: MeshArrays): { vertices: number; triangles: number } {
     if (out === undefined) throw invalid('out', 'undefined; an object with positions, normals and indices is needed');
@@ -279,32 +283,35 @@ export class Mesh {
     }
   }
 
-  /** Measures of the mesh. */
+  /** Computes measures of the mesh: counts, topology, area, volume, moments, edge lengths and angles. */
   info(): MeshInfo {
     return this.#handle.use((raw) => raw.info() as MeshInfo);
   }
 
-  /** An independent look at the mesh, from its arrays alone. */
+  /**
+   * Reports whether the mesh is closed and oriented, and counts non-manifold elements, degenerate triangles and
+   * self-intersections, from its arrays alone, independently of the code that edits it.
+   */
   check(): MeshReport {
     return this.#handle.use((raw) => raw.check() as MeshReport);
   }
 
   /**
-   * The mesh to be drawn with its texture: along the seams of the texture a vertex has several texture coordinates, and
-   * becomes as many vertices, so that {@link Mesh.arrays} has `uvs`. It is open there. A mesh without seams comes back
-   * as it is.
+   * Returns a copy for drawing with the texture: a vertex on a texture seam, which has several texture coordinates, is
+   * split into as many vertices, so that {@link Mesh.arrays} has `uvs`. The copy is open along the seams. A mesh
+   * without seams is copied unchanged.
    */
   splitAtSeams(): Mesh {
     return this.#handle.use((raw) => made(() => raw.splitAtSeams()));
   }
 
-  /** The connected parts, each as a mesh of its own. */
+  /** Returns the connected components, each as a mesh of its own. */
   components(): Mesh[] {
     return this.#handle.use((raw) => raw.components()).map((part) => made(() => part));
   }
 
   /**
-   * One sqrt(3) refinement pass: three triangles for each.
+   * Refines the mesh by one √3-subdivision pass: three triangles for each.
    *
    * @throws {@link VesicleError} `not-closed`; `invalid-argument` for the mesh of a model: `clone()` it first;
    *   `too-large`.
@@ -314,14 +321,15 @@ export class Mesh {
   }
 
   /**
-   * One round of restructuring, pass by pass: edges shorter than `min` are drawn together, those longer than `max` split, and
-   * edges flipped where that brings valences nearer to six. The mesh stays closed, with the same components and genus; its
-   * shape suffers a little, and it may come to cross itself: {@link Mesh.remesh} keeps both.
+   * Runs one round of restructuring, pass by pass: collapses edges shorter than `min`, splits those longer than `max`,
+   * and flips edges where that brings valences closer to six. The mesh stays closed, with the same components and
+   * genus; its shape changes a little, and self-intersections may arise: {@link Mesh.remesh} avoids both.
    *
-   * @param edge - Bounds of edges, `max` more than twice `min`.
-   * @param passes - In the order they are to run; default all three once.
-   * @returns How many edges were drawn together, split or flipped.
-   * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first; `too-large`.
+   * @param edge - Bounds of edge lengths, `max` more than twice `min`.
+   * @param passes - The passes in order; default each of the three once.
+   * @returns The number of edges collapsed, split or flipped.
+   * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first;
+   *   `too-large`.
    */
   restructure(edge: { min: number; max: number }, passes: readonly RestructurePass[] = RESTRUCTURE_PASSES): number {
     const [min, max] = edgeBounds(edge);
@@ -332,15 +340,15 @@ export class Mesh {
   }
 
   /**
-   * Draws edges together, those first whose loss is felt least (by quadric errors), until at most so many triangles
-   * are left. The mesh stays closed, keeps its components and their genus, no triangle turns over, and where it did
-   * not cross itself it does not afterwards.
+   * Decimates the mesh to at most `targetTriangles` triangles by edge collapses, in the order of their quadric error.
+   * The mesh stays closed, keeps its components and their genus, no triangle flips over, and a mesh without
+   * self-intersections remains free of them.
    *
-   * Stops early where no edge can be drawn together safely: a component keeps four triangles at least, a handle some
-   * more. Vertices are numbered anew. Texture coordinates and colours are not kept. A target of as many triangles as
-   * there are, or more, changes nothing.
+   * Stops early if no edge can be collapsed safely: a component keeps at least four triangles, and more with handles.
+   * Vertices are renumbered. Texture coordinates and colours are removed. A target of at least the present number of
+   * triangles changes nothing.
    *
-   * @param targetTriangles - At least 1; a fraction is cut off.
+   * @param targetTriangles - At least 1; fractions are truncated.
    * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first.
    */
   decimate(targetTriangles: number): void {
@@ -349,16 +357,16 @@ export class Mesh {
   }
 
   /**
-   * Brings the lengths of edges into bounds and the number of edges at each vertex towards six, so that triangles become
-   * alike, with edges of about √(min · max): by collapse, split and flip, and by moves along the surface. The shape is
-   * kept, mostly to within a quarter of such an edge. The mesh stays closed, keeps its components and their genus, and
-   * where it did not cross itself it does not afterwards.
+   * Remeshes isotropically: brings edge lengths into bounds and valences towards six by collapse, split, flip and
+   * tangential relaxation, with edges of about √(min · max). The shape is kept, mostly to within a quarter of such an
+   * edge. The mesh stays closed, keeps its components and their genus, and a mesh without self-intersections remains
+   * free of them.
    *
-   * Some edges stay shorter than `min` where parts are thinner than that, or the shape would be lost. What crosses itself
-   * already is left much as it is. Vertices are numbered anew, and all of them may move. Texture coordinates and colours
-   * are not kept.
+   * Some edges stay shorter than `min` in parts that are thinner than that, or where the shape would be lost. Regions
+   * that already intersect themselves are mostly left unchanged. Vertices are renumbered, and all of them may move.
+   * Texture coordinates and colours are removed.
    *
-   * @param edge - Lengths, world units: `min` above 0, `max` more than twice as much.
+   * @param edge - Bounds of edge lengths, world units: `min` above 0, `max` more than twice `min`.
    * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first;
    *   `too-large` where more than eight million vertices would be needed.
    */
@@ -368,11 +376,11 @@ export class Mesh {
   }
 
   /**
-   * Curvature at each vertex, in the order of {@link Mesh.arrays}. `mean` is positive where the surface bulges outwards:
-   * 1/r on a ball of radius r, -1/r on a cavity. `gaussian` is 1/r² on both and negative on a saddle.
+   * Computes the curvature at each vertex, in the order of {@link Mesh.arrays}. `mean` is positive on convex parts: 1/r
+   * on a ball of radius r, -1/r on a cavity. `gaussian` is 1/r² on both and negative on a saddle.
    *
-   * Of the triangles around a vertex, so rough where they are: smooth the values for display if need be. Always finite;
-   * 0 on the rim of an open mesh and at vertices of no triangle.
+   * Computed from the triangles around each vertex, and therefore noisy where they are: smooth the values for display
+   * if need be. Always finite; 0 on the boundary of an open mesh and at isolated vertices.
    *
    * @throws {@link VesicleError} `invalid-argument`: neither of the two.
    */
@@ -382,13 +390,13 @@ export class Mesh {
   }
 
   /**
-   * Distance along the surface from one vertex to each, in the order of {@link Mesh.arrays}, world units; `Infinity`
-   * where no triangles lead, as on other components.
+   * Computes the geodesic distance from one vertex to each, in the order of {@link Mesh.arrays}, world units;
+   * `Infinity` on other components.
    *
-   * Exact on flat parts. On curved ones, and where ways from two sides meet, up to half an edge short; never shorter
-   * than the straight line.
+   * Exact on flat parts. On curved ones, and where paths from two sides meet, up to half an edge too short; never
+   * shorter than the straight line.
    *
-   * @param fromVertex - Index of the vertex.
+   * @param fromVertex - Index of the source vertex.
    * @throws {@link VesicleError} `invalid-argument`: there is no such vertex.
    */
   geodesic(fromVertex: number): Float32Array {
@@ -397,11 +405,11 @@ export class Mesh {
   }
 
   /**
-   * Unsigned distance from each of this mesh's vertices to the other's surface, and summaries of both ways: from this
-   * mesh's vertices to the other's surface, and from the other's vertices to this one's surface.
+   * Computes the unsigned distance from each vertex of this mesh to the other's surface, and summaries over both
+   * directions: from this mesh's vertices to the other's surface, and from the other's vertices to this one's surface.
    *
-   * In the summaries each vertex counts by the area around it. `a.distanceTo(b)` and `b.distanceTo(a)` give the same
-   * summaries.
+   * In the summaries each vertex is weighted by the area around it. `a.distanceTo(b)` and `b.distanceTo(a)` give the
+   * same summaries.
    *
    * @throws {@link VesicleError} `invalid-argument`: `other` is no mesh, or one of the two has no triangle.
    */
@@ -411,7 +419,7 @@ export class Mesh {
   }
 
   /**
-   * The nearest place where a ray meets the surface, from either side, or nothing.
+   * Returns the first intersection of a ray with the surface, from either side, or undefined.
    *
    * @param direction - Any length but 0.
    * @throws {@link VesicleError} `invalid-argument`.
@@ -423,7 +431,7 @@ export class Mesh {
   }
 
   /**
-   * Line segments where a plane cuts the surface: pairs of points, six numbers a segment.
+   * Computes the cross-section of the surface with a plane as line segments: pairs of points, six numbers a segment.
    *
    * @param normal - Any length but 0.
    * @throws {@link VesicleError} `invalid-argument`.
@@ -435,8 +443,9 @@ export class Mesh {
   }
 
   /**
-   * The mesh as the bytes of a file: glb (binary glTF), ply and stl (binary), obj, vtp or mz3. Only a glb has the
-   * texture in it; obj, ply and vtp of a mesh with one have its texture coordinates as programs expect them, 1 - v.
+   * Encodes the mesh as the bytes of a file: glb (binary glTF), ply and stl (binary), obj, vtp or mz3. Only a glb
+   * contains the texture; obj, ply and vtp of a mesh with a texture contain its coordinates with the usual orientation
+   * of those formats, 1 - v.
    *
    * @throws {@link VesicleError} `invalid-argument`: no such format.
    */
@@ -445,13 +454,13 @@ export class Mesh {
     return this.#handle.use((raw) => raw.toBytes(format));
   }
 
-  /** A copy that nothing else changes; of a model's mesh, the surface as it is now. */
+  /** Returns an independent copy; for a model's live mesh, of its present state. */
   clone(): Mesh {
     return this.#handle.use((raw) => made(() => raw.clone()));
   }
 
   /**
-   * Gives the memory back; the mesh cannot be used afterwards. A model's mesh belongs to the model and goes with it:
+   * Frees the memory; the mesh cannot be used afterwards. A model's mesh belongs to the model and is freed with it:
    * freeing it alone does nothing.
    */
   free(): void {
@@ -488,7 +497,7 @@ function checkTexture(texture: MeshTexture | undefined): void {
   typed('texture.bytes', bytes, Uint8Array);
 }
 
-/** A copy inside the module, which takes it over. */
+/** Copies a texture into the module, which takes ownership. */
 function rawTexture(texture: MeshTexture | undefined): RawTexture | undefined {
   return texture && new RawTexture(texture.type, texture.bytes);
 }

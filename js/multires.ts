@@ -5,49 +5,60 @@ import { Runner, type RunOptions, type Stepper, type StepReport } from './steppe
 import { RawMultires, TrianglesOf } from './vesicle.js';
 import type { Vec3 } from './volume.js';
 
-/** A solid ellipsoid that the skin is spanned over. */
+/**
+ * A solid ellipsoid that supports the low-frequency surface of a {@link MultiresolutionModel} and drives its
+ * deformation.
+ */
 export interface ControlEllipsoid {
-  /** Its middle. */
+  /** The centre. */
   center: Vec3;
-  /** Three orthogonal semi-axes as vectors. Detail turns with them, so give them in the same order every time. */
+  /** Three orthogonal semi-axes as vectors. Detail rotates with them, so keep their order from call to call. */
   axes: [Vec3, Vec3, Vec3];
 }
 
-/** Parameters of the multiresolution model; `paramSpecs('multires')` has ranges, defaults and a sentence on each. */
+/** Parameters of the multiresolution model; `paramSpecs('multires')` has their ranges, defaults and descriptions. */
 export interface MultiresParams {
-  /** ε_min: shorter edges are drawn together, in the mesh's units; by default such that the base has some 10,000 triangles. */
+  /**
+   * ε_min: shorter edges are collapsed, in the mesh's units; by default such that the base has some 10,000 triangles.
+   */
   edgeMin?: number;
   /** ε_max: longer edges are split; more than twice `edgeMin`. */
   edgeMax?: number;
-  /** Levels of the solver above the target resolution. */
+  /** Number of levels of the multi-level solver above the target resolution. */
   levels?: number;
-  /** q: from level to level, bounds of edges shrink by this factor. */
+  /** q: factor by which edge bounds shrink from one level to the next finer one. */
   refineFactor?: number;
-  /** Umbrella iterations a level. */
+  /** Umbrella iterations per level. */
   smoothing?: number;
-  /** Applications of the operator D a step. */
+  /** Applications of the operator D per step. */
   distribute?: number;
-  /** How often edges of the base are halved for the detail, at the most: where it is finer than the base, or stretched. */
+  /**
+   * Largest number of times that edges of the base are halved for the detail, where it is finer than the base, or
+   * stretched.
+   */
   supersample?: number;
-  /** What the skin makes least: its area, or its bending. */
+  /** Energy that the low-frequency surface minimises: membrane (area) or thin plate (bending). */
   energy?: 'membrane' | 'thin-plate';
-  /** What becomes of a neck that is a thread, and of parts in contact. */
+  /** Topology changes: whether thin necks are cut, and whether parts in contact are joined. */
   topology?: 'never' | 'split' | 'split-and-join';
 }
 
-/** What a {@link MultiresolutionModel} is made of. Everything is copied. */
+/** Constructor options of a {@link MultiresolutionModel}. Everything is copied. */
 export interface MultiresOptions {
-  /** The detailed surface, closed; left out: a bare membrane (lava lamp). */
+  /** The detailed surface, closed; without it the model is a bare membrane (lava lamp). */
   detail?: Mesh;
-  /** Its low-frequency approximation, closed and without crossings; default: made by smoothing and coarsening. */
+  /**
+   * Low-frequency approximation of the detailed surface, closed and without self-intersections; by default made by
+   * smoothing and coarsening.
+   */
   base?: Mesh;
-  /** At least one; one of them has to touch the base. */
+  /** Initial control ellipsoids: at least one, of which one has to touch the base. */
   ellipsoids: ControlEllipsoid[];
-  /** Any of them; the others have their defaults. */
+  /** Parameters: any subset; the others have their defaults. */
   params?: MultiresParams;
 }
 
-/** What there is to tell beside the contract. */
+/** Figures of a {@link MultiresolutionModel} that are not part of the {@link StepReport}. */
 interface Facts {
   bands: number;
   folded: number;
@@ -58,11 +69,13 @@ interface Facts {
 const OPTIONS = ['detail', 'base', 'ellipsoids', 'params'];
 
 /**
- * A detailed surface that is deformed, as far as you like, by ellipsoids under a skin that remeshes itself.
+ * A detailed surface deformed, without limit, by ellipsoids that support a low-frequency surface with dynamic
+ * connectivity.
  *
- * After Kobbelt, Bareuther and Seidel, "Multiresolution shape deformations for meshes with dynamic vertex connectivity". A
- * step is one frame: the ellipsoids go on towards where they are to be, by as much as the skin can follow, the skin is
- * solved for, and the detail put back. It is done when they are there and the skin is at rest.
+ * After Kobbelt, Bareuther and Seidel, "Multiresolution shape deformations for meshes with dynamic vertex
+ * connectivity". A step is one frame: the ellipsoids move towards their goals as far as the low-frequency surface can
+ * follow, that surface is solved for, and the detail is reconstructed on it. The model is done when the ellipsoids have
+ * reached their goals and the surface has settled.
  *
  * @throws All methods: {@link VesicleError} `freed` after {@link MultiresolutionModel.free}.
  */
@@ -73,12 +86,13 @@ export class MultiresolutionModel implements Stepper {
   readonly #runner = new Runner();
 
   /**
-   * A model before its first step: its surface is the base with the detail.
+   * Creates a model whose surface is the base with the detail.
    *
-   * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: no ellipsoid, none that touches the base,
-   *   axes that are not orthogonal or have no length, `edgeMax` not more than twice `edgeMin`, a detail that no base can be made
-   *   of; `not-closed` for a detail or base that is open or not manifold; `self-intersecting` for a base that crosses itself;
-   *   `too-large` for edges so short that the surface would have more than 200,000 vertices.
+   * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: no ellipsoid, none that touches the
+   *   base, axes that are not orthogonal or have no length, `edgeMax` not more than twice `edgeMin`, a detail that no
+   *   base can be made from; `not-closed` for a detail or base that is open or not manifold; `self-intersecting` for a
+   *   base with self-intersections; `too-large` for edges so short that the surface would have more than 200,000
+   *   vertices.
    */
   constructor(given: MultiresOptions) {
     const known = knownOnly('options', given, OPTIONS) as MultiresOptions;
@@ -92,52 +106,63 @@ export class MultiresolutionModel implements Stepper {
     this.#meshes = this.#meshHandles.map((handle) => wrapMesh(handle, true));
   }
 
-  /** The surface with its detail, and texture coordinates where the finest surface has them: the same live object always. */
+  /**
+   * The surface with its detail, and with texture coordinates if the finest surface has them: the same live object
+   * always.
+   */
   get mesh(): Mesh {
     return this.#meshes[0] as Mesh;
   }
 
-  /** The deformed low-frequency surface; live. */
+  /** The deformed low-frequency surface without the detail; live. */
   get baseMesh(): Mesh {
     return this.#meshes[1] as Mesh;
   }
 
-  /** The map T: the vertices of {@link MultiresolutionModel.baseMesh} where they lie on the undeformed base; live. It may fold. */
+  /**
+   * The map T: the vertices of {@link MultiresolutionModel.baseMesh} at their corresponding positions on the undeformed
+   * base; live. It may fold.
+   */
   get linkMesh(): Mesh {
     return this.#meshes[2] as Mesh;
   }
 
-  /** All parameters as they are now; a copy. */
+  /** Current values of all parameters; a copy. */
   get params(): Required<MultiresParams> {
     return this.#handle.use((raw) => raw.params() as Required<MultiresParams>);
   }
 
-  /** The ellipsoids where they are now, on their way; a copy. Some more may be vanishing. */
+  /**
+   * Current ellipsoids, between their previous positions and their goals; a copy. Removed ones that are still shrinking
+   * come last.
+   */
   get ellipsoids(): ControlEllipsoid[] {
     return unpackedEllipsoids(this.#handle.use((raw) => raw.ellipsoids()));
   }
 
-  /** The ellipsoids where they are to be; a copy. */
+  /** Goals of the ellipsoids; a copy. */
   get goals(): ControlEllipsoid[] {
     return unpackedEllipsoids(this.#handle.use((raw) => raw.goals()));
   }
 
-  /** Surfaces of the decomposition from the base to the detail, both among them. */
+  /** Number of surfaces in the multiresolution decomposition, from the base to the detail, both included. */
   get bands(): number {
     return this.#facts().bands;
   }
 
-  /** Triangles of the base whose image under T is turned over. */
+  /** Number of triangles of the base surface whose image under T is flipped. */
   get folded(): number {
     return this.#facts().folded;
   }
 
-  /** Vertices of the mesh whose normal on the base did not meet the detail: the nearest point stands in. */
+  /**
+   * Number of vertices of the mesh whose normal on the base did not hit the detail; the closest point is used instead.
+   */
   get missed(): number {
     return this.#facts().missed;
   }
 
-  /** Vertices of the mesh whose detail was held back, so that nothing crosses. */
+  /** Number of vertices of the mesh whose detail was reduced to avoid self-intersections. */
   get held(): number {
     return this.#facts().held;
   }
@@ -147,9 +172,9 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * Sends the ellipsoids to new places, each by its index; a step takes them half a semi-axis on their way. Those beyond the
-   * ones before grow from nothing, or come out of the nearest one where their place is outside of the surface; those left out
-   * shrink and vanish.
+   * Sets new goals for the ellipsoids, by index; each step moves them by at most half of their shortest semi-axis.
+   * Additional ellipsoids grow from a fraction of their size, or out of the nearest existing one if they lie outside the
+   * surface; those omitted shrink and vanish.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the ellipsoid; nothing has changed then.
    */
@@ -159,11 +184,11 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * So many frames at once, synchronous and deterministic; fewer where all is at rest before.
+   * Runs up to `iterations` frames, synchronous and deterministic; fewer if the model finishes earlier.
    *
-   * @returns The report of the last, with the events of all.
-   * @throws {@link VesicleError} `too-large` where the surface would have too many vertices, and then stays as it was;
-   *   `invalid-argument` while a {@link MultiresolutionModel.run} is under way.
+   * @returns The last report, with the events of all frames.
+   * @throws {@link VesicleError} `too-large` where the surface would have too many vertices, and then stays unchanged;
+   *   `invalid-argument` while a {@link MultiresolutionModel.run} is in progress.
    */
   step(iterations = 1): StepReport {
     whole('iterations', iterations, { min: 1 });
@@ -172,10 +197,12 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * Until all is at rest, yielding to the event loop between frames. Ellipsoids and parameters may be changed meanwhile.
+   * Runs until the surface has settled, yielding to the event loop between frames. Ellipsoids and parameters may be
+   * changed meanwhile.
    *
    * @returns The last report.
-   * @throws As {@link MultiresolutionModel.step}; `signal.reason` when aborted, and the model stays usable; what `onStep` throws.
+   * @throws As {@link MultiresolutionModel.step}; `signal.reason` when aborted, and the model stays usable; any error
+   *   thrown by `onStep`.
    */
   run(given?: RunOptions): Promise<StepReport> {
     return this.#runner.run(() => this.#step(1), given);
@@ -186,21 +213,22 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * How much T distorts, per vertex of {@link MultiresolutionModel.baseMesh}: `area` is the area on the undeformed base over
-   * that on the deformed one, 1 where it is kept; `angle` the longest over the shortest stretch of directions, 1 where angles are.
+   * Computes the distortion of T per vertex of {@link MultiresolutionModel.baseMesh}: `area` is the area on the
+   * undeformed base divided by that on the deformed one, 1 where areas are preserved; `angle` the ratio of the largest
+   * to the smallest stretch over all directions, 1 where angles are preserved.
    */
   distortion(): { area: Float32Array; angle: Float32Array } {
     return this.#handle.use((raw) => ({ area: raw.distortion(0), angle: raw.distortion(1) }));
   }
 
-  /** The meshes that the skin is solved on for the ellipsoids as they are, from coarse to fine; copies. */
+  /** Returns copies of the meshes of the multi-level solver for the current ellipsoids, from coarse to fine. */
   levelMeshes(): Mesh[] {
     const levels = this.#handle.use((raw) => raw.levelMeshes());
     return levels.map((level) => wrapMesh(new Handle('Mesh', () => level)));
   }
 
   /**
-   * Live parameters: any subset, validated as a whole before any of it is taken.
+   * Changes any subset of the parameters of the live model. All values are validated before any is set.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the parameter, `too-large`; nothing has changed then.
    */
@@ -209,16 +237,19 @@ export class MultiresolutionModel implements Stepper {
     this.#handle.use((raw) => raw.setParams(values));
   }
 
-  /** The whole state, for {@link MultiresolutionModel.restore} of a model made of the same meshes and first ellipsoids. */
+  /**
+   * Saves the whole state, for {@link MultiresolutionModel.restore} of a model made of the same meshes and initial
+   * ellipsoids.
+   */
   save(): Uint8Array {
     return this.#handle.use((raw) => raw.save());
   }
 
   /**
-   * Back to a saved state, bit for bit.
+   * Restores a saved state, bit for bit.
    *
-   * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a model, which then stays as it was;
-   *   `invalid-argument` while a run is under way.
+   * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a model, which then stays unchanged;
+   *   `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
     typed('state', state, Uint8Array);
@@ -226,7 +257,7 @@ export class MultiresolutionModel implements Stepper {
     this.#handle.use((raw) => raw.restore(state));
   }
 
-  /** Gives the memory back; the model and its live meshes cannot be used afterwards. */
+  /** Frees the memory; the model and its live meshes cannot be used afterwards. */
   free(): void {
     for (const handle of this.#meshHandles) handle.free();
     this.#handle.free();

@@ -2,31 +2,31 @@ import { choice } from './check.js';
 import { call } from './runtime.js';
 import { deformableParamSpecs, implicitParamSpecs, multiresParamSpecs, trackingParamSpecs } from './vesicle.js';
 
-/** One parameter of a method, described so that a page can build a control for it. */
+/** Description of one parameter of a method, from which a page can build a control. */
 export interface ParamSpec {
-  /** As in the method's parameters. */
+  /** Name of the property in the method's parameters. */
   name: string;
-  /** A few words for a label. */
+  /** Short label of the control. */
   label: string;
-  /** One sentence a student understands. */
+  /** Description in one sentence, for students. */
   help: string;
-  /** As in the paper: 'αc', 'πI', 'δ', 'τ'. */
+  /** Symbol in the paper: 'αc', 'πI', 'δ', 'τ'. */
   symbol?: string;
   type: 'number' | 'integer' | 'boolean' | 'choice';
   default: unknown;
   min?: number;
   max?: number;
-  /** Of a slider. */
+  /** Step of a slider. */
   step?: number;
-  /** Of a slider. */
+  /** Scale of a slider. */
   scale?: 'linear' | 'log';
   unit?: string;
-  /** For type 'choice'. */
+  /** Accepted values, for type 'choice'. */
   choices?: string[];
 }
 
 /**
- * The parameters of a method, in the order they are best shown.
+ * Returns descriptions of the parameters of a method, in their recommended order of display.
  *
  * @throws {@link VesicleError} `invalid-argument`: no such method.
  */

@@ -1,24 +1,24 @@
-// The WebAssembly instance: how it starts, how calls into it fail, how objects of it are held.
+// The WebAssembly instance: loading, translation of errors, and handles of objects inside it.
 import { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
 import { ownModule } from './module.js';
 import load, { initSync as loadSync, __wbg_reset_state as reset } from './vesicle.js';
 
-/** Whatever the module can be made from. */
+/** Sources of the WebAssembly module: its address, a response, its bytes, or the compiled module. */
 export type InitInput = RequestInfo | URL | Response | BufferSource | WebAssembly.Module;
 
 let starting: Promise<unknown> | undefined;
 let instance: unknown;
 let crash: VesicleCrash | undefined;
-// Counts instances, so that an object of a lost one is known.
+// Number of instances so far, to recognise objects of a lost one.
 let generation = 0;
 
 /**
- * Loads the WebAssembly module; everything else needs it. Idempotent: later calls give the same promise. After a
- * {@link VesicleCrash} it starts a fresh instance.
+ * Loads the WebAssembly module; required before anything else. Idempotent: later calls return the same promise. After a
+ * {@link VesicleCrash} it starts a new instance.
  *
- * @param options - `module_or_path`: the module, its bytes or its address. Left out, the `.wasm` beside this file
- *   is fetched (in a browser) or read (in Node); in `vesicle/inline` it is in the file itself.
- * @throws Whatever fetching or compiling threw; a later call tries again.
+ * @param options - `module_or_path`: the module, its bytes or its address. By default, the `.wasm` beside this file is
+ *   fetched (in a browser) or read (in Node); in `vesicle/inline` it is embedded in the file itself.
+ * @throws Any error of fetching or compiling; a later call tries again.
  */
 export function init(options: { module_or_path?: InitInput | Promise<InitInput> } = {}): Promise<unknown> {
   if (crash) restart();
@@ -30,8 +30,8 @@ export function init(options: { module_or_path?: InitInput | Promise<InitInput> 
 }
 
 /**
- * Like {@link init}, at once, from bytes or a compiled module. Browsers refuse to compile large modules on the
- * main thread: use it in workers and in Node.
+ * Loads the WebAssembly module like {@link init}, but synchronously, from bytes or a compiled module. Browsers refuse
+ * to compile large modules on the main thread: use it in workers and in Node.
  */
 export function initSync(options: { module: BufferSource | WebAssembly.Module }): unknown {
   if (crash) restart();
@@ -51,13 +51,13 @@ async function compile(source: InitInput): Promise<WebAssembly.Module> {
   if (source instanceof URL && source.protocol === 'file:') return WebAssembly.compile(await readFile(source));
   const response = source instanceof Response ? source : await fetch(source);
   if (!response.ok) throw new Error(`${response.url}: ${response.status} ${response.statusText}`);
-  // Streaming needs the right media type; not every server sends it.
+  // Streaming requires the right media type, which not every server sends.
   const streams = response.headers.get('Content-Type') === 'application/wasm';
   return streams ? WebAssembly.compileStreaming(response) : WebAssembly.compile(await response.arrayBuffer());
 }
 
 async function readFile(path: URL): Promise<BufferSource> {
-  // Put together out of the bundlers' sight: a page never gets here.
+  // The name is assembled at run time so that bundlers do not resolve it: a page never gets here.
   const files = ['node', 'fs/promises'].join(':');
   const { readFile } = await import(/* @vite-ignore */ /* webpackIgnore: true */ files);
   return readFile(path);
@@ -69,7 +69,7 @@ function restart(): void {
   crash = undefined;
 }
 
-/** Runs one call into the module, and turns what it throws into the library's errors. */
+/** Runs a call into the WebAssembly module and translates its errors into those of the library. */
 export function call<T>(work: () => T): T {
   if (crash) throw crash;
   if (!instance) throw new VesicleError('invalid-argument', 'init: call `await init()` before anything else');
@@ -86,7 +86,7 @@ function translate(error: unknown): unknown {
   return code === 'panic' ? crashed(message, error) : new VesicleError(code, message);
 }
 
-// A trap, or a stack that ran out: either leaves the instance's memory in the middle of something.
+// Traps and stack overflows leave the instance's memory in an undefined state.
 function isFatal(error: Error): boolean {
   return error instanceof WebAssembly.RuntimeError || /call stack|recursion/i.test(error.message);
 }
@@ -96,7 +96,7 @@ function crashed(what: string, cause: unknown): VesicleCrash {
   return crash;
 }
 
-/** An object inside the module, until it is freed. */
+/** Owner of an object inside the WebAssembly module, until it is freed. */
 export class Handle<Raw extends { free(): void }> {
   #raw: Raw | undefined;
   readonly #name: string;
@@ -107,7 +107,7 @@ export class Handle<Raw extends { free(): void }> {
     this.#raw = call(make);
   }
 
-  /** Runs one call with the object. Throws `freed` when it is gone. */
+  /** Calls `work` with the raw object. Throws `freed` if it was freed, or lost in a crash. */
   use<T>(work: (raw: Raw) => T): T {
     const raw = this.#raw;
     if (!raw) throw new VesicleError('freed', `this ${this.#name} was freed and cannot be used any more`);
@@ -117,7 +117,7 @@ export class Handle<Raw extends { free(): void }> {
     return call(() => work(raw));
   }
 
-  /** Gives the memory back; again and again does no harm. */
+  /** Frees the object's memory; further calls have no effect. */
   free(): void {
     const raw = this.#raw;
     this.#raw = undefined;

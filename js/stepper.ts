@@ -1,28 +1,28 @@
 import { invalid, knownOnly, positive, whole } from './check.js';
 import type { Mesh } from './mesh.js';
 
-/** What one step, or several together, did. */
+/** State of a method after one step, or several together, and the events during them. */
 export interface StepReport {
-  /** Iterations since the start. */
+  /** Number of iterations since the start. */
   iteration: number;
-  /** The method has reached its end. */
+  /** Whether the method has finished. */
   done: boolean;
-  /** What the method is doing now: 'level 2', 'solve', 'extract', 'frame 7' ... */
+  /** Current stage of the method: 'level 2', 'solve', 'extract', 'frame 7' ... */
   phase: string;
-  /** 0..1 where it can be known, else NaN. */
+  /** Progress from 0 to 1 if it can be known, else NaN. */
   progress: number;
-  /** The method's own convergence figure. */
+  /** Convergence measure of the method. */
   residual: number;
-  /** What the residual is compared with. */
+  /** Value that the residual is compared with. */
   tolerance: number;
   vertices: number;
   triangles: number;
   components: number;
-  /** Vertices - edges + triangles. */
+  /** Euler characteristic: vertices - edges + triangles. */
   euler: number;
   /**
-   * Counted since the last report. axial joins (or splits off) by contact, annular cuts a neck; seeds are parts added where
-   * the image shows something that the surface left out.
+   * Counts of mesh edits since the last report. `axial`: joins (or splits) by contact; `annular`: necks cut; `seeds`:
+   * components added where the image shows something that the surface lacks.
    */
   events: {
     creations: number;
@@ -33,48 +33,51 @@ export interface StepReport {
     vanished: number;
     seeds: number;
   };
-  /** Milliseconds of the last step by part: forces, motion, normals, topology, and so on. */
+  /** Durations of the parts of the last step, milliseconds: forces, motion, normals, topology, and so on. */
   times: Record<string, number>;
 }
 
-/** How {@link Stepper.run} works. */
+/** Options of {@link Stepper.run}. */
 export interface RunOptions {
-  /** Stops the run, which rejects with `signal.reason`; the model stays usable. */
+  /** Aborts the run, which then rejects with `signal.reason`; the model stays usable. */
   signal?: AbortSignal;
-  /** Iterations of this run at most; it then resolves with a report that is not `done`. */
+  /** Largest number of iterations of this run; it then resolves with a report that is not `done`. */
   maxIterations?: number;
-  /** Milliseconds of work before the event loop gets its turn; default 12. One step is never cut in two. */
+  /**
+   * Duration of a slice of work before yielding to the event loop, milliseconds; default 12. A step is never
+   * interrupted.
+   */
   budgetMs?: number;
-  /** Called after every iteration. What it throws ends the run, which rejects with it. */
+  /** Called after every iteration. If it throws, the run ends and rejects with that error. */
   onStep?: (report: StepReport) => void;
 }
 
-/** What every method can do. */
+/** Interface that all four methods implement. */
 export interface Stepper {
   /** The surface: the same live object from start to end. */
   readonly mesh: Mesh;
-  /** So many iterations at once, synchronous and deterministic; fewer where the end comes first. */
+  /** Runs up to `iterations` iterations, synchronous and deterministic; fewer if the method finishes earlier. */
   step(iterations?: number): StepReport;
-  /** To the end, yielding to the event loop between slices. */
+  /** Runs to the end, yielding to the event loop between slices. */
   run(options?: RunOptions): Promise<StepReport>;
-  /** Live parameters: any subset, validated as a whole before any of it is taken. */
+  /** Changes any subset of the parameters of the live model. All values are validated before any is set. */
   setParams(params: Record<string, unknown>): void;
-  /** All parameters as they are now. */
+  /** Current values of all parameters. */
   readonly params: Record<string, unknown>;
-  /** The whole state. Bit-exact: restore(save()) then step() equals step(). */
+  /** Saves the whole state. Bit-exact: restore(save()) then step() equals step(). */
   save(): Uint8Array;
-  /** Back to a saved state. */
+  /** Restores a saved state. */
   restore(state: Uint8Array): void;
-  /** Gives the memory back. */
+  /** Frees the memory. */
   free(): void;
 }
 
-/** Milliseconds of work before the event loop gets its turn, by default. */
+/** Default duration of a slice of work before yielding to the event loop, milliseconds. */
 const SLICE = 12;
 
 const OPTIONS = ['signal', 'maxIterations', 'budgetMs', 'onStep'];
 
-/** Gives the event loop its turn: a message comes back sooner than any timer, which browsers hold back. */
+/** Yields to the event loop by posting a message to itself, which is faster than timers, which browsers throttle. */
 class Pause {
   readonly #channel = new MessageChannel();
 
@@ -85,13 +88,13 @@ class Pause {
     });
   }
 
-  /** A channel left open keeps Node from ending. */
+  /** Closes the channel; an open one keeps Node from exiting. */
   close(): void {
     this.#channel.port1.close();
   }
 }
 
-/** Calls `work` until it returns something, and yields to the event loop between slices. Rejects with `signal.reason`. */
+/** Calls `work` until it returns a value, yielding to the event loop between slices. Rejects with `signal.reason`. */
 export async function inSlices<T extends object>(
   work: () => T | undefined,
   signal: AbortSignal | undefined,
@@ -114,16 +117,16 @@ export async function inSlices<T extends object>(
   }
 }
 
-/** Runs a model to its end in slices, one run at a time. */
+/** Runs a model to its end in slices, and allows one run at a time. */
 export class Runner {
   #running = false;
 
-  /** Throws while a run is under way: what it would do to the model has to wait. */
+  /** Throws `invalid-argument` during a run; guards methods that would interfere with it. */
   refuseWhileRunning(what: string): void {
     if (this.#running) throw invalid(what, 'a run of this model is under way: abort it, or wait for it to end');
   }
 
-  /** Steps until done, aborted, or `maxIterations`. See {@link RunOptions}. */
+  /** Steps until the model is done, the run is aborted, or `maxIterations` is reached. See {@link RunOptions}. */
   async run(step: () => StepReport, given: RunOptions | undefined): Promise<StepReport> {
     const { signal, maxIterations = Number.MAX_SAFE_INTEGER, budgetMs, onStep } = checkedRun(given);
     signal?.throwIfAborted();
@@ -144,7 +147,7 @@ export class Runner {
   }
 }
 
-/** The options of a run, or `invalid-argument`. */
+/** Validates the options of a run; throws `invalid-argument`. */
 export function checkedRun(given: RunOptions | undefined): RunOptions {
   const run = knownOnly<RunOptions>('options', given, OPTIONS);
   if (run.maxIterations !== undefined)
@@ -155,12 +158,12 @@ export function checkedRun(given: RunOptions | undefined): RunOptions {
   return run;
 }
 
-/** An AbortSignal, or nothing. */
+/** Throws `invalid-argument` unless `signal` is an AbortSignal or undefined. */
 export function checkSignal(signal: unknown): void {
   if (signal !== undefined && !(signal instanceof AbortSignal)) throw invalid('signal', 'an AbortSignal is needed');
 }
 
-/** A function, or nothing. */
+/** Throws `invalid-argument` unless `listener` is a function or undefined. */
 export function checkListener(parameter: string, listener: unknown): void {
   if (listener !== undefined && typeof listener !== 'function') throw invalid(parameter, 'a function is needed');
 }

@@ -5,67 +5,85 @@ import { Runner, type RunOptions, type Stepper, type StepReport } from './steppe
 import { RawTracker, TrianglesOf } from './vesicle.js';
 import { type Vec3, type Volume, volumeHandle } from './volume.js';
 
-/** Parameters of the tracker; `paramSpecs('tracking')` has ranges, defaults and a sentence on each. */
+/** Parameters of the tracker; `paramSpecs('tracking')` has their ranges, defaults and descriptions. */
 export interface TrackingParams {
-  /** τ: the smallest step between the two cluster means, intensity units; by default, or where 0, above the noise. */
+  /**
+   * Edge threshold τ: the smallest difference between the two cluster means that counts as a boundary, intensity units;
+   * by default, or if 0, above the noise.
+   */
   threshold?: number;
-  /** k: a window is 2k + 1 voxels wide along each axis. */
+  /** k: the window for clustering is 2k + 1 voxels wide along each axis. */
   window?: number;
-  /** Frames to either side that a window holds; 0 looks at each frame by itself. */
+  /** Number of frames before and after that a window covers; 0 treats each frame separately. */
   windowFrames?: number;
   /** Support of the weight θ, world units: 2h. */
   radius?: number;
-  /** c: world units per frame. */
+  /** Time scale c, world units per frame. */
   timeScale?: number;
-  /** β: each step of a projection goes by so much less far than the one before. */
+  /** Damping β: each step of a projection is scaled by this factor relative to the one before. */
   damping?: number;
-  /** c_min: shorter edges are drawn together, in the first frame's mean edge. */
+  /** c_min: shorter edges are collapsed, in units of the first frame's mean edge. */
   edgeMin?: number;
-  /** c_max: longer edges are split, in the same; more than twice `edgeMin`. */
+  /** c_max: longer edges are split, in the same units; more than twice `edgeMin`. */
   edgeMax?: number;
-  /** Whether a frame begins where the surface is going from the one before; else where it was. */
+  /**
+   * Whether each frame starts from a prediction by the surface's motion in the one before; else from the previous
+   * surface.
+   */
   prediction?: boolean;
-  /** Whether the last frame is followed by the first. */
+  /** Whether the sequence is periodic: the first frame follows the last. */
   cyclic?: boolean;
 }
 
-/** What a {@link SurfaceTracker} is made of. Everything is copied. */
+/** Constructor options of a {@link SurfaceTracker}. Everything is copied. */
 export interface TrackingOptions {
-  /** Two frames or more, voxel axes at right angles. */
+  /** 4D volume with at least two frames and orthogonal voxel axes. */
   volume: Volume;
   /**
-   * The part that is looked at, corners in the world; default all of it. What is bright where it ends is closed there. Of a
-   * volume whose axes are not those of the world, the box along its axes around this one is taken.
+   * Region to process, corners in world space; default the whole volume. Bright objects that extend beyond it are
+   * closed at its faces. If the volume's axes differ from those of the world, the bounding box of this one along the
+   * volume's axes is used.
    */
   box?: { min: Vec3; max: Vec3 };
-  /** The same by the first and the last voxel; instead of `box`. */
+  /** The same region by its first and last voxel; instead of `box`. */
   voxels?: { min: Vec3; max: Vec3 };
-  /** The surface of interest: the largest of the first frame (the default), or the one around a point of the world, or nearest to it. */
+  /**
+   * Component to track: the largest of the first frame (the default), or the one that encloses a point in world space,
+   * or the nearest to it.
+   */
   component?: 'largest' | Vec3;
-  /** The surface in the first frame, closed and without crossings, in the world; instead of finding it. */
+  /**
+   * Initial surface in the first frame, closed and without self-intersections, in world space; instead of extracting
+   * it.
+   */
   start?: Mesh;
-  /** Any of them; the others are taken from the volume. */
+  /** Parameters: any subset; the others are derived from the volume. */
   params?: TrackingParams;
 }
 
-/** What happened in one frame, and what came out. */
+/** Statistics of one tracked frame. */
 export interface FrameFacts {
-  /** What the surface encloses, cubed world units. */
+  /** Enclosed volume, world units cubed. */
   volume: number;
-  /** Squared world units. */
+  /** Surface area, world units squared. */
   area: number;
   triangles: number;
-  /** Triangles that face away from their three neighbours. */
+  /** Number of triangles that face away from all three neighbours. */
   folded: number;
-  /** Projections that led nowhere or too far; the vertices went along with their neighbours. */
+  /**
+   * Number of rejected projections, which did not converge or moved too far; these vertices follow their neighbours.
+   */
   rejected: number;
-  /** Moves that were held back, so that nothing crosses. */
+  /** Number of displacements reduced to avoid self-intersections. */
   held: number;
-  /** Vertices that had no boundary: drawn together where a crevice has closed, grown where one has opened, else smoothed. */
+  /**
+   * Number of vertices without boundary points: collapsed where a narrow gap has closed, grown where one has opened,
+   * else smoothed.
+   */
   retracted: number;
-  /** Steps of a vertex's projections, onto space-time and onto the frame, in the mean. */
+  /** Mean number of projection steps of a vertex, onto space-time and onto the frame. */
   steps: number;
-  /** How far the last projection moved the vertices, in the mean, world units. */
+  /** Mean displacement of the vertices by the last projection, world units. */
   correction: number;
 }
 
@@ -77,16 +95,16 @@ interface Facts {
 
 const OPTIONS = ['volume', 'box', 'voxels', 'component', 'start', 'params'];
 
-/** Seconds a frame is shown for in an animation, where the volume does not say. */
+/** Default duration of a frame in an animation, seconds, for volumes that do not define it. */
 const FRAME_SECONDS = 0.1;
 
 /**
- * A surface that is followed through the frames of a 4D image.
+ * Tracks a surface through the frames of a 4D image.
  *
- * After "Dynamic surfaces from 4D cardiac MRI": windows vote for the faces between bright and dark voxels, the votes are
- * weighted points in space-time, and the surface is projected onto what fits them, frame by frame. A step finds the boundary in
- * one more frame; when all have theirs, it takes the surface into one more frame. The surface is in the volume's world space;
- * it stays closed and never crosses itself.
+ * After "Dynamic surfaces from 4D cardiac MRI": local clustering in windows votes for the faces between bright and dark
+ * voxels, the votes are weighted points in space-time, and the surface is projected onto the surface they define, frame
+ * by frame. Each step finds the boundary in one more frame; once all are found, each step tracks the surface into one
+ * more frame. The surface is in the volume's world space; it stays closed and free of self-intersections.
  *
  * @throws All methods: {@link VesicleError} `freed` after {@link SurfaceTracker.free}.
  */
@@ -98,11 +116,11 @@ export class SurfaceTracker implements Stepper {
   readonly #frameSeconds: number;
 
   /**
-   * A tracker before its first step.
+   * Creates a tracker; the work begins with the first step.
    *
-   * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: a volume of one frame, of too few voxels,
-   *   without contrast or with slanted axes, a box outside of it, a start that is empty, inside out, outside the box or much finer than its voxels; `not-closed`, `self-intersecting` for a start
-   *   that is.
+   * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: a volume of one frame, of too few
+   *   voxels, without contrast or with slanted axes, a box outside of it, a start that is empty, inside out, outside
+   *   the box or much finer than its voxels; `not-closed`, `self-intersecting` for a start that is.
    */
   constructor(given: TrackingOptions) {
     const known = knownOnly('options', given, OPTIONS) as TrackingOptions;
@@ -118,40 +136,46 @@ export class SurfaceTracker implements Stepper {
     this.#mesh = wrapMesh(this.#meshHandle, true);
   }
 
-  /** The surface of the current frame: the same live object always. Before the first frame is done it is the start, or has no triangles. */
+  /**
+   * The surface of the current frame: the same live object always. Before the first frame is done it is the start, or
+   * empty.
+   */
   get mesh(): Mesh {
     return this.#mesh;
   }
 
-  /** The frame that {@link SurfaceTracker.mesh} is of, from 0. */
+  /** Index of the frame shown by {@link SurfaceTracker.mesh}, from 0. */
   get frame(): number {
     return this.#handle.use((raw) => raw.frame());
   }
 
-  /** Frames of the volume. */
+  /** Number of frames of the volume. */
   get frames(): number {
     return this.#counts()[0];
   }
 
-  /** The standard deviation of the noise in the box, intensity units: τ below 2.5 times as much marks noise. */
+  /**
+   * Standard deviation of the noise in the box, intensity units. With τ below 2.5 times this, noise is detected as
+   * boundary.
+   */
   get noise(): number {
     return this.#facts().noise;
   }
 
   /**
-   * Of a cyclic sequence, when all is done: how far the last frame's surface, taken on to the first frame, is from the first
-   * frame's in the mean, world units.
+   * Cycle closure error of a cyclic sequence, when all frames are done: the mean distance between the last frame's
+   * surface, tracked on into the first frame, and the first frame's surface, world units.
    */
   get closing(): number | undefined {
     return this.#facts().closing;
   }
 
-  /** What happened in the frames so far, in order. */
+  /** Statistics of the frames tracked so far, in order. */
   get facts(): FrameFacts[] {
     return this.#facts().frames;
   }
 
-  /** All parameters as they are now; a copy. */
+  /** Current values of all parameters; a copy. */
   get params(): Required<TrackingParams> {
     return this.#handle.use((raw) => raw.params() as Required<TrackingParams>);
   }
@@ -165,12 +189,13 @@ export class SurfaceTracker implements Stepper {
   }
 
   /**
-   * So many frames at once, first of the boundary and then of the surface, synchronous and deterministic; fewer where the end
-   * comes first.
+   * Runs up to `iterations` steps of one frame each, first to find the boundaries and then to track the surface,
+   * synchronous and deterministic; fewer if the tracker finishes earlier.
    *
-   * @returns The report of the last, with the events of all.
-   * @throws {@link VesicleError} `invalid-argument`: `threshold` where there is no boundary, with the largest step there is;
-   *   `box` where no surface is in the first frame; while a {@link SurfaceTracker.run} is under way. `too-large`.
+   * @returns The last report, with the events of all steps.
+   * @throws {@link VesicleError} `invalid-argument`: `threshold` where no boundary is found, with the largest
+   *   difference there is; `box` where no surface is in the first frame; while a {@link SurfaceTracker.run} is in
+   *   progress. `too-large`.
    */
   step(iterations = 1): StepReport {
     whole('iterations', iterations, { min: 1 });
@@ -179,10 +204,11 @@ export class SurfaceTracker implements Stepper {
   }
 
   /**
-   * To the last frame, yielding to the event loop between frames.
+   * Runs to the last frame, yielding to the event loop between frames.
    *
    * @returns The last report.
-   * @throws As {@link SurfaceTracker.step}; `signal.reason` when aborted, and the tracker stays usable; what `onStep` throws.
+   * @throws As {@link SurfaceTracker.step}; `signal.reason` when aborted, and the tracker stays usable; any error
+   *   thrown by `onStep`.
    */
   run(given?: RunOptions): Promise<StepReport> {
     return this.#runner.run(() => this.#step(1), given);
@@ -193,8 +219,8 @@ export class SurfaceTracker implements Stepper {
   }
 
   /**
-   * Live parameters: any subset, validated as a whole before any of it is taken. `threshold`, `window`, `windowFrames` and
-   * `cyclic` begin everything again, the others hold from the next frame on.
+   * Changes any subset of the parameters of the live tracker. All values are validated before any is set. `threshold`,
+   * `window`, `windowFrames` and `cyclic` restart from the first step, the others apply from the next frame on.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the parameter; nothing has changed then.
    */
@@ -204,10 +230,11 @@ export class SurfaceTracker implements Stepper {
   }
 
   /**
-   * Boundary votes as weighted space-time points, five numbers each: x, y, z in the world, t in frames, and w, the share of the
-   * windows that separate the two voxels of a face. Faces between two frames lie half a frame later.
+   * Returns the boundary votes as weighted space-time points, five numbers each: x, y, z in world space, t in frames,
+   * and the weight w, the fraction of windows that separate the two voxels of a face. Faces between two frames have t
+   * half a frame later.
    *
-   * @param frame - Default the newest with a boundary; one whose boundary is not found yet has no points.
+   * @param frame - Default the newest with a boundary; a frame whose boundary is not found yet has no points.
    * @throws {@link VesicleError} `invalid-argument`: no such frame.
    */
   boundary(frame?: number): Float32Array {
@@ -217,7 +244,7 @@ export class SurfaceTracker implements Stepper {
   }
 
   /**
-   * The surface of a frame, a copy.
+   * Returns a copy of the surface in a frame.
    *
    * @throws {@link VesicleError} `invalid-argument`: no such frame, or it is not done.
    */
@@ -231,13 +258,14 @@ export class SurfaceTracker implements Stepper {
     );
   }
 
-  /** Enclosed volume of the frames that are done, world units cubed. */
+  /** Returns the enclosed volume of each frame tracked so far, world units cubed. */
   volumes(): Float64Array {
     return this.#handle.use((raw) => raw.volumes());
   }
 
   /**
-   * The frames that are done, as an animated glb: one node per frame, shown in turn, each as long as the volume says or 0.1 s.
+   * Encodes the frames tracked so far as an animated glb: one node per frame, shown in turn, each for the frame time of
+   * the volume or 0.1 s.
    *
    * @throws {@link VesicleError} `invalid-argument` where none is done; `too-large`.
    */
@@ -246,16 +274,19 @@ export class SurfaceTracker implements Stepper {
     return this.#handle.use((raw) => raw.toGlb(seconds));
   }
 
-  /** The whole state but the image, for {@link SurfaceTracker.restore} of a tracker of the same volume, box, component and start. */
+  /**
+   * Saves the whole state except the image, for {@link SurfaceTracker.restore} of a tracker with the same volume, box,
+   * component and start.
+   */
   save(): Uint8Array {
     return this.#handle.use((raw) => raw.save());
   }
 
   /**
-   * Back to a saved state, bit for bit.
+   * Restores a saved state, bit for bit.
    *
-   * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a tracker, which then stays as it was;
-   *   `invalid-argument` while a run is under way.
+   * @throws {@link VesicleError} `bad-file` for bytes that are no state of such a tracker, which then stays unchanged;
+   *   `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
     typed('state', state, Uint8Array);
@@ -263,7 +294,7 @@ export class SurfaceTracker implements Stepper {
     this.#handle.use((raw) => raw.restore(state));
   }
 
-  /** Gives the memory back; the tracker and its live mesh cannot be used afterwards. */
+  /** Frees the memory; the tracker and its live mesh cannot be used afterwards. */
   free(): void {
     this.#meshHandle.free();
     this.#handle.free();

@@ -5,7 +5,7 @@ import { RawFrames, RawVolume } from './vesicle.js';
 /** Three numbers: a point, a direction, or one number for each of x, y and z. */
 export type Vec3 = [number, number, number];
 
-/** The array types voxels can come in. They are kept as the type they have. */
+/** The typed arrays that voxels may be stored in. Voxels keep this type. */
 export type VoxelArray =
   | Uint8Array
   | Int8Array
@@ -16,28 +16,28 @@ export type VoxelArray =
   | Float32Array
   | Float64Array;
 
-/** The direction of the world axes: right-anterior-superior, or left-posterior-superior. */
+/** Orientation of the world axes: right-anterior-superior, or left-posterior-superior. */
 export type Space = 'RAS' | 'LPS';
 
-/** What a {@link Volume} is made of. */
+/** Constructor options of a {@link Volume}. */
 export interface VolumeInit {
-  /** One number a voxel: x fastest, then y, z, t. Copied once. */
+  /** One value per voxel: x fastest, then y, z, t. Copied once. */
   data: VoxelArray;
-  /** Voxels along x, y, z, and the number of frames where there are several. */
+  /** Number of voxels along x, y, z, and the number of frames of a 4D volume. */
   dims: Vec3 | [number, number, number, number];
-  /** 16 numbers, column-major, voxel index to world. Left out, `spacing` and `origin` say it. */
+  /** Transform from voxel index to world: 16 numbers, column-major. Default from `spacing` and `origin`. */
   affine?: ArrayLike<number>;
-  /** Voxel size, world units; 1 where left out. Not together with `affine`. */
+  /** Voxel size, world units; default 1. Not together with `affine`. */
   spacing?: Vec3;
-  /** World position of the centre of the first voxel; 0 where left out. Not together with `affine`. */
+  /** World position of the centre of the first voxel; default 0. Not together with `affine`. */
   origin?: Vec3;
-  /** Intensity = stored value * slope + intercept. Default 1; not 0. */
+  /** Slope of intensity = stored value * slope + intercept. Default 1; not 0. */
   slope?: number;
-  /** See `slope`. Default 0. */
+  /** Intercept, see `slope`. Default 0. */
   intercept?: number;
   /** Seconds from one frame to the next; 4D only. */
   frameSeconds?: number;
-  /** Of the world axes. Default RAS; meshes come back in the same space. */
+  /** Orientation of the world axes. Default RAS; meshes are returned in the same space. */
   space?: Space;
 }
 
@@ -47,13 +47,13 @@ const ELEMENTS = [
   ...[Uint32Array, Int32Array, Float32Array, Float64Array],
 ];
 
-/** The handle of a volume; for the library's own modules. */
+/** Returns the handle of a volume, for the other modules of the library. */
 export let volumeHandle: (parameter: string, volume: Volume) => Handle<RawVolume>;
-/** A volume of a raw one. For the library's own modules. */
+/** Creates a volume from a raw one, for the other modules of the library. */
 export let wrapVolume: (make: () => RawVolume) => Volume;
 
 /**
- * A regular grid of intensities, with one or several frames, and its place in the world.
+ * A regular grid of intensities, with one or several frames, and its transform to world space.
  *
  * @throws All methods: {@link VesicleError} `freed` after {@link Volume.free}.
  */
@@ -69,7 +69,7 @@ export class Volume {
   }
 
   /**
-   * A volume of voxels in memory.
+   * Creates a volume from voxels in memory.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the property that is missing, misspelled, of the wrong
    *   length or not finite; `too-large` where there is no memory for the voxels.
@@ -80,10 +80,10 @@ export class Volume {
   }
 
   /**
-   * The volume in a file: NIfTI-1 or 2 (`.nii`, `.nii.gz`), NRRD (`.nrrd`, or `.nhdr` and data) or MetaImage
-   * (`.mha`, or `.mhd` and data), detected from the bytes. gzip is handled.
+   * Parses a volume file: NIfTI-1 or 2 (`.nii`, `.nii.gz`), NRRD (`.nrrd`, or `.nhdr` and data) or MetaImage (`.mha`,
+   * or `.mhd` and data), detected from the bytes. gzip is handled.
    *
-   * @param options - `data`: the payload that belongs to a detached header.
+   * @param options - `data`: the payload of a detached header.
    * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`.
    */
   static parse(bytes: Uint8Array, options: { data?: Uint8Array } = {}): Volume {
@@ -94,7 +94,8 @@ export class Volume {
   }
 
   /**
-   * Volumes of one grid, in order, as the frames of a 4D one. Of those that are 4D already all frames are taken, in order.
+   * Joins volumes on the same grid, in order, into the frames of a 4D volume. Volumes that are already 4D contribute
+   * all their frames, in order.
    *
    * @param options - `frameSeconds`: from one frame to the next; default that of the first volume.
    * @throws {@link VesicleError} `invalid-argument` where the grids differ, or there is none.
@@ -110,12 +111,12 @@ export class Volume {
     });
   }
 
-  /** The volume as the bytes of a NIfTI-1 file. */
+  /** Encodes the volume as a NIfTI-1 file. */
   toNifti(): Uint8Array {
     return this.#handle.use((raw) => raw.toNifti());
   }
 
-  /** Voxels along x, y and z. */
+  /** Number of voxels along x, y and z. */
   get dims(): Vec3 {
     return this.#handle.use((raw) => triple(raw.dims()));
   }
@@ -125,7 +126,7 @@ export class Volume {
     return this.#handle.use((raw) => raw.frames());
   }
 
-  /** Seconds from one frame to the next; 0 where there is no such time. */
+  /** Seconds from one frame to the next; 0 if undefined. */
   get frameSeconds(): number {
     return this.#handle.use((raw) => raw.frameSeconds());
   }
@@ -135,12 +136,12 @@ export class Volume {
     return this.#handle.use((raw) => triple(raw.spacing()));
   }
 
-  /** Voxel index to world: 16 numbers, column-major. */
+  /** Transform from voxel index to world: 16 numbers, column-major. */
   get affine(): Float64Array {
     return this.#handle.use((raw) => raw.affine());
   }
 
-  /** Direction of the world axes. */
+  /** Orientation of the world axes. */
   get space(): Space {
     return this.#handle.use((raw) => raw.space() as Space);
   }
@@ -152,7 +153,8 @@ export class Volume {
   }
 
   /**
-   * Number of voxels in each of `bins` equal parts of {@link Volume.range}, of one frame.
+   * Returns the intensity histogram of one frame: the number of voxels in each of `bins` equal parts of
+   * {@link Volume.range}.
    *
    * @throws {@link VesicleError} `invalid-argument`: no bins, or no such frame.
    */
@@ -163,7 +165,7 @@ export class Volume {
   }
 
   /**
-   * Trilinear intensity at a world point; outside the volume the border is replicated.
+   * Samples the intensity at a world point by trilinear interpolation; outside the volume the border is replicated.
    *
    * @throws {@link VesicleError} `invalid-argument`: no such frame, or a point that is not finite.
    */
@@ -174,7 +176,7 @@ export class Volume {
   }
 
   /**
-   * Intensities of one slice, row-major: for axis 0 (sagittal) rows of y, for 1 and 2 rows of x.
+   * Returns the intensities of one slice, row-major: for axis 0 (sagittal) rows of y, for 1 and 2 rows of x.
    *
    * @throws {@link VesicleError} `invalid-argument`: no such axis, slice or frame.
    */
@@ -186,7 +188,7 @@ export class Volume {
   }
 
   /**
-   * All intensities of one frame, x fastest, for upload as a 3D texture.
+   * Returns all intensities of one frame, x fastest, for upload as a 3D texture.
    *
    * @throws {@link VesicleError} `invalid-argument`: no such frame; `too-large`.
    */
@@ -196,9 +198,10 @@ export class Volume {
   }
 
   /**
-   * One volume a level, each smaller than the one before by `factor` along each axis; [0] = this one.
+   * Builds an image pyramid: one volume a level, each smaller than the one before by `factor` along each axis; [0] =
+   * this one.
    *
-   * @param levels - How many, this volume included.
+   * @param levels - Number of levels, this volume included.
    * @param options - `factor`: above 1, at most 2; default the square root of 3.
    * @throws {@link VesicleError} `invalid-argument`: factor out of range, or more levels than the size allows.
    */
@@ -210,10 +213,11 @@ export class Volume {
   }
 
   /**
-   * Means of blocks of voxels, in all frames: fewer and larger voxels of the same type. What is left over at the far ends is
-   * left out. For images that were interpolated to smaller pixels than were measured.
+   * Reduces the resolution of all frames by averaging blocks of voxels: fewer and larger voxels of the same type.
+   * Incomplete blocks at the far ends are dropped. For images that were interpolated to smaller pixels than were
+   * measured.
    *
-   * @param factors - Voxels along x, y and z that become one, 1 to 16 each.
+   * @param factors - Block size in voxels along x, y and z, 1 to 16 each.
    * @throws {@link VesicleError} `invalid-argument`: a factor out of range, or beyond the volume; `too-large`.
    */
   binned(factors: Vec3): Volume {
@@ -222,11 +226,11 @@ export class Volume {
   }
 
   /**
-   * In-between slices along the axis of the largest spacing, by symmetric optical flow between neighbours, for all frames.
-   * The slices that were there stay as they are, at their places; voxels keep their type.
+   * Inserts in-between slices along the axis of the largest spacing, by symmetric optical flow between neighbouring
+   * slices, in all frames. The original slices stay unchanged, at their positions; voxels keep their type.
    *
-   * @param options - `factor`: so many slices for one, 1 to 16; default the whole number that brings the voxels nearest to
-   *   cubes, 1 changes nothing. `method`: `'linear'` takes weighted means instead.
+   * @param options - `factor`: number of slices for each original one, 1 to 16; default the integer that makes voxels
+   *   closest to cubes; 1 changes nothing. `method`: `'linear'` interpolates linearly instead.
    * @throws {@link VesicleError} `invalid-argument`: factor out of range, or a single slice; `too-large`.
    */
   enrichSlices(options: { factor?: number; method?: 'flow' | 'linear' } = {}): Volume {
@@ -236,7 +240,7 @@ export class Volume {
     return wrap(() => this.#handle.use((raw) => raw.enrichSlices(factor, method === 'flow')));
   }
 
-  /** Gives the memory back; the volume cannot be used afterwards. What was made from it stays. */
+  /** Frees the memory; the volume cannot be used afterwards. Objects made from it stay valid. */
   free(): void {
     this.#handle.free();
   }
@@ -248,7 +252,7 @@ export class Volume {
 }
 
 function wrap(make: () => RawVolume): Volume {
-  // The constructor knows a handle from what users give it.
+  // The constructor distinguishes a handle from the options of users.
   return new Volume(new Handle('Volume', make) as unknown as VolumeInit);
 }
 

@@ -1,6 +1,6 @@
 /**
- * What runs in the worker of `vesicle/worker`: the library itself, and a table of the objects that were made. It exports
- * nothing; a bundler that does not find it by itself takes it as the entry of a worker.
+ * Script of the worker of `vesicle/worker`: runs the library itself and keeps a table of the objects created for the
+ * page. It exports nothing; bundlers that do not detect it need it as the entry point of a worker.
  *
  * @packageDocumentation
  */
@@ -46,10 +46,10 @@ const LIBRARY: Pick<Library, ClassName | FunctionName> = {
 
 const CLASSES = Object.keys(MEMBERS) as ClassName[];
 
-/** Why a run was called off from the page, which knows the reason. */
+/** Abort reason of tasks aborted by the page; the page knows the real reason. */
 const ABORTED = new VesicleError('aborted', 'the run was called off');
 
-/** Does what the page asks for, one request after the other; runs go on between them. */
+/** Handles the page's requests in order; runs continue between them. */
 class Host {
   readonly #post: Post;
   readonly #made = new Map<number, Made>();
@@ -88,7 +88,7 @@ class Host {
       const Class = LIBRARY[name] as unknown as new (...args: unknown[]) => Own;
       this.#made.set(at, { object: new Class(...this.#incoming(args)) });
     } catch (failed) {
-      // Everything asked of it meets the same failure.
+      // All later requests for this object fail with the same error.
       this.#made.set(at, { failed });
       throw failed;
     }
@@ -100,7 +100,9 @@ class Host {
     return kind === 'value' ? member : (member as (...args: unknown[]) => unknown).apply(target, this.#incoming(args));
   }
 
-  /** Where a name is, and what it is; only names in the tables are found. */
+  /**
+   * Resolves the target of a call and the kind of its member; throws unless the name is in the tables of the protocol.
+   */
   #find(on: Call['on'], name: string): { target: Record<string, unknown>; kind: string } {
     if (on === undefined) return { target: LIBRARY, kind: lookUp(FUNCTIONS, name) };
     if (typeof on === 'string') {
@@ -119,7 +121,7 @@ class Host {
     throw new VesicleError('invalid-argument', `${part}: this is no object`);
   }
 
-  /** Into the page's buffers, which came with the request and go back. */
+  /** Copies the mesh into the page's buffers, which were transferred with the request and are transferred back. */
   #copyTo({ on, args }: Call): unknown {
     const { target } = this.#find(on, 'copyTo');
     const [arrays] = this.#incoming(args) as [MeshArrays];
@@ -155,7 +157,10 @@ class Host {
     );
   }
 
-  /** A result, and the buffers in it: they are fresh, so they can be handed over. */
+  /**
+   * Prepares a result for posting: objects become references, and the buffers of typed arrays are collected for
+   * transfer, which is safe because results are newly allocated.
+   */
   #outgoing(result: unknown): [unknown, ArrayBuffer[]] {
     const buffers = new Set<ArrayBuffer>();
     const value = swapped('', result, (_, found) => {
@@ -197,7 +202,7 @@ function failureOf(error: unknown): Failure {
 const asError = (error: unknown) => (error instanceof Error ? error : new Error(String(error)));
 
 async function inNode(): Promise<void> {
-  // Out of the bundlers' sight: a page never gets here.
+  // Hidden from bundlers: a page never gets here.
   const threads = 'node:worker_threads';
   const { parentPort } = await import(/* @vite-ignore */ /* webpackIgnore: true */ threads);
   const host = new Host((reply, transfer) => parentPort.postMessage(reply, transfer));

@@ -1,46 +1,47 @@
-// What the page and the worker say to each other, and the names that may be asked for. Nothing else is ever called.
+// Messages between the page and the worker, and tables of the members that may be accessed. Nothing outside these
+// tables is ever called.
 import { VesicleError } from './error.js';
 import type { ErrorCode } from './index.js';
 import type { StepReport } from './stepper.js';
 import type { ClassName, FunctionName, Library } from './worker-types.js';
 
-/** Stands for an object that is in the worker, or for a live mesh of one. */
+/** A reference to an object in the worker, or to one of its live meshes. */
 export interface Reference {
-  /** Above 0 where the page chose it, below where the worker did. */
+  /** Id of the object: above 0 if assigned by the page, below 0 if assigned by the worker. */
   readonly vesicle: number;
   readonly class: ClassName;
-  /** The property of the object that is meant. */
+  /** Name of the property that holds the live mesh. */
   readonly part?: string;
 }
 
-/** A thing to do that has an answer, without its number. */
+/** A task that the page posts to the worker and that has an answer; without its id. */
 export type Task =
   | { type: 'init'; module: BufferSource | WebAssembly.Module | string | undefined }
   | { type: 'make'; as: Reference; args: unknown[] }
-  /** Of an object, of a class, or one of the functions. */
+  /** Call on an object, on a class, or of a free function. */
   | { type: 'call'; on: Reference | ClassName | undefined; name: string; args: unknown[]; reports?: boolean };
 
-/** From the page. */
+/** A message from the page to the worker. */
 export type Request = (Task & { id: number }) | { type: 'abort'; id: number } | { type: 'free'; object: number };
 
-/** From the worker: an answer, or one report of a task that goes on. */
+/** A message from the worker to the page: an answer, or a report of a task in progress. */
 export type Reply =
   | { type: 'value'; id: number; value: unknown }
   | { type: 'error'; id: number; failure: Failure }
   | { type: 'report'; id: number; report: Report };
 
-/** What a task tells while it goes on: the report of a step, or the share done. */
+/** Content of a report: that of a step, or the fraction done of a measurement. */
 export type Report = StepReport | number;
 
-/** Methods that can be aborted from the page, and the option of each that is called with reports. */
+/** Methods that the page can abort, with the name of the listener option that receives their reports. */
 export const ABORTABLE = { run: 'onStep', coverage: 'onProgress' } as const;
 
-/** An error, so that it can be made again on the other side. */
+/** A serialised error, from which the page creates an equal one. */
 export type Failure =
   | { kind: 'error'; code: ErrorCode; message: string }
   | { kind: 'crash'; message: string; cause: Error | undefined }
   | { kind: 'aborted' }
-  /** Of other names than JavaScript's own errors, copies of the error have lost theirs. */
+  /** Structured clones lose the name of an error that is not one of JavaScript's own. */
   | { kind: 'other'; name: string; error: Error };
 
 type Kind<T> = T extends (...args: never) => unknown
@@ -61,7 +62,7 @@ const STEPPER = {
   restore: 'method',
 } as const;
 
-/** What may be asked of the objects of each class. Does not compile where a name is missing, or is one too many. */
+/** Members of the objects of each class that may be accessed. Compilation fails if a name is missing or superfluous. */
 export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype']> } = {
   Volume: {
     dims: 'value',
@@ -158,7 +159,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
   },
 };
 
-/** What may be asked of each class itself. */
+/** Static methods of each class that may be called. */
 export const STATICS: { readonly [N in ClassName]: Names<Exclude<keyof Library[N], 'prototype'>> } = {
   Volume: { parse: 'method', fromFrames: 'method' },
   Mesh: { icosphere: 'method', fromArrays: 'method', parse: 'method', marchingCubes: 'method' },
@@ -168,7 +169,7 @@ export const STATICS: { readonly [N in ClassName]: Names<Exclude<keyof Library[N
   MultiresolutionModel: {},
 };
 
-/** Functions of no class. */
+/** Free functions that may be called. */
 export const FUNCTIONS: Names<FunctionName> = {
   version: 'method',
   paramSpecs: 'method',
@@ -176,31 +177,34 @@ export const FUNCTIONS: Names<FunctionName> = {
   animationGlb: 'method',
 };
 
-/** What a table says of a name. Throws where it is not in the table itself. */
+/** Returns the entry of `name` in a table. Throws `invalid-argument` unless it is an own property. */
 export function lookUp<T>(table: Readonly<Record<string, T>>, name: string): T {
   const found = Object.hasOwn(table, name) ? table[name] : undefined;
   if (found !== undefined) return found;
   throw new VesicleError('invalid-argument', `${name}: there is no such thing in the worker`);
 }
 
-/** True for what stands for an object in the worker. */
+/** Whether a value is a reference to an object in the worker. */
 export function isReference(value: object): value is Reference {
   return Object.hasOwn(value, 'vesicle') && Object.hasOwn(value, 'class');
 }
 
-/** True for objects without a class. */
+/** Whether an object is plain, i.e. an instance of no class. */
 export function isPlain(value: object): boolean {
   const prototype: unknown = Object.getPrototypeOf(value);
-  // Objects of other windows have another Object.prototype, but nothing above it.
+  // Objects of other windows have another Object.prototype, but it, too, has no prototype.
   return prototype === null || Object.getPrototypeOf(prototype) === null;
 }
 
-/** No argument or result of the library has so many objects in each other; what refers to itself has. */
+/**
+ * Greatest depth of nested objects in a message. Arguments and results of the library are shallower; cyclic values
+ * exceed it.
+ */
 const DEEPEST = 8;
 
 /**
- * A copy with other things in place of some: `swap` gives the thing for an object or a function, or nothing where it has
- * to be looked into. `path` tells it where it is.
+ * Copies nested arrays and objects with replacements: `swap` returns the replacement of an object or function, or
+ * undefined to descend into it. `path` is the location of the value, for error messages.
  */
 export function swapped(
   path: string,
@@ -216,7 +220,7 @@ export function swapped(
   if (Array.isArray(value))
     return value.map((entry, index) => (isSimple(entry) ? entry : inside(`${path}[${index}]`, entry)));
   const named = (name: string) => (depth === 0 ? name : `${path}.${name}`);
-  // As own properties, whatever their names.
+  // Creates own properties whatever their names, `__proto__` included.
   return Object.fromEntries(Object.entries(value).map(([name, entry]) => [name, inside(named(name), entry)]));
 }
 

@@ -1,4 +1,4 @@
-// The page's side of the objects in the worker.
+// The page's proxies of the objects in the worker.
 import { invalid, knownOnly } from './check.js';
 import { type CoverageOptions, checkedCoverage } from './coverage.js';
 import { VesicleError } from './error.js';
@@ -22,8 +22,8 @@ import type { ClassName, FunctionName, RemoteClass, RemoteFunction } from './wor
 const handedOver = new WeakSet<object>();
 
 /**
- * Lets a typed array, or all that are in an object, go to the worker without a copy when it is next given to something. It
- * is empty here afterwards, as is every other array over the same buffer.
+ * Marks a typed array, or all typed arrays inside an object, to be transferred to the worker without a copy when next
+ * passed as an argument. Afterwards it is empty here, as is every other array on the same buffer.
  *
  * @returns The value itself.
  */
@@ -33,16 +33,16 @@ export function transfer<T extends object>(value: T): T {
   return value;
 }
 
-/** Where an object is in the worker. */
+/** Identity and state of a remote object: its reference, the session it belongs to, and whether it was freed. */
 class Place {
   freed = false;
 
   constructor(
     readonly reference: Reference,
     readonly session: Session | undefined,
-    /** Why there is no object, where not even the request for it could be posted. */
+    /** Why there is no object, if not even the request to create it could be posted. */
     readonly failed?: unknown,
-    /** Of a live mesh: its model, which must stay as long as the mesh is used. */
+    /** For a live mesh: its model, which must not be collected while the mesh is used. */
     readonly owner?: Remote,
   ) {}
 }
@@ -56,7 +56,7 @@ function release(place: Place): void {
   place.session?.free(place.reference.vesicle);
 }
 
-/** An object in the worker. */
+/** Base class of the page's proxies of objects in the worker. */
 class Remote {
   readonly #place: Place;
   readonly #parts = new Map<string, Remote>();
@@ -70,7 +70,7 @@ class Remote {
     if (!place.owner) garbage.register(this, place, place);
   }
 
-  /** The same live mesh every time. */
+  /** Returns the proxy of a live mesh, always the same. */
   part(name: string): Remote {
     const { reference, session, failed } = this.#place;
     const made = () => new classes.Mesh(new Place({ ...reference, class: 'Mesh', part: name }, session, failed, this));
@@ -80,7 +80,7 @@ class Remote {
   }
 
   free(): void {
-    // A live mesh goes with its model.
+    // A live mesh is freed with its model.
     if (this.#place.owner || this.#place.freed) return;
     garbage.unregister(this.#place);
     release(this.#place);
@@ -91,7 +91,10 @@ class Remote {
   }
 }
 
-/** The session of an object that can be asked. Throws where it failed, is freed, or went with its worker. */
+/**
+ * Returns the session of a usable object. Throws if the object's creation failed, if it was freed, or if its worker
+ * ended.
+ */
 function sessionOf(remote: Remote): Session {
   const { failed, session, reference, owner } = placeOf(remote);
   if (failed !== undefined) throw failed;
@@ -101,13 +104,16 @@ function sessionOf(remote: Remote): Session {
   throw new VesicleError('freed', `this ${reference.class} was lost when its worker ended; make a new one`);
 }
 
-/** What stands for an object that can be asked. */
+/** Returns the reference of a usable object; throws as `sessionOf`. */
 function referenceOf(remote: Remote): Reference {
   sessionOf(remote);
   return placeOf(remote).reference;
 }
 
-/** Arguments as they are posted, and the buffers that go with them. */
+/**
+ * Prepares arguments for posting: references instead of proxies, copies of typed arrays unless marked by `transfer`,
+ * and the buffers to transfer.
+ */
 function packed(args: readonly unknown[]): { args: unknown[]; transfer: ArrayBuffer[] } {
   const buffers = new Set<ArrayBuffer>();
   const pack = (path: string, value: object, moved: boolean): unknown => {
@@ -119,7 +125,7 @@ function packed(args: readonly unknown[]): { args: unknown[]; transfer: ArrayBuf
       return sent;
     }
     if (!Array.isArray(value) && !isPlain(value)) throw unsendable(path, value);
-    // What is inside is looked at one by one, and goes the same way.
+    // Nested values are packed one by one, and are transferred, too.
     return moves && !moved ? swapped(path, value, (at, inner) => pack(at, inner, true)) : undefined;
   };
   const sent = args.map((arg, k) => swapped(`argument ${k + 1}`, arg, (path, value) => pack(path, value, false)));
@@ -132,23 +138,23 @@ function unsendable(path: string, value: object): VesicleError {
   return invalid(path, `a ${name} cannot be sent to the worker; ${accepted}`);
 }
 
-/** An array that gives its buffer away. */
+/** Returns an array to be transferred with its buffer; throws `invalid-argument` for shared memory. */
 function whole(path: string, array: ArrayBufferView): ArrayBufferView {
   if (!(array.buffer instanceof ArrayBuffer)) throw invalid(path, 'memory that is shared cannot be handed over');
   return array.byteLength > 0 ? array : copied(path, array);
 }
 
-/** Only what the array shows of its buffer. */
+/** Copies the visible part of an array's buffer. */
 function copied(path: string, array: ArrayBufferView): ArrayBufferView {
   try {
-    // The same for all typed arrays, and a copy also where a class makes it a view.
+    // Works for all typed arrays, and copies also where a subclass's slice returns a view.
     return Uint8Array.prototype.slice.call(array);
   } catch {
     throw invalid(path, 'is no typed array, or was handed over before');
   }
 }
 
-/** The same with remote objects for what stands for them. */
+/** Replaces the references in a result by proxies. */
 function received(value: unknown, session: Session): unknown {
   return swapped('', value, (_, found) => {
     if (isReference(found)) return new classes[found.class](new Place(found, session));
@@ -156,7 +162,7 @@ function received(value: unknown, session: Session): unknown {
   });
 }
 
-/** Asks for something of an object, of a class, or of neither. */
+/** Posts a call on an object, on a class, or of a free function, and resolves with its result. */
 async function ask(
   session: Session,
   on: Remote | ClassName | undefined,
@@ -181,7 +187,10 @@ async function coverage(remote: Remote, given?: CoverageOptions): Promise<unknow
 
 type Listener = (report: Report) => void;
 
-/** The signal and the listener stay here: the one aborts the task from here, the other is called with what comes back. */
+/**
+ * Runs an abortable method in the worker. Signal and listener stay on the page: the signal posts an abort message, the
+ * listener is called with the reports received.
+ */
 async function abortable(
   remote: Remote,
   name: keyof typeof ABORTABLE,
@@ -203,14 +212,14 @@ async function abortable(
     stop.signal.throwIfAborted();
     return result;
   } catch (error) {
-    // Whoever stopped it hears why; but of a worker that has ended, everybody hears.
+    // Rejects with the abort reason, but with the worker's failure if it has ended.
     throw stop.signal.aborted && !session.ended ? stop.signal.reason : error;
   } finally {
     signal?.removeEventListener('abort', abort);
   }
 }
 
-/** What a listener throws ends the task, though that may be some steps ahead. */
+/** Calls a listener; if it throws, the task is aborted, though the worker may be some steps ahead. */
 function tell(listener: Listener, report: Report, stop: AbortController): void {
   if (stop.signal.aborted) return;
   try {
@@ -220,14 +229,14 @@ function tell(listener: Listener, report: Report, stop: AbortController): void {
   }
 }
 
-/** The buffers of `out` go there and back. */
+/** Implements `Mesh.copyTo`: the buffers of `out` are transferred to the worker and back. */
 async function copyTo(remote: Remote, out: MeshArrays): Promise<unknown> {
   const { uvs, colors, ...given } = knownOnly('out', out, ['positions', 'normals', 'indices', 'uvs', 'colors']);
   const session = sessionOf(remote);
   const sent = packed([transfer({ ...given, ...(uvs && { uvs }), ...(colors && { colors }) })]);
   const task: Task = { type: 'call', on: referenceOf(remote), name: 'copyTo', args: sent.args };
   const { answer } = session.ask(task, { ...sent, asked: remote });
-  // Until they are back: what was handed over cannot be sent again.
+  // Transferred arrays cannot be sent again until they are back.
   Object.assign(out, { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() });
   for (const name of ['uvs', 'colors'] as const) delete out[name];
   const { counts, arrays } = (await answer) as { counts: unknown; arrays: MeshArrays };
@@ -235,7 +244,7 @@ async function copyTo(remote: Remote, out: MeshArrays): Promise<unknown> {
   return counts;
 }
 
-/** Asks for a new object; a failure is kept for whatever is asked of it. */
+/** Requests the creation of an object; an error is kept and thrown by every later use of the object. */
 function make(name: ClassName, args: readonly unknown[]): { place: Place; made: Promise<unknown> } {
   try {
     const session = currentSession();
@@ -250,7 +259,7 @@ function make(name: ClassName, args: readonly unknown[]): { place: Place; made: 
 
 type Class = (new (...args: unknown[]) => Remote) & Record<string, unknown>;
 
-/** A class with what the tables say, and nothing else. */
+/** Creates the proxy class for a class of the library, with exactly the members in the protocol's tables. */
 function remoteClass(name: ClassName): Class {
   const named = {
     [name]: class extends Remote {
@@ -264,7 +273,7 @@ function remoteClass(name: ClassName): Class {
     define(made, method, { value: async (...args: unknown[]) => ask(currentSession(), name, method, args) });
   }
   for (const [member, kind] of Object.entries(MEMBERS[name])) define(made.prototype, member, memberOf(member, kind));
-  // Meshes are made by the functions of the class.
+  // Meshes are created by static methods only.
   if (name !== 'Mesh') define(made, 'create', { value: creator(made, name) });
   return made;
 }
@@ -280,7 +289,7 @@ function memberOf(name: string, kind: string): PropertyDescriptor {
   return { value: fromThis(call) };
 }
 
-/** A method or getter of a function. */
+/** Turns a function of the proxy into a method or getter. */
 function fromThis<T>(work: (remote: Remote, args: unknown[]) => T): (this: Remote, ...args: unknown[]) => T {
   return function (this: Remote, ...args) {
     return work(this, args);
@@ -288,12 +297,12 @@ function fromThis<T>(work: (remote: Remote, args: unknown[]) => T): (this: Remot
 }
 
 function define(target: object, name: string, what: PropertyDescriptor): void {
-  // Like methods and getters that are written in a class.
+  // Attributes as for methods and getters written in a class.
   const writable = 'value' in what ? { writable: true } : {};
   Object.defineProperty(target, name, { configurable: true, enumerable: false, ...writable, ...what });
 }
 
-/** Nobody may wait for it: the failure shows in whatever is asked of the object. */
+/** Suppresses the unhandled rejection: the failure is reported by every use of the object. */
 function silently({ place, made }: ReturnType<typeof make>): Place {
   made.catch(() => undefined);
   return place;
@@ -312,10 +321,10 @@ const classes = Object.fromEntries(
   Object.keys(MEMBERS).map((name) => [name, remoteClass(name as ClassName)]),
 ) as Record<ClassName, Class>;
 
-/** The classes of the library, whose objects are in the worker. */
+/** Proxy classes for the classes of the library. */
 export const remoteClasses = classes as unknown as { readonly [N in ClassName]: RemoteClass<N> };
 
-/** A function of the library that is done in the worker. */
+/** Returns the proxy of a free function of the library. */
 export function remoteFunction<N extends FunctionName>(name: N): RemoteFunction<N> {
   const call = async (...args: unknown[]) => ask(currentSession(), undefined, name, args);
   return call as unknown as RemoteFunction<N>;

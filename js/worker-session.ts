@@ -1,8 +1,8 @@
-// One worker, from its start to its end: what is asked of it, and what waits for its answers.
+// Connection to one worker from start to end: pending requests and their answers.
 import { VesicleCrash, VesicleError } from './error.js';
 import type { Failure, Reply, Report, Request, Task } from './worker-protocol.js';
 
-/** A worker of `node:worker_threads`, as far as it is used. */
+/** The part of the worker class of `node:worker_threads` that is used. */
 export interface NodeWorker {
   postMessage(message: unknown, transfer: ArrayBuffer[]): void;
   terminate(): unknown;
@@ -15,24 +15,24 @@ interface Waiting {
   resolve: (value: unknown) => void;
   reject: (error: unknown) => void;
   onReport: ((report: Report) => void) | undefined;
-  /** The object that is asked must not be given back as garbage meanwhile. */
+  /** The object of the call, kept from garbage collection until the answer arrives. */
   asked: unknown;
 }
 
-/** What goes with a task. */
+/** Options of a request: buffers to transfer, the object of the call, and the listener of reports. */
 interface Extra {
   transfer?: ArrayBuffer[];
   asked?: unknown;
   onReport?: ((report: Report) => void) | undefined;
 }
 
-/** A promise and the number it goes by. */
+/** A pending answer and the id of its request. */
 interface Asked {
   id: number;
   answer: Promise<unknown>;
 }
 
-/** Asks, and gives each answer to whoever waits for it. */
+/** Sends requests to a worker and settles the promise of each with its answer. */
 export class Session {
   readonly #worker: Worker | NodeWorker;
   readonly #waiting = new Map<number, Waiting>();
@@ -49,24 +49,24 @@ export class Session {
     );
   }
 
-  /** Why nothing can be asked any more. */
+  /** The error with which the worker ended; undefined while it is usable. */
   get ended(): Error | undefined {
     return this.#end;
   }
 
-  /** A number for an object or a request. */
+  /** Returns a new id, for an object or a request. */
   number(): number {
     this.#last += 1;
     return this.#last;
   }
 
-  /** Posts a task. Throws at once where it cannot be posted. */
+  /** Posts a task. Throws synchronously if it cannot be posted. */
   ask(task: Task, { transfer = [], asked, onReport }: Extra = {}): Asked {
     if (this.#end) throw this.#end;
     const id = this.number();
     this.#send({ ...task, id }, transfer);
     const answer = new Promise((resolve, reject) => this.#waiting.set(id, { resolve, reject, onReport, asked }));
-    // Node goes on as long as something waits, and no longer.
+    // Keeps Node running as long as requests are pending, and no longer.
     if ('ref' in this.#worker) this.#worker.ref();
     return { id, answer };
   }
@@ -76,12 +76,12 @@ export class Session {
     if (!this.#end) this.#send({ type: 'abort', id }, []);
   }
 
-  /** Gives an object in the worker back. */
+  /** Frees an object in the worker. */
   free(object: number): void {
     if (!this.#end) this.#send({ type: 'free', object }, []);
   }
 
-  /** The worker's end: all that waits, and all that comes after, rejects with the reason. */
+  /** Terminates the worker: all pending and later requests reject with the reason. */
   end(reason: Error): void {
     if (this.#end) return;
     this.#end = reason;
@@ -142,7 +142,7 @@ function listen(worker: Worker | NodeWorker, hear: (reply: Reply) => void, fail:
   }
   worker.addEventListener('message', ({ data }) => hear(data));
   worker.addEventListener('error', (event) => {
-    // Whoever waits hears of it; no need to tell the console.
+    // All pending requests reject with it; the console need not report it.
     event.preventDefault();
     fail(event.message || 'its script could not be loaded');
   });

@@ -1,32 +1,32 @@
-// How the worker is started, wherever the page and the package are, and how it ends.
+// Starts and terminates the worker, for any origin of page and package.
 import { knownOnly } from './check.js';
 import { VesicleError } from './error.js';
 import type { InitInput } from './runtime.js';
 import type { Task } from './worker-protocol.js';
 import { type NodeWorker, Session } from './worker-session.js';
 
-/** What the worker is started with. */
+/** Options of {@link init} of `vesicle/worker`. */
 export interface WorkerInit {
-  /** The module, its bytes or its address, as in `vesicle`. Left out, the worker takes the `.wasm` beside itself. */
+  /** The module, its bytes or its address, as in `vesicle`. By default the worker loads the `.wasm` beside itself. */
   module_or_path?: InitInput | Promise<InitInput>;
   /**
-   * A new worker that runs `vesicle/worker-host`, where this library cannot make one: for bundlers that do not know
-   * `new Worker(new URL(…, import.meta.url), { type: 'module' })`. It belongs to the library from then on, and each start
-   * needs another.
+   * A new worker that runs `vesicle/worker-host`, where this library cannot create one: for bundlers that do not
+   * recognise `new Worker(new URL(…, import.meta.url), { type: 'module' })`. The library takes ownership, and each
+   * start needs another one.
    */
   worker?: Worker | NodeWorker;
 }
 
 let session: Session | undefined;
 let starting: Promise<void> | undefined;
-// Counts starts, so that one which was called off meanwhile is known.
+// Number of starts, to recognise one that was cancelled meanwhile.
 let turn = 0;
 
 /**
- * Starts the worker and the module in it; everything else needs it. Idempotent: later calls give the same promise. After a
- * `VesicleCrash` or {@link terminate} it starts a fresh worker.
+ * Starts the worker and loads the module in it; required before anything else. Idempotent: later calls return the same
+ * promise. After a `VesicleCrash` or {@link terminate} it starts a new worker.
  *
- * @throws An `Error` where the worker's script cannot be loaded; whatever fetching or compiling the module threw. A later
+ * @throws An `Error` where the worker's script cannot be loaded; any error of fetching or compiling the module. A later
  *   call tries again.
  */
 export function init(given: WorkerInit = {}): Promise<void> {
@@ -39,8 +39,8 @@ export function init(given: WorkerInit = {}): Promise<void> {
 }
 
 /**
- * Ends the worker at once, and with it every volume, mesh and model in it. What waits rejects with a `VesicleError`
- * `aborted`. {@link init} starts a fresh one.
+ * Terminates the worker at once, and with it all volumes, meshes and models in it. Pending promises reject with a
+ * `VesicleError` `aborted`. {@link init} starts a new worker.
  */
 export function terminate(): void {
   turn += 1;
@@ -48,7 +48,7 @@ export function terminate(): void {
   session?.end(terminated());
 }
 
-/** The worker there is. */
+/** Returns the session of the current worker; throws `invalid-argument` before {@link init}. */
 export function currentSession(): Session {
   if (session) return session;
   throw new VesicleError('invalid-argument', 'init: call `await init()` before anything else');
@@ -76,14 +76,14 @@ async function start(given: WorkerInit, mine: number): Promise<void> {
   await made.ask({ type: 'init', module }).answer;
 }
 
-/** Nothing came of it; a later call tries again. */
+/** Ends the session after a failed start; a later call of `init` tries again. */
 function giveUp(error: unknown): void {
   starting = undefined;
   session?.end(error instanceof Error ? error : new Error(String(error)));
   session = undefined;
 }
 
-/** What can be sent of where the module comes from; a relative address is one of the page. */
+/** Converts the module source into a form that can be posted; relative addresses are resolved against the page. */
 async function sendable(source: InitInput | undefined): Promise<Extract<Task, { type: 'init' }>['module']> {
   if (source === undefined || source instanceof WebAssembly.Module) return source;
   if (source instanceof ArrayBuffer || ArrayBuffer.isView(source)) return source;
@@ -98,14 +98,17 @@ async function sendable(source: InitInput | undefined): Promise<Extract<Task, { 
 function browserWorker(): Worker {
   const here = import.meta.url;
   if (isForeign(here)) return foreignWorker(new URL('./worker-host.js', here));
-  // Bundlers know these very words, and make a script of its own out of what they name.
+  // Bundlers recognise exactly this expression, and bundle the script it names.
   return new Worker(new URL('./worker-host.js', import.meta.url), { type: 'module' });
 }
 
 const isForeign = (address: string) =>
   /^https?:/.test(address) && new URL(address).origin !== globalThis.location?.origin;
 
-/** Browsers start no worker from another origin, but let one of this origin import a module from there. */
+/**
+ * Starts a worker whose script has another origin: browsers refuse such a script, but a script of this origin may
+ * import a module from there.
+ */
 function foreignWorker(address: URL): Worker {
   const script = new Blob([`import ${JSON.stringify(address.href)};`], { type: 'text/javascript' });
   const local = URL.createObjectURL(script);
@@ -117,10 +120,10 @@ function foreignWorker(address: URL): Worker {
 }
 
 async function nodeWorker(): Promise<NodeWorker> {
-  // Out of the bundlers' sight: a page never gets here.
+  // Hidden from bundlers: a page never gets here.
   const threads = 'node:worker_threads';
   const { Worker } = await import(/* @vite-ignore */ /* webpackIgnore: true */ threads);
   const here = import.meta.url;
-  // Some of the options that the program itself was started with are refused in a worker.
+  // `execArgv` is cleared because some options of the main program are refused in a worker.
   return new Worker(new URL('./worker-host.js', here), { execArgv: [] });
 }

@@ -1,13 +1,13 @@
-// The library's types as they are seen from the other side of a worker, made from those of the library itself, so that the
-// two cannot drift apart.
+// Types of the library as seen from the page's side of a worker, derived from those of the library itself so that they
+// cannot diverge.
 import type * as vesicle from './index.js';
 
-/** What `vesicle` exports. */
+/** The exports of `vesicle`. */
 export type Library = typeof vesicle;
 
 type Callable = (...args: never) => unknown;
 
-/** The classes whose objects are in the worker. */
+/** Names of the classes whose objects live in the worker. */
 export type ClassName = {
   [K in keyof Library]: Library[K] extends Callable
     ? never
@@ -16,28 +16,30 @@ export type ClassName = {
       : never;
 }[keyof Library];
 
-/** The functions that are done in the worker. A worker cannot be started at once: there is no `initSync`. */
+/**
+ * Names of the free functions that run in the worker. A worker cannot start synchronously, so there is no `initSync`.
+ */
 export type FunctionName = Exclude<
   { [K in keyof Library]: Library[K] extends Callable ? K : never }[keyof Library],
   'default' | 'initSync'
 >;
 
-/** An object of the library, as it is in the worker. */
+/** Any object of the library, as it exists in the worker. */
 export type Own = Library[ClassName]['prototype'];
 
-/** A volume in the worker. */
+/** A `Volume` of the library, in the worker. */
 export interface Volume extends Remote<vesicle.Volume> {}
-/** A mesh in the worker. */
+/** A `Mesh` of the library, in the worker. */
 export interface Mesh extends Remote<vesicle.Mesh> {}
-/** A deformable model in the worker. */
+/** A `DeformableModel` of the library, in the worker. */
 export interface DeformableModel extends Remote<vesicle.DeformableModel> {}
-/** An implicit surface in the worker. */
+/** An `ImplicitSurface` of the library, in the worker. */
 export interface ImplicitSurface extends Remote<vesicle.ImplicitSurface> {}
-/** A multiresolution model in the worker. */
+/** A `MultiresolutionModel` of the library, in the worker. */
 export interface MultiresolutionModel extends Remote<vesicle.MultiresolutionModel> {}
-/** A surface tracker in the worker. */
+/** A `SurfaceTracker` of the library, in the worker. */
 export interface SurfaceTracker extends Remote<vesicle.SurfaceTracker> {}
-/** What every method can do, from the other side. */
+/** Interface that all four models in the worker implement. */
 export interface Stepper extends Remote<vesicle.Stepper> {}
 
 interface Remotes {
@@ -61,12 +63,12 @@ type Swapped<T> = T extends Own
       ? { [K in keyof T]: Swapped<T[K]> }
       : T;
 
-/** A type with remote objects in place of the library's. One that has none of them keeps its name. */
+/** A type with remote objects in place of the library's. A type that contains none of them keeps its name. */
 export type There<T> = [T, Swapped<T>] extends [Swapped<T>, T] ? T : Swapped<T>;
 
 type Arguments<A extends unknown[]> = { [K in keyof A]: There<A[K]> };
 
-// With the leniency of methods, so that each model is a Stepper here as it is there.
+// Method types are compared bivariantly, so that each remote model is a Stepper, as in the library.
 type Method<A extends unknown[], R> = { method(...args: A): R }['method'];
 
 type Member<T> = [T] extends [Own]
@@ -75,20 +77,24 @@ type Member<T> = [T] extends [Own]
     ? Method<Arguments<A>, Promise<There<Awaited<R>>>>
     : Promise<There<T>>;
 
-/** An object on the other side: promises for what its methods and properties give; live meshes are there at once. */
+/**
+ * Proxy of an object in the worker: methods and properties return promises; live meshes are available synchronously.
+ */
 export type Remote<T> = {
   readonly [K in keyof T as K extends string ? Exclude<K, 'free'> : never]: Member<T[K]>;
 } & {
-  /** Gives the memory in the worker back; the object cannot be used afterwards. A model's mesh goes with its model only. */
+  /**
+   * Frees the memory in the worker; the object cannot be used afterwards. A model's mesh is freed only with its model.
+   */
   free(): void;
   /** The same as `free()`, for `using`. */
   [Symbol.dispose](): void;
 };
 
-/** A function that is done in the worker. */
+/** Proxy of a free function that runs in the worker. */
 export type RemoteFunction<N extends FunctionName> = Member<Library[N]>;
 
-/** A class whose objects are in the worker. */
+/** Proxy of a class whose objects live in the worker. */
 export type RemoteClass<N extends ClassName> = {
   readonly [K in keyof Library[N] as Exclude<K, 'prototype'>]: Member<Library[N][K]>;
 } & Maker<Library[N]>;
@@ -97,12 +103,12 @@ type Maker<C> = C extends new (
   ...args: infer A
 ) => infer I
   ? {
-      /** An object at once; if it cannot be made, every promise asked of it rejects. */
+      /** Returns an object at once; if its creation fails, every promise of the object rejects. */
       new (...args: Arguments<A>): There<I>;
-      /** An object that is known to be made; else rejects. */
+      /** Resolves with an object once it is created; rejects if the creation fails. */
       create(...args: Arguments<A>): Promise<There<I>>;
     }
-  : // Made by its functions, never by `new`; this is for `instanceof`.
+  : // For classes without a public constructor; only for `instanceof`.
     C extends { prototype: infer I }
     ? abstract new (
         ...args: never

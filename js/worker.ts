@@ -1,5 +1,5 @@
 /**
- * The same as `vesicle`, off the main thread: the library runs in a worker, and the page stays free.
+ * The API of `vesicle` off the main thread: the library runs in a worker, and the page stays responsive.
  *
  * ```js
  * import init, { DeformableModel, Volume } from 'vesicle/worker';
@@ -11,40 +11,41 @@
  * const { positions, indices } = await model.mesh.arrays();
  * ```
  *
- * **What is the same.** All names, arguments, results and errors of `vesicle`, to the bit. There is no `initSync`: a worker
- * does not start at once.
+ * **The same API.** Names, arguments, results and errors are those of `vesicle`, and results are bit-identical. There
+ * is no `initSync`: a worker cannot start synchronously.
  *
- * **Promises.** Methods, functions and properties give promises: `await mesh.check()`, `await volume.dims`. What is a volume,
- * mesh or model comes back as an object here that stands for one in the worker. The worker does what it is asked in
- * order, so nothing need be awaited for the sake of order alone: `model.setParams(params); model.step();`. While a run is
- * under way, other things are done between its steps. Live meshes are there without a promise, `model.mesh.arrays()`, and
- * are the same object always.
+ * **Promises.** Methods, functions and properties return promises: `await mesh.check()`, `await volume.dims`. Volumes,
+ * meshes and models are returned as proxies of objects in the worker. The worker handles requests in order, so nothing
+ * need be awaited for the sake of order alone: `model.setParams(params); model.step();`. During a run, other requests
+ * are handled between its steps. Live meshes, as in `model.mesh.arrays()`, are available without a promise, and are the
+ * same object always.
  *
- * **New objects.** `new Volume(…)` gives an object at once, to be used at once. Where it cannot be made, what is asked of it
- * rejects with the reason. `await Volume.create(…)` gives one that is known to be made, or rejects itself.
+ * **New objects.** `new Volume(…)` returns an object that can be used at once. If it cannot be created, every promise
+ * of the object rejects with the reason. `await Volume.create(…)` resolves once the object is created, or rejects
+ * itself.
  *
- * **Runs.** `run({ signal, onStep })` calls `onStep` here, which hears of steps that are over while the worker goes on. When
- * the signal aborts, or `onStep` throws, the worker stops after the step it is at, so it may be some steps ahead of the
- * last report; the promise then rejects with `signal.reason`, or with what was thrown. `coverage({ signal, onProgress })` works
- * the same way.
+ * **Runs.** `run({ signal, onStep })` calls `onStep` on the page, with reports of finished steps while the worker
+ * continues. When the signal aborts, or `onStep` throws, the worker stops after its current step, so it may be some
+ * steps ahead of the last report; the promise then rejects with `signal.reason`, or with the error thrown.
+ * `coverage({ signal, onProgress })` works the same way.
  *
- * **Arrays.** Typed arrays are copied, once; {@link transfer} hands them over instead. Those of results are handed over by the
- * worker. `mesh.copyTo(out)` sends the buffers of `out` there and back: `out` has empty arrays until the promise resolves,
- * and then new arrays over the same memory where there was room.
+ * **Arrays.** Typed arrays are copied, once; {@link transfer} transfers them instead. Those of results are transferred
+ * by the worker. `mesh.copyTo(out)` transfers the buffers of `out` there and back: `out` has empty arrays until the
+ * promise resolves, and then new arrays over the same memory where it was large enough.
  *
- * **Errors.** A {@link VesicleError} has its code. A {@link VesicleCrash}, or a worker that ended by itself (also a
- * `VesicleCrash`), rejects all that waits and all that comes after, until `init` starts a fresh worker; objects made
- * before are `freed` then. Arguments that cannot be sent are refused with `invalid-argument`, {@link transfer} too where
- * a buffer cannot be handed over.
+ * **Errors.** A {@link VesicleError} has its code. After a {@link VesicleCrash}, or if the worker ended by itself (also
+ * a `VesicleCrash`), all pending and later promises reject, until `init` starts a new worker; objects created before
+ * are `freed` then. Arguments that cannot be sent are rejected with `invalid-argument`; so are buffers given to
+ * {@link transfer} that cannot be transferred.
  *
- * **Memory.** `free()` gives back what an object has in the worker; so does the garbage collection of objects that nobody
- * holds any more, some time. {@link terminate} ends it all. In Node a worker that nobody waits for does not keep the
- * program from ending.
+ * **Memory.** `free()` frees an object's memory in the worker; so does garbage collection of unreachable objects, at
+ * some later time. {@link terminate} ends the worker. In Node a worker without pending requests does not keep the
+ * program from exiting.
  *
- * **Where the worker comes from.** From `worker-host.js` beside this file, as a module worker; Vite and webpack know the words
- * and bundle it. From another origin it is started by way of a `blob:`, which a content security policy has to allow
- * in `worker-src`. For other bundlers make a worker of `vesicle/worker-host` and give it to `init`. In Node it
- * runs on `node:worker_threads`.
+ * **Where the worker comes from.** From `worker-host.js` beside this file, as a module worker; Vite and webpack
+ * recognise the expression and bundle it. From another origin it is started through a `blob:` URL, which a content
+ * security policy has to allow in `worker-src`. For other bundlers create a worker from `vesicle/worker-host` and pass
+ * it to `init`. In Node it runs on `node:worker_threads`.
  *
  * @module vesicle/worker
  */
@@ -93,13 +94,13 @@ export type { NodeWorker } from './worker-session.js';
 export { init as default, terminate, type WorkerInit } from './worker-start.js';
 export type { Remote, Stepper } from './worker-types.js';
 
-/** As in `vesicle`, with objects of the worker. */
+/** Constructor options of a {@link DeformableModel} in the worker, as in `vesicle`. */
 export type DeformableOptions = there.There<vesicle.DeformableOptions>;
-/** As in `vesicle`, with objects of the worker. */
+/** The initial surface of a {@link DeformableModel} in the worker, as in `vesicle`. */
 export type DeformableStart = there.There<vesicle.DeformableStart>;
-/** As in `vesicle`, with objects of the worker. */
+/** Constructor options of a {@link MultiresolutionModel} in the worker, as in `vesicle`. */
 export type MultiresOptions = there.There<vesicle.MultiresOptions>;
-/** As in `vesicle`, with objects of the worker. */
+/** Constructor options of a {@link SurfaceTracker} in the worker, as in `vesicle`. */
 export type TrackingOptions = there.There<vesicle.TrackingOptions>;
 
 export type Volume = there.Volume;
@@ -111,11 +112,11 @@ export type MultiresolutionModel = there.MultiresolutionModel;
 
 export const { Volume, Mesh, DeformableModel, ImplicitSurface, SurfaceTracker, MultiresolutionModel } = remoteClasses;
 
-/** The version of the library in the worker. */
+/** Returns the version of the library in the worker. */
 export const version = remoteFunction('version');
-/** The parameters of a method, as in `vesicle`. */
+/** Returns descriptions of a method's parameters, as in `vesicle`. */
 export const paramSpecs = remoteFunction('paramSpecs');
-/** Points of a file, as in `vesicle`. */
+/** Parses points from a file, as in `vesicle`. */
 export const parsePoints = remoteFunction('parsePoints');
-/** Meshes one after the other as an animated glb, as in `vesicle`. */
+/** Encodes a sequence of meshes as an animated glb, as in `vesicle`. */
 export const animationGlb = remoteFunction('animationGlb');

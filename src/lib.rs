@@ -1,8 +1,8 @@
-//! **Vesicle** grows living surfaces out of 3D data: a closed triangle mesh that splits, merges and
-//! refines itself while it is fitted to a volume.
+//! **Vesicle** fits closed triangle meshes to 3D data: a mesh that splits, merges and refines itself while it is fitted
+//! to a volume.
 //!
-//! Modules form one-way layers, kept by `tests/core/architecture.rs`:
-//! `math < mesh < {spatial, volume} < remesh < methods < bindings`; `io` uses only math, mesh and volume.
+//! Modules form one-way layers, enforced by `tests/core/architecture.rs`: `math < mesh < {spatial, volume} < remesh <
+//! methods < bindings`; `io` uses only math, mesh and volume.
 
 pub mod io;
 pub mod math;

@@ -1,5 +1,5 @@
-// The browser's half of the notebook's widget: grows the surface of `volume`, shows it, and gives its mesh back.
-// The library comes with its module inside, for a notebook serves no files beside this one.
+// The browser side of the notebook widget: fits a surface to `volume`, displays it and returns its mesh to Python.
+// The library is bundled with its wasm module inline, because a notebook serves no other files.
 
 import type { AnyModel, Initialize, Render } from '@anywidget/types';
 import * as THREE from 'three';
@@ -7,14 +7,14 @@ import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import init, { DeformableModel, type DeformableParams, Volume, type VoxelArray } from 'vesicle/inline';
 import { type MeshSource, ThreeSurface } from 'vesicle/three';
 
-/** An array as it crosses over: its numbers as bytes. Of volumes the first axis is fastest, of lists of three the last. */
+/** A NumPy array as bytes. The first axis is fastest in volumes, the last in arrays of vertices and triangles. */
 export interface Packed {
   kind: string;
   shape: number[];
   data: DataView;
 }
 
-/** The traits that Python has, too. */
+/** The traits that the widget shares with Python. */
 export interface Traits {
   volume: Packed;
   affine: number[];
@@ -30,7 +30,7 @@ export interface Traits {
 
 type Model = AnyModel<Traits>;
 
-/** Milliseconds of steps between two pictures, about. */
+/** Approximate time of steps between two rendered images, in milliseconds. */
 const SLICE = 30;
 
 const KINDS: Record<string, new (buffer: ArrayBuffer) => VoxelArray> = {
@@ -38,19 +38,20 @@ const KINDS: Record<string, new (buffer: ArrayBuffer) => VoxelArray> = {
   ...{ uint32: Uint32Array, int32: Int32Array, float32: Float32Array, float64: Float64Array },
 };
 
+/** Returns a typed array from the bytes of a NumPy array. */
 function unpacked({ kind, data }: Pick<Packed, 'kind' | 'data'>): VoxelArray {
   const Kind = KINDS[kind];
   if (!Kind) throw new Error(`volume: numbers of kind ${kind}; there are ${Object.keys(KINDS).join(', ')}`);
-  // A copy: bytes of a message may begin anywhere.
+  // A copy: the bytes of a message may not be aligned.
   return new Kind(data.buffer.slice(data.byteOffset, data.byteOffset + data.byteLength) as ArrayBuffer);
 }
 
-/** Rows of three. */
+/** Returns an array of triples (positions or triangles) as bytes for Python. */
 function packed(kind: 'float32' | 'uint32', triples: Float32Array | Uint32Array): Packed {
   return { kind, shape: [triples.length / 3, 3], data: new DataView(triples.buffer) };
 }
 
-/** The surface of one widget, however often it is shown. */
+/** The deformable model of one widget, shared by all its views. */
 class Growth {
   readonly #model: Model;
   #surface: DeformableModel | undefined;
@@ -64,7 +65,7 @@ class Growth {
     model.on('change:running', () => this.#grow());
   }
 
-  /** From the start, with the traits as they are. */
+  /** Starts a new model with the current traits. */
   async begin(): Promise<void> {
     this.#tell({ state: 'loading', message: '', iteration: 0, vertices: null, triangles: null });
     try {
@@ -80,6 +81,7 @@ class Growth {
     }
   }
 
+  /** Creates the model from the current traits. */
   #make(): DeformableModel {
     const { shape, ...numbers } = this.#model.get('volume');
     const dims = shape as [number, number, number];
@@ -91,7 +93,7 @@ class Growth {
     }
   }
 
-  /** Parameters are live: what is at rest goes on with others. Wrong ones change nothing. */
+  /** Sets the parameters of the running model; a finished one continues. Invalid ones change nothing. */
   async #change(): Promise<void> {
     if (!this.#surface) return this.begin();
     try {
@@ -103,7 +105,7 @@ class Growth {
     }
   }
 
-  /** Until it is done or paused; between slices the page gets its turn. */
+  /** Steps the model until it is done or paused, yielding to the page between slices. */
   async #grow(): Promise<void> {
     if (this.#growing) return;
     this.#growing = true;
@@ -114,7 +116,7 @@ class Growth {
     }
   }
 
-  /** Some steps and a picture; whether there is nothing more to do. */
+  /** Steps for one time slice and updates the views; returns whether the model is done or paused. */
   #slice(surface: DeformableModel): boolean {
     if (!this.#model.get('running')) return this.#rest(surface, 'paused');
     const until = performance.now() + SLICE;
@@ -125,20 +127,21 @@ class Growth {
     return report.done && this.#rest(surface, 'done');
   }
 
-  /** What came of it, to Python. */
+  /** Sends the mesh and the state to Python. */
   #rest(surface: DeformableModel, state: 'done' | 'paused'): true {
     const { positions, indices } = surface.mesh.arrays();
     this.#tell({ state, vertices: packed('float32', positions), triangles: packed('uint32', indices) });
     return true;
   }
 
+  /** Sets traits, in Python as well, and shows a message in all views. */
   #tell(traits: Partial<Traits>): void {
     for (const [name, value] of Object.entries(traits)) this.#model.set(name as keyof Traits, value);
     this.#model.save_changes();
     if (traits.message) for (const view of this.views) view.say(traits.message);
   }
 
-  /** One more place to show it in. */
+  /** Adds a view and displays the surface in it. */
   enter(view: View): void {
     this.views.add(view);
     if (this.#surface) view.begin(this.#surface.mesh);
@@ -151,9 +154,10 @@ class Growth {
   }
 }
 
+/** Returns the message of an error. */
 const words = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
-/** One place where the surface is seen. */
+/** A 3D view of the surface in an output cell. */
 class View {
   readonly #renderer = new THREE.WebGLRenderer({ antialias: true });
   readonly #camera = new THREE.PerspectiveCamera(40, 16 / 9);
@@ -177,7 +181,7 @@ class View {
     this.#controls.addEventListener('change', () => this.#draw());
   }
 
-  /** Another surface: all of it in sight, from before. */
+  /** Displays a new surface, with the camera in front of it at a distance that shows it whole. */
   begin(mesh: MeshSource): void {
     this.#surface.update(mesh);
     const { center, radius } = this.#object.geometry.boundingSphere ?? new THREE.Sphere();
@@ -192,11 +196,13 @@ class View {
     this.#draw();
   }
 
+  /** Displays the changed surface and a status text. */
   show(mesh: MeshSource, words: string): void {
     if (this.#surface.update(mesh)) this.#draw();
     this.say(words);
   }
 
+  /** Displays a status text. */
   say(words: string): void {
     this.#status.textContent = words;
   }
@@ -212,7 +218,7 @@ class View {
   }
 }
 
-/** anywidget calls this once a widget. */
+/** Creates the callbacks of a widget; anywidget calls it once per widget. */
 export default () => {
   let growth: Growth | undefined;
   const initialize: Initialize<Traits> = ({ model }) => {

@@ -1,6 +1,6 @@
-"""A surface in a notebook: a NumPy array goes to the browser, the surface grows there, its mesh comes back.
+"""A widget that fits a closed surface to a NumPy array in the browser and returns its mesh.
 
-`npm run notebook` makes `built/surface.js`, which has the library inside: nothing else is fetched.
+`npm run notebook` builds `built/surface.js`, which includes the library: nothing else is downloaded.
 """
 
 from pathlib import Path
@@ -9,12 +9,12 @@ import anywidget
 import numpy as np
 import traitlets
 
-# What the library takes as it is; anything else becomes the nearest of them.
+# Number types that the library supports; others are converted to one of them.
 KINDS = ["uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64"]
 
 
 def array_trait(order):
-    """A trait that holds an array or None, and crosses over as bytes; order "F" has the first axis fastest, "C" the last."""
+    """Returns a trait of an array or None, sent as bytes; in order "F" the first axis is fastest, in "C" the last."""
 
     def packed(array, _widget):
         if array is None:
@@ -32,7 +32,7 @@ def array_trait(order):
 
 
 def voxels(volume):
-    """The volume with numbers of a kind that the library takes."""
+    """Returns the volume in a number type that the library supports."""
     volume = np.asarray(volume)
     if volume.ndim not in (3, 4):
         raise ValueError(f"volume: {volume.ndim} axes; volume[x, y, z] or volume[x, y, z, frame] is needed")
@@ -42,15 +42,15 @@ def voxels(volume):
 
 
 class Surface(anywidget.AnyWidget):
-    """A closed surface that grows onto what is brighter than `params["iso"]` in a volume.
+    """A closed surface that is fitted to the boundary of the voxels brighter than `params["iso"]`.
 
-    volume: array [x, y, z], as nibabel has it; of an array [z, y, x] the transpose.
-    affine: 4 x 4, voxel index to world, as nibabel has it; without it a voxel is 1 wide.
-    params: of the deformable model, such as {"iso": 95}; they may be changed at any time.
-    levels: of the pyramid, from coarse to fine.
+    volume: array [x, y, z], as in nibabel; transpose an array [z, y, x].
+    affine: 4 x 4 matrix from voxel index to world, as in nibabel; by default a voxel has size 1.
+    params: parameters of the deformable model, such as {"iso": 95}; they can be changed at any time.
+    levels: number of pyramid levels above the volume, through which the fit goes from coarse to fine.
 
-    `state` is loading, running, paused, done or error, and `message` says what is wrong; setting `running` pauses and goes on.
-    `vertices` (n x 3, world) and `triangles` (m x 3, counter-clockwise from outside) are there when it pauses or is done.
+    `state` is loading, running, paused, done or error, and `message` describes an error; `running` pauses and resumes.
+    `vertices` (n x 3, world) and `triangles` (m x 3, counter-clockwise from outside) are set when it is paused or done.
     """
 
     _esm = Path(__file__).with_name("built") / "surface.js"
@@ -68,6 +68,6 @@ class Surface(anywidget.AnyWidget):
     triangles = array_trait("C")
 
     def __init__(self, volume, affine=None, **traits):
-        # Column by column, as the library has matrices.
+        # Column-major, as the library expects.
         columns = np.eye(4) if affine is None else np.asarray(affine, float)
         super().__init__(volume=voxels(volume), affine=columns.T.ravel().tolist(), **traits)

@@ -1,4 +1,4 @@
-//! Edits of a mesh one by one, and the passes that make its triangles fewer or alike.
+//! Fuzz targets of single mesh edits, decimation and remeshing.
 
 use super::bytes::Bytes;
 use super::steppers::shape;
@@ -7,10 +7,11 @@ use vesicle::mesh::{EditError, Mesh, TriangleMesh, count_crossings, curvature, g
 use vesicle::remesh::{EdgeBounds, Unchecked, decimate, remesh, restructure};
 use vesicle::spatial::{cross_section, surface_distance};
 
-/// Vertices beyond which no more edits are made.
+/// Number of vertices beyond which no more edits are made.
 const MOST: usize = 200;
 
-/// Edits, each refused and nothing changed, or done and the mesh sound; recorded ones may be taken back.
+/// Makes random edits: each is rejected and changes nothing, or succeeds and leaves a valid mesh; recorded ones may be
+/// rolled back.
 pub fn edits(data: &[u8]) {
     let bytes = &mut Bytes::new(data);
     let Ok(mut mesh) = Mesh::from_triangles(&shape(bytes)) else { return };
@@ -31,6 +32,7 @@ pub fn edits(data: &[u8]) {
     }
 }
 
+/// Makes one random edit.
 fn edit(mesh: &mut Mesh, bytes: &mut Bytes) -> Result<(), EditError> {
     let live: Vec<_> = mesh.vertices().collect();
     let u = live[bytes.below(live.len())];
@@ -55,7 +57,7 @@ fn edit(mesh: &mut Mesh, bytes: &mut Bytes) -> Result<(), EditError> {
     }
 }
 
-/// Meshes that do not cross themselves stay so; measures are numbers.
+/// Decimates, remeshes and restructures a random mesh: embedded meshes stay embedded, and measures are finite.
 pub fn remeshing(data: &[u8]) {
     let bytes = &mut Bytes::new(data);
     let given = shape(bytes);
@@ -72,6 +74,7 @@ pub fn remeshing(data: &[u8]) {
     }
 }
 
+/// Makes one random pass over the mesh.
 fn pass(mesh: &mut Mesh, edge: f32, bytes: &mut Bytes) {
     let min = edge * bytes.within(0.2, 1.5) as f32;
     let bounds = EdgeBounds { min, max: min * bytes.within(1.9, 5.0) as f32 };
@@ -88,7 +91,8 @@ fn pass(mesh: &mut Mesh, edge: f32, bytes: &mut Bytes) {
     }
 }
 
-/// What is asked of any mesh gives numbers.
+/// Asserts that measures, curvatures, geodesic distances, cross-sections and distances of a mesh are finite and
+/// complete.
 pub fn measured(mesh: &TriangleMesh) {
     let found = measure(mesh);
     assert!(found.volume.is_finite() && found.area.is_finite());

@@ -1,4 +1,4 @@
-//! What is fuzzed: one plain function a target, called with bytes by the fuzzer and by `tests/fuzz_corpus.rs`.
+//! The fuzz targets: one plain function each, called with bytes by the fuzzer and by `tests/fuzz_corpus.rs`.
 #![allow(dead_code, reason = "the fuzzer and the test each use a part of it")]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a finding is a panic")]
 
@@ -10,28 +10,29 @@ pub mod states;
 pub mod steppers;
 pub mod volumes;
 
-/// One thing that is fuzzed.
+/// A fuzz target.
 pub struct Target {
-    /// Also the name of its program and of its folder of seeds.
+    /// Name of the target, of its program and of its folder of seeds.
     pub name: &'static str,
-    /// Panics where something is wrong.
+    /// Runs the target on an input; panics if it finds a bug.
     pub body: fn(&[u8]),
-    /// Memory that it may take at a time, whatever the bytes claim.
+    /// Limit of the memory in use at any time, in bytes, whatever sizes the input claims.
     pub most_memory: usize,
-    /// Changed seeds that the ordinary test runs: as many as take a second or so.
+    /// Number of mutated seeds that the ordinary test runs, which takes a second or so.
     pub changes: usize,
 }
 
+/// Returns the target of a file reader.
 const fn reader(name: &'static str, body: fn(&[u8])) -> Target {
     Target { name, body, most_memory: 16 << 20, changes: 20_000 }
 }
 
-/// States and scenes: slower, and a solver needs memory.
+/// Returns the target of a saved state or a scene, which is slower and needs more memory for solvers.
 const fn method(name: &'static str, body: fn(&[u8]), changes: usize) -> Target {
     Target { name, body, most_memory: 256 << 20, changes }
 }
 
-/// All of them.
+/// All fuzz targets.
 pub static TARGETS: [Target; 21] = [
     reader("nifti", volumes::nifti),
     reader("nrrd", volumes::nrrd),
@@ -56,12 +57,12 @@ pub static TARGETS: [Target; 21] = [
     method("remeshing", edits::remeshing, 100),
 ];
 
-/// The target of that name.
+/// Returns the target with a name.
 pub fn target(name: &str) -> &'static Target {
     TARGETS.iter().find(|target| target.name == name).unwrap_or_else(|| panic!("no target is called {name}"))
 }
 
-/// Runs a target on bytes.
+/// Runs a target on an input; panics if it finds a bug or exceeds its memory limit.
 pub fn run(name: &str, data: &[u8]) {
     let target = target(name);
     let peak = memory::peak_of(|| (target.body)(data));

@@ -1,4 +1,4 @@
-//! How much memory a run takes: what it asks for counts, whether it gets it or not.
+//! Measurement of the memory that a run allocates; requests count whether they succeed or not.
 #![allow(
     unsafe_code,
     reason = "an allocator cannot be written without; this one hands all on to the system's"
@@ -40,17 +40,18 @@ unsafe impl GlobalAlloc for Meter {
     }
 }
 
+/// Counts bytes that this thread allocates.
 fn take(bytes: usize) {
     NOW.set(NOW.get().saturating_add(bytes));
     PEAK.set(PEAK.get().max(NOW.get()));
 }
 
-/// What was taken before counting began, or by another thread, may be given back as well.
+/// Counts bytes that are freed. Some may have been allocated before counting began, or by another thread.
 fn give_back(bytes: usize) {
     NOW.set(NOW.get().saturating_sub(bytes));
 }
 
-/// The most bytes that were held at a time by this thread while `work` ran.
+/// Returns the largest number of bytes that this thread had allocated at any time while `work` ran.
 pub fn peak_of(work: impl FnOnce()) -> usize {
     NOW.set(0);
     PEAK.set(0);

@@ -1,4 +1,4 @@
-//! Readers of meshes and points; what was read is written in every format and read again.
+//! Fuzz targets of the readers of meshes and points; meshes that are read are written in every format and read again.
 
 use super::edits::measured;
 use std::sync::Arc;
@@ -6,36 +6,39 @@ use vesicle::io::{MeshFormat, parse_mesh, parse_points, parse_textured_mesh, wri
 use vesicle::mesh::{Mesh, Texture, TriangleMesh, count_crossings, measure, report};
 use vesicle::remesh::decimate;
 
-/// Triangles up to which everything is asked of a mesh.
+/// Largest number of triangles for which a mesh is checked in full.
 const FEW: usize = 60;
 
-/// Whole files; seeds tell the formats apart.
+/// Reads a whole file as a mesh and as points; the seeds are PLY files.
 pub fn ply(data: &[u8]) {
     use_mesh(data);
     use_points(data);
 }
 
+/// Reads a whole file as a mesh; the seeds are STL files.
 pub fn stl(data: &[u8]) {
     use_mesh(data);
 }
 
+/// Reads a whole file as a mesh and as points; the seeds are OBJ files.
 pub fn obj(data: &[u8]) {
     use_mesh(data);
     use_points(data);
 }
 
+/// Reads a whole file as a mesh; the seeds are GLB files.
 pub fn glb(data: &[u8]) {
     use_mesh(data);
 }
 
-/// The two parts of a GLB whose lengths are right: text up to the first byte 0, and the rest.
+/// Reads a GLB with valid chunk lengths: its JSON is the input up to the first byte 0, its binary chunk the rest.
 pub fn gltf(data: &[u8]) {
     let end = data.iter().position(|&b| b == 0).unwrap_or(data.len());
     let (text, binary) = (&data[..end], data.get(end + 1..).unwrap_or_default());
     use_mesh(&container(text, binary));
 }
 
-/// A GLB of the two.
+/// Returns a GLB with these JSON and binary chunks.
 pub fn container(text: &[u8], binary: &[u8]) -> Vec<u8> {
     let padded = |bytes: &[u8], with: u8| {
         let mut bytes = bytes.to_vec();
@@ -50,6 +53,7 @@ pub fn container(text: &[u8], binary: &[u8]) -> Vec<u8> {
     [&b"glTF\x02\0\0\0"[..], &length, &chunks].concat()
 }
 
+/// Reads a whole file as points.
 pub fn points(data: &[u8]) {
     use_points(data);
 }
@@ -67,10 +71,12 @@ fn use_points(data: &[u8]) {
     }
 }
 
+/// Asserts that an error message is short, whatever the file holds.
 fn is_short(message: &str) {
     assert!(message.len() < 2000, "a message of {} bytes", message.len());
 }
 
+/// Reads a mesh, also with a texture, and checks it.
 fn use_mesh(data: &[u8]) {
     match parse_mesh(data) {
         Ok(mesh) => check(&mesh, data.len()),
@@ -85,6 +91,7 @@ fn use_mesh(data: &[u8]) {
     }
 }
 
+/// Asserts that a mesh that was read is valid, and that it can be measured, edited and written.
 fn check(mesh: &TriangleMesh, choice: usize) {
     assert!(mesh.validate().is_ok() && !mesh.triangles.is_empty());
     if mesh.triangles.len() > FEW {
@@ -104,7 +111,7 @@ fn check(mesh: &TriangleMesh, choice: usize) {
     write(mesh, choice);
 }
 
-/// In one of the formats, or as frames of an animation.
+/// Writes the mesh in the format number `choice` or as an animation, and reads it again.
 fn write(mesh: &TriangleMesh, choice: usize) {
     let Some(&format) = MeshFormat::ALL.get(choice % 7) else { return animate(mesh) };
     let file = write_mesh(mesh, format).unwrap();

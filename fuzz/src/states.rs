@@ -1,4 +1,5 @@
-//! Saved states with their checksum right and their contents changed: refused, or a run that goes on.
+//! Fuzz targets of saved states with valid checksums and changed contents: each is rejected, or the run continues from
+//! it.
 
 use super::steppers;
 use std::sync::LazyLock;
@@ -8,10 +9,10 @@ use vesicle::methods::implicit::ImplicitSurface;
 use vesicle::methods::multires::MultiresolutionModel;
 use vesicle::methods::tracking::SurfaceTracker;
 
-/// Mark and checksum.
+/// Size of signature and checksum in bytes.
 const HEADER: usize = 16;
 
-/// Bytes that begin as those of `saved` do, up to the number that tells inputs apart, with a checksum that is right.
+/// Returns a state with a valid checksum: that of `saved` up to the number that identifies the input, then `contents`.
 pub fn resealed(saved: &[u8], contents: &[u8]) -> Vec<u8> {
     let body = [&saved[HEADER..contents_of(saved)], contents].concat();
     let mix = |hash: u64, &byte: &u8| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
@@ -19,13 +20,14 @@ pub fn resealed(saved: &[u8], contents: &[u8]) -> Vec<u8> {
     [&saved[..8], &sum.to_le_bytes(), &body].concat()
 }
 
-/// Where the contents begin after the number that tells inputs apart, which ends with its first byte below 128.
+/// Returns the offset of the contents, after the number that identifies the input; its last byte is the first below
+/// 128.
 pub fn contents_of(saved: &[u8]) -> usize {
     let number = &saved[HEADER..];
     HEADER + 1 + number.iter().position(|&byte| byte < 0x80).unwrap_or(0)
 }
 
-/// A scene that is always the same, small, some steps on its way.
+/// Defines a function that returns the state of a small fixed model after three steps, and the model at its start.
 macro_rules! scene {
     ($name:ident, $model:ty, $make:expr) => {
         fn $name() -> (&'static [u8], $model) {
@@ -41,7 +43,8 @@ macro_rules! scene {
     };
 }
 
-/// Restores a changed state; where it is taken, its own state comes out of it, and a few steps are made.
+/// Defines a target that restores a changed state. If the state is accepted, saving returns it unchanged, and a few
+/// steps are made.
 macro_rules! target {
     ($name:ident, $saved:ident, $scene:ident, $meshes:expr) => {
         pub fn $name(data: &[u8]) {
@@ -62,7 +65,7 @@ macro_rules! target {
             }
         }
 
-        /// What the target begins with.
+        /// Returns the contents of the unchanged state, the seed of the target.
         pub fn $saved() -> Vec<u8> {
             let (saved, _) = $scene();
             saved[contents_of(saved)..].to_vec()

@@ -1,4 +1,5 @@
-//! The methods on small random scenes, with parameters changed on the way: sound after every step.
+//! Fuzz targets of the methods on small random scenes, with parameters that change during the run: valid after every
+//! step.
 
 use super::bytes::Bytes;
 use vesicle::math::{DAffine3, DVec3, Vec3};
@@ -16,13 +17,14 @@ use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOpti
 use vesicle::methods::{MethodError, deformable};
 use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
 
-/// Closed, oriented, manifold, as the edits predict, and no triangles cross.
+/// Asserts that a mesh is closed, oriented and manifold, has the predicted Euler characteristic, and has no
+/// self-intersections.
 fn assert_sound(mesh: &Mesh) {
     assert_eq!(mesh.check(), Ok(()));
     assert_eq!(count_crossings(&mesh.to_triangles()), 0, "triangles cross");
 }
 
-/// Blobs in noise, in a grid that is turned and not of cubes; a voxel may be no number.
+/// Returns a volume of blobs in noise, on a rotated grid with anisotropic voxels; some voxels may be NaN.
 fn volume(bytes: &mut Bytes, dims: [usize; 4]) -> Volume {
     let [nx, ny, nz, frames] = dims;
     let blobs: Vec<[DVec3; 2]> = (0..1 + bytes.below(3))
@@ -63,7 +65,7 @@ fn volume(bytes: &mut Bytes, dims: [usize; 4]) -> Volume {
     Volume::new(init).unwrap_or_else(|_| flat())
 }
 
-/// In place of one without numbers.
+/// Returns a constant volume, used if the random one has no finite voxels.
 fn flat() -> Volume {
     let voxels = Voxels::U8(vec![1; 27]);
     let affine = DAffine3::IDENTITY;
@@ -79,6 +81,7 @@ fn flat() -> Volume {
     Volume::new(init).unwrap()
 }
 
+/// Steps a deformable model with random volume, start and parameters, and checks its mesh after each step.
 pub fn deformable(data: &[u8]) {
     let bytes = &mut Bytes::new(data);
     let dims = [2 + bytes.below(11), 2 + bytes.below(11), 1 + bytes.below(11), 1 + bytes.below(2)];
@@ -110,20 +113,21 @@ pub fn deformable(data: &[u8]) {
     }
 }
 
-/// Coverage consists of shares and places.
+/// Asserts that coverage consists of fractions and finite positions.
 fn assert_covers(model: &DeformableModel) {
     let Ok(coverage) = model.coverage() else { return };
     assert!([coverage.recall, coverage.precision].iter().all(|share| (0.0..=1.0 + 1e-9).contains(share)));
     assert!(coverage.uncovered.iter().all(|part| part.position.is_finite() && part.area > 0.0));
 }
 
-/// Goes on from what it has saved.
+/// Restores the model from its own saved state.
 fn restored(model: &mut DeformableModel) {
     let saved = model.save();
     model.restore(&saved).unwrap_or_else(|error| panic!("its own state: {error}"));
     assert!(model.save() == saved, "another state comes out");
 }
 
+/// Returns a random start surface.
 fn start(bytes: &mut Bytes, volume: &Volume) -> Start {
     match bytes.below(9) {
         6.. => Start::Contour,
@@ -170,6 +174,7 @@ fn deformable_params(bytes: &mut Bytes, volume: &Volume) -> DeformableParams {
     }
 }
 
+/// Runs an implicit surface of random points to the end, with random edits and parameters, and checks its mesh.
 pub fn implicit(data: &[u8]) {
     let bytes = &mut Bytes::new(data);
     let cloud = cloud(bytes);
@@ -194,11 +199,13 @@ pub fn implicit(data: &[u8]) {
     panic!("no end");
 }
 
+/// Asserts that a mesh is empty or valid, with finite normals.
 fn assert_healthy(mesh: &TriangleMesh) {
     assert!(mesh.triangles.is_empty() || report(mesh).unwrap().is_healthy());
     assert!(mesh.normals.iter().flatten().all(|n| n.is_finite()));
 }
 
+/// Changes the parameters or the points, or restores the surface from its own saved state.
 fn implicit_change(
     surface: &mut ImplicitSurface,
     bytes: &mut Bytes,
@@ -222,12 +229,13 @@ fn implicit_change(
     }
 }
 
-/// How far the points go, about.
+/// Returns the approximate extent of the points.
 fn size(points: &[Vec3]) -> f64 {
     points.iter().map(|p| p.as_dvec3().distance(points[0].as_dvec3())).fold(0.0, f64::max)
 }
 
-/// Points on a ball, in a plane, on a line or anywhere; some in one place; large, small or far away.
+/// Returns points on a sphere, in a plane, on a line or anywhere; some coincide, and their scale may be large, small or
+/// far from the origin.
 fn cloud(bytes: &mut Bytes) -> Cloud {
     let (count, kind) = (1 + bytes.below(24), bytes.below(5));
     let (scale, away) = bytes.one_of(&[(1.0, 0.0), (1.0, 0.0), (300.0, 3000.0), (1e-20, 0.0), (1e20, 0.0)]);
@@ -265,7 +273,7 @@ fn implicit_options(bytes: &mut Bytes, size: f64) -> ImplicitOptions {
     }
 }
 
-/// Coarse, so that a run takes milliseconds.
+/// Returns random parameters with coarse cells, so that a run takes milliseconds.
 fn implicit_params(bytes: &mut Bytes, size: f64) -> ImplicitParams {
     ImplicitParams {
         delta: bytes.one_of(&[0.1, 1.0, 5.0, 20.0, 100.0]),
@@ -284,6 +292,7 @@ fn implicit_params(bytes: &mut Bytes, size: f64) -> ImplicitParams {
     }
 }
 
+/// Steps a multiresolution model with random meshes and ellipsoids, and checks its meshes after each step.
 pub fn multires(data: &[u8]) {
     let bytes = &mut Bytes::new(data);
     let detail = bytes.chance(2).then(|| shape(bytes));
@@ -341,6 +350,7 @@ fn multires_params(bytes: &mut Bytes) -> MultiresParams {
     }
 }
 
+/// Runs a tracker on a random 4D volume, and checks its meshes after each step.
 pub fn tracking(data: &[u8]) {
     let bytes = &mut Bytes::new(data);
     let dims = [2 + bytes.below(7), 2 + bytes.below(7), 1 + bytes.below(5), 2 + bytes.below(2)];
@@ -391,8 +401,8 @@ fn tracking_params(bytes: &mut Bytes) -> TrackingParams {
     }
 }
 
-/// Balls and rings side by side or within each other; bumps may make them cross themselves. Some are as small or large as
-/// numbers are.
+/// Returns spheres and tori beside or inside each other; bumps may make them intersect themselves. Some are scaled to
+/// the limits of single precision.
 pub fn shape(bytes: &mut Bytes) -> TriangleMesh {
     let mut whole = TriangleMesh::default();
     for _ in 0..bytes.one_of(&[1, 1, 1, 2, 3]) {
@@ -410,6 +420,7 @@ pub fn shape(bytes: &mut Bytes) -> TriangleMesh {
     whole
 }
 
+/// Returns a sphere, which may be flattened.
 fn ball(bytes: &mut Bytes) -> TriangleMesh {
     let (radius, edge) = (bytes.within(0.4, 2.0) as f32, bytes.within(0.35, 0.9) as f32);
     let mesh = Mesh::icosphere(Vec3::ZERO, radius, edge * radius);
@@ -419,7 +430,7 @@ fn ball(bytes: &mut Bytes) -> TriangleMesh {
     TriangleMesh { positions: mesh.positions, triangles: mesh.triangles, ..TriangleMesh::default() }
 }
 
-/// A torus.
+/// Returns a torus.
 fn ring(bytes: &mut Bytes) -> TriangleMesh {
     let (n, m) = (3 + bytes.below(12) as u32, 3 + bytes.below(6) as u32);
     let (wide, thin) = (bytes.within(0.8, 2.0), bytes.within(0.05, 0.7));
@@ -437,13 +448,14 @@ fn ring(bytes: &mut Bytes) -> TriangleMesh {
     mesh
 }
 
-/// Scenes of few vertices that are always the same, for states.
+/// Returns a fixed scene of few vertices, for the targets of saved states.
 pub fn small_deformable() -> DeformableModel {
     let volume = volume(&mut Bytes::new(&[0; 24]), [6, 6, 6, 1]);
     let options = DeformableOptions { edge: Some(3.0), levels: 1, ..DeformableOptions::default() };
     DeformableModel::new(&volume, options).unwrap()
 }
 
+/// Returns a fixed scene of few points, for the targets of saved states.
 pub fn small_implicit() -> ImplicitSurface {
     let points = vec![Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
     let params = ImplicitParams { cell: 0.5, ..ImplicitParams::default() };
@@ -451,6 +463,7 @@ pub fn small_implicit() -> ImplicitSurface {
     ImplicitSurface::new(Cloud { points, ..Cloud::default() }, options).unwrap()
 }
 
+/// Returns a fixed scene of few vertices, for the targets of saved states.
 pub fn small_multires() -> MultiresolutionModel {
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let ellipsoids = vec![ControlEllipsoid { center: [0.0; 3], axes }];
@@ -458,6 +471,7 @@ pub fn small_multires() -> MultiresolutionModel {
     MultiresolutionModel::new(MultiresOptions { ellipsoids, params, ..MultiresOptions::default() }).unwrap()
 }
 
+/// Returns a fixed scene of few voxels, for the targets of saved states.
 pub fn small_tracking() -> SurfaceTracker {
     let volume = volume(&mut Bytes::new(&[0; 24]), [6, 6, 4, 3]);
     let options = TrackingOptions {

@@ -1,33 +1,35 @@
-//! Readers of volumes, and what can be asked of a volume that was read.
+//! Fuzz targets of the readers of volumes, and of the functions on a volume that was read.
 
 use vesicle::io::{parse_volume, write_nifti};
 use vesicle::math::DVec3;
 use vesicle::volume::{Enrichment, Volume, marching_cubes_world};
 
-/// Voxels up to which everything is asked of a volume.
+/// Largest number of voxels for which a volume is checked in full.
 const FEW: usize = 4096;
 
-/// Whole files; seeds tell the formats apart.
+/// Reads a whole file as a volume; the seeds are NIfTI files.
 pub fn nifti(data: &[u8]) {
     use_volume(data, None);
 }
 
+/// Reads a whole file as a volume; the seeds are NRRD files.
 pub fn nrrd(data: &[u8]) {
     use_volume(data, None);
 }
 
+/// Reads a whole file as a volume; the seeds are MetaImage files.
 pub fn metaimage(data: &[u8]) {
     use_volume(data, None);
 }
 
-/// A header and the voxels beside it: two bytes say how long the header is.
+/// Reads a header with detached voxels; the first two bytes are the length of the header.
 pub fn pair(data: &[u8]) {
     let Some((&length, rest)) = data.split_first_chunk() else { return };
     let (header, voxels) = rest.split_at(usize::from(u16::from_le_bytes(length)).min(rest.len()));
     use_volume(header, Some(voxels));
 }
 
-/// Compressed voxels whose checksums are right: the first byte chooses the file around them.
+/// Reads compressed voxels with valid checksums; the first byte chooses the format of the file around them.
 pub fn gzip(data: &[u8]) {
     let Some((&kind, deflated)) = data.split_first() else { return };
     let content = inflated(deflated).unwrap_or_default();
@@ -39,10 +41,12 @@ pub fn gzip(data: &[u8]) {
     use_volume(&file, None);
 }
 
+/// Inflates a deflate stream, up to a limit.
 fn inflated(deflated: &[u8]) -> Option<Vec<u8>> {
     miniz_oxide::inflate::decompress_to_vec_with_limit(deflated, 1 << 16).ok()
 }
 
+/// Returns a deflate stream as a gzip member with valid checksum.
 fn gzipped(deflated: &[u8], content: &[u8]) -> Vec<u8> {
     let header = [0x1F, 0x8B, 8, 0, 0, 0, 0, 0, 0, 255];
     [&header[..], deflated, &crc32(content).to_le_bytes(), &(content.len() as u32).to_le_bytes()].concat()
@@ -53,6 +57,7 @@ fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), bit))
 }
 
+/// Returns a deflate stream as a zlib stream with valid checksum.
 fn zlib(deflated: &[u8], content: &[u8]) -> Vec<u8> {
     let sums = content.iter().fold([1, 0], |[a, b], &byte| {
         let a = (a + u32::from(byte)) % 65_521;
@@ -61,6 +66,7 @@ fn zlib(deflated: &[u8], content: &[u8]) -> Vec<u8> {
     [&[0x78, 0x9C], deflated, &(sums[1] << 16 | sums[0]).to_be_bytes()].concat()
 }
 
+/// Reads a volume and checks it.
 fn use_volume(bytes: &[u8], detached: Option<&[u8]>) {
     match parse_volume(bytes, detached) {
         Ok(volume) => check(&volume),
@@ -70,6 +76,7 @@ fn use_volume(bytes: &[u8], detached: Option<&[u8]>) {
     }
 }
 
+/// Asserts that a volume that was read is valid, and that it can be sampled, contoured and written.
 fn check(volume: &Volume) {
     let ([nx, ny, nz], frames) = (volume.dims(), volume.frames());
     assert_eq!(volume.voxels().len(), nx * ny * nz * frames);
@@ -98,7 +105,7 @@ fn check(volume: &Volume) {
     write(volume);
 }
 
-/// Volumes made of it, or refusals.
+/// Derives other volumes from it, or fails with an error.
 fn derive(volume: &Volume) {
     let levels = volume.max_pyramid_levels(2.0).unwrap_or(0);
     let _ = volume.pyramid(levels.min(3), 2.0);
@@ -108,7 +115,7 @@ fn derive(volume: &Volume) {
     }
 }
 
-/// What is written is read again, and written the same.
+/// Writes the volume and reads it again.
 fn write(volume: &Volume) {
     let file = write_nifti(volume).unwrap();
     if let Ok(again) = parse_volume(&file, None) {

@@ -1,7 +1,7 @@
 /**
- * Between Vesicle and NiiVue, 0.69 and 1.0-rc: its volumes, and a mesh in its view that follows a surface.
+ * Adapter for NiiVue, 0.69 and 1.0-rc: converts its volumes, and shows a surface in its view that follows a mesh.
  *
- * Nothing of NiiVue is imported: its classes come from the caller.
+ * Nothing of NiiVue is imported: the caller passes its classes.
  *
  * @module vesicle/niivue
  */
@@ -12,7 +12,7 @@ import { affineOf, bounds, type Frame, type MeshSource, Reader, voxels } from '.
 
 export type { MeshSource } from './source.js';
 
-/** What is read of a volume of NiiVue, `nv.volumes[i]`. */
+/** The properties used of a volume of NiiVue, `nv.volumes[i]`. */
 export interface NiivueVolume {
   /** Voxels in the order of the file. */
   img?: unknown;
@@ -23,20 +23,20 @@ export interface NiivueVolume {
     xyzt_units: number;
     scl_slope: number;
     scl_inter: number;
-    /** Index to world, rows. */
+    /** Rows of the transform from voxel index to world. */
     affine: number[][];
   } | null;
 }
 
-/** NIfTI's codes of colours and complex numbers. */
+/** NIfTI datatype codes with several numbers a voxel (colours and complex numbers), which are rejected. */
 const SEVERAL_NUMBERS: Record<number, string> = { 32: 'complex64', 128: 'RGB', 1792: 'complex128', 2304: 'RGBA' };
 
-/** NIfTI's codes of time units, in seconds; of none, too. */
+/** Seconds per unit of each NIfTI time unit code; 0, unknown, counts as seconds. */
 const SECONDS: Record<number, number> = { 0: 1, 8: 1, 16: 1e-3, 24: 1e-6 };
 
 /**
- * What a `Volume` is made of, from a volume of NiiVue: `new Volume(volumeFromNiivue(nv.volumes[0]))`. Its world is NiiVue's:
- * RAS, whatever the file says. All frames that NiiVue has loaded come along.
+ * Converts a volume of NiiVue to the options of a `Volume`: `new Volume(volumeFromNiivue(nv.volumes[0]))`. World space
+ * is NiiVue's: RAS, whatever the file says. All frames that NiiVue has loaded are included.
  *
  * @throws `VesicleError` `invalid-argument`: a volume that is not loaded, or several numbers a voxel.
  */
@@ -53,7 +53,7 @@ export function volumeFromNiivue(volume: NiivueVolume | undefined): VolumeInit {
   return {
     ...grid,
     affine: affineOf(columns, columns[3] ?? []),
-    // NIfTI: a slope of 0 is none.
+    // NIfTI: a slope of 0 means no scaling.
     slope: hdr.scl_slope || 1,
     intercept: hdr.scl_inter || 0,
     space: 'RAS',
@@ -66,15 +66,15 @@ function secondsBetween(hdr: { pixDims: number[]; xyzt_units: number }, frames: 
   return frames > 1 && seconds > 0 && Number.isFinite(seconds) ? { frameSeconds: seconds } : {};
 }
 
-/** What is used of a `Niivue`, or `NiiVueGPU` as it is called in 1.0. */
+/** The methods used of a `Niivue`, called `NiiVueGPU` in 1.0. */
 export interface Niivue {
   addMesh(mesh: object): unknown;
-  /** The mesh in 0.69, its place in the list in 1.0. */
+  /** Takes the mesh in 0.69, its index in `meshes` in 1.0. */
   removeMesh(mesh: object | number): unknown;
   readonly meshes: readonly object[];
 }
 
-/** NiiVue's `NVMesh`, of 0.69. */
+/** Constructor of NiiVue's `NVMesh`, 0.69. */
 export type NVMeshClass = new (
   pts: Float32Array<ArrayBuffer>,
   tris: Uint32Array<ArrayBuffer>,
@@ -85,20 +85,20 @@ export type NVMeshClass = new (
   gl: WebGL2RenderingContext,
 ) => object;
 
-/** How a {@link NiivueSurface} is made. */
+/** Options of {@link NiivueSurface}. */
 export interface NiivueSurfaceOptions {
-  /** NiiVue's class of this name; 0.69 needs it, 1.0 does not. */
+  /** NiiVue's class of this name; required by 0.69, not used by 1.0. */
   NVMesh?: NVMeshClass;
-  /** In NiiVue's list of meshes; default 'vesicle'. */
+  /** Name in NiiVue's list of meshes; default 'vesicle'. */
   name?: string;
-  /** rgba, 0..1; default a warm white. Where the mesh has colours of its own, those are shown. */
+  /** Colour as rgba, 0..1; default a warm white. Vertex colours of the mesh take precedence. */
   color?: readonly [number, number, number, number];
-  /** Of the mesh, as its volume says it; default RAS, as NiiVue. */
+  /** Space of the mesh, that of its volume; default RAS, as in NiiVue. */
   space?: Space;
 }
 
 /**
- * A mesh in NiiVue that follows another, whatever becomes of its connectivity.
+ * A mesh in NiiVue that follows a mesh of this library, through all changes of connectivity.
  *
  * ```js
  * const surface = new NiivueSurface(nv, { NVMesh }); // 1.0: without NVMesh
@@ -110,8 +110,8 @@ export class NiivueSurface {
   readonly #shown: Shown;
 
   /**
-   * @param nv - Attached to its canvas.
-   * @throws `VesicleError` `invalid-argument`: no NiiVue, one that has no canvas yet, or 0.69 without `NVMesh`.
+   * @param nv - A NiiVue attached to its canvas.
+   * @throws `VesicleError` `invalid-argument`: no NiiVue, one without a canvas, or 0.69 without `NVMesh`.
    */
   constructor(nv: Niivue, options: NiivueSurfaceOptions = {}) {
     const { NVMesh, name = 'vesicle', color = [1, 0.88, 0.75, 1], space = 'RAS' } = options;
@@ -125,16 +125,16 @@ export class NiivueSurface {
     else throw invalid('NVMesh', "NiiVue 0.69 needs its class: import { Niivue, NVMesh } from '@niivue/niivue'");
   }
 
-  /** The mesh in NiiVue's list, `nv.meshes`; nothing before the first update. */
+  /** The mesh in NiiVue's list, `nv.meshes`; undefined before the first update. */
   get mesh(): object | undefined {
     return this.#shown.mesh;
   }
 
   /**
-   * Takes over what changed since the last time; to see it, draw. False where nothing did.
+   * Updates NiiVue's mesh if the mesh has changed since the last call; draw to show it. Resolves with whether it has.
    *
-   * All is done when this returns, and the promise is kept at once, but for the first time in 1.0: then NiiVue adds a mesh
-   * and uploads its volumes again.
+   * The work is done synchronously and the promise resolves at once, except on the first call in 1.0: there NiiVue adds
+   * a mesh and uploads its volumes again.
    *
    * @throws `VesicleError` `invalid-argument`: no mesh.
    */
@@ -145,7 +145,7 @@ export class NiivueSurface {
     return true;
   }
 
-  /** Takes the mesh out of NiiVue. */
+  /** Removes the mesh from NiiVue. */
   async dispose(): Promise<void> {
     this.#reader.clear();
     await this.#shown.remove();
@@ -157,14 +157,14 @@ interface Look {
   color: readonly [number, number, number, number];
 }
 
-/** A mesh as one of the two generations of NiiVue has it. */
+/** The mesh in one of the two supported generations of NiiVue. */
 interface Shown {
   readonly mesh: object | undefined;
   show(frame: Frame): unknown;
   remove(): unknown;
 }
 
-/** Four bytes a vertex: its own colour where the mesh has them, else the same for all. */
+/** Returns four bytes a vertex, rgba: the vertex colours if the mesh has them, else `color` for all. */
 function paint({ positions, colors }: MeshArrays, color: ArrayLike<number>): Uint8Array<ArrayBuffer> {
   const bytes = new Uint8Array((positions.length / 3) * 4);
   const all = Array.from(color, (share) => Math.round(255 * share));
@@ -176,7 +176,7 @@ function paint({ positions, colors }: MeshArrays, color: ArrayLike<number>): Uin
   return bytes;
 }
 
-/** What is used of an `NVMesh` of 0.69. */
+/** The properties used of an `NVMesh` of 0.69. */
 interface FirstMesh {
   pts: Float32Array;
   tris: Uint32Array;
@@ -206,7 +206,7 @@ class InFirst implements Shown {
   }
 
   show(frame: Frame): void {
-    // NiiVue keeps what it is given, for what it does with the mesh later on.
+    // NiiVue keeps the arrays for later use, so they are copied.
     const [positions, indices] = [frame.positions.slice(), frame.indices.slice()];
     if (this.mesh) this.#change(this.mesh, positions, indices, frame);
     else this.#add(positions, indices, frame);
@@ -218,7 +218,8 @@ class InFirst implements Shown {
     Object.assign(mesh, { pts: positions, extentsMin: min, extentsMax: max });
     mesh.furthestVertexFromOrigin = furthest(positions);
     if (frame.colors) mesh.rgba255 = paint(frame, this.#look.color);
-    // Packed by hand it takes a fifth of the time. One day the records may be others.
+    // Packing the vertex records here takes a fifth of the time of `updateMesh`, which is used if their format is
+    // another one.
     if (mesh.f32PerVertex === 5 && mesh.layers.length === 0) this.#upload(mesh, frame);
     else mesh.updateMesh(this.#gl);
   }
@@ -241,7 +242,7 @@ class InFirst implements Shown {
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.tris, gl.DYNAMIC_DRAW);
     }
     gl.bindVertexArray(null);
-    // As updateMesh has them: indices, and numbers of positions.
+    // Counts as set by updateMesh: indices, and numbers of positions.
     [mesh.indexCount, mesh.vertexCount] = [mesh.tris.length, mesh.pts.length];
   }
 
@@ -251,7 +252,7 @@ class InFirst implements Shown {
   }
 }
 
-/** 20 bytes a vertex: position, normal in signed bytes, colour. */
+/** Packs vertex records for 0.69, 20 bytes each: position, normal in signed bytes, colour. */
 function records({ positions, normals }: Frame, rgba: Uint8Array): ArrayBuffer {
   const vertices = positions.length / 3;
   const buffer = new ArrayBuffer(20 * vertices);
@@ -280,7 +281,7 @@ function furthest(positions: Float32Array): number {
   return Math.sqrt(most);
 }
 
-/** What is used of a mesh of 1.0. */
+/** The properties used of a mesh of 1.0. */
 interface NextMesh {
   positions: Float32Array;
   indices: Uint32Array;
@@ -293,7 +294,7 @@ interface NextMesh {
   perVertexColors: Uint32Array | null;
 }
 
-/** What the view of 1.0 has of a mesh on the graphics card. */
+/** WebGL buffers of a mesh in the view of 1.0. */
 interface NextBuffers {
   vao: WebGLVertexArrayObject | null;
   vertexBuffer: WebGLBuffer | null;
@@ -301,7 +302,7 @@ interface NextBuffers {
   indexCount: number;
 }
 
-/** The view of 1.0, with what it keeps to itself; in WebGPU it has less of it. */
+/** The view of 1.0 with its private properties; some are missing with WebGPU. */
 interface View {
   gl?: WebGL2RenderingContext | null;
   meshResources?: Map<object, NextBuffers>;
@@ -330,14 +331,17 @@ class InNext implements Shown {
     return buffers ? this.#upload(buffers, frame, geometry) : this.#rebuild();
   }
 
-  // What is asked of NiiVue in the open uploads its volumes again, too.
+  // NiiVue's public method uploads its volumes again, too.
   #rebuild(): unknown {
     const { _rebuildMeshResources } = this.#view;
     if (_rebuildMeshResources) return _rebuildMeshResources.call(this.#view);
     return (this.#nv as { updateGLVolume?: () => unknown }).updateGLVolume?.();
   }
 
-  /** NiiVue's own buffers of the mesh, as it was, where their size says that the records are those that are known. */
+  /**
+   * Returns NiiVue's own buffers of the mesh before the update, if their size matches the known record format; else
+   * undefined.
+   */
   #buffers(mesh: NextMesh): NextBuffers | undefined {
     const { gl, meshResources } = this.#view;
     const buffers = meshResources?.get(mesh);
@@ -378,7 +382,7 @@ class InNext implements Shown {
     };
   }
 
-  /** What a mesh of 1.0 has besides. */
+  /** Returns the other properties of a mesh of 1.0. */
   #plain() {
     const { name, color } = this.#look;
     const [r, g, b, a] = color;
@@ -396,7 +400,7 @@ class InNext implements Shown {
   }
 }
 
-/** 28 bytes a vertex: position, normal, colour. */
+/** Packs vertex records for 1.0, 28 bytes each: position, normal, colour. */
 function longRecords({ positions, normals }: Frame, colors: Uint32Array): ArrayBuffer {
   const buffer = new ArrayBuffer(28 * colors.length);
   const [floats, words] = [new Float32Array(buffer), new Uint32Array(buffer)];

@@ -1,27 +1,30 @@
-// What the adapters share: a mesh that is read when it has changed, and checks of what a host gives.
+// Shared by the adapters: reads a mesh when it has changed, and validates the host's volumes.
 import { choice, invalid } from '../check.js';
 import type { MeshArrays } from '../mesh.js';
 import type { Space, Vec3, VolumeInit, VoxelArray } from '../volume.js';
 
-/** Anything with a surface that changes: a `Mesh`, the `mesh` of a model, or arrays of your own with two counters. */
+/**
+ * A changing surface that an adapter can show: a `Mesh`, the `mesh` of a model, or arrays of your own with two
+ * counters.
+ */
 export interface MeshSource {
-  /** Counts up when connectivity changes. */
+  /** Counter that increases when the connectivity changes. */
   readonly topologyVersion: number;
-  /** Counts up when any vertex moves. */
+  /** Counter that increases when any vertex moves. */
   readonly geometryVersion: number;
-  /** The surface as it is now. */
+  /** Returns the surface in its present state. */
   arrays(): MeshArrays;
-  /** The same into buffers that are there; used where it exists. */
+  /** Copies the surface into existing arrays; preferred to `arrays` if present. */
   copyTo?(out: MeshArrays): { vertices: number; triangles: number };
 }
 
-/** A surface as it is to be shown. The arrays are good until the next one is read. */
+/** A surface ready to be shown, in the host's space. The arrays are valid until the next read. */
 export interface Frame extends MeshArrays {
-  /** Connectivity changed, or the mesh is another one. */
+  /** Whether the connectivity has changed, or the mesh is another one. */
   topology: boolean;
 }
 
-/** Reads a mesh when it has changed since the last time. */
+/** Reads a mesh if it has changed since the last read, and converts it to the host's space. */
 export class Reader {
   readonly #turned: boolean;
   #arrays: MeshArrays = { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() };
@@ -29,14 +32,17 @@ export class Reader {
   #topology = 0;
   #geometry = 0;
 
-  /** From the mesh's space to the host's: the two differ by half a turn about z, which keeps the outside outside. */
+  /**
+   * Converts from the mesh's space to the host's: RAS and LPS differ by a rotation of 180° about z, which preserves
+   * orientation.
+   */
   constructor(space: Space | undefined, host: Space | undefined) {
     const spaces = [space, host].filter((one) => one !== undefined);
     for (const one of spaces) choice('space', one, ['RAS', 'LPS']);
     this.#turned = spaces[0] !== spaces.at(-1);
   }
 
-  /** The surface, or nothing where it is as it was. */
+  /** Returns the surface, or undefined if it has not changed. */
   read(mesh: MeshSource): Frame | undefined {
     checkSource(mesh);
     const topology = mesh !== this.#mesh || mesh.topologyVersion !== this.#topology;
@@ -53,7 +59,7 @@ export class Reader {
     return cut(this.#arrays, vertices, triangles);
   }
 
-  /** Forgets the mesh. */
+  /** Forgets the mesh, so that the next read returns it in full. */
   clear(): void {
     this.#mesh = undefined;
   }
@@ -65,12 +71,12 @@ function checkSource(mesh: MeshSource): void {
   throw invalid('mesh', 'a Mesh is needed, or an object with arrays(), topologyVersion and geometryVersion');
 }
 
-// Arrays of somebody else's are not ours to turn.
+// Arrays owned by others must not be rotated in place.
 function copied({ positions, normals, ...rest }: MeshArrays): MeshArrays {
   return { ...rest, positions: positions.slice(), normals: normals.slice() };
 }
 
-/** The part of the buffers that is in use. */
+/** Returns views of the used part of the arrays. */
 function cut(
   { positions, normals, indices, uvs, colors }: MeshArrays,
   vertices: number,
@@ -92,7 +98,7 @@ function turn(vectors: Float32Array): void {
   }
 }
 
-/** The corners of the box around packed points; of no points, a box at the origin. */
+/** Returns the bounding box of packed points; for no points, a box at the origin. */
 export function bounds(positions: Float32Array): { min: Vec3; max: Vec3 } {
   if (positions.length === 0) return { min: [0, 0, 0], max: [0, 0, 0] };
   const min: Vec3 = [Infinity, Infinity, Infinity];
@@ -112,7 +118,10 @@ const ELEMENTS = [
   ...[Uint32Array, Int32Array, Float32Array, Float64Array],
 ];
 
-/** Voxels with one number each, and their counts: so many frames as there are. */
+/**
+ * Validates voxels with one number each and returns them with their dimensions; the number of frames follows from the
+ * length.
+ */
 export function voxels(data: unknown, sizes: readonly number[]): Pick<VolumeInit, 'data' | 'dims'> {
   if (!ELEMENTS.some((kind) => data instanceof kind)) {
     throw invalid('volume', `has no voxels of a kind that is taken: ${ELEMENTS.map(({ name }) => name).join(', ')}`);
@@ -124,7 +133,10 @@ export function voxels(data: unknown, sizes: readonly number[]): Pick<VolumeInit
   throw invalid('volume', `${length} numbers for ${x} x ${y} x ${z} voxels; one for each voxel and frame is needed`);
 }
 
-/** The index-to-world matrix of columns and the place of the first voxel. */
+/**
+ * Returns the column-major affine matrix from voxel index to world, given its columns and the position of the first
+ * voxel.
+ */
 export function affineOf(columns: readonly ArrayLike<number>[], origin: ArrayLike<number>): Float64Array {
   const column = (values: ArrayLike<number> | undefined, last: number) => [
     ...Array.from({ length: 3 }, (_, row) => Number(values?.[row])),

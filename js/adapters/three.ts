@@ -1,7 +1,7 @@
 /**
- * Between Vesicle and three.js: the volumes of its `NRRDLoader`, and a surface in its scene that follows a mesh.
+ * Adapter for three.js: converts the volumes of its `NRRDLoader`, and shows a surface in its scene that follows a mesh.
  *
- * Nothing of three.js is imported: its classes come from the caller.
+ * Nothing of three.js is imported: the caller passes its classes.
  *
  * @module vesicle/three
  */
@@ -12,17 +12,17 @@ import { affineOf, bounds, type Frame, type MeshSource, Reader, voxels } from '.
 
 export type { MeshSource } from './source.js';
 
-/** What is read of a volume of three's `NRRDLoader`. */
+/** The properties used of a volume of three's `NRRDLoader`. */
 export interface ThreeVolume {
   data: ArrayLike<number>;
   xLength: number;
   yLength: number;
   zLength: number;
-  /** Index to world without the place of the first voxel; 3 x 3 where the volume was made by hand. */
+  /** Transform from index to world without the position of the first voxel; 3 x 3 where the volume was made by hand. */
   matrix: { elements: ArrayLike<number> };
 }
 
-/** The fields of the file's header that are needed, as `NRRDLoader` leaves them. */
+/** The fields used of the file's header, as `NRRDLoader` parses them. */
 interface Header {
   space?: string;
   vectors?: number[][];
@@ -34,11 +34,12 @@ interface Header {
 }
 
 /**
- * What a `Volume` is made of, from a volume of three's `NRRDLoader`: `new Volume(volumeFromThree(volume))`.
+ * Converts a volume of three's `NRRDLoader` to the options of a `Volume`: `new Volume(volumeFromThree(volume))`.
  *
- * @param options - `world`: `'file'`, the default, is the world of the file, with its origin, and RAS or LPS as it says.
- *   `'slices'` is where `volume.extractSlice()` draws: the middle of the volume at the origin, RAS.
- * @throws `VesicleError` `invalid-argument`: not such a volume, several numbers a voxel, or an order of bytes that the
+ * @param options - `world`: `'file'`, the default, is the world space of the file, with its origin, and RAS or LPS as
+ *   stated there. `'slices'` is the space in which `volume.extractSlice()` draws: the middle of the volume at the
+ *   origin, RAS.
+ * @throws `VesicleError` `invalid-argument`: not such a volume, several numbers a voxel, or a byte order that the
  *   loader does not read.
  */
 export function volumeFromThree(volume: ThreeVolume, options: { world?: 'file' | 'slices' } = {}): VolumeInit {
@@ -50,7 +51,7 @@ export function volumeFromThree(volume: ThreeVolume, options: { world?: 'file' |
   if (choice('world', options.world ?? 'file', ['file', 'slices']) === 'slices') {
     return { ...grid, affine: affineOf(columns, centred(columns, grid.dims)), space: 'RAS' };
   }
-  // The loader's matrix leaves the origin out, and turns the index instead of the world where the file is LPS.
+  // The loader's matrix omits the origin, and for LPS files it flips the index instead of the world axes.
   const { vectors = columns, space_origin = [0, 0, 0] } = header;
   return { ...grid, ...inSpace(header.space ?? '', vectors, space_origin.map(Number)) };
 }
@@ -71,13 +72,13 @@ function checkHeader({ sizes = [], kinds = '', endian, encoding }: Header, data:
   throw invalid('volume', 'big-endian, which NRRDLoader reads as little-endian; give the file to Volume.parse instead');
 }
 
-/** Columns of a matrix of 4 x 4 or 3 x 3, column-major. */
+/** Returns the columns of the linear part of a column-major 4 x 4 or 3 x 3 matrix. */
 function columnsOf(elements: ArrayLike<number>): number[][] {
   const rows = elements.length === 9 ? 3 : 4;
   return [0, 1, 2].map((column) => [0, 1, 2].map((row) => Number(elements[rows * column + row])));
 }
 
-/** Where the first voxel lies when the middle of the grid is at the origin. */
+/** Returns the position of the first voxel that puts the middle of the grid at the origin. */
 function centred(columns: number[][], dims: readonly number[]): number[] {
   const half = dims.slice(0, 3).map((count) => (count - 1) / 2);
   return [0, 1, 2].map((row) => -columns.reduce((sum, column, k) => sum + (column[row] ?? 0) * (half[k] ?? 0), 0));
@@ -86,20 +87,20 @@ function centred(columns: number[][], dims: readonly number[]): number[] {
 function inSpace(name: string, vectors: number[][], origin: number[]): { affine: Float64Array; space: Space } {
   const plain = name.toLowerCase().replace(/-time$/, '');
   const space = plain === 'left-posterior-superior' || plain === 'lps' ? 'LPS' : 'RAS';
-  // The third of the named spaces, LAS, is a mirrored RAS.
+  // The third of NRRD's named spaces, LAS, is a mirrored RAS.
   const mirrored = plain === 'left-anterior-superior' || plain === 'las';
   const world = ([x = 0, y = 0, z = 0]: number[]) => [mirrored ? -x : x, y, z];
   return { affine: affineOf(vectors.map(world), world(origin)), space };
 }
 
-/** What is used of a three.js `BufferAttribute`. */
+/** The members used of a three.js `BufferAttribute`. */
 interface Attribute {
   needsUpdate: boolean;
   clearUpdateRanges(): void;
   addUpdateRange(start: number, count: number): void;
 }
 
-/** What is used of a three.js `BufferGeometry`. */
+/** The members used of a three.js `BufferGeometry`. */
 interface Geometry {
   boundingSphere: object | null;
   boundingBox: object | null;
@@ -113,7 +114,7 @@ interface Vector {
   set(x: number, y: number, z: number): unknown;
 }
 
-/** The classes of three.js that are needed; the whole of it, `THREE`, will do. */
+/** The classes of three.js that are needed; the whole module, `THREE`, can be passed. */
 export interface ThreeClasses {
   BufferGeometry: new () => Geometry;
   BufferAttribute: new (array: Float32Array | Uint32Array, itemSize: number) => Attribute;
@@ -121,12 +122,12 @@ export interface ThreeClasses {
   Box3: new () => { min: Vector; max: Vector };
 }
 
-/** What has a geometry: a `Mesh` of three.js, mostly. */
+/** An object with a geometry, usually a `Mesh` of three.js. */
 export interface ThreeObject {
   geometry: Geometry;
 }
 
-/** An array of the mesh, the name three.js has for it, and how many numbers a vertex has. */
+/** Arrays of the mesh, their attribute names in three.js, and numbers per vertex. */
 const ATTRIBUTES = [
   ['positions', 'position', 3],
   ['normals', 'normal', 3],
@@ -134,11 +135,11 @@ const ATTRIBUTES = [
   ['colors', 'color', 3],
 ] as const;
 
-/** Buffers are so many times as large as what is in them, so that they are seldom made anew. */
+/** Capacity of buffers relative to their contents, so that they are seldom reallocated. */
 const ROOM = 1.5;
 
 /**
- * A surface in a three.js scene that follows a mesh, whatever becomes of its connectivity.
+ * A surface in a three.js scene that follows a mesh, through all changes of connectivity.
  *
  * ```js
  * const object = new THREE.Mesh(undefined, new THREE.MeshStandardMaterial());
@@ -146,8 +147,8 @@ const ROOM = 1.5;
  * surface.update(model.mesh); // after every step
  * ```
  *
- * The object's `geometry` is another one whenever the buffers have to grow; material and place in the scene are the
- * caller's. Positions are those of the mesh, in its volume's world.
+ * The object's `geometry` is replaced whenever the buffers have to grow; material and transform in the scene are the
+ * caller's. Positions are those of the mesh, in its volume's world space.
  */
 export class ThreeSurface {
   readonly #three: ThreeClasses;
@@ -157,9 +158,9 @@ export class ThreeSurface {
 
   /**
    * @param three - The classes of three.js.
-   * @param object - Gets the geometry; what it had is not disposed of.
-   * @param options - `space` of the mesh and `worldSpace` of the scene: where both are given and differ, x and y change
-   *   their signs.
+   * @param object - Receives the geometry; its previous geometry is not disposed of.
+   * @param options - `space` of the mesh and `worldSpace` of the scene: if both are given and differ, the signs of x
+   *   and y are flipped.
    * @throws `VesicleError` `invalid-argument`: classes that are missing, no such object.
    */
   constructor(three: ThreeClasses, object: ThreeObject, options: { space?: Space; worldSpace?: Space } = {}) {
@@ -173,7 +174,8 @@ export class ThreeSurface {
   }
 
   /**
-   * Takes over what changed since the last time; the next rendering uploads it. False where nothing did.
+   * Updates the geometry if the mesh has changed since the last call; the next rendering uploads it. Returns whether it
+   * has.
    *
    * @throws `VesicleError` `invalid-argument`: no mesh.
    */
@@ -191,7 +193,7 @@ export class ThreeSurface {
     this.#object.geometry = this.#buffers.geometry;
   }
 
-  /** Frees the buffers. The object stays in the scene, as the caller's; `update` would make new ones. */
+  /** Frees the buffers. The object stays in the caller's scene; `update` would allocate new buffers. */
   dispose(): void {
     this.#buffers?.geometry.dispose();
     this.#buffers = undefined;
@@ -199,7 +201,7 @@ export class ThreeSurface {
   }
 }
 
-/** A geometry with room for more than is in it. */
+/** A geometry whose buffers have a larger capacity than their contents. */
 class Buffers {
   readonly geometry: Geometry;
   readonly #parts = new Map<keyof MeshArrays, { array: Float32Array | Uint32Array; attribute: Attribute }>();
@@ -209,7 +211,7 @@ class Buffers {
 
   constructor({ BufferGeometry, BufferAttribute, Sphere, Box3 }: ThreeClasses, frame: MeshArrays) {
     this.geometry = new BufferGeometry();
-    // Of what is in the buffers; three would take in what is left over in them.
+    // Bounds are set by hand: three would include stale values beyond the contents.
     this.geometry.boundingSphere = this.#sphere = new Sphere();
     this.geometry.boundingBox = this.#box = new Box3();
     for (const [name, called, size] of ATTRIBUTES) {
@@ -226,7 +228,7 @@ class Buffers {
     this.#parts.set('indices', { array, attribute });
   }
 
-  /** Whether everything of this surface, and nothing else, has its place. */
+  /** Whether the buffers have the capacity for this surface, and the same set of attributes. */
   fit(frame: MeshArrays): boolean {
     return (['indices', ...ATTRIBUTES.map(([name]) => name)] as const).every((name) => {
       const [room, needed] = [this.#parts.get(name)?.array.length, frame[name]?.length];

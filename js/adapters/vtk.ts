@@ -1,7 +1,7 @@
 /**
- * Between Vesicle and vtk.js and itk-wasm: their images, and a vtk.js surface that follows a mesh.
+ * Adapter for vtk.js and itk-wasm: converts their images, and shows a vtk.js surface that follows a mesh.
  *
- * Nothing of either is imported: vtk's classes come from the caller.
+ * Nothing of either is imported: the caller passes vtk's classes.
  *
  * @module vesicle/vtk
  */
@@ -11,7 +11,7 @@ import { affineOf, type Frame, type MeshSource, Reader, voxels } from './source.
 
 export type { MeshSource } from './source.js';
 
-/** What is read of a `vtkImageData`. */
+/** The methods used of a `vtkImageData`. */
 export interface VtkImage {
   getDimensions(): number[];
   getExtent(): number[];
@@ -19,22 +19,22 @@ export interface VtkImage {
   getPointData(): { getScalars(): { getData(): ArrayLike<number>; getNumberOfComponents(): number } | null };
 }
 
-/** What is read of an itk-wasm `Image`. */
+/** The properties used of an itk-wasm `Image`. */
 export interface ItkImage {
   imageType: { dimension: number; components: number; pixelType: string };
   size: ArrayLike<number>;
   spacing: ArrayLike<number>;
   origin: ArrayLike<number>;
-  /** Row-major. */
+  /** Direction cosines, row-major. */
   direction: ArrayLike<number | bigint>;
   data: unknown;
 }
 
 /**
- * What a `Volume` is made of, from a `vtkImageData` of vtk.js: `new Volume(volumeFromVtk(image))`.
+ * Converts a `vtkImageData` of vtk.js to the options of a `Volume`: `new Volume(volumeFromVtk(image))`.
  *
- * @param options - `space`: which way the world axes of the image point, which vtk.js does not know; default LPS, as in what
- *   itk and DICOM readers give.
+ * @param options - `space`: orientation of the image's world axes, which vtk.js does not know; default LPS, as produced
+ *   by itk and DICOM readers.
  * @throws `VesicleError` `invalid-argument`: no such image, no scalars, or several numbers a voxel.
  */
 export function volumeFromVtk(image: VtkImage, options: { space?: Space } = {}): VolumeInit {
@@ -42,7 +42,7 @@ export function volumeFromVtk(image: VtkImage, options: { space?: Space } = {}):
   const matrix = image.getIndexToWorld();
   const [x = 0, , y = 0, , z = 0] = image.getExtent();
   const columns = [0, 4, 8].map((first) => [0, 1, 2].map((row) => Number(matrix[first + row])));
-  // The first voxel is where the extent begins, and that need not be at 0.
+  // The first voxel is at the start of the extent, which need not be 0.
   const first = [0, 1, 2].map((row) => Number(matrix[12 + row]) + dot([x, y, z], columns, row));
   return {
     ...voxels(scalars.getData(), image.getDimensions()),
@@ -65,8 +65,9 @@ function scalarsOf(image: VtkImage) {
 }
 
 /**
- * What a `Volume` is made of, from an `Image` of itk-wasm, in 3D, or 4D with frames last: `new Volume(volumeFromItk(image))`.
- * Its world is LPS. Seconds between frames are the caller's to add, since not all files say them.
+ * Converts an `Image` of itk-wasm, 3D, or 4D with frames last, to the options of a `Volume`:
+ * `new Volume(volumeFromItk(image))`. World space is LPS. The caller adds the seconds between frames, because not all
+ * files state them.
  *
  * @throws `VesicleError` `invalid-argument`: no such image, another dimension, or several numbers a voxel.
  */
@@ -85,7 +86,7 @@ interface DataArray {
   setData(values: Float32Array | Uint32Array, components?: number): void;
 }
 
-/** What is used of a `vtkPolyData`. */
+/** The methods used of a `vtkPolyData`. */
 export interface VtkPolyData {
   getPoints(): DataArray;
   getPolys(): DataArray;
@@ -101,7 +102,7 @@ export interface VtkClasses<P extends VtkPolyData> {
 }
 
 /**
- * A `vtkPolyData` that follows a mesh, whatever becomes of its connectivity.
+ * A `vtkPolyData` that follows a mesh, through all changes of connectivity.
  *
  * ```js
  * const surface = new VtkSurface({ vtkPolyData, vtkDataArray });
@@ -109,18 +110,18 @@ export interface VtkClasses<P extends VtkPolyData> {
  * surface.update(model.mesh); // after every step, then render
  * ```
  *
- * Points are those of the mesh, in its volume's world; they have normals, outwards.
+ * Points are those of the mesh, in its volume's world space; they have outward normals.
  */
 export class VtkSurface<P extends VtkPolyData> {
-  /** For a `vtkMapper`; the same from start to end. */
+  /** Input of a `vtkMapper`; the same object from start to end. */
   readonly polyData: P;
   readonly #normals: DataArray;
   readonly #reader: Reader;
 
   /**
    * @param vtk - The classes of vtk.js.
-   * @param options - `space` of the mesh and `worldSpace` of the view: where both are given and differ, x and y change
-   *   their signs.
+   * @param options - `space` of the mesh and `worldSpace` of the view: if both are given and differ, the signs of x and
+   *   y are flipped.
    * @throws `VesicleError` `invalid-argument`: classes that are missing.
    */
   constructor(vtk: VtkClasses<P>, options: { space?: Space; worldSpace?: Space } = {}) {
@@ -138,14 +139,15 @@ export class VtkSurface<P extends VtkPolyData> {
   }
 
   /**
-   * Takes over what changed since the last time; the next rendering uploads it. False where nothing did.
+   * Updates the poly data if the mesh has changed since the last call; the next rendering uploads it. Returns whether
+   * it has.
    *
    * @throws `VesicleError` `invalid-argument`: no mesh.
    */
   update(mesh: MeshSource): boolean {
     const frame = this.#reader.read(mesh);
     if (!frame) return false;
-    // vtk.js keeps what it is given.
+    // vtk.js keeps the arrays, so they are copied.
     this.polyData.getPoints().setData(frame.positions.slice(), 3);
     this.#normals.setData(frame.normals.slice(), 3);
     if (frame.topology) this.polyData.getPolys().setData(polygons(frame));
@@ -153,14 +155,14 @@ export class VtkSurface<P extends VtkPolyData> {
     return true;
   }
 
-  /** Deletes the poly data; take its actor out of the view before. */
+  /** Deletes the poly data; remove its actor from the view first. */
   dispose(): void {
     this.#reader.clear();
     this.polyData.delete();
   }
 }
 
-/** Triangles as vtk has polygons: each with the number of its corners before it. */
+/** Returns the triangles as vtk cells: each preceded by its number of corners. */
 function polygons({ indices }: Frame): Uint32Array {
   const cells = new Uint32Array((indices.length / 3) * 4);
   for (let from = 0, to = 0; from < indices.length; from += 3, to += 4) {

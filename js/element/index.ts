@@ -1,12 +1,12 @@
 /**
- * `<vesicle-lab>`: a surface that grows over data of yours, on any page, without a line of script.
+ * `<vesicle-lab>`: fits a surface to your data on any page, without scripting.
  *
  * ```html
  * <script type="module" src="https://…/vesicle/element.js"></script>
  * <vesicle-lab src="head.nii.gz" method="deformable" levels="1" params='{ "iso": 95 }'></vesicle-lab>
  * ```
  *
- * Importing it defines the element. three.js is inside; the library itself is the one beside it, in a worker of its own.
+ * Importing the module defines the element. three.js is bundled; the library is loaded from beside it, into a worker.
  *
  * @packageDocumentation
  */

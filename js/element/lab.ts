@@ -1,4 +1,4 @@
-// The element: attributes in, a surface and what can be said of it out.
+// The custom element: takes attributes, and shows a surface and figures about it.
 import { invalid } from '../check.js';
 import type { MeshArrays } from '../mesh.js';
 import type { StepReport } from '../stepper.js';
@@ -7,27 +7,27 @@ import { fetched, json, type Made, MODELS, startNamed } from './making.js';
 import { STYLE } from './style.js';
 import { View } from './view.js';
 
-/** The method that a lab runs. */
+/** The method that a `<vesicle-lab>` runs. */
 export type LabMethod = keyof typeof MODELS;
 
-/** What a lab is doing; its attribute `data-state` says so, too. */
+/** State of a `<vesicle-lab>`, also in its attribute `data-state`. */
 export type LabState = 'loading' | 'running' | 'paused' | 'done' | 'error';
 
-/** Milliseconds of steps between two pictures, about, and the most steps. */
+/** Approximate time for steps between two renderings, milliseconds, and the largest number of steps. */
 const SLICE = 60;
 const MOST_STEPS = 256;
 
 const ATTRIBUTES = ['src', 'method', 'start', 'levels', 'params', 'ellipsoids'];
 
 /**
- * `<vesicle-lab>`: loads `src`, runs a method on it, and shows the surface while it grows.
+ * The element `<vesicle-lab>`: loads `src`, runs a method on it, and shows the surface while it evolves.
  *
- * Attributes: `src`, the file; `method`, `deformable` (a volume, the default), `implicit` (points), `tracking` (a volume
- * with frames) or `multires` (a mesh, with `ellipsoids` as JSON); `params` of the method as JSON; `levels` of the pyramid
- * and `start`, `contour` (the default) or `enclosing`, of the deformable model;
- * `paused`, not to begin by itself. A change of one of them, but `paused`, begins anew. Events: `vesicle-step` after one
- * step or a few, with a `StepReport` as `detail`, `vesicle-done`, `vesicle-error` with the error. The parts `view`, `controls` and `status` can be
- * styled.
+ * Attributes: `src`, the file; `method`, `deformable` (a volume, the default), `implicit` (points), `tracking` (a
+ * volume with frames) or `multires` (a mesh, with `ellipsoids` as JSON); `params` of the method as JSON; `levels` of
+ * the pyramid and `start`, `contour` (the default) or `enclosing`, of the deformable model; `paused`, not to start
+ * automatically. Changing an attribute other than `paused` restarts the method. Events: `vesicle-step` after one step
+ * or a few, with a `StepReport` as `detail`, `vesicle-done`, `vesicle-error` with the error. The parts `view`,
+ * `controls` and `status` can be styled.
  */
 export class VesicleLab extends HTMLElement {
   static readonly observedAttributes = ATTRIBUTES;
@@ -38,17 +38,17 @@ export class VesicleLab extends HTMLElement {
   });
   #view: View | undefined;
   #model: Stepper | undefined;
-  /** Counts openings: what an earlier one brings comes too late. */
+  /** Number of resets, so that results of an earlier one are discarded. */
   #opening = 0;
   #from: Vec3 = [0, -1, 0];
   #framed = false;
 
-  /** What it is doing. */
+  /** The current state. */
   get state(): LabState {
     return (this.dataset.state ?? 'loading') as LabState;
   }
 
-  /** The model, off the main thread, as `vesicle/worker` has it; undefined before it is made. */
+  /** The model in its worker, as in `vesicle/worker`; undefined before it is created. */
   get model(): Stepper | undefined {
     return this.#model;
   }
@@ -69,7 +69,7 @@ export class VesicleLab extends HTMLElement {
     if (this.isConnected && this.#view !== undefined) void this.reset();
   }
 
-  /** Back to the start, with what the attributes say now. */
+  /** Restarts the method with the current attributes. */
   async reset(): Promise<void> {
     this.#close();
     const opening = ++this.#opening;
@@ -110,7 +110,7 @@ export class VesicleLab extends HTMLElement {
     if (!model || this.state === 'running' || this.state === 'done') return;
     this.#is('running', 'Running.');
     try {
-      // Slices that are answered one by one: however fast the steps, the page is never behind.
+      // Each slice is awaited, so that however fast the steps, the page does not fall behind.
       for (let steps = 1; this.#runs(model); ) {
         const began = performance.now();
         await this.#go(model, steps);
@@ -126,12 +126,12 @@ export class VesicleLab extends HTMLElement {
     return this.state === 'running' && model === this.#model;
   }
 
-  /** Stops after the steps it is at. */
+  /** Pauses the run after the steps in progress. */
   pause(): void {
     if (this.state === 'running') this.#is('paused', 'Paused.');
   }
 
-  /** One step of the method. */
+  /** Runs one step of the method, and pauses. */
   async step(): Promise<void> {
     const model = this.#model;
     if (!model || this.state === 'done') return;
@@ -143,7 +143,7 @@ export class VesicleLab extends HTMLElement {
     }
   }
 
-  /** So many steps, and what came of them on the screen. */
+  /** Runs `steps` steps and shows the result. */
   async #go(model: Stepper, steps: number): Promise<void> {
     const report = await model.step(steps);
     if (model !== this.#model) return;
@@ -164,7 +164,7 @@ export class VesicleLab extends HTMLElement {
     const arrays = (await model?.mesh.arrays()) as MeshArrays | undefined;
     if (model !== this.#model || !arrays?.indices.length) return;
     this.#view?.show(arrays);
-    // What it came to may be much smaller than what it began with.
+    // The final surface may be much smaller than the initial one.
     if (!this.#framed || this.state === 'done') this.#view?.frame(this.#from);
     this.#framed = true;
   }
@@ -185,7 +185,7 @@ export class VesicleLab extends HTMLElement {
   }
 }
 
-/** What stands in the shadow of the element. */
+/** The elements in the shadow root: canvas, buttons and status line. */
 class Parts {
   #canvas = canvas();
   readonly #play = document.createElement('button');
@@ -218,7 +218,7 @@ class Parts {
     root.append(this.#canvas, controls);
   }
 
-  /** The view; where there is no WebGL, words in its place. */
+  /** Creates the view; without WebGL, shows a message instead and returns undefined. */
   makeView(): View | undefined {
     try {
       return new View(this.#canvas);
@@ -230,7 +230,7 @@ class Parts {
     }
   }
 
-  /** A canvas that had a context keeps it; an element that comes back gets a new one. */
+  /** Replaces the canvas, because a context cannot be created twice on one; for an element that is inserted again. */
   newCanvas(): void {
     const fresh = canvas();
     this.#canvas.replaceWith(fresh);

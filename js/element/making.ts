@@ -1,4 +1,4 @@
-// A model of each method out of what the attributes of the element say.
+// Creates a model of each method from the attributes of the element.
 import { invalid } from '../check.js';
 import { VesicleError } from '../error.js';
 import {
@@ -14,11 +14,11 @@ import {
   Volume,
 } from '../worker.js';
 
-/** The starts of the deformable model that have a name. */
+/** Named initial surfaces of the deformable model. */
 const STARTS = ['contour', 'enclosing'] as const;
 type StartName = (typeof STARTS)[number];
 
-/** What the element is told. */
+/** The parsed attributes of the element and the bytes of its file. */
 export interface Told {
   bytes: Uint8Array;
   start: StartName;
@@ -27,16 +27,16 @@ export interface Told {
   ellipsoids: ControlEllipsoid[];
 }
 
-/** A model, and the direction from which its surface is seen at first. */
+/** A model, and the direction from which the camera views it initially. */
 export interface Made {
   model: Stepper;
   from: Vec3;
 }
 
-/** Along +y, where things made by hand have their front. */
+/** Initial viewing direction along +y, for man-made objects, which usually face −y. */
 const FRONT: Vec3 = [-0.5, -1, 0.35];
 
-/** From one method to its model; whatever else was made on the way is freed. */
+/** Factory of the model for each method; intermediate objects are freed. */
 export const MODELS = {
   deformable: ({ bytes, start, levels, params }: Told): Promise<Made> =>
     ofVolume(bytes, (volume) => DeformableModel.create({ volume, start, levels, params })),
@@ -52,7 +52,7 @@ export const MODELS = {
   },
 };
 
-/** Of a person: from before, a little from their left. */
+/** Creates a model from a volume, with the camera in front of a patient, a little to their left. */
 function ofVolume(bytes: Uint8Array, make: (volume: Volume) => Promise<Stepper>): Promise<Made> {
   const made = async (volume: Volume): Promise<Made> => {
     const [model, space] = await Promise.all([make(volume), volume.space]);
@@ -69,21 +69,21 @@ async function using<T extends { free(): void }, Made>(thing: T, make: (thing: T
   }
 }
 
-/** The file at an address. */
+/** Downloads the file at an address. */
 export async function fetched(address: string): Promise<Uint8Array> {
   const response = await fetch(address);
   if (!response.ok) throw new VesicleError('bad-file', `src: ${address}: ${response.status} ${response.statusText}`);
   return new Uint8Array(await response.arrayBuffer());
 }
 
-/** The start that an attribute names; the contour when it is left out. */
+/** Returns the initial surface that an attribute names; `'contour'` by default. */
 export function startNamed(name: string | null): StartName {
   const start = STARTS.find((one) => one === (name ?? 'contour'));
   if (!start) throw invalid('start', `'${name}'; accepted: ${STARTS.join(', ')}`);
   return start;
 }
 
-/** JSON out of an attribute; what it is when it is left out. */
+/** Parses an attribute as JSON; returns `otherwise` if it is empty or missing. */
 export function json<T>(name: string, text: string | null, otherwise: T): T {
   if (text === null || text.trim() === '') return otherwise;
   try {

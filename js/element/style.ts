@@ -1,4 +1,4 @@
-/** The style of the element; what is around it may set the colours and the parts. */
+/** Style sheet of the element; the page can override its colours, and style its parts. */
 export const STYLE = `
   :host {
     display: grid;

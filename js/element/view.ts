@@ -1,4 +1,4 @@
-// The surface in three dimensions.
+// The 3D view of the element.
 import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { type MeshSource, ThreeSurface } from '../adapters/three.js';
@@ -6,10 +6,10 @@ import type { MeshArrays } from '../mesh.js';
 import type { Vec3 } from '../volume.js';
 
 const FIELD_OF_VIEW = 40;
-/** Pixels drawn for one of the page at most. */
+/** Upper bound of the device pixel ratio of the rendering. */
 const FINEST = 2;
 
-/** Draws a surface when it has changed or the view has. */
+/** Renders a surface with three.js whenever the surface or the camera has changed. */
 export class View {
   readonly #renderer: THREE.WebGLRenderer;
   readonly #scene = new THREE.Scene();
@@ -21,12 +21,12 @@ export class View {
   );
   readonly #surface = new ThreeSurface(THREE, this.#object);
   readonly #observer = new ResizeObserver(() => this.#resize());
-  /** Nobody has turned it yet: it may still be put right. */
+  /** Whether the user has not moved the camera, so that it may still be adjusted automatically. */
   #untouched = true;
   #version = 0;
   #asked = 0;
 
-  /** Throws where the browser gives no WebGL. */
+  /** Throws if WebGL is not available. */
   constructor(readonly canvas: HTMLCanvasElement) {
     this.#renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
     const light = new THREE.DirectionalLight('#ffffff', 2.4);
@@ -43,7 +43,7 @@ export class View {
     this.#observer.observe(canvas);
   }
 
-  /** Shows a surface. */
+  /** Updates the surface and requests a rendering. */
   show(arrays: MeshArrays): void {
     this.#version += 1;
     const source: MeshSource = { topologyVersion: this.#version, geometryVersion: this.#version, arrays: () => arrays };
@@ -51,12 +51,12 @@ export class View {
     this.#ask();
   }
 
-  /** Begins with another surface, which nobody has turned. */
+  /** Resets the flag of user interaction for a new surface, so that the camera is adjusted again. */
   begin(): void {
     this.#untouched = true;
   }
 
-  /** Puts the whole surface in sight, from a direction, unless it was turned by hand. */
+  /** Fits the whole surface into the view from a given direction, unless the user has moved the camera. */
   frame(from: Vec3): void {
     if (!this.#untouched) return;
     const { center, radius } = this.#object.geometry.boundingSphere ?? new THREE.Sphere();
@@ -79,7 +79,7 @@ export class View {
     event.preventDefault();
     this.#untouched = false;
     const away = this.#camera.position.clone().sub(this.#controls.target);
-    // About the axis that is up in the world, and about the one to the right on the screen.
+    // Rotates about the world's up axis, and about the horizontal axis of the screen.
     away.applyAxisAngle(this.#camera.up, 0.12 * right);
     const level = Math.acos(away.z / away.length()) - 0.12 * up;
     if (level > 0.05 && level < Math.PI - 0.05) {
@@ -97,7 +97,7 @@ export class View {
     this.#renderer.setSize(width, height, false);
     this.#camera.aspect = width / height;
     this.#camera.updateProjectionMatrix();
-    // A new size clears the canvas: drawn at once, or it flashes.
+    // Resizing clears the canvas: it is rendered at once to avoid flashing.
     this.#draw();
   }
 
@@ -121,7 +121,7 @@ export class View {
   }
 }
 
-/** To the right, up, and closer. */
+/** Camera motion of each key: to the right, up, and closer. */
 const KEYS: Record<string, [number, number, number]> = {
   ArrowLeft: [-1, 0, 0],
   ArrowRight: [1, 0, 0],

@@ -1,4 +1,4 @@
-//! Meshes one after the other, as the bytes of an animated GLB.
+//! Bindings of the writer of animated GLB files.
 
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
@@ -6,25 +6,25 @@ use super::error::Failure;
 use super::mesh::RawMesh;
 use crate::io::AnimationWriter;
 
-/// An animation that grows frame by frame.
+/// Builder of an animated GLB that takes one frame at a time.
 #[wasm_bindgen]
 #[derive(Default)]
 pub struct RawAnimation(AnimationWriter);
 
 #[wasm_bindgen]
 impl RawAnimation {
-    /// Without frames.
+    /// Creates an animation without frames.
     #[wasm_bindgen(constructor)]
     pub fn new() -> RawAnimation {
         RawAnimation::default()
     }
 
-    /// Adds a mesh as it is now.
+    /// Appends a frame that shows the current state of a mesh.
     pub fn add(&mut self, mesh: &RawMesh) -> Result<(), JsValue> {
         Ok(self.0.add(&mesh.triangles()).map_err(Failure::from)?)
     }
 
-    /// The bytes of the file; nothing is left of the animation.
+    /// Returns the bytes of the GLB file, in which each frame lasts `frame_seconds`; the animation is used up.
     pub fn finish(self, frame_seconds: f64) -> Result<Vec<u8>, JsValue> {
         Ok(self.0.finish(frame_seconds).map_err(Failure::from)?)
     }

@@ -1,5 +1,5 @@
-//! From JavaScript's arrays and objects to the core's types and back. Everything is copied: a view into the
-//! module's memory would die when the memory grows.
+//! Conversion of JavaScript's arrays and objects to the core's types and back. Everything is copied: a view into the
+//! module's memory would become invalid when the memory grows.
 
 use js_sys::{Float32Array, Float64Array, Reflect, Uint8Array, Uint32Array};
 use serde::Serialize;
@@ -13,12 +13,13 @@ use crate::math::{DVec3, Vec2, Vec3};
 
 #[wasm_bindgen]
 extern "C" {
-    /// Milliseconds since some moment.
+    /// Returns the milliseconds since the start of the page or process (`performance.now`), for the clocks of the
+    /// methods.
     #[wasm_bindgen(js_namespace = performance)]
     pub fn now() -> f64;
 }
 
-/// An array of `length` elements that `copy` fills, or `too-large` where there is no memory for it.
+/// Returns an array of `length` elements that `copy` fills; a `too-large` failure if there is not enough memory.
 pub fn copied<T: Clone + Default>(length: u32, copy: impl FnOnce(&mut [T])) -> Result<Vec<T>, Failure> {
     let mut values = Vec::new();
     let bytes = u64::from(length).saturating_mul(size_of::<T>() as u64);
@@ -28,39 +29,39 @@ pub fn copied<T: Clone + Default>(length: u32, copy: impl FnOnce(&mut [T])) -> R
     Ok(values)
 }
 
-/// The bytes of a file.
+/// Copies the bytes of a file.
 pub fn bytes(array: &Uint8Array) -> Result<Vec<u8>, Failure> {
     copied(array.length(), |out| array.copy_to(out))
 }
 
-/// The numbers of a typed array.
+/// Copies the numbers of a `Float32Array`.
 pub fn floats(array: &Float32Array) -> Result<Vec<f32>, Failure> {
     copied(array.length(), |out| array.copy_to(out))
 }
 
-/// The numbers of a typed array.
+/// Copies the numbers of a `Float64Array`.
 pub fn doubles(array: &Float64Array) -> Result<Vec<f64>, Failure> {
     copied(array.length(), |out| array.copy_to(out))
 }
 
-/// Packed xyz as points.
+/// Converts packed xyz to points.
 pub fn points(array: &Float32Array) -> Result<Vec<Vec3>, Failure> {
     Ok(floats(array)?.chunks_exact(3).map(Vec3::from_slice).collect())
 }
 
-/// Packed uv as texture coordinates.
+/// Converts packed uv to texture coordinates.
 pub fn coordinates(array: &Float32Array) -> Result<Vec<Vec2>, Failure> {
     Ok(floats(array)?.chunks_exact(2).map(Vec2::from_slice).collect())
 }
 
-/// Packed abc as triangles.
+/// Converts packed abc to triangles.
 pub fn triangles(array: &Uint32Array) -> Result<Vec<[u32; 3]>, Failure> {
     let indices = copied(array.length(), |out| array.copy_to(out))?;
     let (triangles, _) = indices.as_chunks::<3>();
     Ok(triangles.to_vec())
 }
 
-/// Three numbers as a point.
+/// Converts three numbers to a point.
 pub fn point(values: &[f64]) -> Result<DVec3, Failure> {
     match values {
         [x, y, z] => Ok(DVec3::new(*x, *y, *z)),
@@ -68,24 +69,24 @@ pub fn point(values: &[f64]) -> Result<DVec3, Failure> {
     }
 }
 
-/// Points as packed xyz.
+/// Converts points to packed xyz.
 pub fn packed(points: &[Vec3]) -> Vec<f32> {
     points.iter().flat_map(|point| point.to_array()).collect()
 }
 
-/// Something serialisable as plain objects and arrays; what is `None` stays out.
+/// Converts a serialisable value to plain objects and arrays; members that are `None` are left out.
 pub fn to_js<T: Serialize>(value: &T) -> Result<JsValue, Failure> {
     value
         .serialize(&Serializer::new().serialize_maps_as_objects(true))
         .map_err(|error| Failure::invalid("result", &error.to_string()))
 }
 
-/// `current` with the properties of a JavaScript object written over its own.
+/// Returns `current` with the properties of a JavaScript object written over its own, used to set parameters.
 ///
-/// Properties that are `undefined` are skipped.
+/// Properties that are `undefined` are ignored.
 ///
 /// # Errors
-/// A name that `current` does not have, or a value of the wrong type: `invalid-argument` naming it.
+/// A name that `current` does not have, or a value of the wrong type: `invalid-argument` with the name.
 pub fn merged<T: Serialize + DeserializeOwned>(current: &T, given: &JsValue) -> Result<T, Failure> {
     let all = to_js(current)?;
     for name in js_sys::Object::keys(given.unchecked_ref::<js_sys::Object>()).iter() {
@@ -97,7 +98,7 @@ pub fn merged<T: Serialize + DeserializeOwned>(current: &T, given: &JsValue) -> 
         if !js_sys::Object::has_own(all.unchecked_ref::<js_sys::Object>(), &name) {
             return Err(unknown(&parameter, &all));
         }
-        // One at a time, so that a value of the wrong type is blamed on its own name.
+        // One at a time, so that the error about a value of the wrong type has its name.
         let alone = to_js(current)?;
         Reflect::set(&alone, &name, &value).ok();
         read::<T>(&parameter, &alone)?;
@@ -106,10 +107,12 @@ pub fn merged<T: Serialize + DeserializeOwned>(current: &T, given: &JsValue) -> 
     read("params", &all)
 }
 
+/// Returns a property of an object; undefined if it cannot be read.
 fn property(object: &JsValue, name: &JsValue) -> JsValue {
     Reflect::get(object, name).unwrap_or(JsValue::UNDEFINED)
 }
 
+/// Deserialises an object; an error names `parameter`.
 fn read<T: DeserializeOwned>(parameter: &str, object: &JsValue) -> Result<T, Failure> {
     serde_wasm_bindgen::from_value(object.clone()).map_err(|error| {
         let problem = error.to_string().replace("f64", "a number");
@@ -117,6 +120,7 @@ fn read<T: DeserializeOwned>(parameter: &str, object: &JsValue) -> Result<T, Fai
     })
 }
 
+/// Returns the error about a parameter that does not exist, which lists those that do.
 fn unknown(parameter: &str, all: &JsValue) -> Failure {
     let names = js_sys::Object::keys(all.unchecked_ref::<js_sys::Object>());
     let names: Vec<String> = names.iter().filter_map(|name| name.as_string()).collect();

@@ -1,4 +1,4 @@
-//! The deformable model.
+//! Bindings of the deformable model.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -17,52 +17,53 @@ use crate::methods::deformable::{
     Start, param_specs,
 };
 
-/// The first surface of a model.
+/// The start surface of a deformable model.
 #[wasm_bindgen]
 pub struct RawStart(Start);
 
 #[wasm_bindgen]
 impl RawStart {
-    /// The iso-surface of the coarsest level.
+    /// Starts from the iso-surface at π_I (the parameter `iso`) of the coarsest pyramid level.
     pub fn contour() -> RawStart {
         RawStart(Start::Contour)
     }
 
-    /// Around all that the object takes up.
+    /// Starts from an icosahedron that encloses the object.
     pub fn enclosing() -> RawStart {
         RawStart(Start::Enclosing)
     }
 
-    /// A grid of `count` by `count` by `count` bubbles.
+    /// Starts from a grid of `count` × `count` × `count` bubbles.
     pub fn bubbles(count: u32) -> RawStart {
         RawStart(Start::Bubbles(count))
     }
 
-    /// Spheres at packed world points.
+    /// Starts from spheres of `radius` at packed world points.
     pub fn seeds(seeds: &Float32Array, radius: f64) -> Result<RawStart, JsValue> {
         let points = points(seeds)?.into_iter().map(|seed| seed.as_dvec3()).collect();
         Ok(RawStart(Start::Seeds { points, radius }))
     }
 
-    /// The iso-surface of the volume.
+    /// Starts from the iso-surface of the coarsest pyramid level at intensity `iso`.
     #[wasm_bindgen(js_name = marchingCubes)]
     pub fn marching_cubes(iso: f64) -> RawStart {
         RawStart(Start::MarchingCubes(iso))
     }
 
-    /// A mesh of the caller's.
+    /// Starts from a copy of a closed mesh.
     pub fn mesh(mesh: &RawMesh) -> RawStart {
         RawStart(Start::Mesh(Rc::unwrap_or_clone(mesh.triangles())))
     }
 }
 
-/// A deformable model, shared with its live mesh.
+/// Handle of a deformable model, which it shares with its live mesh.
 #[wasm_bindgen]
 pub struct RawDeformable(Rc<RefCell<DeformableModel>>);
 
 #[wasm_bindgen]
 impl RawDeformable {
-    /// A model of one frame of a volume; parameters are written over the defaults for that volume.
+    /// Creates a model of one frame of a volume. `edge` is the target edge at the finest level, in world units;
+    /// `params` are written over the defaults for that volume.
     #[wasm_bindgen(constructor)]
     pub fn new(
         volume: &RawVolume,
@@ -79,12 +80,13 @@ impl RawDeformable {
         Ok(RawDeformable(Rc::new(RefCell::new(model))))
     }
 
-    /// The surface as a mesh that follows the model.
+    /// Returns the surface as a live mesh, which changes with the model.
     pub fn mesh(&self) -> RawMesh {
         RawMesh(Body::Live(Rc::<RefCell<DeformableModel>>::clone(&self.0)))
     }
 
-    /// Iterations until the end or `iterations` of them; the report of the last, with the events of all.
+    /// Makes `iterations` steps, fewer if the model is done; returns the report of the last step, with the events of
+    /// all.
     pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
         let mut model = self.0.borrow_mut();
         let mut report = model.step().map_err(Failure::from)?;
@@ -100,25 +102,25 @@ impl RawDeformable {
         Ok(to_js(&report)?)
     }
 
-    /// Adds what this level shows and the surface leaves out.
+    /// Adds the parts of the current level's contour that the surface lacks; returns the report.
     pub fn seed(&self) -> Result<JsValue, JsValue> {
         let report = self.0.borrow_mut().seed().map_err(Failure::from)?;
         Ok(to_js(&report)?)
     }
 
-    /// Begins to measure how much of the iso-surface is covered.
+    /// Starts a measurement of how much of the iso-surface the surface covers.
     #[wasm_bindgen(js_name = surveyCoverage)]
     pub fn survey_coverage(&self) -> Result<RawCoverageSurvey, JsValue> {
         let survey = self.0.borrow().survey_coverage().map_err(Failure::from)?;
         Ok(RawCoverageSurvey(Some(survey)))
     }
 
-    /// All parameters.
+    /// Returns all parameters.
     pub fn params(&self) -> Result<JsValue, JsValue> {
         Ok(to_js(self.0.borrow().params())?)
     }
 
-    /// Some parameters, checked together with the others before any is taken.
+    /// Sets some parameters; all are validated together before any is changed.
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
         let mut model = self.0.borrow_mut();
@@ -127,7 +129,7 @@ impl RawDeformable {
         Ok(())
     }
 
-    /// Attractors, five numbers each: x, y, z, strength, radius.
+    /// Sets the attractors, packed with five numbers each: x, y, z, strength, radius.
     #[wasm_bindgen(js_name = setAttractors)]
     pub fn set_attractors(&self, packed: &Float64Array) -> Result<(), JsValue> {
         let numbers = doubles(packed)?;
@@ -141,52 +143,52 @@ impl RawDeformable {
         Ok(())
     }
 
-    /// Pyramid level, 0 = the volume itself.
+    /// Returns the pyramid level of the current step; 0 is the volume itself.
     pub fn level(&self) -> usize {
         self.0.borrow().level()
     }
 
-    /// Edge length the sampling is built on, world units.
+    /// Returns δ, the least edge length of the sampling, in world units.
     pub fn delta(&self) -> f64 {
         self.0.borrow().delta()
     }
 
-    /// Speed of each vertex along its normal, in the order of the mesh's arrays.
+    /// Returns the speed of each vertex along its normal, in the order of the mesh's arrays.
     pub fn speeds(&self) -> Vec<f32> {
         self.0.borrow().speeds()
     }
 
-    /// The whole state.
+    /// Returns the complete state of the run, for `restore`.
     pub fn save(&self) -> Vec<u8> {
         self.0.borrow().save()
     }
 
-    /// Back to a saved state.
+    /// Restores a saved state; the run then continues bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())
     }
 }
 
-/// A measurement of coverage under way, of the surface as it was when it began.
+/// A coverage measurement in progress, of the surface at the moment it was started.
 #[wasm_bindgen]
 pub struct RawCoverageSurvey(Option<CoverageSurvey>);
 
 #[wasm_bindgen]
 impl RawCoverageSurvey {
-    /// Tests so many further triangles; the share of all that have been tested.
+    /// Tests the next `triangles` triangles; returns the fraction of all that have been tested.
     pub fn advance(&mut self, triangles: usize) -> f64 {
         self.0.as_mut().map_or(1.0, |survey| survey.advance(triangles))
     }
 
-    /// The result, once all triangles have been tested.
+    /// Returns the result, after all triangles have been tested.
     pub fn finish(&mut self) -> Result<JsValue, JsValue> {
         let survey = self.0.take().ok_or_else(|| Failure::invalid("coverage", "has been measured"))?;
         Ok(to_js(&Measured::from(survey.finish()))?)
     }
 }
 
-/// [`Coverage`] as JavaScript has it.
+/// [`Coverage`] as it is passed to JavaScript.
 #[derive(Serialize)]
 struct Measured {
     recall: f64,
@@ -215,7 +217,7 @@ impl From<Coverage> for Measured {
     }
 }
 
-/// What the model's parameters are, for building controls.
+/// Returns the specifications of the model's parameters, from which user interfaces build their controls.
 #[wasm_bindgen(js_name = deformableParamSpecs)]
 pub fn deformable_param_specs() -> Result<JsValue, JsValue> {
     Ok(to_js(&param_specs())?)

@@ -1,4 +1,5 @@
-//! How a failure crosses into JavaScript: as `{ code, message }`, which the TypeScript side makes a `VesicleError` of.
+//! Conversion of the core's errors to JavaScript: `{ code, message }`, which the TypeScript side turns into a
+//! `VesicleError`.
 
 use js_sys::{Object, Reflect};
 use wasm_bindgen::prelude::JsValue;
@@ -8,7 +9,7 @@ use crate::mesh::MeshError;
 use crate::methods::MethodError;
 use crate::volume::VolumeError;
 
-/// A failure on its way to JavaScript.
+/// An error with the code and message that JavaScript receives.
 #[derive(Debug)]
 pub struct Failure {
     code: &'static str,
@@ -16,17 +17,17 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// A failure of one of the kinds that the TypeScript `ErrorCode` lists.
+    /// Creates a failure with a code of the TypeScript `ErrorCode`.
     pub fn new(code: &'static str, message: impl Into<String>) -> Self {
         Self { code, message: message.into() }
     }
 
-    /// An argument that cannot be used, named as the caller knows it.
+    /// Creates an `invalid-argument` failure, with the parameter's name as the caller knows it.
     pub fn invalid(parameter: &str, problem: &str) -> Self {
         Self::new("invalid-argument", format!("{parameter}: {problem}"))
     }
 
-    /// More memory than there is.
+    /// Creates a `too-large` failure: more memory is needed than there is.
     pub fn too_large(bytes: u64) -> Self {
         Self::new(
             "too-large",

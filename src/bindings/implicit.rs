@@ -1,4 +1,4 @@
-//! The implicit surface, its cameras, and files of points.
+//! Bindings of the implicit surface, its cameras, and files of points.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -17,47 +17,48 @@ use crate::methods::implicit::{
     Camera, Cloud, Edits, ImplicitOptions, ImplicitParams, ImplicitSurface, param_specs,
 };
 
-/// The points of a file.
+/// A point cloud read from a file.
 #[wasm_bindgen]
 pub struct RawPoints(PointCloud);
 
 #[wasm_bindgen]
 impl RawPoints {
-    /// From the bytes of a file.
+    /// Reads a point cloud from the bytes of a file.
     pub fn parse(file: &Uint8Array) -> Result<RawPoints, JsValue> {
         Ok(RawPoints(parse_points(&bytes(file)?).map_err(Failure::from)?))
     }
 
-    /// Packed xyz.
+    /// Returns the positions as packed xyz.
     pub fn points(&self) -> Vec<f32> {
         packed(&self.0.points)
     }
 
-    /// Packed xyz, where there are any.
+    /// Returns the normals as packed xyz, if the file has them.
     pub fn normals(&self) -> Option<Vec<f32>> {
         self.0.normals.as_deref().map(packed)
     }
 
-    /// Packed rgb, where there are any.
+    /// Returns the colours as packed rgb, if the file has them.
     pub fn colors(&self) -> Option<Vec<f32>> {
         self.0.colors.as_deref().map(packed)
     }
 }
 
-/// Cameras, collected.
+/// A list of cameras, passed to an implicit surface.
 #[wasm_bindgen]
 #[derive(Default)]
 pub struct RawCameras(Vec<Camera>);
 
 #[wasm_bindgen]
 impl RawCameras {
-    /// None yet.
+    /// Creates an empty list.
     #[wasm_bindgen(constructor)]
     pub fn new() -> RawCameras {
         Self::default()
     }
 
-    /// One more: twelve numbers row by row, and rgba bytes where there is a picture.
+    /// Appends a camera: a row-major 3 × 4 projection from world to pixels, the image size in pixels, and the image as
+    /// rgba bytes if there is one.
     pub fn push(
         &mut self,
         projection: &[f64],
@@ -73,13 +74,13 @@ impl RawCameras {
     }
 }
 
-/// An implicit surface, shared with its live mesh.
+/// Handle of an implicit surface, which it shares with its live mesh.
 #[wasm_bindgen]
 pub struct RawImplicit(Rc<RefCell<ImplicitSurface>>);
 
 #[wasm_bindgen]
 impl RawImplicit {
-    /// A surface of packed points; parameters are written over the defaults.
+    /// Creates an implicit surface of packed points; `params` are written over the defaults.
     #[wasm_bindgen(constructor)]
     #[expect(
         clippy::too_many_arguments,
@@ -115,18 +116,18 @@ impl RawImplicit {
         Ok(RawImplicit(Rc::new(RefCell::new(surface))))
     }
 
-    /// The surface as a mesh that follows it.
+    /// Returns the surface as a live mesh, which changes with the model.
     pub fn mesh(&self) -> RawMesh {
         RawMesh(Body::Live(Rc::<RefCell<ImplicitSurface>>::clone(&self.0)))
     }
 
-    /// The surface that is being extracted, as far as it was followed.
+    /// Returns a copy of the part of the surface that has been extracted so far.
     pub fn preview(&self) -> Result<RawMesh, JsValue> {
         let mesh = self.0.borrow().preview().map_err(Failure::from)?;
         Ok(RawMesh(Body::Triangles(Rc::new(mesh))))
     }
 
-    /// Slices until the end or `iterations` of them; the report of the last.
+    /// Makes `iterations` steps, fewer if the model is done; returns the report of the last.
     pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
         let mut surface = self.0.borrow_mut();
         let mut report = surface.step().map_err(Failure::from)?;
@@ -139,12 +140,12 @@ impl RawImplicit {
         Ok(to_js(&report)?)
     }
 
-    /// All parameters.
+    /// Returns all parameters.
     pub fn params(&self) -> Result<JsValue, JsValue> {
         Ok(to_js(self.0.borrow().params())?)
     }
 
-    /// Some parameters, checked together with the others before any is taken.
+    /// Sets some parameters; all are validated together before any is changed.
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
         let mut surface = self.0.borrow_mut();
@@ -153,7 +154,8 @@ impl RawImplicit {
         Ok(())
     }
 
-    /// Points by hand, packed, in place of those before.
+    /// Sets the manual edits of the points in place of earlier ones: points added and points outside as packed xyz, and
+    /// the indices of points removed.
     #[wasm_bindgen(js_name = setEdits)]
     pub fn set_edits(
         &self,
@@ -166,45 +168,45 @@ impl RawImplicit {
         Ok(())
     }
 
-    /// Points added by hand, packed.
+    /// Returns the points that were added manually, as packed xyz.
     pub fn added(&self) -> Vec<f32> {
         packed(&self.0.borrow().edits().added)
     }
 
-    /// Indices of those left out by hand.
+    /// Returns the indices of the points that were removed manually.
     pub fn removed(&self) -> Vec<u32> {
         self.0.borrow().edits().removed.clone()
     }
 
-    /// Points outside by hand, packed.
+    /// Returns the exterior points that were set manually, as packed xyz.
     pub fn outside(&self) -> Vec<f32> {
         packed(&self.0.borrow().edits().outside)
     }
 
-    /// f at packed points.
+    /// Returns the values of f at packed points.
     pub fn evaluate(&self, at: &Float32Array) -> Result<Vec<f32>, JsValue> {
         let values = self.0.borrow().evaluate(&points(at)?).map_err(Failure::from)?;
         Ok(values.into_iter().map(|value| value as f32).collect())
     }
 
-    /// ∇f at packed points, packed.
+    /// Returns the gradients ∇f at packed points, as packed xyz.
     pub fn gradient(&self, at: &Float32Array) -> Result<Vec<f32>, JsValue> {
         let gradients = self.0.borrow().gradient(&points(at)?).map_err(Failure::from)?;
         Ok(gradients.into_iter().flat_map(|g| g.as_vec3().to_array()).collect())
     }
 
-    /// The points that take part (0) or those outside (1), packed.
+    /// Returns the surface constraints (0) or the exterior constraints (1), as packed xyz.
     pub fn constraints(&self, which: usize) -> Vec<f32> {
         self.0.borrow().constraints().get(which).map(|all: &Vec<Vec3>| packed(all)).unwrap_or_default()
     }
 
-    /// How well the surface fits, as the contract has it.
+    /// Returns the fit of the surface to the original points, as `ImplicitSurface.fitness` documents it.
     pub fn fitness(&self) -> Result<JsValue, JsValue> {
         let fitness = self.0.borrow().fitness().map_err(Failure::from)?;
         Ok(to_js(&fitness)?)
     }
 
-    /// f on a grid.
+    /// Returns f sampled on a grid of `dims` voxels around the object.
     #[wasm_bindgen(js_name = toVolume)]
     pub fn to_volume(&self, dims: &[u32]) -> Result<RawVolume, JsValue> {
         let dims: [u32; 3] =
@@ -213,13 +215,14 @@ impl RawImplicit {
         Ok(RawVolume(volume))
     }
 
-    /// Colours the surface from photographs.
+    /// Colours the surface from the images of cameras.
     pub fn colorize(&self, cameras: RawCameras) -> Result<(), JsValue> {
         self.0.borrow_mut().colorize(&cameras.0).map_err(Failure::from)?;
         Ok(())
     }
 
-    /// What else there is to tell.
+    /// Returns further results: cell size, point spacing, numbers of duplicates and outliers, and a warning about the
+    /// parameters.
     pub fn facts(&self) -> Result<JsValue, JsValue> {
         let surface = self.0.borrow();
         Ok(to_js(&Facts {
@@ -231,12 +234,12 @@ impl RawImplicit {
         })?)
     }
 
-    /// The whole state.
+    /// Returns the complete state of the run, for `restore`.
     pub fn save(&self) -> Vec<u8> {
         self.0.borrow().save()
     }
 
-    /// Back to a saved state.
+    /// Restores a saved state; the run then continues bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())
@@ -253,7 +256,7 @@ struct Facts {
     warning: Option<&'static str>,
 }
 
-/// What the surface's parameters are, for building controls.
+/// Returns the specifications of the implicit surface's parameters, from which user interfaces build their controls.
 #[wasm_bindgen(js_name = implicitParamSpecs)]
 pub fn implicit_param_specs() -> Result<JsValue, JsValue> {
     Ok(to_js(&param_specs())?)

@@ -1,4 +1,4 @@
-//! Meshes: closed ones that can be edited, plain triangles as they came, and the live surface of a model.
+//! Bindings of meshes: editable closed meshes, plain triangle lists, and the live surfaces of models.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -22,23 +22,24 @@ use crate::remesh::{
 use crate::spatial::{SurfaceDistance, SurfacePoint, TriangleTree, cross_section, surface_distance};
 use crate::volume::marching_cubes_world;
 
-/// What stands behind a JavaScript `Mesh`.
+/// The content of a JavaScript `Mesh`.
 pub(super) enum Body {
-    /// Closed, and ready to be edited.
+    /// A closed mesh that can be edited.
     Surface(Box<Mesh>),
-    /// As it was given: perhaps open, perhaps crossing itself.
+    /// A list of triangles as given, which may be open or intersect itself.
     Triangles(Rc<TriangleMesh>),
-    /// The surface of a model, as it is now.
+    /// The live surface of a model.
     Live(Rc<RefCell<dyn Live>>),
 }
 
-/// A method with a surface of its own.
+/// A model with a surface that a JavaScript `Mesh` can follow.
 pub(super) trait Live {
-    /// The surface as it is now.
+    /// Returns a copy of the current surface.
     fn surface(&self) -> TriangleMesh;
-    /// Numbers of its vertices and triangles.
+    /// Returns the numbers of vertices and triangles.
     fn counts(&self) -> [usize; 2];
-    /// How often its connectivity changed, and how often a vertex moved.
+    /// Returns the topology version and the geometry version, which increase when connectivity changes and when a
+    /// vertex moves.
     fn versions(&self) -> [u32; 2];
 }
 
@@ -70,23 +71,23 @@ impl Live for ImplicitSurface {
     }
 }
 
-/// A mesh of any kind.
+/// A mesh of any kind: editable, a list of triangles, or live.
 #[wasm_bindgen]
 pub struct RawMesh(pub(super) Body);
 
-/// A mesh's arrays at one moment, to be copied out.
+/// A snapshot of a mesh's arrays, to be copied out.
 #[wasm_bindgen]
 pub struct RawArrays(Rc<TriangleMesh>);
 
 #[wasm_bindgen]
 impl RawMesh {
-    /// A sphere of nearly equal triangles.
+    /// Creates a sphere of nearly equilateral triangles with edges of at most `max_edge`.
     pub fn icosphere(center: &[f64], radius: f64, max_edge: f64) -> Result<RawMesh, JsValue> {
         let mesh = Mesh::icosphere(point(center)?.as_vec3(), radius as f32, max_edge as f32);
         Ok(RawMesh(Body::Surface(Box::new(mesh.map_err(Failure::from)?))))
     }
 
-    /// From packed arrays, which are copied.
+    /// Creates a mesh from packed arrays, which are copied.
     #[wasm_bindgen(js_name = fromArrays)]
     pub fn from_arrays(
         positions: &Float32Array,
@@ -104,7 +105,7 @@ impl RawMesh {
         Ok(RawMesh(loose(mesh)))
     }
 
-    /// From the bytes of a file.
+    /// Reads a mesh from the bytes of a file, with a texture from a separate image if one is given.
     pub fn parse(file: &Uint8Array, texture: Option<RawTexture>) -> Result<RawMesh, JsValue> {
         let file = bytes(file)?;
         let mesh = match texture {
@@ -114,14 +115,14 @@ impl RawMesh {
         Ok(RawMesh(loose(mesh.map_err(Failure::from)?)))
     }
 
-    /// Iso-surface of one frame of a volume, in world space.
+    /// Returns the iso-surface of one frame of a volume, in world space.
     #[wasm_bindgen(js_name = marchingCubes)]
     pub fn marching_cubes(volume: &RawVolume, iso: f64, frame: usize) -> Result<RawMesh, JsValue> {
         let mesh = marching_cubes_world(&volume.0, iso, frame).map_err(Failure::from)?;
         Ok(RawMesh(loose(mesh)))
     }
 
-    /// Number of vertices.
+    /// Returns the number of vertices.
     #[wasm_bindgen(js_name = vertexCount)]
     pub fn vertex_count(&self) -> usize {
         match &self.0 {
@@ -131,7 +132,7 @@ impl RawMesh {
         }
     }
 
-    /// Number of triangles.
+    /// Returns the number of triangles.
     #[wasm_bindgen(js_name = triangleCount)]
     pub fn triangle_count(&self) -> usize {
         match &self.0 {
@@ -141,7 +142,7 @@ impl RawMesh {
         }
     }
 
-    /// Counts up when connectivity changes.
+    /// Returns a counter that increases when connectivity changes.
     #[wasm_bindgen(js_name = topologyVersion)]
     pub fn topology_version(&self) -> u32 {
         match &self.0 {
@@ -151,7 +152,7 @@ impl RawMesh {
         }
     }
 
-    /// Counts up when any vertex moves.
+    /// Returns a counter that increases when any vertex moves.
     #[wasm_bindgen(js_name = geometryVersion)]
     pub fn geometry_version(&self) -> u32 {
         match &self.0 {
@@ -161,7 +162,7 @@ impl RawMesh {
         }
     }
 
-    /// The arrays as they are now.
+    /// Returns a snapshot of the arrays, with normals.
     pub fn arrays(&self) -> RawArrays {
         let mut mesh = self.with_normals();
         if mesh.corner_uvs.is_some() {
@@ -171,45 +172,46 @@ impl RawMesh {
         RawArrays(mesh)
     }
 
-    /// Measures as the contract's `MeshInfo`.
+    /// Returns the measures of the mesh as a `MeshInfo`.
     pub fn info(&self) -> Result<JsValue, JsValue> {
         Ok(to_js(&Info::from(measure(&self.triangles())))?)
     }
 
-    /// An independent report as the contract's `MeshReport`.
+    /// Tests the mesh independently of the edits that made it; returns a `MeshReport`.
     pub fn check(&self) -> Result<JsValue, JsValue> {
         let report = report(&self.triangles()).map_err(Failure::from)?;
         Ok(to_js(&Report::from(report))?)
     }
 
-    /// The picture on the mesh, where there is one.
+    /// Returns the texture, if the mesh has one.
     pub fn texture(&self) -> Option<RawTexture> {
         let texture = match &self.0 {
-            // Edits have dropped it.
+            // Editable meshes have no texture.
             Body::Surface(_) => None,
             Body::Triangles(_) | Body::Live(_) => self.triangles().texture.clone(),
         };
         texture.map(RawTexture)
     }
 
-    /// As many vertices as texture needs; see [`TriangleMesh::split_at_seams`].
+    /// Returns the mesh with vertices duplicated along the seams of the texture; see [`TriangleMesh::split_at_seams`].
     #[wasm_bindgen(js_name = splitAtSeams)]
     pub fn split_at_seams(&self) -> RawMesh {
         RawMesh(loose(self.triangles().split_at_seams()))
     }
 
-    /// One mesh a connected component.
+    /// Returns one mesh per connected component.
     pub fn components(&self) -> Vec<RawMesh> {
         self.triangles().components().into_iter().map(|part| RawMesh(loose(part))).collect()
     }
 
-    /// One sqrt(3) refinement pass.
+    /// Refines the mesh by one sqrt(3) pass.
     pub fn refine(&mut self) -> Result<(), JsValue> {
         self.editable()?.refine().map_err(Failure::from)?;
         Ok(())
     }
 
-    /// One round of restructuring by passes: collapses (0), splits (1), flips (2); see [`restructure`].
+    /// Runs passes of restructuring in the given order: collapses (0), splits (1), flips (2); see [`restructure`].
+    /// Returns the number of edits.
     ///
     /// [`restructure`]: crate::remesh::restructure
     pub fn restructure(&mut self, min: f64, max: f64, passes: &[u8]) -> Result<u32, JsValue> {
@@ -227,14 +229,14 @@ impl RawMesh {
         Ok(changes.creations + changes.deletions + changes.inversions)
     }
 
-    /// Quadric decimation; see [`decimate`].
+    /// Decimates the mesh to `target_triangles` by quadric error; see [`decimate`].
     pub fn decimate(&mut self, target_triangles: f64) -> Result<(), JsValue> {
-        // A fraction is cut off, and so is what no mesh can have.
+        // Truncates a fraction, and saturates a count that no mesh can have.
         let target = target_triangles as usize;
         if let Body::Triangles(mesh) = &self.0
             && mesh.triangles.len() <= target
         {
-            // Nothing is left to do, and nothing changes; an open mesh is refused all the same.
+            // Already small enough: nothing changes, but an open mesh is still rejected.
             Mesh::from_triangles(mesh).map_err(Failure::from)?;
             return Ok(());
         }
@@ -242,49 +244,49 @@ impl RawMesh {
         Ok(())
     }
 
-    /// Edges into bounds; see [`remesh`].
+    /// Remeshes to edge lengths in `min..=max`; see [`remesh`].
     pub fn remesh(&mut self, min: f64, max: f64) -> Result<(), JsValue> {
         let bounds = EdgeBounds { min: min as f32, max: max as f32 };
         remesh(self.editable()?, bounds).map_err(Failure::from)?;
         Ok(())
     }
 
-    /// Mean curvature of each vertex.
+    /// Returns the mean curvature at each vertex.
     #[wasm_bindgen(js_name = meanCurvature)]
     pub fn mean_curvature(&self) -> Vec<f32> {
         narrowed(&curvature(&self.triangles()).mean)
     }
 
-    /// Gaussian curvature of each vertex.
+    /// Returns the Gaussian curvature at each vertex.
     #[wasm_bindgen(js_name = gaussianCurvature)]
     pub fn gaussian_curvature(&self) -> Vec<f32> {
         narrowed(&curvature(&self.triangles()).gaussian)
     }
 
-    /// Distance along the surface of each vertex.
+    /// Returns the geodesic distance of each vertex from vertex `from_vertex`.
     pub fn geodesic(&self, from_vertex: u32) -> Result<Vec<f32>, JsValue> {
         Ok(narrowed(&geodesic(&self.triangles(), from_vertex).map_err(Failure::from)?))
     }
 
-    /// Distances to another surface as the contract has them.
+    /// Returns the distances to another surface, per vertex and in summary, as `Mesh.distanceTo` documents them.
     #[wasm_bindgen(js_name = distanceTo)]
     pub fn distance_to(&self, other: &RawMesh) -> Result<JsValue, JsValue> {
         let found = surface_distance(&self.triangles(), &other.triangles()).map_err(Failure::from)?;
         let summaries = to_js(&Summaries::from(&found))?;
         let per_vertex = Float32Array::from(narrowed(&found.per_vertex).as_slice());
-        // Setting a property of a fresh plain object cannot fail.
+        // Setting a property of a new plain object cannot fail.
         Reflect::set(&summaries, &"perVertex".into(), &per_vertex).ok();
         Ok(summaries)
     }
 
-    /// The nearest triangle a ray meets, or nothing.
+    /// Returns the nearest triangle that a ray hits; undefined if it hits none.
     pub fn pick(&self, origin: &[f64], direction: &[f64]) -> Result<JsValue, JsValue> {
         let tree = TriangleTree::new(&self.triangles()).map_err(Failure::from)?;
         let hit = tree.ray_hit(point(origin)?.as_vec3(), direction_of(direction)?);
         Ok(to_js(&hit.map(Hit::from))?)
     }
 
-    /// Pairs of points where a plane cuts.
+    /// Returns the line segments in which a plane cuts the surface, as packed pairs of points.
     #[wasm_bindgen(js_name = crossSection)]
     pub fn cross_section(&self, origin: &[f64], normal: &[f64]) -> Result<Vec<f32>, JsValue> {
         let (origin, normal) = (point(origin)?.as_vec3(), direction_of(normal)?);
@@ -292,7 +294,7 @@ impl RawMesh {
         Ok(packed(segments.as_flattened()))
     }
 
-    /// The bytes of a file.
+    /// Returns the mesh as the bytes of a file; `format` is glb, ply, stl, obj, vtp or mz3.
     #[wasm_bindgen(js_name = toBytes)]
     pub fn to_bytes(&self, format: &str) -> Result<Vec<u8>, JsValue> {
         let format = MeshFormat::from_extension(format)
@@ -300,7 +302,7 @@ impl RawMesh {
         Ok(write_mesh(&self.with_normals(), format).map_err(Failure::from)?)
     }
 
-    /// A copy that nothing else changes.
+    /// Returns an independent copy; that of a live mesh no longer changes with its model.
     #[wasm_bindgen(js_name = clone)]
     pub fn duplicate(&self) -> RawMesh {
         match &self.0 {
@@ -309,6 +311,7 @@ impl RawMesh {
         }
     }
 
+    /// Returns the triangles with vertex normals, which are computed if there are none.
     fn with_normals(&self) -> Rc<TriangleMesh> {
         let mut mesh = self.triangles();
         if mesh.normals.is_none() {
@@ -318,6 +321,7 @@ impl RawMesh {
         mesh
     }
 
+    /// Returns the triangles of the current mesh.
     pub(super) fn triangles(&self) -> Rc<TriangleMesh> {
         match &self.0 {
             Body::Surface(mesh) => Rc::new(mesh.to_triangles()),
@@ -326,7 +330,7 @@ impl RawMesh {
         }
     }
 
-    /// The mesh ready for edits; triangles become one now, if they are closed.
+    /// Returns the mesh for editing. A list of triangles becomes an editable mesh first; an error if it is not closed.
     fn editable(&mut self) -> Result<&mut Mesh, Failure> {
         if let Body::Triangles(triangles) = &self.0 {
             self.0 = Body::Surface(Box::new(Mesh::from_triangles(triangles)?));
@@ -338,13 +342,13 @@ impl RawMesh {
     }
 }
 
-/// A picture, to be copied in or out.
+/// The texture of a mesh: an image file in memory.
 #[wasm_bindgen]
 pub struct RawTexture(Arc<Texture>);
 
 #[wasm_bindgen]
 impl RawTexture {
-    /// From the bytes of an image file, which must be of the media type that is named.
+    /// Creates a texture from the bytes of an image file, which must be of the media type `kind`.
     #[wasm_bindgen(constructor)]
     pub fn new(kind: &str, file: &Uint8Array) -> Result<RawTexture, JsValue> {
         let texture = Texture::new(bytes(file)?).map_err(Failure::from)?;
@@ -356,12 +360,12 @@ impl RawTexture {
         Ok(RawTexture(Arc::new(texture)))
     }
 
-    /// Its media type.
+    /// Returns the media type of the image.
     pub fn kind(&self) -> String {
         self.0.kind().media_type().to_owned()
     }
 
-    /// The image file.
+    /// Returns the bytes of the image file.
     pub fn bytes(&self) -> Vec<u8> {
         self.0.bytes().to_vec()
     }
@@ -369,39 +373,39 @@ impl RawTexture {
 
 #[wasm_bindgen]
 impl RawArrays {
-    /// Number of vertices.
+    /// Returns the number of vertices.
     pub fn vertices(&self) -> usize {
         self.0.positions.len()
     }
 
-    /// Number of triangles.
+    /// Returns the number of triangles.
     pub fn triangles(&self) -> usize {
         self.0.triangles.len()
     }
 
-    /// Packed xyz.
+    /// Copies the positions to `out`, as packed xyz.
     pub fn positions(&self, out: &Float32Array) {
         fill(out, &packed(&self.0.positions));
     }
 
-    /// Packed xyz.
+    /// Copies the normals to `out`, as packed xyz.
     pub fn normals(&self, out: &Float32Array) {
         fill(out, &packed(self.0.normals.as_deref().unwrap_or_default()));
     }
 
-    /// Packed abc.
+    /// Copies the triangles to `out`, as packed abc.
     pub fn indices(&self, out: &Uint32Array) {
         let indices = self.0.triangles.as_flattened();
         out.subarray(0, indices.len() as u32).copy_from(indices);
     }
 
-    /// Packed uv, where there are any.
+    /// Returns the texture coordinates as packed uv, if there are any.
     pub fn uvs(&self) -> Option<Vec<f32>> {
         let uvs = self.0.uvs.as_ref()?;
         Some(uvs.iter().flat_map(|uv| uv.to_array()).collect())
     }
 
-    /// Packed rgb, where there are any.
+    /// Returns the colours as packed rgb, if there are any.
     pub fn colors(&self) -> Option<Vec<f32>> {
         self.0.colors.as_deref().map(packed)
     }
@@ -526,21 +530,21 @@ impl From<Measures> for Info {
     }
 }
 
-/// A direction of any length but 0, as one of length 1.
+/// Normalises a direction of any length but 0.
 fn direction_of(values: &[f64]) -> Result<Vec3, Failure> {
     let given = point(values)?;
     let largest = given.abs().max_element();
-    // Scaled first: squares of very long and very short ones leave the range of numbers.
+    // Scaled first: squares of very long and very short vectors would overflow or underflow.
     Ok((given / largest).normalize_or_zero().as_vec3())
 }
 
-/// The triangles of a mesh, copied out of it for a model to keep.
+/// A copy of the triangles of a mesh, for a model to keep.
 #[wasm_bindgen]
 pub struct TrianglesOf(pub(super) TriangleMesh);
 
 #[wasm_bindgen]
 impl TrianglesOf {
-    /// Those of `mesh` as it is now.
+    /// Copies the current triangles of `mesh`.
     #[wasm_bindgen(constructor)]
     pub fn new(mesh: &RawMesh) -> TrianglesOf {
         TrianglesOf((*mesh.triangles()).clone())

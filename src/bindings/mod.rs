@@ -1,7 +1,7 @@
-//! The JavaScript face of the core: convert, call one core function, convert back.
+//! JavaScript bindings of the core: each converts its arguments, calls one core function and converts the result.
 //!
-//! What is exported here is private to the npm package: the classes people use are the TypeScript ones in
-//! `js/`, which hold these as raw handles and check every argument first.
+//! These exports are private to the npm package. Its public classes are the TypeScript ones in `js/`, which hold these
+//! as raw handles and check all arguments first.
 
 mod animation;
 mod convert;
@@ -18,14 +18,15 @@ use wasm_bindgen::throw_val;
 
 use error::Failure;
 
-/// Runs once, when the module starts.
+/// Installs the panic hook; runs once, when the module is instantiated.
 #[wasm_bindgen(start)]
 pub fn start() {
-    // A panic aborts; thrown from here its message reaches the caller, who is told that the instance is lost.
+    // A panic aborts the module. Thrown from here, its message reaches the caller, who learns that the instance is
+    // unusable.
     std::panic::set_hook(Box::new(|info| throw_val(Failure::new("panic", info.to_string()).into())));
 }
 
-/// The version of the library, as in `Cargo.toml`.
+/// Returns the version of the library, as in `Cargo.toml`.
 #[wasm_bindgen]
 pub fn version() -> String {
     env!("CARGO_PKG_VERSION").to_owned()

@@ -1,4 +1,4 @@
-//! The multiresolution model.
+//! Bindings of the multiresolution model.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -15,16 +15,17 @@ use crate::methods::multires::{
     ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, param_specs,
 };
 
-/// A multiresolution model, shared with its live meshes.
+/// Handle of a multiresolution model, which it shares with its live meshes.
 #[wasm_bindgen]
 pub struct RawMultires(Rc<RefCell<MultiresolutionModel>>);
 
-/// One of the surfaces of a model.
+/// One of the live surfaces of a model.
 struct View {
     model: Rc<RefCell<MultiresolutionModel>>,
     which: Which,
 }
 
+/// The surfaces of a model: detailed, deformed base, and link mesh.
 #[derive(Clone, Copy)]
 enum Which {
     Detailed,
@@ -57,7 +58,7 @@ impl Live for View {
 
 #[wasm_bindgen]
 impl RawMultires {
-    /// A model of meshes, which are copied, and packed ellipsoids; parameters are written over the defaults.
+    /// Creates a model of meshes and packed ellipsoids; `params` are written over the defaults.
     #[wasm_bindgen(constructor)]
     pub fn new(
         detail: Option<TrianglesOf>,
@@ -76,7 +77,7 @@ impl RawMultires {
         Ok(RawMultires(Rc::new(RefCell::new(model))))
     }
 
-    /// A mesh that follows: the detailed surface (0), the deformed base (1), the link mesh (2).
+    /// Returns a live mesh of the model: the detailed surface (0), the deformed base (1) or the link mesh (2).
     pub fn mesh(&self, which: u32) -> RawMesh {
         let which = match which {
             0 => Which::Detailed,
@@ -86,14 +87,15 @@ impl RawMultires {
         RawMesh(Body::Live(Rc::new(RefCell::new(View { model: Rc::clone(&self.0), which }))))
     }
 
-    /// The meshes of the solver's levels, coarse to fine.
+    /// Returns the meshes of the multi-level solver, from coarse to fine.
     #[wasm_bindgen(js_name = levelMeshes)]
     pub fn level_meshes(&self) -> Vec<RawMesh> {
         let levels = self.0.borrow().levels();
         levels.into_iter().map(|mesh| RawMesh(Body::Triangles(Rc::new(mesh)))).collect()
     }
 
-    /// So many frames, or to the end; the report of the last.
+    /// Makes `iterations` steps, fewer if the model is done; returns the report of the last step, with the events of
+    /// all.
     pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
         let mut model = self.0.borrow_mut();
         let mut report = model.step().map_err(Failure::from)?;
@@ -108,36 +110,36 @@ impl RawMultires {
         Ok(to_js(&report)?)
     }
 
-    /// Where the ellipsoids are to be, packed.
+    /// Sets the target ellipsoids, packed with twelve numbers each: centre and three semi-axes.
     #[wasm_bindgen(js_name = setEllipsoids)]
     pub fn set_ellipsoids(&self, ellipsoids: &Float64Array) -> Result<(), JsValue> {
         self.0.borrow_mut().set_ellipsoids(&unpacked(ellipsoids)?).map_err(Failure::from)?;
         Ok(())
     }
 
-    /// Where they are now, packed.
+    /// Returns the current ellipsoids, packed.
     pub fn ellipsoids(&self) -> Vec<f64> {
         packed(&self.0.borrow().ellipsoids())
     }
 
-    /// Where they are to be, packed.
+    /// Returns the target ellipsoids, packed.
     pub fn goals(&self) -> Vec<f64> {
         packed(&self.0.borrow().goals())
     }
 
-    /// Ratios of areas (0) or directions (1) by vertex.
+    /// Returns the distortion of areas (0) or of angles (1) across the base correspondence, per vertex.
     pub fn distortion(&self, which: u32) -> Vec<f32> {
         let found = self.0.borrow().distortion();
         let values = if which == 0 { found.area } else { found.angle };
         values.into_iter().map(|value| value as f32).collect()
     }
 
-    /// All parameters.
+    /// Returns all parameters.
     pub fn params(&self) -> Result<JsValue, JsValue> {
         Ok(to_js(self.0.borrow().params())?)
     }
 
-    /// Some parameters, checked together with the others before any is taken.
+    /// Sets some parameters; all are validated together before any is changed.
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
         let mut model = self.0.borrow_mut();
@@ -146,19 +148,20 @@ impl RawMultires {
         Ok(())
     }
 
-    /// What else there is to tell.
+    /// Returns further counts: surfaces in the decomposition, folded triangles of the map T, vertices whose normal
+    /// missed the finer surface, and vertices held back to avoid self-intersections.
     pub fn facts(&self) -> Result<JsValue, JsValue> {
         let model = self.0.borrow();
         let [missed, held] = model.misses();
         Ok(to_js(&Facts { bands: model.bands(), folded: model.folded(), missed, held })?)
     }
 
-    /// The whole state.
+    /// Returns the complete state of the run, for `restore`.
     pub fn save(&self) -> Vec<u8> {
         self.0.borrow().save()
     }
 
-    /// Back to a saved state.
+    /// Restores a saved state; the run then continues bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())
@@ -173,7 +176,7 @@ struct Facts {
     held: usize,
 }
 
-/// Ellipsoids packed in twelves: the middle, and the three semi-axes.
+/// Unpacks ellipsoids of twelve numbers each: centre and three semi-axes.
 fn unpacked(packed: &Float64Array) -> Result<Vec<ControlEllipsoid>, Failure> {
     let numbers = doubles(packed)?;
     let (all, _) = numbers.as_chunks::<12>();
@@ -184,11 +187,12 @@ fn unpacked(packed: &Float64Array) -> Result<Vec<ControlEllipsoid>, Failure> {
         .collect())
 }
 
+/// Packs ellipsoids with twelve numbers each: centre and three semi-axes.
 fn packed(all: &[ControlEllipsoid]) -> Vec<f64> {
     all.iter().flat_map(|e| e.center.into_iter().chain(e.axes.into_iter().flatten())).collect()
 }
 
-/// What the model's parameters are, for building controls.
+/// Returns the specifications of the model's parameters, from which user interfaces build their controls.
 #[wasm_bindgen(js_name = multiresParamSpecs)]
 pub fn multires_param_specs() -> Result<JsValue, JsValue> {
     Ok(to_js(&param_specs())?)

@@ -1,4 +1,4 @@
-//! The surface tracker.
+//! Bindings of the surface tracker.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -18,11 +18,11 @@ use crate::methods::tracking::{
     Bounds, Component, FrameFacts, SurfaceTracker, TrackingOptions, TrackingParams, param_specs,
 };
 
-/// A surface tracker, shared with its live mesh.
+/// Handle of a surface tracker, which it shares with its live mesh.
 #[wasm_bindgen]
 pub struct RawTracker(Rc<RefCell<SurfaceTracker>>);
 
-/// The surface of the newest frame.
+/// The live surface of the current frame.
 struct Newest(Rc<RefCell<SurfaceTracker>>);
 
 impl Live for Newest {
@@ -43,8 +43,9 @@ impl Live for Newest {
 
 #[wasm_bindgen]
 impl RawTracker {
-    /// A tracker of a volume. `corners`: six numbers, of the box in the world; `voxels`: six, the first and the last voxel;
-    /// `nearest`: a point, for the surface around it or nearest to it.
+    /// Creates a tracker of a 4D volume. `corners`: six numbers, the box in world space; `voxels`: six, its first and
+    /// last voxel; `nearest`: a point that selects the surface around it or nearest to it. `params` are written over
+    /// the defaults.
     #[wasm_bindgen(constructor)]
     pub fn new(
         volume: &RawVolume,
@@ -70,19 +71,20 @@ impl RawTracker {
         Ok(RawTracker(Rc::new(RefCell::new(tracker))))
     }
 
-    /// A mesh that follows the newest frame.
+    /// Returns a live mesh of the current frame's surface.
     pub fn mesh(&self) -> RawMesh {
         RawMesh(Body::Live(Rc::new(RefCell::new(Newest(Rc::clone(&self.0))))))
     }
 
-    /// The surface of a frame that is done; nothing for the others.
+    /// Returns the surface of a finished frame; undefined for other frames.
     #[wasm_bindgen(js_name = meshAt)]
     pub fn mesh_at(&self, frame: usize) -> Option<RawMesh> {
         let tracker = self.0.borrow();
         tracker.meshes().get(frame).map(|mesh| RawMesh(Body::Triangles(Rc::new(mesh.clone()))))
     }
 
-    /// So many frames, or to the end; the report of the last.
+    /// Makes `iterations` steps, fewer if the tracker is done; returns the report of the last step, with the events of
+    /// all.
     pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
         let mut tracker = self.0.borrow_mut();
         let mut report = tracker.step().map_err(Failure::from)?;
@@ -97,47 +99,47 @@ impl RawTracker {
         Ok(to_js(&report)?)
     }
 
-    /// The frame that the mesh is of.
+    /// Returns the index of the frame that the live mesh shows.
     pub fn frame(&self) -> usize {
         self.0.borrow().frame()
     }
 
-    /// Frames of the volume, those with a boundary, those with a surface.
+    /// Returns the numbers of frames in the volume, with a boundary, and with a surface.
     pub fn counts(&self) -> Vec<u32> {
         let tracker = self.0.borrow();
         [tracker.frames(), tracker.bounded(), tracker.meshes().len()].map(|n| n as u32).to_vec()
     }
 
-    /// Points of the boundary, five numbers each: x, y, z, t, w.
+    /// Returns the boundary points of a frame, packed with five numbers each: x, y, z, t, w.
     pub fn boundary(&self, frame: usize) -> Vec<f32> {
         self.0.borrow().boundary(frame).into_iter().flatten().collect()
     }
 
-    /// The volumes of the frames that are done.
+    /// Returns the enclosed volumes of the finished frames, in world units cubed.
     pub fn volumes(&self) -> Vec<f64> {
         self.0.borrow().volumes()
     }
 
-    /// What there is to tell of the frames, the noise, and how a cycle closes.
+    /// Returns further results: the image noise, the closure error of a cycle, and the statistics of each frame.
     pub fn facts(&self) -> Result<JsValue, JsValue> {
         let tracker = self.0.borrow();
         let facts = Facts { noise: tracker.noise(), closing: tracker.closing(), frames: tracker.facts() };
         Ok(to_js(&facts)?)
     }
 
-    /// The frames that are done, as an animated GLB.
+    /// Returns the finished frames as an animated GLB.
     #[wasm_bindgen(js_name = toGlb)]
     pub fn to_glb(&self, frame_seconds: f64) -> Result<Vec<u8>, JsValue> {
         let tracker = self.0.borrow();
         Ok(write_animation(tracker.meshes(), frame_seconds).map_err(Failure::from)?)
     }
 
-    /// All parameters.
+    /// Returns all parameters.
     pub fn params(&self) -> Result<JsValue, JsValue> {
         Ok(to_js(self.0.borrow().params())?)
     }
 
-    /// Some parameters, checked together with the others before any is taken.
+    /// Sets some parameters; all are validated together before any is changed.
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
         let mut tracker = self.0.borrow_mut();
@@ -146,12 +148,12 @@ impl RawTracker {
         Ok(())
     }
 
-    /// The whole state.
+    /// Returns the complete state of the run, for `restore`.
     pub fn save(&self) -> Vec<u8> {
         self.0.borrow().save()
     }
 
-    /// Back to a saved state.
+    /// Restores a saved state; the run then continues bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         self.0.borrow_mut().restore(&bytes(state)?).map_err(Failure::from)?;
         Ok(())
@@ -166,7 +168,7 @@ struct Facts<'a> {
     frames: &'a [FrameFacts],
 }
 
-/// What the tracker's parameters are, for building controls.
+/// Returns the specifications of the tracker's parameters, from which user interfaces build their controls.
 #[wasm_bindgen(js_name = trackingParamSpecs)]
 pub fn tracking_param_specs() -> Result<JsValue, JsValue> {
     Ok(to_js(&param_specs())?)

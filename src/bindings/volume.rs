@@ -1,4 +1,4 @@
-//! Volumes.
+//! Bindings of volumes.
 
 use js_sys::{
     Float32Array, Float64Array, Int8Array, Int16Array, Int32Array, Uint8Array, Uint16Array, Uint32Array,
@@ -12,18 +12,18 @@ use crate::io::{parse_volume, write_nifti};
 use crate::math::DAffine3;
 use crate::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
 
-/// A volume.
+/// A 3D or 4D volume.
 #[wasm_bindgen]
 pub struct RawVolume(pub(super) Volume);
 
-/// Volumes collected to become the frames of one.
+/// A list of volumes that become the frames of one.
 #[wasm_bindgen]
 #[derive(Default)]
 pub struct RawFrames(Vec<Volume>);
 
 #[wasm_bindgen]
 impl RawVolume {
-    /// From a typed array, x fastest; `dims` has four numbers, `affine` sixteen, column-major.
+    /// Creates a volume from a typed array, x fastest; `dims` has four numbers, `affine` sixteen, column-major.
     #[wasm_bindgen(constructor)]
     pub fn new(
         data: &JsValue,
@@ -46,34 +46,34 @@ impl RawVolume {
         Ok(RawVolume(Volume::new(init).map_err(Failure::from)?))
     }
 
-    /// From the bytes of a file, and those of its payload where the header is detached.
+    /// Reads a volume from the bytes of a file, and those of its payload if the header is detached.
     pub fn parse(file: &Uint8Array, data: Option<Uint8Array>) -> Result<RawVolume, JsValue> {
         let payload = data.as_ref().map(bytes).transpose()?;
         Ok(RawVolume(parse_volume(&bytes(file)?, payload.as_deref()).map_err(Failure::from)?))
     }
 
-    /// NIfTI-1 bytes.
+    /// Returns the volume as a NIfTI file: NIfTI-1, or NIfTI-2 if a dimension exceeds 32,767.
     #[wasm_bindgen(js_name = toNifti)]
     pub fn to_nifti(&self) -> Result<Vec<u8>, JsValue> {
         Ok(write_nifti(&self.0).map_err(Failure::from)?)
     }
 
-    /// Voxels along x, y and z.
+    /// Returns the numbers of voxels along x, y and z.
     pub fn dims(&self) -> Vec<f64> {
         self.0.dims().map(|n| n as f64).to_vec()
     }
 
-    /// Number of frames.
+    /// Returns the number of frames.
     pub fn frames(&self) -> usize {
         self.0.frames()
     }
 
-    /// Voxel size along x, y and z.
+    /// Returns the voxel size along x, y and z, in world units.
     pub fn spacing(&self) -> Vec<f64> {
         self.0.spacing().to_vec()
     }
 
-    /// Voxel index to world, sixteen numbers, column-major.
+    /// Returns the transform from voxel indices to world space: sixteen numbers, column-major.
     pub fn affine(&self) -> Vec<f64> {
         let columns = self.0.affine().to_cols_array();
         let (columns, _) = columns.as_chunks::<3>();
@@ -81,7 +81,7 @@ impl RawVolume {
         columns.iter().zip(last_row).flat_map(|(&[x, y, z], w)| [x, y, z, w]).collect()
     }
 
-    /// `RAS` or `LPS`.
+    /// Returns the anatomical orientation of world space, `RAS` or `LPS`.
     pub fn space(&self) -> String {
         match self.0.space() {
             Space::Ras => "RAS",
@@ -90,50 +90,50 @@ impl RawVolume {
         .to_owned()
     }
 
-    /// Smallest and largest intensity.
+    /// Returns the smallest and the largest intensity.
     pub fn range(&self) -> Vec<f64> {
         self.0.range().to_vec()
     }
 
-    /// Counts per bin over the range.
+    /// Returns the histogram of a frame, with `bins` equal bins over the intensity range.
     pub fn histogram(&self, bins: usize, frame: usize) -> Result<Vec<u32>, JsValue> {
         Ok(self.0.histogram(bins, frame).map_err(Failure::from)?)
     }
 
-    /// Intensity at a world point.
+    /// Returns the intensity at a world point, by trilinear interpolation.
     pub fn sample(&self, world: &[f64], frame: usize) -> Result<f64, JsValue> {
         Ok(self.0.sample(point(world)?, frame).map_err(Failure::from)?)
     }
 
-    /// Intensities of one slice.
+    /// Returns the intensities of one slice across `axis`, row-major.
     pub fn slice(&self, axis: usize, index: usize, frame: usize) -> Result<Vec<f32>, JsValue> {
         Ok(self.0.slice(axis, index, frame).map_err(Failure::from)?)
     }
 
-    /// Intensities of one frame.
+    /// Returns all intensities of one frame.
     pub fn intensities(&self, frame: usize) -> Result<Vec<f32>, JsValue> {
         Ok(self.0.intensities(frame).map_err(Failure::from)?)
     }
 
-    /// One volume a level.
+    /// Returns the volumes of a pyramid, one per level; the first is this one.
     pub fn pyramid(&self, levels: usize, factor: f64) -> Result<Vec<RawVolume>, JsValue> {
         let levels = self.0.pyramid(levels, factor).map_err(Failure::from)?;
         Ok(levels.into_iter().map(RawVolume).collect())
     }
 
-    /// Seconds from one frame to the next; 0 where there is no such time.
+    /// Returns the seconds between frames; 0 if there is no such time.
     #[wasm_bindgen(js_name = frameSeconds)]
     pub fn frame_seconds(&self) -> f64 {
         self.0.frame_seconds()
     }
 
-    /// Means of blocks of voxels.
+    /// Returns the volume downsampled by the means of blocks of `factors` voxels along x, y and z.
     pub fn binned(&self, factors: &[u32]) -> Result<RawVolume, JsValue> {
         let factors = [0, 1, 2].map(|axis| factors.get(axis).map_or(1, |&n| n as usize));
         Ok(RawVolume(self.0.binned(factors).map_err(Failure::from)?))
     }
 
-    /// In-between slices, by optical flow or as means.
+    /// Returns the volume with in-between slices, interpolated by optical flow or linearly.
     #[wasm_bindgen(js_name = enrichSlices)]
     pub fn enrich_slices(&self, factor: Option<usize>, flow: bool) -> Result<RawVolume, JsValue> {
         let method = if flow { Enrichment::Flow } else { Enrichment::Linear };
@@ -143,24 +143,24 @@ impl RawVolume {
 
 #[wasm_bindgen]
 impl RawFrames {
-    /// None yet.
+    /// Creates an empty list.
     #[wasm_bindgen(constructor)]
     pub fn new() -> RawFrames {
         Self::default()
     }
 
-    /// One more frame. (Clones of a volume share its voxels.)
+    /// Appends a frame. (Clones of a volume share its voxels.)
     pub fn push(&mut self, volume: &RawVolume) {
         self.0.push(volume.0.clone());
     }
 
-    /// The 4D volume of all of them.
+    /// Returns the 4D volume of all frames; the list is used up.
     pub fn join(self, frame_seconds: Option<f64>) -> Result<RawVolume, JsValue> {
         Ok(RawVolume(Volume::from_frames(&self.0, frame_seconds).map_err(Failure::from)?))
     }
 }
 
-/// A typed array of any kind, copied once, kept as the type it has.
+/// Copies a typed array of any supported kind, without changing its type.
 fn voxels(data: &JsValue) -> Result<Voxels, Failure> {
     macro_rules! of {
         ($($array:ty => $voxels:ident),*) => {
@@ -174,12 +174,14 @@ fn voxels(data: &JsValue) -> Result<Voxels, Failure> {
     Err(Failure::invalid("data", "not a typed array of numbers of at most 32 bits, or of 64-bit floats"))
 }
 
+/// Converts the four dimensions.
 fn four(dims: &[u32]) -> Result<[usize; 4], Failure> {
     let dims: [u32; 4] =
         dims.try_into().map_err(|_| Failure::invalid("dims", "3 or 4 whole numbers are needed"))?;
     Ok(dims.map(|n| n as usize))
 }
 
+/// Converts sixteen numbers, column-major, to an affine transform.
 fn world(affine: &[f64]) -> Result<DAffine3, Failure> {
     let (columns, _) = affine.as_chunks::<4>();
     let last_row: Vec<f64> = columns.iter().map(|column| column[3]).collect();

@@ -1,28 +1,28 @@
-//! Meshes one after the other, as an animated GLB.
+//! Writer of animated GLB files: a sequence of meshes, each shown for one frame or more.
 //!
-//! Meshes of different connectivity cannot be morphed into one another, so each is a node of its own that has its size
-//! in its own time and the size 0 before and after. Where animations are not played the first one is seen.
+//! Meshes of different connectivity cannot be morphed into one another. Each mesh is therefore a node of its own, whose
+//! scale is 1 during its frames and 0 before and after. A viewer that plays no animations shows the first mesh.
 
 use super::glb_writer::{Parts, table};
 use crate::math::Vec3;
 use crate::mesh::{MeshError, TriangleMesh};
 use std::borrow::Borrow;
 
-/// The shortest time of a frame, seconds: no screen shows less, and after hours times that are nearer are one in single
-/// precision.
+/// Shortest duration of an animation frame, in seconds. No screen shows shorter ones, and after hours of animation,
+/// times closer together than this are equal in single precision.
 const SHORTEST: f64 = 1e-3;
 
-/// The longest time of a frame, seconds: beyond it a player seems to stand still.
+/// Longest duration of an animation frame, in seconds: with longer ones a player seems to stand still.
 const LONGEST: f64 = 1e3;
 
-/// A GLB that shows meshes one after the other, `frame_seconds` (0.001 to 1000) each; every mesh as
-/// [`write_mesh`](super::write_mesh) writes it, with its texture, normals, texture coordinates and colours.
+/// Returns the bytes of an animated GLB that shows the meshes in order, `frame_seconds` (0.001 to 1000) each. Every
+/// mesh is stored as by [`write_mesh`](super::write_mesh), with its texture, normals, texture coordinates and colours.
 ///
-/// Frames that are equal to the one before are not stored again, nor are equal textures.
+/// A frame equal to the previous one is not stored again; nor is a texture equal to an earlier one.
 ///
 /// # Errors
-/// [`MeshError::InvalidArgument`] without frames, for a mesh that is not valid or has no triangles, and for a time out
-/// of range; [`MeshError::TooLarge`] where the file would pass 4 GiB, or there is no memory for it.
+/// [`MeshError::InvalidArgument`] if there are no frames, if a mesh is not valid or has no triangles, or if the time is
+/// out of range; [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
 pub fn write_animation<M: Borrow<TriangleMesh>>(
     frames: impl IntoIterator<Item = M>,
     frame_seconds: f64,
@@ -32,22 +32,22 @@ pub fn write_animation<M: Borrow<TriangleMesh>>(
     writer.finish(frame_seconds)
 }
 
-/// An animated GLB that grows frame by frame, so that not all meshes have to be there at a time; see
+/// Builder of an animated GLB that takes one frame at a time, so that not all meshes have to be in memory at once; see
 /// [`write_animation`].
 #[derive(Default)]
 pub struct AnimationWriter {
     parts: Parts,
-    /// For each mesh in the file, the number of the frame it is seen from.
+    /// For each mesh in the file, the index of the first frame that shows it.
     starts: Vec<usize>,
     frames: usize,
     last: Option<TriangleMesh>,
 }
 
 impl AnimationWriter {
-    /// Adds a frame at the end.
+    /// Appends a frame that shows `mesh`.
     ///
     /// # Errors
-    /// As [`write_animation`]; the frame is not added then.
+    /// As [`write_animation`]; the frame is then not added.
     pub fn add(&mut self, mesh: &TriangleMesh) -> Result<(), MeshError> {
         mesh.validate()?;
         if mesh.triangles.is_empty() {
@@ -62,7 +62,7 @@ impl AnimationWriter {
         Ok(())
     }
 
-    /// The file.
+    /// Returns the bytes of the GLB file, in which each frame lasts `frame_seconds`.
     ///
     /// # Errors
     /// As [`write_animation`].
@@ -88,8 +88,9 @@ impl AnimationWriter {
         self.parts.finish(&table("animations", &animation))
     }
 
-    /// When mesh number `mesh` changes its size, in seconds, and to what. The last one keeps it up to the end: without
-    /// a time there the animation would end as its last frame begins.
+    /// Returns the animation track of mesh number `mesh`: the times in seconds at which its scale changes, and the
+    /// scales. The last mesh has a key at the end as well: without it the animation would end when its last frame
+    /// begins.
     fn track(&self, mesh: usize, frame_seconds: f64) -> (Vec<f32>, Vec<f32>) {
         let seconds = |frame: usize| (frame as f64 * frame_seconds) as f32;
         let next = self.starts.get(mesh + 1);
@@ -102,7 +103,8 @@ impl AnimationWriter {
     }
 }
 
-/// At rest all but the first have no size: the place of those that play no animation.
+/// Returns the JSON of the node of mesh number `mesh`. Without animation, all nodes but the first have scale 0, so that
+/// a viewer that plays no animations shows only the first mesh.
 fn node(mesh: usize) -> String {
     let scale = if mesh == 0 { "" } else { r#","scale":[0,0,0]"# };
     format!(r#"{{"mesh":{mesh}{scale}}}"#)

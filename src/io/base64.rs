@@ -1,8 +1,8 @@
-//! Bytes as text, by RFC 4648: in VTP files, and in the data addresses of glTF.
+//! Base64 encoding and decoding (RFC 4648), used for the arrays of VTP files and the data URIs of glTF.
 
 const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// The text that stands for the bytes, filled up with `=`.
+/// Returns the base64 text of the bytes, padded with `=`.
 pub(super) fn encode(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
@@ -16,8 +16,8 @@ pub(super) fn encode(bytes: &[u8]) -> String {
     text
 }
 
-/// The bytes that the text stands for, with or without `=` at its end; `None` for text with other signs in it, or
-/// with a single digit left over.
+/// Returns the bytes that base64 text encodes, with or without trailing `=`; `None` if it contains any other character
+/// or ends in a single leftover digit.
 pub(super) fn decode(text: &str) -> Option<Vec<u8>> {
     let digits = text.trim_end_matches('=').as_bytes();
     let mut bytes = Vec::with_capacity(digits.len() / 4 * 3 + 2);
@@ -32,6 +32,7 @@ pub(super) fn decode(text: &str) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
+/// Returns the 6-bit value of a base64 digit.
 fn value(sign: u8) -> Option<u32> {
     Some(match sign {
         b'A'..=b'Z' => u32::from(sign - b'A'),

@@ -1,4 +1,4 @@
-//! Which format a file is in, told from its bytes.
+//! Detection of the format of a volume file from its bytes.
 
 use super::gzip::{gunzip_start, is_gzip};
 use super::{FormatError, metaimage, nifti, nrrd};
@@ -7,14 +7,14 @@ use crate::volume::Volume;
 const ANY: &str = "volume file";
 const ACCEPTED: &str =
     "NIfTI (.nii, .nii.gz, .hdr with .img), NRRD (.nrrd, .nhdr with data), MetaImage (.mha, .mhd with data)";
-/// Bytes at the start of a gzipped file that are looked at.
+/// Bytes inflated from the start of a gzipped file to detect its format.
 const START: usize = 512;
 
-/// Reads a volume file, its format detected from the bytes; `detached` is the payload of a header that names
-/// another file for its voxels (where it names several, their bytes one after the other).
+/// Reads a volume file, whose format is detected from the bytes. `detached` is the payload of a header that refers to
+/// another file for its voxels (several files are concatenated in order).
 ///
 /// # Errors
-/// [`FormatError`] naming format and field; for a format that is not read, one that says which it is.
+/// [`FormatError`] with the format and the field; for a format that is not supported, one that names it.
 pub fn parse_volume(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, FormatError> {
     if is_gzip(bytes) {
         let start = gunzip_start(ANY, bytes, START)?;
@@ -42,7 +42,7 @@ pub fn parse_volume(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
     }
 }
 
-/// What a file of no accepted format is, as far as its first bytes tell.
+/// Returns the error for a file of no accepted format, which names the format if its first bytes identify it.
 fn unknown(bytes: &[u8]) -> FormatError {
     if bytes.is_empty() {
         return FormatError::truncated(ANY, "signature", 4, 0);
@@ -50,6 +50,7 @@ fn unknown(bytes: &[u8]) -> FormatError {
     FormatError::unsupported(ANY, "signature", signature(bytes), ACCEPTED)
 }
 
+/// Returns the name of an unsupported format that the first bytes identify, for the error message.
 fn signature(bytes: &[u8]) -> &'static str {
     let at = |offset: usize, mark: &[u8]| bytes.get(offset..).is_some_and(|rest| rest.starts_with(mark));
     let line = |mark: &[u8]| bytes.trim_ascii_start().starts_with(mark);

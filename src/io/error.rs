@@ -1,28 +1,28 @@
-//! What can be wrong with a file, said so that its owner can act on it.
+//! The error of all readers and writers of files, worded so that the owner of the file can act on it.
 
-/// Why a file could not be read or written; every variant names the format and the field.
+/// Reason why a file could not be read or written; every variant names the format and the field.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FormatError {
-    /// A field holds something the format does not allow, or that contradicts another field.
+    /// A field has a value that the format does not allow, or that contradicts another field.
     #[error("{format}: {field}: {problem}")]
     Invalid {
         /// Name of the file format.
         format: &'static str,
         /// Header field or part of the file.
         field: String,
-        /// What was found and what is accepted.
+        /// The value found, and the values accepted.
         problem: String,
     },
-    /// A correct file that uses something this reader does not take.
+    /// The file is valid, but uses a feature that the reader does not support.
     #[error("{format}: {field}: {found} is not supported; accepted: {accepted}")]
     Unsupported {
         /// Name of the file format.
         format: &'static str,
         /// Header field or part of the file.
         field: String,
-        /// What the file uses.
+        /// Feature that the file uses.
         found: String,
-        /// What can be read.
+        /// Alternatives that are supported.
         accepted: &'static str,
     },
     /// The file ends too early.
@@ -32,25 +32,25 @@ pub enum FormatError {
         format: &'static str,
         /// Header field or part of the file.
         field: String,
-        /// Bytes that the header asks for.
+        /// Number of bytes that the header calls for.
         needed: u64,
-        /// Bytes that are there.
+        /// Number of bytes present.
         found: u64,
     },
-    /// The content does not fit into memory.
+    /// The content does not fit in memory.
     #[error("{format}: {field}: needs {needed} bytes, more than can be had")]
     TooLarge {
         /// Name of the file format.
         format: &'static str,
         /// Header field or part of the file.
         field: String,
-        /// Bytes that would be needed.
+        /// Number of bytes that would be needed.
         needed: u64,
     },
 }
 
 impl FormatError {
-    /// An [`Invalid`](Self::Invalid) field.
+    /// Returns an [`Invalid`](Self::Invalid) error about `field`.
     pub(crate) fn invalid(
         format: &'static str,
         field: impl Into<String>,
@@ -59,7 +59,7 @@ impl FormatError {
         Self::Invalid { format, field: shown(field), problem: shown(problem) }
     }
 
-    /// Something [`Unsupported`](Self::Unsupported).
+    /// Returns an [`Unsupported`](Self::Unsupported) error about `field`.
     pub(crate) fn unsupported(
         format: &'static str,
         field: impl Into<String>,
@@ -69,7 +69,7 @@ impl FormatError {
         Self::Unsupported { format, field: shown(field), found: shown(found), accepted }
     }
 
-    /// A [`Truncated`](Self::Truncated) part.
+    /// Returns a [`Truncated`](Self::Truncated) error about `field`; `needed` and `found` are in bytes.
     pub(crate) fn truncated(
         format: &'static str,
         field: impl Into<String>,
@@ -79,16 +79,17 @@ impl FormatError {
         Self::Truncated { format, field: shown(field), needed: needed as u64, found: found as u64 }
     }
 
-    /// Something [`TooLarge`](Self::TooLarge).
+    /// Returns a [`TooLarge`](Self::TooLarge) error about `field`, which needs `needed` bytes.
     pub(crate) fn too_large(format: &'static str, field: impl Into<String>, needed: u64) -> Self {
         Self::TooLarge { format, field: shown(field), needed }
     }
 }
 
-/// Characters of a file's own words that a message repeats.
+/// Maximum number of characters of a file's content that an error message quotes.
 const MOST_SHOWN: usize = 200;
 
-/// Cut to what can be read: a file may have anything of any length where one word belongs.
+/// Truncates text quoted in an error message to [`MOST_SHOWN`] characters: a malformed file may have a field of any
+/// length.
 fn shown(text: impl Into<String>) -> String {
     let mut text = text.into();
     if let Some((end, _)) = text.char_indices().nth(MOST_SHOWN) {

@@ -1,4 +1,4 @@
-//! GLB, binary glTF 2.0: the container. What the JSON says is read in `gltf` and written in `glb_writer`.
+//! The container of GLB, binary glTF 2.0. Its JSON is read in `gltf` and written in `glb_writer`.
 
 use super::{FormatError, gltf};
 use crate::mesh::{MeshError, TriangleMesh};
@@ -9,9 +9,11 @@ const HEADER: usize = 12;
 const JSON: u32 = u32::from_le_bytes(*b"JSON");
 const BINARY: u32 = u32::from_le_bytes(*b"BIN\0");
 
-/// A parsed document takes some 16 times its text; far more than this is no mesh.
+/// Largest JSON chunk that is parsed, in bytes: a parsed document takes some 16 times the memory of its text, and no
+/// mesh needs this much.
 const JSON_LIMIT: usize = 1 << 26;
 
+/// Reads the triangles of a GLB file.
 pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     let (json, binary) = chunks(bytes)?;
     if json.len() > JSON_LIMIT {
@@ -22,7 +24,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     gltf::triangles(&root, binary)
 }
 
-/// The JSON and the binary chunk; the latter is empty where there is none.
+/// Returns the JSON chunk and the binary chunk of a GLB; the latter is empty if the file has none.
 fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), FormatError> {
     let version = word(bytes, 4, "version")?;
     if version != 2 {
@@ -41,7 +43,7 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), FormatError> {
         match kind {
             JSON if json.is_none() => json = Some(chunk),
             BINARY if binary.is_none() => binary = Some(chunk),
-            // Kinds to come are to be passed over.
+            // The format requires unknown chunk types to be ignored.
             _ => {}
         }
         at += 8 + size;
@@ -50,15 +52,16 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), FormatError> {
     Ok((json, binary.unwrap_or_default()))
 }
 
+/// Reads the little-endian 32-bit number at byte `at`.
 fn word(bytes: &[u8], at: usize, field: &str) -> Result<u32, FormatError> {
     let found = bytes.get(at..at + 4).and_then(|b| b.try_into().ok());
     found.map(u32::from_le_bytes).ok_or_else(|| FormatError::truncated(FORMAT, field, at + 4, bytes.len()))
 }
 
-/// The file with both chunks, each filled up to a multiple of four bytes.
+/// Returns the bytes of a GLB with a JSON and a binary chunk, each padded to a multiple of four bytes.
 ///
 /// # Errors
-/// [`MeshError::TooLarge`] where there is no memory for it, or its length is no number of 32 bits.
+/// [`MeshError::TooLarge`] if there is not enough memory for it, or its length does not fit in 32 bits.
 pub(super) fn container(json: String, mut binary: Vec<u8>) -> Result<Vec<u8>, MeshError> {
     let mut json = json.into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');

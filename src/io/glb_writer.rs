@@ -1,4 +1,4 @@
-//! Writing of GLB: meshes and pictures as parts of one buffer, and the JSON that says where they are.
+//! Writer of GLB: meshes and images become ranges of one buffer, described by the JSON.
 
 use super::glb::container;
 use super::mesh_file::push_floats;
@@ -6,15 +6,15 @@ use crate::math::{Bounds, Vec2, Vec3};
 use crate::mesh::{ImageKind, MeshError, Texture, TriangleMesh};
 use std::sync::Arc;
 
-/// What the arrays of vertices and of indices are for, in the words of WebGL.
+/// WebGL targets of buffer views: `ARRAY_BUFFER` for vertex attributes, `ELEMENT_ARRAY_BUFFER` for indices.
 const VERTICES: Option<u32> = Some(34962);
 const INDICES: Option<u32> = Some(34963);
 
-/// One node with one primitive: positions, normals (made where there are none), and what else there is. Without
-/// triangles, a scene with an empty node.
+/// Returns a GLB of one node with one primitive: positions, normals (computed if the mesh has none), and the other
+/// attributes that the mesh has. Without triangles, the scene has one empty node.
 ///
 /// # Errors
-/// [`MeshError::TooLarge`] where there is no memory for it.
+/// [`MeshError::TooLarge`] if there is not enough memory for it.
 pub(super) fn write(mesh: &TriangleMesh) -> Result<Vec<u8>, MeshError> {
     let mut parts = Parts::default();
     let node = if mesh.triangles.is_empty() {
@@ -26,7 +26,7 @@ pub(super) fn write(mesh: &TriangleMesh) -> Result<Vec<u8>, MeshError> {
     parts.finish("")
 }
 
-/// A document as far as it is written.
+/// A glTF document under construction: its buffer and the entries of its JSON arrays.
 #[derive(Default)]
 pub(super) struct Parts {
     bytes: Vec<u8>,
@@ -39,10 +39,11 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// Adds a mesh with its picture, and gives back its number.
+    /// Adds a mesh with its texture and returns its index in the document.
     ///
     /// # Errors
-    /// [`MeshError::TooLarge`] where the file would pass 4 GiB, or there is no memory for it; no mesh is added then.
+    /// [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it; no mesh is then
+    /// added.
     pub(super) fn mesh(&mut self, mesh: &TriangleMesh) -> Result<usize, MeshError> {
         let material = mesh.texture.as_ref().map(|texture| self.material(texture)).transpose()?;
         let mesh = mesh.split_at_seams();
@@ -56,12 +57,13 @@ impl Parts {
         Ok(self.meshes.len() - 1)
     }
 
+    /// Adds the vertex attributes of a mesh and returns the members of the primitive's `attributes` object.
     fn attributes(&mut self, mesh: &TriangleMesh) -> String {
         let bounds = Bounds::of(&mesh.positions);
         let [min, max] = [bounds.min, bounds.max].map(|p| format!("[{:?},{:?},{:?}]", p.x, p.y, p.z));
         let position =
             self.vectors(mesh.positions.iter().copied(), VERTICES, &format!(r#","min":{min},"max":{max}"#));
-        // The format wants unit normals: up, where a vertex has none.
+        // glTF requires unit normals: a vertex without one gets +z.
         let unit = |n: &Vec3| n.try_normalize().unwrap_or(Vec3::Z);
         let made = mesh.normals.is_none().then(|| mesh.vertex_normals());
         let normals = mesh.normals.as_ref().or(made.as_ref());
@@ -77,19 +79,21 @@ impl Parts {
         attributes
     }
 
+    /// Adds an accessor of the triangles' vertex indices and returns its index.
     fn indices(&mut self, triangles: &[[u32; 3]]) -> usize {
         let start = self.bytes.len();
         triangles.as_flattened().iter().for_each(|v| self.bytes.extend(v.to_le_bytes()));
         self.accessor(start, INDICES, [5125, 3 * triangles.len()], "SCALAR", "")
     }
 
+    /// Adds an accessor of texture coordinates and returns its index.
     fn coordinates(&mut self, uvs: &[Vec2]) -> usize {
         let start = self.bytes.len();
         uvs.iter().for_each(|uv| push_floats(&mut self.bytes, &uv.to_array()));
         self.accessor(start, VERTICES, [5126, uvs.len()], "VEC2", "")
     }
 
-    /// The number of an accessor of vectors; `more` is what its JSON says besides.
+    /// Adds an accessor of vectors and returns its index; `more` is appended to its JSON.
     pub(super) fn vectors(
         &mut self,
         vectors: impl ExactSizeIterator<Item = Vec3>,
@@ -101,7 +105,7 @@ impl Parts {
         self.accessor(start, target, [5126, count], "VEC3", more)
     }
 
-    /// The number of an accessor of numbers that go up.
+    /// Adds an accessor of ascending animation times in seconds and returns its index.
     pub(super) fn times(&mut self, times: &[f32]) -> usize {
         let start = self.bytes.len();
         push_floats(&mut self.bytes, times);
@@ -110,7 +114,8 @@ impl Parts {
         self.accessor(start, None, [5126, times.len()], "SCALAR", &bounds)
     }
 
-    /// A view and an accessor from byte `start` to the end; gives back the accessor's number.
+    /// Adds a buffer view from byte `start` to the end of the buffer and an accessor of it; returns the accessor's
+    /// index.
     fn accessor(
         &mut self,
         start: usize,
@@ -126,6 +131,7 @@ impl Parts {
         self.accessors.len() - 1
     }
 
+    /// Adds a buffer view from byte `start` to the end of the buffer and returns its index.
     fn view(&mut self, start: usize, target: Option<u32>) -> usize {
         let length = self.bytes.len() - start;
         let target = target.map_or(String::new(), |target| format!(r#","target":{target}"#));
@@ -133,7 +139,7 @@ impl Parts {
         self.views.len() - 1
     }
 
-    /// The number of the material with that picture; each picture is stored once.
+    /// Returns the index of the material with that texture, which is added if it is new: each image is stored once.
     fn material(&mut self, texture: &Arc<Texture>) -> Result<usize, MeshError> {
         if let Some(known) = self.textures.iter().position(|known| known == texture) {
             return Ok(known);
@@ -142,7 +148,7 @@ impl Parts {
         let start = self.bytes.len();
         self.bytes.extend(texture.bytes());
         let view = self.view(start, None);
-        // Arrays of numbers begin at multiples of four bytes.
+        // Accessors must be aligned to four bytes.
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let kind = texture.kind().media_type();
         self.images.push(format!(r#"{{"bufferView":{view},"mimeType":"{kind}"}}"#));
@@ -150,17 +156,18 @@ impl Parts {
         Ok(self.textures.len() - 1)
     }
 
-    /// Room for more bytes, so that running out of memory is an error and no crash.
+    /// Reserves memory for `more` bytes, so that lack of memory is an error instead of a crash.
     fn reserve(&mut self, more: usize) -> Result<(), MeshError> {
         let bytes = self.bytes.len() as u64 + more as u64;
         let fits = bytes <= u64::from(u32::MAX) && self.bytes.try_reserve(more).is_ok();
         if fits { Ok(()) } else { Err(MeshError::TooLarge { bytes }) }
     }
 
-    /// The file, with all nodes side by side in one scene; `more` is what the JSON holds besides.
+    /// Returns the bytes of the file, with all nodes as roots of one scene; `more` is appended to the members of the
+    /// JSON.
     ///
     /// # Errors
-    /// [`MeshError::TooLarge`] where the file would pass 4 GiB, or there is no memory for it.
+    /// [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
     pub(super) fn finish(mut self, more: &str) -> Result<Vec<u8>, MeshError> {
         let mut json = String::from(r#"{"asset":{"version":"2.0","generator":"vesicle"},"scene":0"#);
         let nodes: Vec<String> = (0..self.nodes.len()).map(|node| node.to_string()).collect();
@@ -181,12 +188,12 @@ impl Parts {
         container(json + "}", std::mem::take(&mut self.bytes))
     }
 
-    /// Materials and pictures. WebP is not in glTF itself, and said to be needed.
+    /// Returns the JSON of materials, textures and images. WebP is an extension of glTF, declared as required.
     fn looks(&self) -> String {
         let is_webp = |texture: &Arc<Texture>| texture.kind() == ImageKind::Webp;
         let (mut materials, mut textures) = (Vec::new(), Vec::new());
         for (number, texture) in self.textures.iter().enumerate() {
-            // A metal, as without the factor, shows little of its own colour.
+            // The default factor of 1 makes a metal, which shows little of its base colour.
             materials.push(format!(
                 r#"{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":{number}}},"metallicFactor":0}}}}"#
             ));
@@ -211,7 +218,7 @@ impl Parts {
     }
 }
 
-/// A list in the JSON; none where it would be empty, which the format does not allow.
+/// Returns an array as a member of a JSON object, preceded by a comma; nothing for an empty array, which glTF forbids.
 pub(super) fn table(name: &str, entries: &[String]) -> String {
     if entries.is_empty() { String::new() } else { format!(r#","{name}":[{}]"#, entries.join(",")) }
 }

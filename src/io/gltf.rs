@@ -1,8 +1,8 @@
-//! The triangles that a glTF 2.0 document describes.
+//! Reader of the triangles of a glTF 2.0 document.
 //!
-//! The document is looked at as plain JSON, field by field, and every index and range is checked before it is used.
-//! Why not the `gltf` crate: it adds 96 kB of compressed wasm (this, with the readers of all other mesh formats, 55),
-//! and takes the container's length for granted. It is the oracle of our writer, in the tests.
+//! The document is read as plain JSON, field by field, and every index and range is checked before use. The `gltf`
+//! crate is not used because it adds 96 kB of compressed wasm (this reader, with those of all other mesh formats, adds
+//! 55) and trusts the length in the container's header. In the tests it checks the files that Vesicle writes.
 
 use super::FormatError;
 use super::glb::FORMAT;
@@ -13,24 +13,25 @@ use glam::{DMat4, DQuat};
 use serde_json::Value;
 use std::sync::Arc;
 
-/// Triangle corners in all: nodes may repeat a mesh, so the file's size bounds nothing.
+/// Maximum total number of triangle corners: nodes may repeat a mesh, so the size of the file is no bound.
 const CORNER_LIMIT: u64 = 3 << 23;
 
-/// What compressed files are to be, instead.
+/// Accepted alternative named in the error about compressed files.
 const UNCOMPRESSED: &str = "files without compression (save the mesh without it)";
 
-/// What a primitive counts at least, so that empty ones repeated by many nodes come to an end, too.
+/// Minimum number of corners counted for a primitive, so that empty primitives repeated by many nodes also reach
+/// [`CORNER_LIMIT`].
 const PRIMITIVE_COST: u64 = 64;
 
-/// The extensions that a file may demand: they leave positions and triangles alone, or are read here.
+/// Returns whether a file may require the extension: it does not affect positions and triangles, or is supported.
 fn is_harmless(extension: &str) -> bool {
     extension.starts_with("KHR_materials_")
         || ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_texture_basisu", "EXT_texture_webp"]
             .contains(&extension)
 }
 
-/// All triangles of the default scene, each where its node puts it. Normals, texture coordinates and colours are
-/// taken where every part has them, and with the coordinates the first base colour texture that a part has.
+/// Returns all triangles of the default scene, transformed to world space by their nodes. Normals, texture coordinates
+/// and colours are read if every primitive has them; with texture coordinates, so is the first base colour texture.
 pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, FormatError> {
     let document = Document { root, binary };
     document.check_extensions()?;
@@ -53,6 +54,7 @@ pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, For
     Ok(mesh)
 }
 
+/// Returns both meshes as one, with the attributes that both have.
 fn joined(mut mesh: TriangleMesh, part: TriangleMesh) -> TriangleMesh {
     let first = mesh.positions.len() as u32;
     mesh.positions.extend(part.positions);
@@ -63,25 +65,28 @@ fn joined(mut mesh: TriangleMesh, part: TriangleMesh) -> TriangleMesh {
     mesh
 }
 
+/// Concatenates two attribute arrays; `None` if either is missing.
 fn both<T>(a: Option<Vec<T>>, b: Option<Vec<T>>) -> Option<Vec<T>> {
     let mut a = a?;
     a.extend(b?);
     Some(a)
 }
 
+/// A glTF document: its JSON and the binary chunk of the container.
 #[derive(Clone, Copy)]
 pub(super) struct Document<'a> {
     root: &'a Value,
     binary: &'a [u8],
 }
 
-/// A primitive and the place it is to go.
+/// A primitive and its transform to world space.
 struct Part<'a> {
     to_world: DAffine3,
     primitive: Primitive<'a>,
 }
 
 impl<'a> Document<'a> {
+    /// Returns an error if the file requires an extension that is not supported.
     fn check_extensions(&self) -> Result<(), FormatError> {
         let required = self.root["extensionsRequired"].as_array().map_or(&[][..], Vec::as_slice);
         match required.iter().filter_map(Value::as_str).find(|name| !is_harmless(name)) {
@@ -90,7 +95,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// An entry of one of the document's tables.
+    /// Returns entry `index` of one of the document's arrays, such as `meshes`.
     pub(super) fn entry(&self, table: &'static str, index: u64) -> Result<&'a Value, FormatError> {
         let entries = self.root[table].as_array().map_or(&[][..], Vec::as_slice);
         let found = usize::try_from(index).ok().and_then(|i| entries.get(i));
@@ -98,7 +103,7 @@ impl<'a> Document<'a> {
         found.ok_or_else(|| FormatError::invalid(FORMAT, table, problem()))
     }
 
-    /// All triangle primitives of the default scene, in the order of its nodes.
+    /// Returns all triangle primitives of the default scene, in the order of its nodes.
     fn parts(&self) -> Result<Vec<Part<'a>>, FormatError> {
         let nodes = self.root["nodes"].as_array().map_or(0, Vec::len);
         let mut seen = vec![false; nodes];
@@ -128,7 +133,8 @@ impl<'a> Document<'a> {
         Ok(parts)
     }
 
-    /// The nodes at the top of the default scene; of the first one, or of the whole document, where none is named.
+    /// Returns the root nodes of the default scene; without a default, of the first scene; without scenes, of the
+    /// document.
     fn roots(&self) -> Result<Vec<u64>, FormatError> {
         if self.root["scenes"].as_array().is_some_and(|scenes| !scenes.is_empty()) {
             let scene = unsigned(self.root, "scene")?.unwrap_or(0);
@@ -145,13 +151,13 @@ impl<'a> Document<'a> {
         Ok((0..).zip(is_child).filter_map(|(n, is)| (!is).then_some(n)).collect())
     }
 
-    /// Those of the node's mesh, if it has one.
+    /// Returns the primitives of the node's mesh, if it has one.
     fn primitives(&self, node: &Value) -> Result<&'a [Value], FormatError> {
         let Some(mesh) = unsigned(node, "mesh")? else { return Ok(&[]) };
         Ok(self.entry("meshes", mesh)?["primitives"].as_array().map_or(&[][..], Vec::as_slice))
     }
 
-    /// The data of accessor `index`, whose elements must have one of the given numbers of components.
+    /// Returns the data of accessor `index`, whose elements must have one of the given numbers of components.
     fn accessor(&self, index: u64, widths: &[usize]) -> Result<Accessor<'a>, FormatError> {
         let value = self.entry("accessors", index)?;
         let field = format!("accessors[{index}]");
@@ -183,6 +189,7 @@ impl<'a> Document<'a> {
         Ok(Accessor { bytes, count: count as usize, stride: stride as usize, width, component, normalized })
     }
 
+    /// Returns the bytes of buffer view `index`, which must be in the binary chunk and not compressed.
     pub(super) fn view(&self, index: u64) -> Result<View<'a>, FormatError> {
         let value = self.entry("bufferViews", index)?;
         let field = format!("bufferViews[{index}]");
@@ -208,30 +215,32 @@ impl<'a> Document<'a> {
         Ok(View { bytes, stride: unsigned(value, "byteStride")? })
     }
 
-    /// Whether a buffer has nothing in it but room for what is compressed elsewhere.
+    /// Returns whether a buffer is only a placeholder for data compressed elsewhere by `extension`.
     fn is_stand_in(&self, buffer: u64, extension: &str) -> bool {
         let buffer = self.entry("buffers", buffer);
         buffer.is_ok_and(|buffer| buffer["extensions"][extension]["fallback"] == true)
     }
 
-    /// Whether an accessor has nothing but a length: its elements are compressed elsewhere.
+    /// Returns whether an accessor has no buffer view, because its elements are compressed elsewhere.
     fn is_hollow(&self, accessor: u64) -> bool {
         self.entry("accessors", accessor).is_ok_and(|accessor| accessor["bufferView"].is_null())
     }
 }
 
-/// The extension by which a primitive or a view is compressed; what stands beside it is for readers that do not know it.
+/// Returns the extension by which a primitive or buffer view is compressed. Uncompressed data beside it is a fallback
+/// for readers without the extension.
 fn compression(value: &Value) -> Option<&'static str> {
     let known = ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
     known.into_iter().find(|name| !value["extensions"][name].is_null())
 }
 
+/// The bytes of a buffer view, and the stride between elements if the file gives it.
 pub(super) struct View<'a> {
     pub(super) bytes: &'a [u8],
     stride: Option<u64>,
 }
 
-/// How corners are told by the order of vertices.
+/// How the order of vertices defines triangles: a list, a strip or a fan.
 #[derive(Clone, Copy)]
 enum Mode {
     List,
@@ -239,6 +248,7 @@ enum Mode {
     Fan,
 }
 
+/// A triangle primitive of a glTF mesh, its ranges checked.
 struct Primitive<'a> {
     document: Document<'a>,
     attributes: &'a Value,
@@ -246,12 +256,12 @@ struct Primitive<'a> {
     positions: Accessor<'a>,
     indices: Option<Accessor<'a>>,
     base_color: Option<BaseColor<'a>>,
-    /// A bound on the corners of its triangles and on its vertices.
+    /// Upper bound on the number of triangle corners and on the number of vertices.
     corners: u64,
 }
 
 impl<'a> Primitive<'a> {
-    /// `None` for points and lines.
+    /// Reads a primitive of a mesh; `None` for points and lines.
     fn new(document: &Document<'a>, value: &'a Value) -> Result<Option<Self>, FormatError> {
         let mode = match unsigned(value, "mode")?.unwrap_or(4) {
             4 => Mode::List,
@@ -273,6 +283,7 @@ impl<'a> Primitive<'a> {
         Ok(Some(Self { document: *document, attributes, mode, positions, indices, base_color, corners }))
     }
 
+    /// Returns the primitive's triangles with its normals, texture coordinates and colours.
     fn read(&self) -> Result<TriangleMesh, FormatError> {
         let vectors = |a: Accessor| (0..a.count).map(|i| a.vector(i)).collect();
         Ok(TriangleMesh {
@@ -285,7 +296,8 @@ impl<'a> Primitive<'a> {
         })
     }
 
-    /// The coordinates that the base colour goes by, as it moves them; the first ones, where it has no texture.
+    /// Returns the texture coordinates of the base colour, with its texture transform applied; the first set if the
+    /// primitive has no texture.
     fn uvs(&self) -> Result<Option<Vec<Vec2>>, FormatError> {
         let set = self.base_color.as_ref().map_or(0, |base| base.set);
         let Some(a) = self.attribute(&format!("TEXCOORD_{set}"), &[2])? else { return Ok(None) };
@@ -296,6 +308,7 @@ impl<'a> Primitive<'a> {
         }))
     }
 
+    /// Returns a vertex attribute, if the primitive has it; it must have one element per position.
     fn attribute(&self, name: &str, widths: &[usize]) -> Result<Option<Accessor<'a>>, FormatError> {
         let Some(index) = unsigned(self.attributes, name)? else { return Ok(None) };
         let accessor = self.document.accessor(index, widths)?;
@@ -306,6 +319,7 @@ impl<'a> Primitive<'a> {
         Ok(Some(accessor))
     }
 
+    /// Returns the triangles as vertex indices, with strips and fans expanded.
     fn triangles(&self) -> Result<Vec<[u32; 3]>, FormatError> {
         let vertices = self.positions.count;
         let order: Vec<u32> = match &self.indices {
@@ -326,7 +340,7 @@ impl<'a> Primitive<'a> {
     }
 }
 
-/// An error where nothing but compressed data is there.
+/// Returns an error if a primitive has only compressed data.
 fn check_compression(document: &Document, primitive: &Value) -> Result<(), FormatError> {
     let Some(name) = compression(primitive) else { return Ok(()) };
     let attributes = &primitive["attributes"];
@@ -337,6 +351,7 @@ fn check_compression(document: &Document, primitive: &Value) -> Result<(), Forma
     Ok(())
 }
 
+/// Type of one component of an accessor's elements.
 #[derive(Clone, Copy)]
 enum Component {
     I8,
@@ -376,7 +391,7 @@ impl Component {
         }
     }
 
-    /// The integer that stands for 1 in normalised data.
+    /// Returns the value that represents 1 in normalised data.
     fn full(self) -> f64 {
         match self {
             Self::I8 => 127.0,
@@ -389,7 +404,7 @@ impl Component {
     }
 }
 
-/// Elements whose range in the file has been checked.
+/// Elements of an accessor, whose byte range has been checked.
 struct Accessor<'a> {
     bytes: &'a [u8],
     count: usize,
@@ -400,7 +415,7 @@ struct Accessor<'a> {
 }
 
 impl Accessor<'_> {
-    /// Component `k` of element `i`.
+    /// Returns component `k` of element `i`, normalised if the accessor says so.
     fn number(&self, i: usize, k: usize) -> f64 {
         debug_assert!(i < self.count && k < self.width);
         let at = i * self.stride + k * self.component.size();
@@ -421,6 +436,7 @@ impl Accessor<'_> {
     }
 }
 
+/// Returns the number of components of an accessor's elements; an error unless it is one of `widths`.
 fn element_width(accessor: &Value, widths: &[usize], field: &str) -> Result<usize, FormatError> {
     let name = accessor["type"].as_str().unwrap_or("nothing");
     let width = match name {
@@ -438,7 +454,7 @@ fn element_width(accessor: &Value, widths: &[usize], field: &str) -> Result<usiz
     Err(FormatError::invalid(FORMAT, format!("{field}.type"), problem))
 }
 
-/// The node's own transform, from a matrix or from scale, rotation and translation.
+/// Returns the local transform of a node, from its matrix or from scale, rotation and translation.
 fn transform(node: &Value, index: u64) -> Result<DAffine3, FormatError> {
     let field = |name: &str| format!("nodes[{index}].{name}");
     if let Some(m) = numbers::<16>(&node["matrix"], || field("matrix"))? {
@@ -463,6 +479,7 @@ fn transform(node: &Value, index: u64) -> Result<DAffine3, FormatError> {
     ))
 }
 
+/// Reads an array of `N` numbers; `None` if it is missing.
 pub(super) fn numbers<const N: usize>(
     value: &Value,
     field: impl Fn() -> String,
@@ -475,7 +492,7 @@ pub(super) fn numbers<const N: usize>(
     found.map(Some).ok_or_else(|| FormatError::invalid(FORMAT, field(), format!("is no list of {N} numbers")))
 }
 
-/// A whole number that may be missing.
+/// Reads a member that is a non-negative integer; `None` if it is missing.
 pub(super) fn unsigned(object: &Value, key: &str) -> Result<Option<u64>, FormatError> {
     let value = &object[key];
     if value.is_null() {
@@ -484,6 +501,7 @@ pub(super) fn unsigned(object: &Value, key: &str) -> Result<Option<u64>, FormatE
     value.as_u64().map(Some).ok_or_else(|| FormatError::invalid(FORMAT, key, "is no whole number from 0"))
 }
 
+/// Reads a member that is a non-negative integer; an error if it is missing.
 pub(super) fn required(object: &Value, key: &str, field: &str) -> Result<u64, FormatError> {
     unsigned(object, key)?.ok_or_else(|| FormatError::invalid(FORMAT, format!("{field}.{key}"), "is missing"))
 }

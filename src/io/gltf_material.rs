@@ -1,4 +1,4 @@
-//! The base colour texture of a glTF primitive: the picture, and how its coordinates are found.
+//! The base colour texture of a glTF primitive: its image and its texture transform.
 
 use super::glb::FORMAT;
 use super::gltf::{Document, numbers, required, unsigned};
@@ -7,27 +7,27 @@ use crate::math::Vec2;
 use crate::mesh::Texture;
 use serde_json::Value;
 
-/// What the material of a primitive says of its base colour.
+/// The base colour texture of a primitive's material.
 pub(super) struct BaseColor<'a> {
     texture: &'a Value,
-    /// Which set of texture coordinates it goes by.
+    /// Index of the set of texture coordinates that it uses.
     pub(super) set: u64,
     placing: Option<Placing>,
 }
 
-/// What `KHR_texture_transform` does to coordinates: scales, turns, moves.
+/// Transform of texture coordinates by `KHR_texture_transform`: scale, then rotation, then offset.
 struct Placing {
     scale: [f64; 2],
-    /// Cosine and sine of an angle, against the clock as one looks at the picture.
+    /// Cosine and sine of the rotation angle, counter-clockwise in the image.
     turn: [f64; 2],
     offset: [f64; 2],
 }
 
 impl<'a> BaseColor<'a> {
-    /// That of a primitive; `None` where it has no texture.
+    /// Returns the base colour texture of a primitive; `None` if it has none.
     ///
     /// # Errors
-    /// Indices of nothing, and a transform that is not of numbers.
+    /// An index out of range, or a texture transform with values that are not numbers.
     pub(super) fn of(document: &Document<'a>, primitive: &Value) -> Result<Option<Self>, FormatError> {
         let Some(material) = unsigned(primitive, "material")? else { return Ok(None) };
         let info = &document.entry("materials", material)?["pbrMetallicRoughness"]["baseColorTexture"];
@@ -42,15 +42,15 @@ impl<'a> BaseColor<'a> {
         Ok(Some(Self { texture, set, placing }))
     }
 
-    /// Where in the picture the coordinates of a vertex lead.
+    /// Returns the texture coordinates of a vertex in the image, with the texture transform applied.
     pub(super) fn place(&self, uv: Vec2) -> Vec2 {
         self.placing.as_ref().map_or(uv, |placing| placing.of(uv))
     }
 
-    /// The picture; `None` where it is a file of its own, or in another encoding than PNG, JPEG and WebP.
+    /// Returns the image; `None` if it is in a separate file or its encoding is not PNG, JPEG or WebP.
     ///
     /// # Errors
-    /// Indices and ranges that are not there, and a data address that cannot be decoded.
+    /// An index or range out of bounds, or a data URI that cannot be decoded.
     pub(super) fn texture(&self, document: &Document<'a>) -> Result<Option<Texture>, FormatError> {
         let webp = &self.texture["extensions"]["EXT_texture_webp"];
         let Some(source) = unsigned(self.texture, "source")?.or(unsigned(webp, "source")?) else {
@@ -78,8 +78,8 @@ impl Placing {
         })
     }
 
-    /// By the extension's first example, and as three.js and the Khronos viewer do it; the matrix in the draft of the
-    /// extension turns the other way.
+    /// Applies the transform as in the extension's first example, three.js and the Khronos viewer; the matrix in the
+    /// draft of the extension rotates in the opposite direction.
     fn of(&self, uv: Vec2) -> Vec2 {
         let [u, v] = [f64::from(uv.x) * self.scale[0], f64::from(uv.y) * self.scale[1]];
         let [cosine, sine] = self.turn;
@@ -88,7 +88,7 @@ impl Placing {
     }
 }
 
-/// The bytes that a data address holds.
+/// Returns the bytes of a base64 data URI.
 fn inline(address: &str, image: u64) -> Result<Vec<u8>, FormatError> {
     let coded = address.split_once(',').filter(|(head, _)| head.ends_with(";base64"));
     coded.and_then(|(_, text)| base64::decode(text)).ok_or_else(|| {

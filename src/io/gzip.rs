@@ -1,4 +1,4 @@
-//! gzip and zlib streams, inflated no further than a limit that the caller knows from a header.
+//! Decompression of gzip and zlib streams, up to a limit that the caller knows from a header.
 
 use super::FormatError;
 use miniz_oxide::inflate::TINFLStatus;
@@ -8,16 +8,16 @@ use miniz_oxide::inflate::core::inflate_flags::{
 };
 use miniz_oxide::inflate::core::{DecompressorOxide, decompress};
 
-/// Whether the bytes begin as a gzip stream does.
+/// Returns whether the bytes start with the signature of gzip.
 pub(super) fn is_gzip(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x1F, 0x8B])
 }
 
-/// The content of a gzip stream of one or more members, their checksums checked.
+/// Returns the content of a gzip stream of one or more members, with their checksums verified.
 ///
 /// # Errors
-/// Truncated or corrupt streams, a wrong checksum, and any content of more than `limit` bytes, which is never
-/// inflated.
+/// A truncated or corrupt stream, a wrong checksum, or content of more than `limit` bytes, which is not inflated any
+/// further.
 pub(super) fn gunzip(format: &'static str, bytes: &[u8], limit: usize) -> Result<Vec<u8>, FormatError> {
     let mut out = Vec::new();
     let mut rest = bytes;
@@ -39,7 +39,8 @@ pub(super) fn gunzip(format: &'static str, bytes: &[u8], limit: usize) -> Result
     }
 }
 
-/// The first `count` bytes of the content, or fewer where it is shorter; checksums are left for [`gunzip`].
+/// Returns the first `count` bytes of a gzip stream's content, or all of it if shorter. Checksums are not verified; see
+/// [`gunzip`].
 ///
 /// # Errors
 /// A corrupt stream, or one that ends before `count` bytes without its end mark.
@@ -50,7 +51,7 @@ pub(super) fn gunzip_start(format: &'static str, bytes: &[u8], count: usize) -> 
     Ok(out)
 }
 
-/// The content of a zlib stream, its checksum checked.
+/// Returns the content of a zlib stream, with its checksum verified.
 ///
 /// # Errors
 /// As [`gunzip`].
@@ -66,18 +67,18 @@ pub(super) fn unzlib(format: &'static str, bytes: &[u8], limit: usize) -> Result
     Ok(out)
 }
 
-/// Where inflating came to.
+/// Result of inflating one deflate stream.
 struct Step {
     consumed: usize,
-    /// More than the limit is there.
+    /// Whether the content exceeds the limit.
     full: bool,
 }
 
-/// Output memory to begin with; doubled as the stream proves to hold more, so that a small file costs little
-/// whatever its header claims.
+/// Initial size of the output buffer, in bytes. It is doubled as needed, so that a small file costs little whatever
+/// size its header claims.
 const FIRST_ROOM: usize = 1 << 16;
 
-/// Appends the content of one deflate stream to `out`, whose length stays at `limit` + 1 or below.
+/// Appends the content of one deflate stream to `out`, which never grows beyond `limit` + 1 bytes.
 fn inflate(
     format: &'static str,
     input: &[u8],
@@ -139,7 +140,7 @@ fn grow(format: &'static str, out: &mut Vec<u8>, len: usize) -> Result<(), Forma
     Ok(())
 }
 
-/// What follows the header of a gzip member.
+/// Returns the bytes after the header of a gzip member.
 fn after_gzip_header<'a>(format: &'static str, bytes: &'a [u8]) -> Result<&'a [u8], FormatError> {
     const EXTRA: u8 = 4;
     const NAME: u8 = 8;
@@ -167,7 +168,7 @@ fn after_gzip_header<'a>(format: &'static str, bytes: &'a [u8]) -> Result<&'a [u
     Ok(rest)
 }
 
-/// What follows the trailer of a gzip member, once checksum and length are found right.
+/// Verifies the checksum and length in the trailer of a gzip member and returns the bytes after it.
 fn check_trailer<'a>(format: &'static str, rest: &'a [u8], content: &[u8]) -> Result<&'a [u8], FormatError> {
     let cut = || FormatError::truncated(format, "gzip trailer", 8, rest.len());
     let (&crc, after) = rest.split_first_chunk().ok_or_else(cut)?;
@@ -178,7 +179,7 @@ fn check_trailer<'a>(format: &'static str, rest: &'a [u8], content: &[u8]) -> Re
     Ok(after)
 }
 
-/// Tables for eight bytes at a time: `CRC[k][b]` is the checksum of byte b followed by k zeros.
+/// CRC-32 tables for eight bytes at a time: `CRC[k][b]` is the checksum of byte b followed by k zeros.
 const CRC: [[u32; 256]; 8] = crc_tables();
 
 const fn crc_tables() -> [[u32; 256]; 8] {
@@ -207,7 +208,7 @@ const fn crc_tables() -> [[u32; 256]; 8] {
     tables
 }
 
-/// The CRC-32 of gzip.
+/// Returns the CRC-32 checksum of the bytes, as gzip uses it.
 fn crc32(bytes: &[u8]) -> u32 {
     let step = |crc: u32, byte: u8| (crc >> 8) ^ CRC[0][((crc ^ u32::from(byte)) & 255) as usize];
     let (eights, rest) = bytes.as_chunks::<8>();
@@ -284,7 +285,7 @@ mod tests {
         for at in 10..whole.len() {
             let mut broken = whole.clone();
             broken[at] ^= 0x10;
-            // The last bits before the trailer are padding: there the content is the same.
+            // The last bits before the trailer are padding; flipping one leaves the content unchanged.
             let same = |content| content == text(3000);
             assert!(gunzip("t", &broken, 3000).is_ok_and(same) == (at == whole.len() - 9), "flip at {at}");
         }

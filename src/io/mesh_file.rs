@@ -1,31 +1,31 @@
-//! Mesh files: which format the bytes are in, and what holds for meshes of every format.
+//! Reading and writing of mesh files: detection of the format, and checks common to all formats.
 
 use super::{FormatError, glb, glb_writer, mz3, obj, ply, stl, vtp};
 use crate::mesh::{MeshError, Texture, TriangleMesh};
 use std::sync::Arc;
 
-/// A file format that meshes can be written in.
+/// A file format in which meshes can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MeshFormat {
     /// Binary glTF 2.0.
     Glb,
     /// Polygon file format, binary little-endian.
     Ply,
-    /// Stereolithography, binary: triangles alone.
+    /// Stereolithography, binary: triangles only.
     Stl,
     /// Wavefront object, text.
     Obj,
     /// VTK XML poly data.
     Vtp,
-    /// Surfice's and NiiVue's compact mesh, not compressed.
+    /// The compact mesh format of Surfice and NiiVue, without compression.
     Mz3,
 }
 
 impl MeshFormat {
-    /// All of them.
+    /// All formats.
     pub const ALL: [Self; 6] = [Self::Glb, Self::Ply, Self::Stl, Self::Obj, Self::Vtp, Self::Mz3];
 
-    /// The usual file extension, without the dot.
+    /// Returns the usual file extension of the format, without the dot.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Glb => "glb",
@@ -37,33 +37,34 @@ impl MeshFormat {
         }
     }
 
-    /// The format with that extension, in lower case; `None` where there is none.
+    /// Returns the format with a file extension, given in lower case and without the dot; `None` if there is none.
     pub fn from_extension(extension: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|format| format.extension() == extension)
     }
 
-    /// Whether v is counted from the lower edge of a picture, and not from the upper one as in glTF.
+    /// Returns whether texture coordinate v is measured from the lower edge of the image, not from the upper one as in
+    /// glTF.
     fn counts_v_from_below(self) -> bool {
         matches!(self, Self::Ply | Self::Obj | Self::Vtp)
     }
 }
 
-/// The mesh in a GLB, PLY, STL or OBJ file, told apart by their content.
+/// Reads the mesh in a GLB, PLY, STL or OBJ file, whose format is detected from its content.
 ///
-/// Vertices at one position are one ([`TriangleMesh::welded`]), polygons are fans of triangles, positions are in the
-/// file's own units, and texture coordinates as the file has them (v runs down in glTF, up in OBJ and PLY). A GLB that
-/// has its texture in it brings it along: the picture of the base colour of the first triangles that have one, with
-/// coordinates as `KHR_texture_transform` places them. Memory is linear in the size of the file.
+/// Vertices with equal positions are merged ([`TriangleMesh::welded`]), polygons become triangle fans, positions are in
+/// the file's own units, and texture coordinates are kept as in the file (v points down in glTF, up in OBJ and PLY).
+/// The texture embedded in a GLB is read as well: the base colour image of the first triangles that have one, with
+/// coordinates transformed by `KHR_texture_transform`. Memory is linear in the size of the file.
 ///
 /// # Errors
-/// [`FormatError`] with the format and the field for bytes in no such format, files that end early, contradict
-/// themselves or use what cannot be read, positions that are not finite, and files without triangles.
+/// [`FormatError`] with the format and the field for bytes in no such format, for files that are truncated,
+/// contradictory or use an unsupported feature, for positions that are not finite, and for files without triangles.
 pub fn parse_mesh(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     Ok(parse_welded(bytes)?.1)
 }
 
-/// The same with the picture that belongs to it, for files that have it beside them (OBJ, PLY); in a GLB it takes the
-/// place of the file's own. As everywhere where there is a texture, v runs down: that of an OBJ or PLY becomes 1 − v.
+/// Reads a mesh as [`parse_mesh`] does, with a texture from a separate file (OBJ, PLY); in a GLB it replaces the file's
+/// own. As for every mesh with a texture, v points down: v of an OBJ or PLY becomes 1 − v.
 ///
 /// # Errors
 /// As [`parse_mesh`], and for files without texture coordinates.
@@ -80,6 +81,7 @@ pub fn parse_textured_mesh(bytes: &[u8], texture: Arc<Texture>) -> Result<Triang
     Ok(mesh)
 }
 
+/// Reads a mesh with its vertices welded, checks it, and returns it with the name of its format.
 fn parse_welded(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
     let (format, mesh) = parse(bytes)?;
     mesh.validate().map_err(|error| match error {
@@ -97,6 +99,7 @@ fn parse_welded(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatErro
     Ok((format, welded))
 }
 
+/// Reads a mesh in the format that its first bytes indicate, with the name of the format.
 fn parse(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
     if bytes.starts_with(b"glTF") {
         return Ok(("GLB", glb::parse(bytes)?));
@@ -116,12 +119,12 @@ fn parse(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
     Err(unknown(bytes))
 }
 
-/// Whether there are no control characters among the first bytes, but those of text.
+/// Returns whether the first bytes contain no control characters other than those of text.
 pub(super) fn is_text(bytes: &[u8]) -> bool {
     !bytes.iter().take(4096).any(|&b| b < b' ' && !b.is_ascii_whitespace() && b != 0x0b)
 }
 
-/// What cannot be read, as precisely as can be told.
+/// Returns the error for bytes in no accepted format, which names the format if it is recognised.
 fn unknown(bytes: &[u8]) -> FormatError {
     const ACCEPTED: &str = "GLB, PLY, STL and OBJ";
     let unsupported = |found: &str| FormatError::unsupported("mesh file", "format", found, ACCEPTED);
@@ -132,22 +135,22 @@ fn unknown(bytes: &[u8]) -> FormatError {
         [b'{', ..] => unsupported("JSON text (glTF must be the binary kind)"),
         [b'M', b'Z', ..] => unsupported("MZ3"),
         _ if bytes.starts_with(b"<?xml") || bytes.starts_with(b"<VTKFile") => unsupported("XML"),
-        // STL has no mark of its own: other bytes with room for its header can only be a broken one.
+        // STL has no signature: other bytes long enough for its header can only be a broken STL.
         _ if !text && bytes.len() >= stl::HEADER => stl::wrong_length(bytes),
         _ if text => unsupported("text without vertices or facets"),
         _ => unsupported("bytes without a known mark"),
     }
 }
 
-/// The bytes of a file with the mesh, with the extras that the format knows: all but colours lossless, and those in
-/// 8 bits except in GLB and OBJ. Read back by [`parse_mesh`] (not VTP and MZ3), closed is closed.
+/// Returns the bytes of a file with the mesh and those of its attributes that the format supports. All but colours are
+/// stored without loss; colours have 8 bits except in GLB and OBJ. A closed mesh is still closed when it is read back
+/// by [`parse_mesh`] (which does not read VTP and MZ3).
 ///
-/// A texture is in GLB only. The coordinates of a mesh with one are written to PLY, OBJ and VTP as they count them, v as
-/// 1 − v.
+/// Only GLB stores the texture. In PLY, OBJ and VTP, where v points up, the texture coordinates of a mesh with a
+/// texture are written with v as 1 − v.
 ///
 /// # Errors
-/// [`MeshError::InvalidArgument`] for a mesh that is not valid, [`MeshError::TooLarge`] where the file would pass 4
-/// GiB.
+/// [`MeshError::InvalidArgument`] for a mesh that is not valid, [`MeshError::TooLarge`] if the file would exceed 4 GiB.
 pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, MeshError> {
     mesh.validate()?;
     check_size(mesh)?;
@@ -167,19 +170,19 @@ pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, Me
     })
 }
 
-/// The binary formats count bytes in 32 bits. The most is what GLB takes for a mesh with seams everywhere: three
-/// vertices of 44 bytes and three indices a triangle.
+/// Returns an error if a file of the mesh may exceed 4 GiB: the binary formats store sizes in 32 bits. The bound is the
+/// size of a GLB with seams everywhere: three vertices of 44 bytes and three indices per triangle.
 fn check_size(mesh: &TriangleMesh) -> Result<(), MeshError> {
     let bytes = 64 * mesh.positions.len() as u64 + 160 * mesh.triangles.len() as u64;
     if bytes > u64::from(u32::MAX) { Err(MeshError::TooLarge { bytes }) } else { Ok(()) }
 }
 
-/// Colour channels as bytes.
+/// Returns a colour with channels in 0..1 as bytes.
 pub(super) fn color_bytes(color: crate::math::Vec3) -> [u8; 3] {
     color.to_array().map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }
 
-/// Appends numbers, little-endian.
+/// Appends numbers as little-endian bytes.
 pub(super) fn push_floats(out: &mut Vec<u8>, values: &[f32]) {
     values.iter().for_each(|x| out.extend(x.to_le_bytes()));
 }

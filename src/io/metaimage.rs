@@ -1,9 +1,9 @@
-//! MetaImage: .mha with the voxels inside, .mhd with them as detached payload.
+//! Reader of MetaImage: .mha with the voxels inside, .mhd with the voxels as detached payload.
 //!
-//! World is LPS, in the unit `DistanceUnits` names. Each row of `TransformMatrix` is the direction of one axis, as
-//! ITK reads it; `CenterOfRotation` and `AnatomicalOrientation` only describe and are not used. The step of a
-//! fourth axis has no unit in the format, so frames come without a time. A list of data files is taken as their
-//! bytes one after the other.
+//! World space is LPS, in the unit that `DistanceUnits` names. Each row of `TransformMatrix` is the direction of one
+//! axis, as in ITK. `CenterOfRotation` and `AnatomicalOrientation` are only descriptive and ignored. The format gives
+//! no unit for the step of a fourth axis, so frames have no time. The files of a list of data files are concatenated in
+//! order.
 
 use super::FormatError;
 use super::gzip::{gunzip, is_gzip, unzlib};
@@ -15,7 +15,7 @@ use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
 const FORMAT: &str = "MetaImage";
 const DATA: Place = Place { format: FORMAT, field: "voxel data" };
 
-/// Whether the bytes begin as a MetaImage header does: with a `key = value` line of one of its first keys.
+/// Returns whether the bytes start like a MetaImage header: with a `key = value` line of one of its usual first keys.
 pub(super) fn is_metaimage(bytes: &[u8]) -> bool {
     let start = bytes.trim_ascii_start();
     [&b"ObjectType"[..], b"NDims", b"Comment", b"ObjectSubType"]
@@ -23,7 +23,7 @@ pub(super) fn is_metaimage(bytes: &[u8]) -> bool {
         .any(|key| start.strip_prefix(*key).is_some_and(|rest| rest.trim_ascii_start().starts_with(b"=")))
 }
 
-/// Reads a volume; `detached` is the payload where the header names a data file.
+/// Reads a MetaImage volume; `detached` is the payload if the header refers to a data file.
 ///
 /// # Errors
 /// [`FormatError`] naming the header field.
@@ -42,12 +42,13 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
     header.volume(source)
 }
 
-/// The header's `key = value` lines, up to the one that says where voxels are.
+/// The header's `key = value` lines, up to the one that names the data file.
 struct Fields {
     pairs: Vec<(String, String)>,
 }
 
 impl Fields {
+    /// Reads the lines of the header.
     fn read(lines: &mut Lines<'_>) -> Result<Self, FormatError> {
         let mut pairs: Vec<(String, String)> = Vec::new();
         while let Some(line) = lines.next_line() {
@@ -70,21 +71,23 @@ impl Fields {
         Ok(Self { pairs })
     }
 
+    /// Returns a field by its key, if the header has it.
     fn get(&self, key: &'static str) -> Option<Field<'_>> {
         let (_, text) = self.pairs.iter().find(|(name, _)| name == key)?;
         Some(Field { format: FORMAT, name: key, text })
     }
 
-    /// The first of several names for one thing.
+    /// Returns the first field that exists under any of several synonymous keys.
     fn any(&self, keys: &[&'static str]) -> Option<Field<'_>> {
         keys.iter().find_map(|key| self.get(key))
     }
 
+    /// Returns a field by its key; an error if it is missing.
     fn need(&self, key: &'static str) -> Result<Field<'_>, FormatError> {
         self.get(key).ok_or_else(|| FormatError::invalid(FORMAT, key, "missing"))
     }
 
-    /// A True or False field, False where it is missing.
+    /// Returns the value of a True or False field; false if it is missing.
     fn flag(&self, keys: &[&'static str]) -> Result<bool, FormatError> {
         let Some(field) = self.any(keys) else { return Ok(false) };
         match field.text.to_ascii_lowercase().as_str() {
@@ -94,19 +97,20 @@ impl Fields {
         }
     }
 
+    /// Returns the number in a field, or `default` if it is missing.
     fn number(&self, key: &'static str, default: f64) -> Result<f64, FormatError> {
         self.get(key).map_or(Ok(default), |field| Ok(field.finite(1)?[0]))
     }
 }
 
-/// A header found consistent.
+/// A header that has been checked for consistency.
 struct Header {
     scalar: Scalar,
     dims: [usize; 4],
     big: bool,
     text: bool,
     compressed: bool,
-    /// Bytes of the data file before the voxels; `None` (-1 in the file): voxels are the last bytes.
+    /// Bytes of the data file before the voxels; `None` (-1 in the file) if the voxels are the last bytes.
     skip: Option<usize>,
     slope: f64,
     intercept: f64,
@@ -115,6 +119,7 @@ struct Header {
 }
 
 impl Header {
+    /// Reads and checks all fields of the header.
     fn check(fields: &Fields) -> Result<Self, FormatError> {
         check_object(fields)?;
         let rank = rank(fields)?;
@@ -135,6 +140,7 @@ impl Header {
         })
     }
 
+    /// Returns the volume, with its voxels read from `source`.
     fn volume(&self, source: &[u8]) -> Result<Volume, FormatError> {
         let volume = Volume::new(VolumeInit {
             voxels: self.voxels(source)?,
@@ -148,6 +154,7 @@ impl Header {
         Ok(volume.map_err(|error| refused(FORMAT, error))?.with_unit(self.unit))
     }
 
+    /// Returns the voxels in `source`, inflated if compressed.
     fn voxels(&self, source: &[u8]) -> Result<Voxels, FormatError> {
         let size = payload_size(DATA, self.dims, self.scalar)?;
         if self.compressed {
@@ -165,13 +172,14 @@ impl Header {
         decode(DATA, exact(DATA, source, size)?, self.scalar, self.big)
     }
 
-    /// What follows the skipped bytes; with -1, the last `size`.
+    /// Returns the bytes after those to skip; with -1 in the header, the last `size` bytes.
     fn after_skip<'a>(&self, source: &'a [u8], size: usize) -> Result<&'a [u8], FormatError> {
         let skip = self.skip.unwrap_or_else(|| source.len().saturating_sub(size));
         source.get(skip..).ok_or_else(|| FormatError::truncated(FORMAT, "HeaderSize", skip, source.len()))
     }
 }
 
+/// Returns an error unless the file is an image with one channel.
 fn check_object(fields: &Fields) -> Result<(), FormatError> {
     if let Some(field) = fields.get("ObjectType").filter(|field| field.text != "Image") {
         return Err(FormatError::unsupported(FORMAT, field.name, format!("'{}'", field.text), "Image"));
@@ -182,6 +190,7 @@ fn check_object(fields: &Fields) -> Result<(), FormatError> {
     Ok(())
 }
 
+/// Returns the number of axes, 1 to 4.
 fn rank(fields: &Fields) -> Result<usize, FormatError> {
     match fields.need("NDims")?.integer(1)? {
         n @ 1..=4 => Ok(n as usize),
@@ -189,6 +198,7 @@ fn rank(fields: &Fields) -> Result<usize, FormatError> {
     }
 }
 
+/// Returns the number type that `ElementType` names.
 fn scalar(field: &Field<'_>) -> Result<Scalar, FormatError> {
     Ok(match field.text {
         "MET_CHAR" => Scalar::I8,
@@ -210,11 +220,13 @@ fn scalar(field: &Field<'_>) -> Result<Scalar, FormatError> {
     })
 }
 
+/// Returns the number of bytes before the voxels; `None` for -1.
 fn skip(fields: &Fields) -> Result<Option<usize>, FormatError> {
     let Some(field) = fields.get("HeaderSize") else { return Ok(Some(0)) };
     if field.integer(-1)? == -1 { Ok(None) } else { Ok(Some(field.offset()?)) }
 }
 
+/// Returns the transform from voxel indices to world space.
 fn affine(fields: &Fields, rank: usize) -> Result<DAffine3, FormatError> {
     let mut columns = axes(fields, rank)?;
     if let Some(field) = fields.any(&["ElementSpacing", "ElementSize"]) {
@@ -229,7 +241,7 @@ fn affine(fields: &Fields, rank: usize) -> Result<DAffine3, FormatError> {
     Ok(DAffine3::from_mat3_translation(DMat3::from_cols(columns[0], columns[1], columns[2]), origin.into()))
 }
 
-/// The directions of the axes in space: rows of the matrix, the world's own where the file has none.
+/// Returns the directions of the axes, which are the rows of the matrix; the world axes if the file has no matrix.
 fn axes(fields: &Fields, rank: usize) -> Result<[DVec3; 3], FormatError> {
     let mut columns = [DVec3::X, DVec3::Y, DVec3::Z];
     let Some(field) = fields.any(&["TransformMatrix", "Rotation", "Orientation"]) else { return Ok(columns) };
@@ -242,6 +254,7 @@ fn axes(fields: &Fields, rank: usize) -> Result<[DVec3; 3], FormatError> {
     Ok(columns)
 }
 
+/// Returns the unit of length that `DistanceUnits` names.
 fn unit(fields: &Fields) -> LengthUnit {
     match fields.get("DistanceUnits").map(|field| field.text) {
         Some("mm") => LengthUnit::Millimetre,

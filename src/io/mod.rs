@@ -1,4 +1,4 @@
-//! Readers and writers of the file formats people have.
+//! Readers and writers of file formats for volumes, meshes and point clouds.
 
 mod animation;
 mod base64;

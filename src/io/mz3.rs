@@ -1,4 +1,4 @@
-//! MZ3, the compact mesh of Surfice and NiiVue, written without compression.
+//! Writer of MZ3, the compact mesh format of Surfice and NiiVue, without compression.
 
 use super::mesh_file::{color_bytes, push_floats};
 use crate::mesh::TriangleMesh;
@@ -7,8 +7,8 @@ const HAS_FACES: u16 = 1;
 const HAS_VERTICES: u16 = 2;
 const HAS_COLORS: u16 = 4;
 
-/// Little-endian: "MZ", attributes, counts of faces and vertices, bytes to skip; faces, vertices, then colours
-/// (rgba).
+/// Returns the bytes of an MZ3 file. Layout, little-endian: "MZ", attributes, counts of faces and vertices, bytes to
+/// skip; faces, vertices, then colours (rgba).
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let colors = if mesh.colors.is_some() { HAS_COLORS } else { 0 };
     let mut out = Vec::with_capacity(16 + 12 * mesh.triangles.len() + 16 * mesh.positions.len());

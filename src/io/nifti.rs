@@ -1,9 +1,10 @@
-//! NIfTI-1 and NIfTI-2: single files (.nii, .nii.gz) and pairs (.hdr with its .img as detached payload).
+//! Reader and writer of NIfTI-1 and NIfTI-2: single files (.nii, .nii.gz) and pairs (.hdr with its .img as detached
+//! payload).
 //!
-//! World is RAS. The affine is the sform where its code is above 0, else the qform where its code is, else the voxel
-//! sizes alone with the first voxel at the origin (methods 3, 2 and 1 of the standard). Lengths stay in the file's
-//! unit, which [`Volume::unit`] names. A slope of 0 or NaN means that stored numbers are intensities. Frame time is
-//! pixdim[4] in the file's time unit, seconds where it names none.
+//! World space is RAS. The affine is the sform if its code is positive, else the qform if its code is, else the voxel
+//! sizes with the first voxel at the origin (methods 3, 2 and 1 of the standard). Lengths stay in the file's unit,
+//! given by [`Volume::unit`]. A slope of 0 or NaN means that stored numbers are intensities. The time between frames is
+//! `pixdim[4]` in the file's time unit, or in seconds if it names none.
 
 use super::FormatError;
 use super::gzip::{gunzip, gunzip_start, is_gzip};
@@ -13,18 +14,18 @@ use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
 
 const FORMAT: &str = "NIfTI";
 const DATA: Place = Place { format: FORMAT, field: "voxel data" };
-/// Header sizes of the two versions, which are also how a file begins.
+/// Header sizes of the two versions in bytes, which are also the first number in the file.
 const SIZE_1: usize = 348;
 const SIZE_2: usize = 540;
-/// What must be inflated to know the header, its extension mark included.
+/// Number of bytes to inflate for the header, including its extension flag.
 const HEADER_ROOM: usize = SIZE_2 + 4;
 
-/// Whether the bytes begin as a NIfTI header of either version and byte order does.
+/// Returns whether the bytes start like a NIfTI header of either version and byte order.
 pub(super) fn is_nifti(bytes: &[u8]) -> bool {
     bytes.first_chunk().is_some_and(|&four| version(four).is_some())
 }
 
-/// The version and whether its byte order is big-endian.
+/// Returns the version that the first four bytes indicate, and whether the byte order is big-endian.
 fn version(four: [u8; 4]) -> Option<(u8, bool)> {
     let known = |size: u32| match size as usize {
         SIZE_1 => Some(1),
@@ -35,7 +36,7 @@ fn version(four: [u8; 4]) -> Option<(u8, bool)> {
     little.or_else(|| known(u32::from_be_bytes(four)).map(|v| (v, true)))
 }
 
-/// Reads a volume; `detached` is the .img of a pair. Either may be gzipped.
+/// Reads a NIfTI volume; `detached` is the .img file of a pair. Either may be gzipped.
 ///
 /// # Errors
 /// [`FormatError`] naming the header field.
@@ -68,14 +69,15 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
     header.volume(source, offset, size)
 }
 
-/// Header bytes with their byte order.
+/// The bytes of a header and their byte order.
 struct Bytes<'a> {
     bytes: &'a [u8],
     big: bool,
 }
 
 impl Bytes<'_> {
-    /// N bytes in little-endian order. The header's length was checked: nothing is ever missing.
+    /// Returns the N bytes at `offset` in little-endian order. The header's length has been checked, so none is
+    /// missing.
     fn at<const N: usize>(&self, offset: usize) -> [u8; N] {
         let mut out = [0; N];
         if let Some(part) = self.bytes.get(offset..offset + N) {
@@ -103,7 +105,7 @@ impl Bytes<'_> {
     }
 }
 
-/// The fields of either version that matter, as they stand.
+/// The header fields of either version that are used, as stored.
 struct Fields {
     version: u8,
     big: bool,
@@ -124,6 +126,7 @@ struct Fields {
 }
 
 impl Fields {
+    /// Reads the fields of a header of either version.
     fn read(bytes: &[u8]) -> Result<Self, FormatError> {
         let cut = |needed| FormatError::truncated(FORMAT, "header", needed, bytes.len());
         let four = *bytes.first_chunk().ok_or_else(|| cut(SIZE_1))?;
@@ -184,7 +187,7 @@ impl Fields {
         }
     }
 
-    /// Whether voxels are in a file of their own.
+    /// Returns whether the voxels are in a separate file.
     fn is_pair(&self) -> Result<bool, FormatError> {
         match (&self.magic, self.version) {
             (b"n+1\0", 1) | (b"n+2\0", 2) => Ok(false),
@@ -206,6 +209,7 @@ impl Fields {
         }
     }
 
+    /// Returns the number of voxels along x, y and z, and the number of frames.
     fn dims(&self) -> Result<[usize; 4], FormatError> {
         let rank = self.dim[0];
         if !(1..=7).contains(&rank) {
@@ -232,6 +236,7 @@ impl Fields {
         Ok(dims)
     }
 
+    /// Returns the number type of the voxels.
     fn scalar(&self) -> Result<Scalar, FormatError> {
         let scalar = match self.datatype {
             2 => Scalar::U8,
@@ -253,7 +258,7 @@ impl Fields {
         Err(FormatError::invalid(FORMAT, "bitpix", problem))
     }
 
-    /// Where voxels begin. A single file that states 0 means right after its header.
+    /// Returns the offset of the voxels in bytes. In a single file, 0 stands for the end of the header.
     fn offset(&self, pair: bool) -> Result<usize, FormatError> {
         let least = if self.version == 1 { 352 } else { 544 };
         let stated = self.vox_offset;
@@ -269,7 +274,7 @@ impl Fields {
         }
     }
 
-    /// Slope and intercept; 0 or NaN for the slope means none.
+    /// Returns slope and intercept; 1 and 0 if the stored slope is 0 or NaN.
     fn scaling(&self) -> Result<(f64, f64), FormatError> {
         if self.slope == 0.0 || self.slope.is_nan() {
             return Ok((1.0, 0.0));
@@ -282,6 +287,7 @@ impl Fields {
         Err(FormatError::invalid(FORMAT, field, format!("{value}; a finite number is needed")))
     }
 
+    /// Returns the transform from voxel indices to world space.
     fn affine(&self) -> Result<DAffine3, FormatError> {
         if self.sform_code > 0 {
             return self.sform();
@@ -292,6 +298,7 @@ impl Fields {
         Ok(DAffine3::from_scale(DVec3::from(self.voxel_sizes()?)))
     }
 
+    /// Returns the affine that the file stores as a matrix.
     fn sform(&self) -> Result<DAffine3, FormatError> {
         for (row, name) in self.srow.iter().zip(["srow_x", "srow_y", "srow_z"]) {
             if row.iter().any(|v| !v.is_finite()) {
@@ -307,7 +314,8 @@ impl Fields {
         Ok(DAffine3::from_mat3_translation(matrix, column(3)))
     }
 
-    /// Rotation by the quaternion (a, b, c, d) with a ≥ 0, after scaling by the voxel sizes; pixdim[0] < 0 turns z.
+    /// Returns the affine that the file stores as a quaternion: scaling by the voxel sizes, then rotation by (a, b, c,
+    /// d) with a ≥ 0. A negative `pixdim[0]` flips z.
     fn qform(&self) -> Result<DAffine3, FormatError> {
         let finite = |field: &str, values: [f64; 3]| {
             if values.iter().all(|v| v.is_finite()) {
@@ -331,7 +339,7 @@ impl Fields {
         Ok(DAffine3::from_mat3_translation(rotation * DMat3::from_diagonal(sizes.into()), origin.into()))
     }
 
-    /// Lengths of the voxel's sides, without sign; 1 along axes the file does not have.
+    /// Returns the absolute voxel sizes along x, y and z; 1 along axes that the file does not have.
     fn voxel_sizes(&self) -> Result<[f64; 3], FormatError> {
         let mut sizes = [1.0; 3];
         for (axis, size) in sizes.iter_mut().enumerate().filter(|(axis, _)| (*axis as i64) < self.dim[0]) {
@@ -344,7 +352,7 @@ impl Fields {
         Ok(sizes)
     }
 
-    /// Seconds from frame to frame, 0 where there is one frame or the fourth axis is not time.
+    /// Returns the seconds between frames; 0 if there is only one frame or the fourth axis is not time.
     fn frame_seconds(&self, frames: usize) -> Result<f64, FormatError> {
         let step = self.pixdim[4];
         if frames < 2 {
@@ -366,6 +374,7 @@ impl Fields {
         Ok(if step > 0.0 { step * second } else { 0.0 })
     }
 
+    /// Returns the unit of length.
     fn unit(&self) -> LengthUnit {
         match self.units & 7 {
             1 => LengthUnit::Metre,
@@ -376,11 +385,14 @@ impl Fields {
     }
 }
 
-/// Offsets beyond this cannot be told apart in a NIfTI-1 header (`f32`), and no header extension is as long.
+/// Largest accepted offset of the voxels in bytes: beyond it, a NIfTI-1 header (`f32`) cannot represent every integer,
+/// and no header extension is as long.
 const MAX_OFFSET: f64 = 16_777_216.0;
-/// How far past length 1 rounding takes a quaternion in `f32`; longer ones are broken.
+/// Tolerance by which the squared length of a quaternion's vector part may exceed 1 through rounding in `f32`; longer
+/// ones are rejected.
 const QUATERNION_TOLERANCE: f64 = 1e-5;
 
+/// Returns the error about a datatype that is not supported, with its name.
 fn unsupported_datatype(code: i64) -> FormatError {
     let name = match code {
         1 => "binary",
@@ -400,7 +412,7 @@ fn unsupported_datatype(code: i64) -> FormatError {
     )
 }
 
-/// A header found consistent.
+/// A header that has been checked for consistency.
 struct Header {
     pair: bool,
     big: bool,
@@ -415,6 +427,7 @@ struct Header {
 }
 
 impl Header {
+    /// Checks the fields and converts them.
     fn check(fields: &Fields) -> Result<Self, FormatError> {
         let pair = fields.is_pair()?;
         let dims = fields.dims()?;
@@ -433,6 +446,7 @@ impl Header {
         })
     }
 
+    /// Returns the volume, whose voxels are the `size` bytes of `source` from `offset`.
     fn volume(&self, source: &[u8], offset: usize, size: usize) -> Result<Volume, FormatError> {
         let Some(rest) = source.get(offset..) else {
             return Err(FormatError::truncated(
@@ -456,12 +470,13 @@ impl Header {
     }
 }
 
-/// A volume as an uncompressed little-endian NIfTI-1 file, voxels as stored, world brought to RAS, affine as sform.
+/// Returns the volume as an uncompressed little-endian NIfTI-1 file: voxels as stored, world space converted to RAS,
+/// and the affine as sform.
 ///
-/// NIfTI-1 holds the affine in `f32` and dimensions up to 32,767; larger volumes are written as NIfTI-2.
+/// NIfTI-1 stores the affine in `f32` and dimensions up to 32,767; larger volumes are written as NIfTI-2.
 ///
 /// # Errors
-/// [`FormatError::TooLarge`] where there is no memory for the file.
+/// [`FormatError::TooLarge`] if there is not enough memory for the file.
 pub fn write_nifti(volume: &Volume) -> Result<Vec<u8>, FormatError> {
     let [nx, ny, nz] = volume.dims();
     let dims = [nx, ny, nz, volume.frames()];
@@ -475,7 +490,7 @@ pub fn write_nifti(volume: &Volume) -> Result<Vec<u8>, FormatError> {
     Ok(out)
 }
 
-/// NIfTI's code and the bytes of one voxel.
+/// Returns NIfTI's code of a voxel type and its size in bytes.
 fn datatype(voxels: &Voxels) -> (i16, usize) {
     match voxels {
         Voxels::U8(_) => (2, 1),
@@ -489,6 +504,7 @@ fn datatype(voxels: &Voxels) -> (i16, usize) {
     }
 }
 
+/// Appends the voxels as little-endian bytes.
 fn append_voxels(out: &mut Vec<u8>, voxels: &Voxels) {
     match voxels {
         Voxels::U8(values) => out.extend_from_slice(values),
@@ -502,13 +518,14 @@ fn append_voxels(out: &mut Vec<u8>, voxels: &Voxels) {
     }
 }
 
-/// Writes bytes at their place in a header.
+/// Writes bytes at offset `at` of a header.
 fn put<const N: usize>(out: &mut [u8], at: usize, bytes: [u8; N]) {
     if let Some(place) = out.get_mut(at..at + N) {
         place.copy_from_slice(&bytes);
     }
 }
 
+/// Writes the header of a NIfTI-1 file.
 fn header_1(out: &mut Vec<u8>, volume: &Volume, dims: [usize; 4], code: i16, size: usize) {
     out.resize(352, 0);
     put(out, 0, (SIZE_1 as i32).to_le_bytes());
@@ -531,6 +548,7 @@ fn header_1(out: &mut Vec<u8>, volume: &Volume, dims: [usize; 4], code: i16, siz
     put(out, 344, *b"n+1\0");
 }
 
+/// Writes the header of a NIfTI-2 file.
 fn header_2(out: &mut Vec<u8>, volume: &Volume, dims: [usize; 4], code: i16, size: usize) {
     out.resize(544, 0);
     put(out, 0, (SIZE_2 as i32).to_le_bytes());
@@ -562,7 +580,7 @@ fn pixdim_field(volume: &Volume) -> [f64; 8] {
     [1.0, x, y, z, volume.frame_seconds(), 0.0, 0.0, 0.0]
 }
 
-/// The length unit, and seconds.
+/// Returns the code of the volume's length unit, with seconds as time unit.
 fn units_field(volume: &Volume) -> u8 {
     8 + match volume.unit() {
         LengthUnit::Unknown => 0,
@@ -572,7 +590,7 @@ fn units_field(volume: &Volume) -> u8 {
     }
 }
 
-/// The upper three rows of the affine to RAS.
+/// Returns the upper three rows of the affine from voxel indices to RAS, row-major.
 fn rows_in_ras(volume: &Volume) -> [f64; 12] {
     let a = volume.affine();
     let sign = if volume.space() == Space::Lps { [-1.0, -1.0, 1.0] } else { [1.0; 3] };

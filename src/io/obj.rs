@@ -1,4 +1,4 @@
-//! Wavefront OBJ: vertices, texture coordinates, normals and faces; everything else in a file is passed over.
+//! Reader and writer of Wavefront OBJ: vertices, texture coordinates, normals and faces. Everything else is ignored.
 
 use super::mesh_file::is_text;
 use super::text::numbered_lines;
@@ -10,27 +10,29 @@ use std::mem;
 
 pub(super) const FORMAT: &str = "OBJ";
 
-/// Whether some line is a vertex, in what is text.
+/// Returns whether the bytes are text with at least one vertex line.
 pub(super) fn is_obj(bytes: &[u8]) -> bool {
     is_text(bytes) && numbered_lines(bytes).any(|(_, line)| words(line).next() == Some(b"v"))
 }
 
+/// Splits a line at whitespace.
 fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
-/// Texture coordinates are taken where every face has them, and colours where every vertex has; normals likewise, the
-/// mean per vertex.
+/// Reads a mesh from an OBJ file. Texture coordinates and normals are kept if every face has them, colours if every
+/// vertex has one; the normals at the corners are averaged per vertex.
 pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     Ok(read(bytes)?.into_mesh())
 }
 
-/// The vertices, of files without faces, too. Normals are those that the faces name, or, where they name none and
-/// there are as many as vertices, those of the vertices in order.
+/// Reads the vertices of an OBJ file as points; the file needs no faces. Normals are those that the faces refer to; if
+/// they refer to none and there are as many as vertices, those of the vertices in order.
 pub(super) fn parse_points(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     Ok(read(bytes)?.into_points())
 }
 
+/// Reads all lines of the file.
 fn read(bytes: &[u8]) -> Result<Reader, FormatError> {
     let mut reader = Reader::default();
     let mut continued = Vec::new();
@@ -52,7 +54,7 @@ fn read(bytes: &[u8]) -> Result<Reader, FormatError> {
     Ok(reader)
 }
 
-/// Indices from 0 into the tables of the file.
+/// The corner of a face: zero-based indices of its position, texture coordinates and normal in the file.
 #[derive(Clone, Copy)]
 struct Corner {
     position: u32,
@@ -60,6 +62,7 @@ struct Corner {
     normal: Option<u32>,
 }
 
+/// The content of an OBJ file read so far, with faces as triangles.
 #[derive(Default)]
 struct Reader {
     positions: Vec<Vec3>,
@@ -70,6 +73,7 @@ struct Reader {
 }
 
 impl Reader {
+    /// Reads one line; unknown keywords are ignored.
     fn line(&mut self, line: &[u8], number: usize) -> Result<(), FormatError> {
         let mut words = words(line);
         match words.next() {
@@ -85,7 +89,8 @@ impl Reader {
         Ok(())
     }
 
-    /// Position, and a colour where three more numbers follow (a fourth alone, or before the colour, is a weight).
+    /// Adds a vertex: a position, and a colour if three more numbers follow. A fourth number alone, or before the
+    /// colour, is a weight.
     fn vertex(&mut self, numbers: &[f32]) {
         self.positions.push(Vec3::from_slice(numbers));
         match numbers {
@@ -94,6 +99,7 @@ impl Reader {
         }
     }
 
+    /// Adds a face as a fan of triangles.
     fn face<'a>(&mut self, words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<(), FormatError> {
         let corners = words.map(|word| self.corner(word, line)).collect::<Result<Vec<_>, _>>()?;
         let [first, rest @ ..] = corners.as_slice() else { return Err(face_size(line, 0)) };
@@ -104,7 +110,7 @@ impl Reader {
         Ok(())
     }
 
-    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`.
+    /// Parses a corner of a face: `v`, `v/vt`, `v//vn` or `v/vt/vn`.
     fn corner(&self, word: &[u8], line: usize) -> Result<Corner, FormatError> {
         let mut parts = word.split(|&b| b == b'/');
         let mut part = |table: &str, count: usize| match parts.next() {
@@ -152,7 +158,7 @@ impl Reader {
         }
     }
 
-    /// What `read` finds, if it finds it at every corner.
+    /// Returns the value of `read` at each corner; `None` if it is missing at any.
     fn per_corner<T>(&self, read: impl Fn(&Corner) -> Option<T>) -> Option<Vec<[T; 3]>> {
         self.corners.iter().map(|[a, b, c]| Some([read(a)?, read(b)?, read(c)?])).collect()
     }
@@ -163,7 +169,7 @@ fn face_size(line: usize, corners: usize) -> FormatError {
     FormatError::invalid(FORMAT, format!("line {line}"), problem)
 }
 
-/// An index from 0, out of one that counts from 1, or from −1 backwards.
+/// Converts an index that counts from 1, or backwards from −1, to a zero-based one.
 fn index(digits: &[u8], table: &str, count: usize, line: usize) -> Result<u32, FormatError> {
     let number = std::str::from_utf8(digits).ok().and_then(|text| text.parse::<i64>().ok());
     let resolved = number.and_then(|n| if n < 0 { n.checked_add(count as i64) } else { n.checked_sub(1) });
@@ -175,6 +181,7 @@ fn index(digits: &[u8], table: &str, count: usize, line: usize) -> Result<u32, F
     })
 }
 
+/// Parses the numbers up to a comment; an error if there are fewer than `least`.
 fn numbers<'a>(
     words: impl Iterator<Item = &'a [u8]>,
     line: usize,
@@ -187,7 +194,7 @@ fn numbers<'a>(
     })
 }
 
-/// Text; numbers in the shortest form that reads back the same.
+/// Returns the text of an OBJ file, with numbers in the shortest form that reads back exactly.
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let mut text = String::from("# vertices and faces\n");
     for (i, p) in mesh.positions.iter().enumerate() {
@@ -217,6 +224,7 @@ fn line(text: &mut String, keyword: &str, numbers: &[f32]) {
     text.push('\n');
 }
 
+/// Appends a corner of a face, with its texture coordinates and normal if the mesh has them.
 fn face_corner(text: &mut String, mesh: &TriangleMesh, corner: usize, vertex: u32) {
     let v = vertex as usize + 1;
     let vt = if mesh.corner_uvs.is_some() { Some(corner + 1) } else { mesh.uvs.as_ref().map(|_| v) };

@@ -1,4 +1,5 @@
-//! PLY: text and binary of both byte orders; elements and properties beyond those of a mesh are passed over.
+//! Reader and writer of PLY, text and binary in both byte orders. Elements and properties beyond those of a mesh are
+//! ignored.
 
 use super::FormatError;
 use super::mesh_file::{color_bytes, push_floats};
@@ -7,15 +8,17 @@ use crate::mesh::TriangleMesh;
 
 pub(super) const FORMAT: &str = "PLY";
 
+/// Reads a mesh from a PLY file.
 pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     read(bytes, Reader::faces)
 }
 
-/// The vertices with their extras; faces are passed over, whatever they hold.
+/// Reads the vertices of a PLY file with their attributes; faces are skipped, whatever they hold.
 pub(super) fn parse_vertices(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     read(bytes, |_, element, body| pass_over(element, body))
 }
 
+/// Reads all elements of a file, with faces read by `faces`.
 fn read(
     bytes: &[u8],
     faces: impl Fn(&mut Reader, &Element, &mut Body) -> Result<(), FormatError>,
@@ -41,6 +44,7 @@ enum Encoding {
     BigEndian,
 }
 
+/// Number type of a property.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     I8,
@@ -80,7 +84,7 @@ impl Kind {
         }
     }
 
-    /// The value that stands for a full colour channel.
+    /// Returns the value of a full colour channel.
     fn full(self) -> f64 {
         match self {
             Self::U8 => 255.0,
@@ -89,7 +93,7 @@ impl Kind {
         }
     }
 
-    /// From little-endian bytes, of its size.
+    /// Decodes a number from the first bytes, in little-endian order.
     fn decode(self, b: [u8; 8]) -> f64 {
         let [b0, b1, b2, b3, ..] = b;
         match self {
@@ -105,13 +109,15 @@ impl Kind {
     }
 }
 
+/// A property of an element, as declared in the header.
 struct Property {
     name: String,
     kind: Kind,
-    /// The type of a list's length; `None` for a single value.
+    /// Number type of the length of a list; `None` for a single value.
     length: Option<Kind>,
 }
 
+/// An element, such as vertices or faces, as declared in the header.
 struct Element {
     name: String,
     count: usize,
@@ -119,7 +125,8 @@ struct Element {
 }
 
 impl Element {
-    /// Refuses a count that the rest of the file cannot hold, before anything is made ready for it.
+    /// Returns an error if the rest of the file is too short for the element's count, before memory is allocated for
+    /// it.
     fn check_size(&self, body: &Body) -> Result<(), FormatError> {
         let smallest = |p: &Property| {
             if body.encoding == Encoding::Text { 1 } else { p.length.unwrap_or(p.kind).size() }
@@ -133,11 +140,12 @@ impl Element {
         Err(FormatError::Truncated { format: FORMAT, field: format!("element {}", self.name), needed, found })
     }
 
+    /// Returns the index of the first property with any of the names.
     fn index_of(&self, names: &[&str]) -> Option<usize> {
         self.properties.iter().position(|p| names.contains(&p.name.as_str()))
     }
 
-    /// Where the first set of names that are all there stands among the properties.
+    /// Returns the indices of the properties in the first set of names that is complete.
     fn indices_of<const N: usize>(&self, sets: &[[&str; N]]) -> Option<[usize; N]> {
         sets.iter().find_map(|names| {
             let found: Vec<usize> = names.iter().filter_map(|name| self.index_of(&[name])).collect();
@@ -182,7 +190,7 @@ impl Header {
     }
 }
 
-/// A line of the header, without its end.
+/// Takes a line of the header, without its line ending, from the front of `rest`.
 fn take_line<'a>(rest: &mut &'a [u8]) -> Result<&'a str, FormatError> {
     let invalid = |problem| FormatError::invalid(FORMAT, "header", problem);
     let end =
@@ -244,17 +252,19 @@ fn parse_property(words: &[&str]) -> Result<Property, FormatError> {
     }
 }
 
-/// Short enough for a message.
+/// Truncates text for an error message.
 fn clipped(text: &str) -> String {
     text.chars().take(60).collect()
 }
 
+/// The part of a file after the header that has not been read yet.
 struct Body<'a> {
     encoding: Encoding,
     bytes: &'a [u8],
 }
 
 impl Body<'_> {
+    /// Reads the next number.
     fn number(&mut self, kind: Kind, field: &str) -> Result<f64, FormatError> {
         if self.encoding == Encoding::Text {
             return self.text_number(field);
@@ -286,7 +296,7 @@ impl Body<'_> {
         })
     }
 
-    /// All values of the property, into `values`.
+    /// Reads all values of a property into `values`.
     fn property(&mut self, property: &Property, values: &mut Vec<f64>) -> Result<(), FormatError> {
         values.clear();
         let Some(length) = property.length else {
@@ -294,7 +304,7 @@ impl Body<'_> {
             return Ok(());
         };
         let count = self.number(length, &property.name)?;
-        // Each takes a byte at least, so this bounds the memory.
+        // Each value takes at least one byte, so this bounds the memory.
         if !(0.0..=self.bytes.len() as f64).contains(&count) {
             let problem = format!("a list of {count} values; {} bytes are left", self.bytes.len());
             return Err(FormatError::invalid(FORMAT, property.name.as_str(), problem));
@@ -306,9 +316,10 @@ impl Body<'_> {
     }
 }
 
+/// Skips all values of an element.
 fn pass_over(element: &Element, body: &mut Body) -> Result<(), FormatError> {
     let mut values = Vec::new();
-    // Without properties there is nothing to read, however often.
+    // An element without properties has no bytes, whatever its count.
     let count = if element.properties.is_empty() { 0 } else { element.count };
     for _ in 0..count {
         element.properties.iter().try_for_each(|property| body.property(property, &mut values))?;
@@ -316,6 +327,7 @@ fn pass_over(element: &Element, body: &mut Body) -> Result<(), FormatError> {
     Ok(())
 }
 
+/// The mesh read so far.
 #[derive(Default)]
 struct Reader {
     mesh: TriangleMesh,
@@ -323,6 +335,7 @@ struct Reader {
 }
 
 impl Reader {
+    /// Reads the vertices with the attributes that they have.
     fn vertices(&mut self, element: &Element, body: &mut Body) -> Result<(), FormatError> {
         let Some(position) = element.indices_of(&[["x", "y", "z"]]) else {
             return Err(FormatError::invalid(FORMAT, "element vertex", "has no properties x, y and z"));
@@ -353,6 +366,7 @@ impl Reader {
         Ok(())
     }
 
+    /// Reads the faces with their texture coordinates.
     fn faces(&mut self, element: &Element, body: &mut Body) -> Result<(), FormatError> {
         let Some(indices_at) = element.index_of(&["vertex_indices", "vertex_index"]) else {
             return Err(FormatError::invalid(FORMAT, "element face", "has no property vertex_indices"));
@@ -373,6 +387,7 @@ impl Reader {
         Ok(())
     }
 
+    /// Adds a polygon as a fan of triangles; `face` is its index, for error messages.
     fn fan(&mut self, indices: &[f64], uvs: &[f64], face: usize) -> Result<(), FormatError> {
         let invalid = |problem| Err(FormatError::invalid(FORMAT, format!("face {face}"), problem));
         let limit = self.mesh.positions.len() as f64;
@@ -394,7 +409,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Texture coordinates per corner count where every face has them.
+    /// Returns the mesh; texture coordinates per corner are kept if every face has them.
     fn finish(mut self) -> Result<TriangleMesh, FormatError> {
         let per_corner = !self.corner_uvs.is_empty() && self.corner_uvs.len() == self.mesh.triangles.len();
         self.mesh.corner_uvs = per_corner.then_some(self.corner_uvs);
@@ -402,7 +417,7 @@ impl Reader {
     }
 }
 
-/// Binary little-endian; colours in 8 bits.
+/// Returns the bytes of a binary little-endian PLY file, with colours in 8 bits.
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let mut out = header(mesh).into_bytes();
     for (i, p) in mesh.positions.iter().enumerate() {

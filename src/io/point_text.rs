@@ -1,4 +1,5 @@
-//! Points as text, a line each: numbers in columns (XYZ, PTS, CSV and their kin), or a keyword first (`p x y z`).
+//! Reader of point clouds in text with a line per point: numbers in columns (XYZ, PTS, CSV and similar), or after a
+//! keyword (`p x y z`).
 
 use super::text::{Field, numbered_lines};
 use super::{FormatError, PointCloud, points::full_channel};
@@ -7,14 +8,14 @@ use std::borrow::Cow;
 use std::iter::Peekable;
 
 pub(super) const FORMAT: &str = "point text";
-/// The format of the data of Hoppe's surface reconstruction.
+/// Name of the format of the data sets of Hoppe's surface reconstruction, in error messages.
 pub(super) const KEYED: &str = "PTS";
 
-/// Most columns that a file may name; real ones have some dozens. Without a limit, a file of nothing but commas would
-/// take forty times its size.
+/// Maximum number of columns; real files have some dozens. Without a limit, a file of nothing but commas would take
+/// forty times its size in memory.
 const MAX_COLUMNS: usize = 1000;
 
-/// A line that says something, without blanks around it.
+/// A line without surrounding whitespace, with its number in the file.
 struct Line<'a> {
     number: usize,
     text: Cow<'a, str>,
@@ -25,16 +26,17 @@ impl Line<'_> {
         format!("line {}", self.number)
     }
 
+    /// Returns an error that quotes the line and its number.
     fn invalid(&self, format: &'static str, problem: &str) -> FormatError {
         Field { format, name: &self.field(), text: &self.text }.invalid(problem)
     }
 
-    /// Whether numbers are all there is.
+    /// Returns whether all cells of the line are numbers.
     fn is_row(&self) -> bool {
         cells(&self.text, mark(&self.text)).iter().all(|cell| cell.parse::<f32>().is_ok())
     }
 
-    /// What a cell of the line says.
+    /// Parses a cell of the line as a finite number.
     fn number(&self, format: &'static str, cell: &str) -> Result<f32, FormatError> {
         let invalid = |problem| Err(Field { format, name: &self.field(), text: cell }.invalid(problem));
         match cell.parse::<f32>() {
@@ -45,35 +47,36 @@ impl Line<'_> {
     }
 }
 
-/// The lines of text that are neither empty nor comments. Bytes that are no UTF-8 are replaced: in comments they do
-/// not matter, and elsewhere they are no number.
+/// Returns the lines that are neither empty nor comments. Invalid UTF-8 is replaced: in comments it does not matter,
+/// and elsewhere it is not a number.
 fn content(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
     lines(bytes).filter(|line| !line.text.is_empty() && comment(&line.text).is_none())
 }
 
+/// Returns all lines, without surrounding whitespace.
 fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
     numbered_lines(bytes)
         .map(|(number, raw)| Line { number, text: String::from_utf8_lossy(raw.trim_ascii()) })
 }
 
-/// What follows the mark of a comment.
+/// Returns the text of a comment; `None` if the line is not one.
 fn comment(line: &str) -> Option<&str> {
     ["#", "//", "%"].iter().find_map(|mark| line.strip_prefix(mark))
 }
 
-/// What sets the cells of the line apart; `None` stands for blanks.
+/// Returns the separator of the line's cells; `None` for whitespace.
 fn mark(line: &str) -> Option<char> {
     [';', ','].into_iter().find(|&mark| line.contains(mark))
 }
 
-/// The cells of a line, without blanks and quotes around them; of too many, one too many.
+/// Returns the cells of a line without surrounding whitespace and quotes, at most [`MAX_COLUMNS`] + 1 of them.
 fn cells(line: &str, mark: Option<char>) -> Vec<&str> {
     let mut quoted = false;
     let ends = |c: char| {
         quoted ^= c == '"';
         !quoted && mark.map_or(c.is_whitespace(), |mark| c == mark)
     };
-    // Several blanks end one cell.
+    // A run of whitespace is one separator.
     let cells = line.split(ends).filter(|cell| mark.is_some() || !cell.is_empty());
     cells.take(MAX_COLUMNS + 1).map(unquoted).collect()
 }
@@ -83,7 +86,7 @@ fn unquoted(cell: &str) -> &str {
     cell.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(cell, str::trim)
 }
 
-/// Points in columns; [`parse_points`](super::parse_points) says which.
+/// Reads points in columns, as described at [`parse_points`](super::parse_points).
 pub(super) fn parse(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     let mut lines = content(bytes).peekable();
     let count_line = lines.next_if(|line| announced(line).is_some());
@@ -102,12 +105,13 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     table.into_points()
 }
 
-/// How many points are to come, where the line says nothing else.
+/// Returns the announced number of points if the line holds nothing else.
 fn announced(line: &Line) -> Option<u64> {
     line.text.parse().ok()
 }
 
-/// Nothing is ever made ready for an announced count, so it is enough to look at it in the end.
+/// Returns an error if the announced number of points is not that of the lines read. No memory is reserved for it, so a
+/// check at the end suffices.
 fn check_count(line: &Line, rows: usize) -> Result<(), FormatError> {
     if announced(line) == Some(rows as u64) {
         return Ok(());
@@ -116,7 +120,8 @@ fn check_count(line: &Line, rows: usize) -> Result<(), FormatError> {
     Err(line.invalid(FORMAT, &problem))
 }
 
-/// The columns as the next line names them, unless it is one of numbers already. After a count it may say anything.
+/// Takes a line of column names, unless the next line consists of numbers. After an announced count, a line that names
+/// no columns is skipped.
 fn take_names<'a>(
     lines: &mut Peekable<impl Iterator<Item = Line<'a>>>,
     counted: bool,
@@ -130,31 +135,31 @@ fn take_names<'a>(
     Ok(named)
 }
 
-/// The columns as the last comment before everything else names them, if one names as many as there are.
+/// Returns the columns named by the last comment before the content that names `count` columns, if there is one.
 fn named_in_comment(bytes: &[u8], count: usize) -> Option<Columns> {
     let before = lines(bytes).take_while(|line| line.text.is_empty() || comment(&line.text).is_some());
     let named = before.filter_map(|line| Columns::named(comment(&line.text)?));
     named.filter(|columns| columns.count == count).last()
 }
 
-/// What the columns hold.
+/// The meaning of the columns.
 struct Columns {
-    /// How many there are.
+    /// Number of columns in the file.
     count: usize,
-    /// Those that are read, coordinates of the points first.
+    /// Indices of the columns that are read, those of the position first.
     read: Vec<usize>,
-    /// `None` where nothing but the numbers tells.
+    /// Normals and colours among them; `None` if only the values can tell.
     extras: Option<Extras>,
 }
 
-/// Where normals and colours begin, among the columns that are read.
+/// First column of normals and of colours, counted among the columns that are read.
 struct Extras {
     normals: Option<usize>,
     colors: Option<usize>,
 }
 
 impl Columns {
-    /// `None` where x, y and z do not all have a name, or there are too many.
+    /// Returns the columns that a line names; `None` if x, y and z are not all named, or there are too many columns.
     fn named(line: &str) -> Option<Self> {
         let names: Vec<String> = cells(line, mark(line)).into_iter().map(str::to_ascii_lowercase).collect();
         let set = |set: [&str; 3]| -> Option<Vec<usize>> {
@@ -174,6 +179,7 @@ impl Columns {
         Some(Self { count: names.len(), read, extras: Some(extras) })
     }
 
+    /// Returns the columns of a file that does not name them.
     fn unnamed(count: usize, first: &Line) -> Result<Self, FormatError> {
         if ![3, 4, 6, 7, 9].contains(&count) {
             let accepted = "3, 4, 6, 7 or 9, or a first line that names them";
@@ -183,7 +189,7 @@ impl Columns {
     }
 }
 
-/// Columns of x, y and z under the names that napari gives: its axes run from the slowest to the fastest.
+/// Returns the columns of x, y and z under the names that napari gives, whose axes are ordered from slowest to fastest.
 fn axes(names: &[String]) -> Option<Vec<usize>> {
     let place = |axis: usize| names.iter().position(|name| *name == format!("axis-{axis}"));
     let all: Vec<usize> = (0..5).map_while(place).collect();
@@ -197,7 +203,7 @@ fn columns(count: usize) -> String {
     if count == 1 { "1 column".into() } else { format!("{count} columns") }
 }
 
-/// The numbers of all lines, one line after the other.
+/// The numbers in the columns that are read, line by line.
 struct Table {
     columns: Columns,
     numbers: Vec<f32>,
@@ -214,6 +220,7 @@ impl Table {
         Ok(table)
     }
 
+    /// Adds the numbers of a line.
     fn push(&mut self, line: &Line, mark: Option<char>) -> Result<(), FormatError> {
         let cells = cells(&line.text, mark);
         if cells.len() != self.columns.count {
@@ -232,7 +239,7 @@ impl Table {
         self.numbers.chunks_exact(self.columns.read.len())
     }
 
-    /// The three numbers from column `at` of all lines.
+    /// Returns the three numbers from column `at`, for every line.
     fn vectors(&self, at: usize) -> impl Iterator<Item = Vec3> + Clone {
         self.rows().map(move |row| Vec3::from_slice(&row[at..]))
     }
@@ -246,7 +253,7 @@ impl Table {
         Ok(PointCloud { points: all(0), normals: extras.normals.map(all), colors: extras.colors.map(all) })
     }
 
-    /// What stands in columns without names: normals are known by their length.
+    /// Returns which unnamed columns hold normals and colours; normals are recognised by their length.
     fn guessed_extras(&self) -> Result<Extras, FormatError> {
         let (normals, colors) = match self.columns.count {
             6 if self.are_normals(3) => (Some(3), None),
@@ -264,16 +271,18 @@ impl Table {
         Err(FormatError::invalid(FORMAT, format!("columns 4 to {}", self.columns.count), problem))
     }
 
+    /// Returns whether all vectors from column `at` have unit length within 1 %.
     fn are_normals(&self, at: usize) -> bool {
         self.vectors(at).all(|v| (v.length() - 1.0).abs() <= 0.01)
     }
 
+    /// Returns whether all triples from column `at` can be colours.
     fn are_colors(&self, at: usize) -> bool {
         full_channel(self.vectors(at)).is_some()
     }
 }
 
-/// Whether some line is a point that says so: `p x y z`.
+/// Returns whether at least one line is a point with a keyword: `p x y z`.
 pub(super) fn is_keyed(bytes: &[u8]) -> bool {
     content(bytes).any(|line| {
         let mut words = line.text.split_whitespace();
@@ -281,11 +290,11 @@ pub(super) fn is_keyed(bytes: &[u8]) -> bool {
     })
 }
 
-/// Points that say so; colours (`d`, `s`) and gloss (`g`), which hold for all that follows, are passed over.
+/// Reads points with a keyword (`p`). Colours (`d`, `s`) and gloss (`g`), which apply to all that follows, are ignored.
 pub(super) fn parse_keyed(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     let mut points = Vec::new();
     for line in content(bytes) {
-        // One word more than a point has is enough to see that there are too many.
+        // One word more than a point has is enough to detect too many.
         let words: Vec<&str> = line.text.split_whitespace().take(5).collect();
         match words.as_slice() {
             ["p", x, y, z] => {
@@ -372,7 +381,7 @@ mod tests {
         let normals = Some(vec![Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
         let colors = Some(vec![Vec3::new(1.0, 0.0, 0.2), Vec3::ZERO]);
         assert_eq!(cloud, PointCloud { points: two(), normals, colors: colors.clone() });
-        // As CloudCompare writes it; without the names, the intensity would stand elsewhere.
+        // As CloudCompare writes it; without the names, the column of the intensity would be ambiguous.
         let cloud = read("//X Y Z R G B Intensity\n2\n1 -2.5 0.03 255 0 51 9\n4 5 6 0 0 0 7\n");
         assert_eq!(cloud, PointCloud { points: two(), normals: None, colors });
         let partial = read("x,y,z,nx,ny,r,red\n1,-2.5,0.03,0,1,8,9\n4,5,6,0,1,8,9\n");
@@ -414,7 +423,7 @@ mod tests {
         ] {
             assert!(refusal(text).starts_with(said), "{}", refusal(text));
         }
-        // A column of pressures is no keyword.
+        // A column named `p` is not a keyword.
         assert_eq!(read("p x y z\n7 1 -2.5 0.03\n8 4 5 6\n").points, two());
     }
 

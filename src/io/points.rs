@@ -1,59 +1,60 @@
-//! Point clouds: which format the bytes are in, and what holds for points of every format.
+//! Reading of point clouds: detection of the format, and checks common to all formats.
 
 use super::mesh_file::is_text;
 use super::{FormatError, obj, ply, point_text, stl};
 use crate::math::Vec3;
 use crate::mesh::TriangleMesh;
 
-/// Points in space, in the order of the file. Each extra, where there is one, has one entry per point.
+/// A point cloud, in the order of the file. Each optional array has one entry per point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointCloud {
-    /// Where the points are, in the file's own units.
+    /// Positions, in the file's own units.
     pub points: Vec<Vec3>,
-    /// Normals as the file has them, meant to be of unit length; zero where a point has none.
+    /// Normals as in the file, expected to be of unit length; zero for a point without one.
     pub normals: Option<Vec<Vec3>>,
     /// Colours, rgb in 0..1.
     pub colors: Option<Vec<Vec3>>,
 }
 
-/// The points in a PLY or OBJ file, or in text with a line a point (XYZ, PTS, CSV, TXT), told apart by their content.
+/// Reads the points of a PLY or OBJ file, or of text with a line per point (XYZ, PTS, CSV, TXT); the format is detected
+/// from the content.
 ///
-/// Points of a mesh are its vertices as they stand, also where several are in one place. Colours are taken as they
-/// are where all are within 0..1, else divided by 255 where all are whole numbers up to that. Memory is linear in the
-/// size of the file.
+/// The points of a mesh are its vertices, including those with equal positions. Colours are kept if all are within
+/// 0..1, and divided by 255 if all are integers up to 255. Memory is linear in the size of the file.
 ///
 /// # Text
-/// Columns are set apart by semicolons, else by commas, else by blanks and tabs, as the first line of numbers has it.
-/// Empty lines and those that start with `#`, `//` or `%` are comments. A first line of one whole number announces
-/// how many points there are, and the line after it may be a comment without a mark.
+/// Columns are separated by semicolons, else by commas, else by spaces and tabs, as in the first line of numbers. Empty
+/// lines and lines that start with `#`, `//` or `%` are comments. A first line with a single integer announces the
+/// number of points, and the line after it may be a comment without a mark.
 ///
-/// Columns may be named, in the first line or in a comment before it: `x`, `y`, `z`, and, in whole sets, `nx`, `ny`,
-/// `nz`, and `red`, `green`, `blue` or `r`, `g`, `b`; capitals and quotes make no difference. In place of the first
-/// set, `axis-0` to `axis-2` are z, y, x, and `axis-0` to `axis-3` time, z, y, x. All others are passed over: a file
-/// with a column of times gives the points of all times.
+/// Columns may be named in the first line or in a comment before it: `x`, `y`, `z`, and, in complete sets, `nx`, `ny`,
+/// `nz`, and `red`, `green`, `blue` or `r`, `g`, `b`; case and quotes do not matter. Instead of the first set, `axis-0`
+/// to `axis-2` are z, y, x, and `axis-0` to `axis-3` are time, z, y, x. All other columns are ignored: a file with a
+/// column of times gives the points of all times.
 ///
-/// Without names, there are
+/// Without names, the number of columns determines their meaning:
 ///
 /// - three columns: x y z;
-/// - four: x y z and an intensity, which is passed over;
-/// - six: x y z and normals where all are of unit length within 1 %, else colours;
+/// - four: x y z and an intensity, which is ignored;
+/// - six: x y z and normals if all are of unit length within 1 %, else colours;
 /// - seven: x y z, an intensity, a colour;
-/// - nine: x y z, a colour and a normal, or the normal first: again, normals are of unit length.
+/// - nine: x y z, a colour and a normal, or the normal first; normals are again recognised by their unit length.
 ///
-/// Lines `p x y z` are points as well; then only lines that start with `d`, `s` or `g` may stand between them, and are
-/// passed over.
+/// Lines `p x y z` are points as well; between them, only lines that start with `d`, `s` or `g` are allowed, and
+/// ignored.
 ///
 /// # Errors
-/// [`FormatError`] with the format and the field (of text, the line) for bytes in no such format, files that end
-/// early or contradict themselves, numbers that are not finite as 32-bit ones, colours of another range, and files
+/// [`FormatError`] with the format and the field (in text, the line) for bytes in no such format, for files that are
+/// truncated or contradictory, for numbers that are not finite in 32 bits, for colours out of range, and for files
 /// without points.
 pub fn parse_points(bytes: &[u8]) -> Result<PointCloud, FormatError> {
-    // Some programs mark text as UTF-8.
+    // Some programs start UTF-8 text with a byte order mark.
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let (format, cloud) = parse(bytes)?;
     checked(format, cloud)
 }
 
+/// Reads points in the format that the bytes indicate, with the name of the format.
 fn parse(bytes: &[u8]) -> Result<(&'static str, PointCloud), FormatError> {
     if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
         return Ok((ply::FORMAT, vertices(ply::parse_vertices(bytes)?)));
@@ -74,7 +75,7 @@ fn parse(bytes: &[u8]) -> Result<(&'static str, PointCloud), FormatError> {
     Ok((point_text::FORMAT, point_text::parse(bytes)?))
 }
 
-/// What bytes are that hold neither a PLY file nor text with points, as far as their start tells.
+/// Returns the name of an unsupported format that the first bytes indicate; `None` for text that may hold points.
 fn foreign(bytes: &[u8]) -> Option<&'static str> {
     let start = |mark: &[u8]| bytes.starts_with(mark);
     Some(match bytes {
@@ -97,7 +98,7 @@ fn vertices(mesh: TriangleMesh) -> PointCloud {
     PointCloud { points: mesh.positions, normals: mesh.normals, colors: mesh.colors }
 }
 
-/// The cloud with colours in 0..1, once it is found sound.
+/// Returns the cloud with colours in 0..1, after checking it.
 fn checked(format: &'static str, cloud: PointCloud) -> Result<PointCloud, FormatError> {
     let count = cloud.points.len();
     if count == 0 {
@@ -114,12 +115,14 @@ fn checked(format: &'static str, cloud: PointCloud) -> Result<PointCloud, Format
     Ok(PointCloud { colors, ..cloud })
 }
 
+/// Returns an error if a vector is not finite.
 fn check_finite(format: &'static str, field: &str, vectors: &[Vec3]) -> Result<(), FormatError> {
     let Some(i) = vectors.iter().position(|v| !v.is_finite()) else { return Ok(()) };
     let problem = format!("that of point {i}, from 0, is {}; finite numbers are accepted", vectors[i]);
     Err(FormatError::invalid(format, field, problem))
 }
 
+/// Returns an error unless there is one vector per point.
 fn check_count(format: &'static str, field: &str, found: &[Vec3], count: usize) -> Result<(), FormatError> {
     if found.len() == count {
         return Ok(());
@@ -128,6 +131,7 @@ fn check_count(format: &'static str, field: &str, found: &[Vec3], count: usize) 
     Err(FormatError::invalid(format, field, problem))
 }
 
+/// Returns the colours scaled to 0..1.
 fn unit_colors(format: &'static str, colors: Vec<Vec3>) -> Result<Vec<Vec3>, FormatError> {
     let full = full_channel(colors.iter().copied()).ok_or_else(|| {
         let problem = "some are out of range; all 0 to 1, or whole numbers of 0 to 255, are accepted";
@@ -136,7 +140,7 @@ fn unit_colors(format: &'static str, colors: Vec<Vec3>) -> Result<Vec<Vec3>, For
     Ok(colors.into_iter().map(|color| color / full).collect())
 }
 
-/// The value that stands for a full channel; `None` where these are no colours.
+/// Returns the value of a full colour channel, 1 or 255; `None` if the values cannot be colours.
 pub(super) fn full_channel(colors: impl Iterator<Item = Vec3> + Clone) -> Option<f32> {
     let all = |fits: fn(f32) -> bool| colors.clone().all(|color| color.to_array().into_iter().all(fits));
     if all(|c| (0.0..=1.0).contains(&c)) {
@@ -151,7 +155,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Two of the three points are in one place.
+    /// Three points, two of them with equal positions.
     fn made() -> PointCloud {
         let p = Vec3::new(0.1, -2.5, 1e10);
         PointCloud {
@@ -161,7 +165,7 @@ mod tests {
         }
     }
 
-    /// Numbers of a point one after the other, colours as they are written for `full`.
+    /// The numbers of each point, with colours scaled to `full`.
     fn rows(cloud: &PointCloud, full: f32) -> Vec<Vec<f32>> {
         let extras = cloud.normals.iter().flatten().zip(cloud.colors.iter().flatten());
         let row = |(p, (n, c)): (&Vec3, (&Vec3, &Vec3))| {
@@ -192,7 +196,7 @@ mod tests {
         format!("{header}2 7 8\n{}0 2 9 9\n", text(&rows(&made(), full), "77 ", " ")).into_bytes()
     }
 
-    /// Doubles and 16-bit colours.
+    /// A binary PLY with doubles and 16-bit colours.
     fn ply_binary(little: bool) -> Vec<u8> {
         let encoding = if little { "binary_little_endian" } else { "binary_big_endian" };
         let mut out = ply_header(encoding, "double", "ushort", ["r", "g", "b"]).into_bytes();
@@ -322,7 +326,7 @@ mod tests {
         assert!(error.starts_with("point file: format: STL"), "{error}");
     }
 
-    /// What holds for whatever was read.
+    /// Asserts the properties of every cloud that is read without an error.
     fn assert_sound(bytes: &[u8], place: &str) {
         let Ok(cloud) = parse_points(bytes) else { return };
         let count = cloud.points.len();

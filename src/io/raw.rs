@@ -1,9 +1,9 @@
-//! Numbers as they stand in a file, turned into voxels.
+//! Conversion of a file's raw numbers to voxels.
 
 use super::FormatError;
 use crate::volume::{VolumeError, Voxels};
 
-/// Type of a stored number.
+/// Type of the numbers in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scalar {
     U8,
@@ -18,13 +18,13 @@ pub(super) enum Scalar {
     F64,
 }
 
-/// Bytes a payload may have beyond what the header accounts for: writers pad the end of files.
+/// Number of bytes that a payload may have beyond the size given by the header: writers pad the end of files.
 pub(super) const SLACK: usize = 512;
 
-/// Largest integer up to which every integer is an `f64`.
+/// Largest integer up to which `f64` represents every integer.
 const MAX_EXACT: u64 = 1 << 53;
 
-/// Where in which file the numbers stand, for messages.
+/// Format and field of the numbers, for error messages.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     pub(super) format: &'static str,
@@ -32,7 +32,7 @@ pub(super) struct Place {
 }
 
 impl Scalar {
-    /// Bytes of one number.
+    /// Returns the size of one number in bytes.
     pub(super) fn size(self) -> usize {
         match self {
             Scalar::U8 | Scalar::I8 => 1,
@@ -43,7 +43,7 @@ impl Scalar {
     }
 }
 
-/// Bytes that `dims` numbers take.
+/// Returns the size of the voxels in bytes.
 ///
 /// # Errors
 /// A dimension of 0, or a size that cannot be addressed.
@@ -63,10 +63,10 @@ pub(super) fn payload_size(place: Place, dims: [usize; 4], scalar: Scalar) -> Re
     Err(FormatError::too_large(place.format, place.field, needed))
 }
 
-/// The part of `bytes` that holds the voxels.
+/// Returns the first `needed` bytes, which hold the voxels.
 ///
 /// # Errors
-/// Fewer bytes than `needed`, or more than [`SLACK`] beyond: then header and payload do not belong together.
+/// Fewer bytes than `needed`, or more than [`SLACK`] beyond it: header and payload then do not match.
 pub(super) fn exact(place: Place, bytes: &[u8], needed: usize) -> Result<&[u8], FormatError> {
     let Some(payload) = bytes.get(..needed) else {
         return Err(FormatError::truncated(place.format, place.field, needed, bytes.len()));
@@ -78,10 +78,10 @@ pub(super) fn exact(place: Place, bytes: &[u8], needed: usize) -> Result<&[u8], 
     Ok(payload)
 }
 
-/// The voxels in `bytes`, whose length is a multiple of the number's size. 64-bit integers become `f64`.
+/// Decodes the voxels in `bytes`, whose length is a multiple of the size of a number. 64-bit integers become `f64`.
 ///
 /// # Errors
-/// A 64-bit integer beyond ±2⁵³, which `f64` may not hold; too little memory.
+/// A 64-bit integer beyond ±2⁵³, which `f64` may not represent exactly; not enough memory.
 pub(super) fn decode(place: Place, bytes: &[u8], scalar: Scalar, big: bool) -> Result<Voxels, FormatError> {
     Ok(match scalar {
         Scalar::U8 => Voxels::U8(numbers(place, bytes, |[b]| b)?),
@@ -117,6 +117,7 @@ pub(super) fn decode(place: Place, bytes: &[u8], scalar: Scalar, big: bool) -> R
     })
 }
 
+/// Decodes all numbers with `read`.
 fn numbers<const N: usize, T>(
     place: Place,
     bytes: &[u8],
@@ -130,6 +131,7 @@ fn numbers<const N: usize, T>(
     Ok(out)
 }
 
+/// Returns an error if the absolute value of an integer exceeds [`MAX_EXACT`].
 fn check_exact(place: Place, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> Result<(), FormatError> {
     match bytes.as_chunks().0.iter().map(|&b| size(b)).find(|&v| v > MAX_EXACT) {
         None => Ok(()),
@@ -140,18 +142,18 @@ fn check_exact(place: Place, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> Res
     }
 }
 
-/// `count` numbers written as text, set apart by blanks or commas; every type becomes `f64`, values are checked
-/// against what the stated type holds.
+/// Parses `count` numbers written as text, separated by whitespace or commas. All become `f64`, after a check that the
+/// stated type can represent them.
 ///
 /// # Errors
-/// Too few or too many numbers, something that is none, a number that its type does not hold.
+/// Too few or too many numbers, a word that is not a number, or a number out of the range of its type.
 pub(super) fn decode_text(
     place: Place,
     bytes: &[u8],
     scalar: Scalar,
     count: usize,
 ) -> Result<Voxels, FormatError> {
-    // A number and the blank after it take two bytes at least: more could never be there.
+    // A number and its separator take at least two bytes: more numbers cannot be present.
     if count > bytes.len() / 2 + 1 {
         return Err(FormatError::truncated(place.format, place.field, count.saturating_mul(2), bytes.len()));
     }
@@ -192,7 +194,7 @@ fn text_number(place: Place, word: &[u8], scalar: Scalar) -> Result<f64, FormatE
     })
 }
 
-/// Whether a type can hold a value.
+/// Returns whether a number type can represent a value.
 fn holds(scalar: Scalar, v: f64) -> bool {
     let within = |low: f64, high: f64| v >= low && v <= high && v == libm::trunc(v);
     match scalar {
@@ -208,7 +210,7 @@ fn holds(scalar: Scalar, v: f64) -> bool {
     }
 }
 
-/// A refusal by [`crate::volume::Volume`] as an error of the file that asked for it.
+/// Converts an error of [`crate::volume::Volume`] to one of the file being read.
 pub(super) fn refused(format: &'static str, error: VolumeError) -> FormatError {
     match error {
         VolumeError::InvalidArgument { parameter, problem } => {

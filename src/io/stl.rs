@@ -1,4 +1,4 @@
-//! STL, binary and text: a list of triangles, each with corners of its own.
+//! Reader and writer of STL, binary and text: a list of triangles, each with its own corners.
 
 use super::FormatError;
 use super::mesh_file::{is_text, push_floats};
@@ -7,23 +7,24 @@ use crate::mesh::TriangleMesh;
 
 const FORMAT: &str = "STL";
 
-/// Bytes before the triangles of a binary file.
+/// Size of the header of a binary file in bytes, including the number of triangles.
 pub(super) const HEADER: usize = 84;
 
-/// Bytes of a triangle: normal, three corners, two unused.
+/// Size of a triangle in bytes: normal, three corners, two unused bytes.
 const RECORD: usize = 50;
 
-/// Whether the number of triangles explains the length; no other mark tells a binary file.
+/// Returns whether the length of the file matches its number of triangles; binary STL has no other signature.
 pub(super) fn is_binary(bytes: &[u8]) -> bool {
     triangle_count(bytes).is_some_and(|count| HEADER as u64 + count * RECORD as u64 == bytes.len() as u64)
 }
 
+/// Returns the number of triangles that the header states.
 fn triangle_count(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(80..HEADER)?;
     Some(u64::from(u32::from_le_bytes(count.try_into().ok()?)))
 }
 
-/// Why bytes that can be nothing else are no binary file either.
+/// Returns the error for bytes that can only be a binary STL but have the wrong length.
 pub(super) fn wrong_length(bytes: &[u8]) -> FormatError {
     let needed = triangle_count(bytes).map_or(0, |count| HEADER as u64 + count * RECORD as u64);
     let found = bytes.len() as u64;
@@ -35,6 +36,7 @@ pub(super) fn wrong_length(bytes: &[u8]) -> FormatError {
     FormatError::invalid(FORMAT, "triangle count", problem)
 }
 
+/// Reads a binary file.
 pub(super) fn parse_binary(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     let records = bytes.get(HEADER..).ok_or_else(|| wrong_length(bytes))?;
     Ok(from_corners(
@@ -47,18 +49,20 @@ fn point(bytes: &[u8]) -> Vec3 {
     Vec3::new(number(0), number(1), number(2))
 }
 
+/// Returns the triangles whose corners follow each other, three by three.
 fn from_corners(positions: Vec<Vec3>) -> TriangleMesh {
     let triangles = (0..positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     TriangleMesh { positions, triangles, ..Default::default() }
 }
 
-/// Whether the bytes start as a text file does: `solid`, and not as a sentence of something else.
+/// Returns whether the bytes are text that starts with the word `solid`.
 pub(super) fn is_text_stl(bytes: &[u8]) -> bool {
     let bytes = bytes.trim_ascii_start();
     let starts = bytes.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
     starts && bytes.get(5).is_none_or(u8::is_ascii_whitespace) && is_text(bytes)
 }
 
+/// Reads a text file.
 pub(super) fn parse_text(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     let mut corners = Vec::new();
     let mut ended = false;
@@ -79,6 +83,7 @@ pub(super) fn parse_text(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
     Ok(from_corners(corners))
 }
 
+/// Parses the coordinates of a vertex line.
 fn text_point<'a>(words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<Vec3, FormatError> {
     let mut numbers = words.map(|word| std::str::from_utf8(word).ok()?.parse::<f32>().ok());
     let mut next = || numbers.next().flatten();
@@ -88,10 +93,10 @@ fn text_point<'a>(words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<
     }
 }
 
-/// A binary file.
+/// Returns the bytes of a binary file.
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let mut out = Vec::with_capacity(HEADER + RECORD * mesh.triangles.len());
-    // Not "solid", which would pass for text.
+    // Not "solid", which would be detected as text.
     out.extend(b"binary STL");
     out.resize(80, b' ');
     out.extend((mesh.triangles.len() as u32).to_le_bytes());

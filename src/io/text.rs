@@ -1,9 +1,9 @@
-//! Headers that are lines of text, and lines of whole files of text.
+//! Lines of text files, and headers that consist of lines of text.
 
 use super::FormatError;
 use std::iter;
 
-/// The lines of a file with their numbers from 1, without their ends (\n, \r\n or \r).
+/// Returns the lines of a file with their numbers from 1, without line endings (\n, \r\n or \r).
 pub(super) fn numbered_lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
     let mut rest = bytes;
     let lines = iter::from_fn(move || {
@@ -19,10 +19,10 @@ pub(super) fn numbered_lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8]
     (1..).zip(lines)
 }
 
-/// Longest line and longest header taken; real ones have a few kilobytes.
+/// Maximum length of a header in bytes; real ones have a few kilobytes.
 const MAX_HEADER: usize = 1 << 20;
 
-/// The lines of a header one by one, and what follows them.
+/// Iterator over the lines of a header, which gives access to the bytes after it.
 pub(super) struct Lines<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -33,7 +33,8 @@ impl<'a> Lines<'a> {
         Self { bytes, at: 0 }
     }
 
-    /// The next line without its end (\n or \r\n), or `None` at the end of the file or of what a header may hold.
+    /// Returns the next line without its ending (\n or \r\n); `None` at the end of the file or at the maximum length of
+    /// a header.
     pub(super) fn next_line(&mut self) -> Option<String> {
         let end = if self.bytes.len() < MAX_HEADER { self.bytes.len() } else { MAX_HEADER };
         let rest = self.bytes.get(self.at..end).filter(|rest| !rest.is_empty())?;
@@ -42,13 +43,13 @@ impl<'a> Lines<'a> {
         Some(String::from_utf8_lossy(&rest[..length]).trim_end_matches('\r').to_owned())
     }
 
-    /// Everything after the lines read so far.
+    /// Returns the bytes after the lines read so far.
     pub(super) fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.at..).unwrap_or(&[])
     }
 }
 
-/// One field's text, with its place for messages.
+/// The text of a header field, with its format and name for error messages.
 #[derive(Clone, Copy)]
 pub(super) struct Field<'a> {
     pub(super) format: &'static str,
@@ -57,16 +58,16 @@ pub(super) struct Field<'a> {
 }
 
 impl Field<'_> {
-    /// An error about this field that quotes it.
+    /// Returns an error about this field that quotes its text.
     pub(super) fn invalid(&self, problem: &str) -> FormatError {
         let shown: String = self.text.chars().take(60).collect();
         FormatError::invalid(self.format, self.name, format!("'{shown}': {problem}"))
     }
 
-    /// Numbers set apart by blanks, NaN included.
+    /// Parses `count` numbers separated by whitespace; NaN is accepted.
     ///
     /// # Errors
-    /// A word that is no number; another count than `count`.
+    /// A word that is not a number; a number of words other than `count`.
     pub(super) fn numbers(&self, count: usize) -> Result<Vec<f64>, FormatError> {
         let words: Result<Vec<f64>, _> = self.text.split_whitespace().map(str::parse).collect();
         words
@@ -75,10 +76,10 @@ impl Field<'_> {
             .ok_or_else(|| self.invalid(&format!("{count} numbers are needed")))
     }
 
-    /// Numbers, all of them finite.
+    /// Parses `count` finite numbers separated by whitespace.
     ///
     /// # Errors
-    /// As [`numbers`](Self::numbers).
+    /// As [`numbers`](Self::numbers), and numbers that are not finite.
     pub(super) fn finite(&self, count: usize) -> Result<Vec<f64>, FormatError> {
         let values = self.numbers(count)?;
         if values.iter().all(|v| v.is_finite()) {
@@ -88,10 +89,10 @@ impl Field<'_> {
         }
     }
 
-    /// Whole numbers of at least 1.
+    /// Parses `count` positive integers separated by whitespace.
     ///
     /// # Errors
-    /// Another count than `count`, a 0, something else than digits, or more than can be addressed.
+    /// A number of words other than `count`, a 0, a word that is not an integer, or a size that cannot be addressed.
     pub(super) fn sizes(&self, count: usize) -> Result<Vec<usize>, FormatError> {
         let words: Result<Vec<u64>, _> = self.text.split_whitespace().map(str::parse).collect();
         let fits = |v: &Vec<u64>| v.len() == count && !v.contains(&0);
@@ -103,20 +104,20 @@ impl Field<'_> {
         counted.map_err(|_| FormatError::too_large(self.format, self.name, needed))
     }
 
-    /// One whole number of at least `least`.
+    /// Parses a single integer of at least `least`.
     ///
     /// # Errors
-    /// Anything else.
+    /// Any other text.
     pub(super) fn integer(&self, least: i64) -> Result<i64, FormatError> {
         let value = self.text.trim().parse().ok().filter(|&v| v >= least);
         value.ok_or_else(|| self.invalid(&format!("a whole number of at least {least} is needed")))
     }
 
-    /// One whole number of at least 0, as an offset; one that cannot be addressed becomes the largest that can, past
-    /// the end of any file.
+    /// Parses a single non-negative integer as an offset; one that cannot be addressed becomes the largest `usize`,
+    /// past the end of any file.
     ///
     /// # Errors
-    /// Anything else.
+    /// Any other text.
     pub(super) fn offset(&self) -> Result<usize, FormatError> {
         Ok(usize::try_from(self.integer(0)?).unwrap_or(usize::MAX))
     }

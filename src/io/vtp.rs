@@ -1,11 +1,11 @@
-//! VTP, VTK's XML poly data, written with its arrays inline as base64.
+//! Writer of VTP, VTK's XML poly data, with its arrays inline as base64.
 
 use super::base64;
 use super::mesh_file::{color_bytes, push_floats};
 use crate::math::Vec3;
 use crate::mesh::TriangleMesh;
 
-/// Points and triangles; normals, texture coordinates and colours as point data.
+/// Returns the text of a VTP file with points and triangles; normals, texture coordinates and colours are point data.
 pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     let split;
     let mesh = if mesh.corner_uvs.is_some() {
@@ -32,6 +32,7 @@ pub(super) fn write(mesh: &TriangleMesh) -> Vec<u8> {
     xml.into_bytes()
 }
 
+/// Returns the XML of the vertex attributes.
 fn point_data(mesh: &TriangleMesh) -> String {
     let mut active = String::new();
     let mut arrays = String::new();
@@ -52,13 +53,14 @@ fn point_data(mesh: &TriangleMesh) -> String {
     format!("<PointData{active}>\n{arrays}</PointData>\n")
 }
 
+/// Returns the XML of an array of vectors.
 fn vectors(name: &str, values: &[Vec3]) -> String {
     let mut bytes = Vec::with_capacity(12 * values.len());
     values.iter().for_each(|v| push_floats(&mut bytes, &v.to_array()));
     data_array("Float32", name, 3, bytes)
 }
 
-/// The length of the array stands before it, inside the base64.
+/// Returns the XML of an array, whose length in bytes precedes its data inside the base64.
 fn data_array(kind: &str, name: &str, components: usize, bytes: Vec<u8>) -> String {
     let mut block = (bytes.len() as u32).to_le_bytes().to_vec();
     block.extend(bytes);

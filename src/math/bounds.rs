@@ -1,4 +1,4 @@
-//! Axis-aligned boxes, and a tree of them for finding the few that matter.
+//! Axis-aligned bounding boxes, and a bounding volume hierarchy for overlap, nearest-box and ray queries.
 
 use super::order::{by_both, rank};
 use super::{DVec3, Vec3};
@@ -7,28 +7,28 @@ use smallvec::SmallVec;
 /// A closed axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// The lowest corner.
+    /// Corner with the smallest coordinates.
     pub min: Vec3,
-    /// The highest corner.
+    /// Corner with the largest coordinates.
     pub max: Vec3,
 }
 
 impl Bounds {
-    /// The box that holds nothing and meets nothing.
+    /// The empty box, which contains no point and overlaps no box.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// The smallest box around the points.
+    /// Returns the smallest box that contains the points.
     #[inline]
     pub fn of(points: &[Vec3]) -> Self {
         points.iter().fold(Self::EMPTY, |b, &p| b.joined(&Self { min: p, max: p }))
     }
 
-    /// The smallest box around both.
+    /// Returns the smallest box that contains both boxes.
     #[inline]
     pub fn joined(&self, other: &Self) -> Self {
         let (mut min, mut max) = (self.min, self.max);
         for axis in 0..3 {
-            // Comparisons, as f32::min by variables is a call in wasm.
+            // Comparisons, since `f32::min` of variables is a call in wasm.
             if other.min[axis] < min[axis] {
                 min[axis] = other.min[axis];
             }
@@ -39,13 +39,13 @@ impl Bounds {
         Self { min, max }
     }
 
-    /// Whether `p` is inside or on the border; false for NaN.
+    /// Returns whether `p` is inside the box or on its border; false for NaN.
     #[inline]
     pub fn contains(&self, p: Vec3) -> bool {
         self.meets(&Self { min: p, max: p })
     }
 
-    /// Whether the boxes share a point.
+    /// Returns whether the boxes share a point.
     #[inline]
     pub fn meets(&self, other: &Self) -> bool {
         self.min.x <= other.max.x
@@ -56,22 +56,22 @@ impl Bounds {
             && other.min.z <= self.max.z
     }
 
-    /// The squared distance from `p` to the box, zero inside.
+    /// Returns the squared distance from `p` to the box, zero inside.
     #[inline]
     pub fn distance_squared(&self, p: Vec3) -> f64 {
         let (low, high) = (self.min.as_dvec3() - p.as_dvec3(), p.as_dvec3() - self.max.as_dvec3());
         low.max(high).max(DVec3::ZERO).length_squared()
     }
 
-    /// The distance along the ray, in lengths of its direction, at which it enters the box; `None` where it misses.
-    /// Zero where it starts inside. Rounded so that a ray along a face counts.
+    /// Returns the distance along the ray, in lengths of its direction, at which it enters the box; `None` if it
+    /// misses. Zero if it starts inside. Rounded so that a ray in a face of the box is a hit.
     #[inline]
     pub fn ray_entry(&self, ray: &Ray) -> Option<f64> {
         self.span_on(ray, 0.0).map(|(enter, _)| enter)
     }
 
-    /// The distance from the ray's origin, in lengths of its direction, at which the line through it enters the box,
-    /// ahead or behind; `None` where it misses. Zero where the origin is inside. Rounded as [`Self::ray_entry`].
+    /// Returns the distance from the ray's origin, in lengths of its direction, at which the line through it enters the
+    /// box, ahead or behind; `None` if it misses. Zero if the origin is inside. Rounded as [`Self::ray_entry`].
     #[inline]
     pub fn line_entry(&self, ray: &Ray) -> Option<f64> {
         let (enter, leave) = self.span_on(ray, f64::NEG_INFINITY)?;
@@ -79,7 +79,7 @@ impl Bounds {
         Some(if near > 0.0 { near } else { 0.0 })
     }
 
-    /// Where the line along the ray is inside, from `start` on.
+    /// Returns the interval of the line along the ray that is inside the box, from parameter `start` on.
     #[inline]
     fn span_on(&self, ray: &Ray, start: f64) -> Option<(f64, f64)> {
         let (mut enter, mut leave) = (start, f64::INFINITY);
@@ -87,7 +87,7 @@ impl Bounds {
             let low = f64::from(self.min[axis]) - ray.origin[axis];
             let high = f64::from(self.max[axis]) - ray.origin[axis];
             if ray.inverse[axis] == 0.0 {
-                // Parallel to the slab: a product would be 0 · ∞ on its faces.
+                // Parallel to the slab: on its faces the product would be 0 · ∞.
                 if low > 0.0 || high < 0.0 {
                     return None;
                 }
@@ -98,11 +98,11 @@ impl Bounds {
             enter = if near > enter { near } else { enter };
             leave = if far < leave { far } else { leave };
         }
-        // Behind the origin both are negative.
+        // Behind the origin both are negative, hence the absolute value.
         (enter <= leave + ROUNDING * leave.abs()).then_some((enter, leave))
     }
 
-    /// The axis along which the box is longest: 0, 1 or 2.
+    /// Returns the axis along which the box is longest: 0, 1 or 2.
     pub fn widest_axis(&self) -> usize {
         let size = self.max - self.min;
         if size.x >= size.y && size.x >= size.z {
@@ -115,35 +115,37 @@ impl Bounds {
     }
 }
 
-/// Each product is within two ulps; less would let a ray slip between two boxes that share a face.
+/// Relative tolerance of the ray test: each product is within two ulps, and with less a ray could pass between two
+/// boxes that share a face.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// A ray made ready for many boxes.
+/// A ray prepared for tests against many boxes.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
     origin: DVec3,
-    /// One over the direction, by axis; 0 across it.
+    /// Reciprocal of the direction per axis; 0 for an axis that the ray is perpendicular to.
     inverse: DVec3,
 }
 
 impl Ray {
-    /// From `origin` along `direction`, of any length but 0.
+    /// Creates the ray from `origin` along `direction`, which may have any length but 0.
     pub fn new(origin: DVec3, direction: DVec3) -> Self {
         let inverse = |x: f64| if x.abs() > LEAST_SLOPE { 1.0 / x } else { 0.0 };
         Self { origin, inverse: DVec3::from(direction.to_array().map(inverse)) }
     }
 }
 
-/// A direction across an axis but for less than this is taken as one across it: its inverse would be near infinity.
+/// Direction components below this are treated as 0: their reciprocal would be close to infinity.
 const LEAST_SLOPE: f64 = 1e-290;
 
-/// Nodes to be looked at, and how far away they are: as many as a tree of a million items needs without an allocation.
+/// Nodes still to visit with their distances; a tree of a million items needs no allocation.
 type Stack = SmallVec<[(f64, usize); 24]>;
 
-/// Boxes in a leaf: 1 doubles the nodes, 16 tests many boxes in vain.
+/// Maximum number of boxes in a leaf: 1 doubles the number of nodes, 16 tests many boxes in vain.
 const LEAF: usize = 4;
 
-/// A balanced tree over boxes: size linear in their number whatever their shapes, and the same for the same boxes.
+/// A balanced bounding volume hierarchy. Its size is linear in the number of boxes whatever their shapes, and equal
+/// boxes give an equal tree.
 #[derive(Clone, Debug, Default)]
 pub struct BoxTree {
     nodes: Vec<Node>,
@@ -153,14 +155,14 @@ pub struct BoxTree {
 #[derive(Clone, Copy, Debug)]
 struct Node {
     bounds: Bounds,
-    /// Inner: the second child (the first is the next node). Leaf: the first item.
+    /// Inner node: index of the second child (the first is the next node). Leaf: index of the first item.
     link: u32,
-    /// Items of a leaf; 0 for an inner node.
+    /// Number of items in a leaf; 0 for an inner node.
     count: u32,
 }
 
 impl BoxTree {
-    /// The tree of `boxes`, whose items are known by their index.
+    /// Builds the tree over `boxes`; an item is the index of its box.
     pub fn new(boxes: &[Bounds]) -> Self {
         let mut items: Vec<(Bounds, u32)> = boxes.iter().copied().zip(0..).collect();
         let mut nodes = Vec::with_capacity(boxes.len());
@@ -170,8 +172,8 @@ impl BoxTree {
         Self { nodes, items }
     }
 
-    /// Visits each pair of items whose boxes meet, once, the lower index first. The order of the pairs is fixed, but
-    /// says nothing.
+    /// Visits each pair of items whose boxes overlap, once, the lower index first. The order of the pairs is
+    /// deterministic but arbitrary.
     pub fn for_each_pair(&self, mut visit: impl FnMut(u32, u32)) {
         let mut stack = Vec::new();
         if !self.nodes.is_empty() {
@@ -188,14 +190,15 @@ impl BoxTree {
                 }
                 (true, true) => self.pairs_between(a, b, &mut visit),
                 (false, true) => stack.extend([(i + 1, j), (a.link as usize, j)]),
-                // The second of the pair next time: both shrink in turn.
+                // The pair is swapped, so that both nodes are split in turn.
                 (_, false) => stack.extend([(j + 1, i), (b.link as usize, i)]),
             }
         }
     }
 
-    /// Visits items nearest box first. `visit` gets an item and the bound so far, and gives back the new bound, a
-    /// squared distance; items whose box is further than it are left out. Ties within a bound are visited.
+    /// Visits items in the order of the distances of their boxes from `p`. `visit` receives an item and the current
+    /// bound, and returns the new bound, a squared distance; items whose box is farther are skipped, those exactly at
+    /// the bound are visited.
     pub fn nearest(&self, p: Vec3, mut visit: impl FnMut(u32, f64) -> f64) {
         let mut bound = f64::INFINITY;
         self.descend(
@@ -208,24 +211,25 @@ impl BoxTree {
         );
     }
 
-    /// Visits items whose boxes have a point within a squared distance of `p`, until `visit` says that it is enough.
+    /// Visits items whose boxes are within the squared distance `squared` of `p`, until `visit` returns true.
     pub fn within(&self, p: Vec3, squared: f64, mut visit: impl FnMut(u32) -> bool) {
         let entry = |bounds: &Bounds| Some(bounds.distance_squared(p));
         self.descend(squared, entry, |item| if visit(item) { -1.0 } else { squared });
     }
 
-    /// Visits items whose boxes the ray enters, nearest entry first, leaving out those entered beyond the bound that
-    /// `visit` gave back last (in lengths of the ray's direction).
+    /// Visits items whose boxes the ray enters, nearest entry first. `visit` returns a bound, in lengths of the ray's
+    /// direction; items entered beyond the last bound are skipped.
     pub fn along_ray(&self, ray: &Ray, visit: impl FnMut(u32) -> f64) {
         self.descend(f64::INFINITY, |bounds| bounds.ray_entry(ray), visit);
     }
 
-    /// As [`Self::along_ray`], along the whole line, ahead and behind, with a bound from the beginning.
+    /// Visits items as [`Self::along_ray`] does, but along the whole line, ahead and behind, with `most` as initial
+    /// bound.
     pub fn along_line(&self, ray: &Ray, most: f64, visit: impl FnMut(u32) -> f64) {
         self.descend(most, |bounds| bounds.line_entry(ray), visit);
     }
 
-    /// Visits items whose boxes share a point with `bounds`.
+    /// Visits items whose boxes overlap `bounds`.
     pub fn meeting(&self, bounds: &Bounds, mut visit: impl FnMut(u32)) {
         let entry = |other: &Bounds| other.meets(bounds).then_some(0.0);
         self.descend(0.0, entry, |item| {
@@ -234,6 +238,8 @@ impl BoxTree {
         });
     }
 
+    /// Visits items whose entry value is within the bound that `visit` returned last, nearest node first; `entry`
+    /// returns the distance of a box, or `None` to skip it.
     fn descend(
         &self,
         mut bound: f64,
@@ -259,6 +265,7 @@ impl BoxTree {
         }
     }
 
+    /// Pushes the children of a node onto the stack, the nearer one on top.
     fn push_children(&self, i: usize, entry: &impl Fn(&Bounds) -> Option<f64>, stack: &mut Stack) {
         let children = [i + 1, self.nodes[i].link as usize];
         let [a, b] = children.map(|c| entry(&self.nodes[c].bounds).map(|distance| (distance, c)));
@@ -273,10 +280,12 @@ impl BoxTree {
         }
     }
 
+    /// Returns the items of a leaf; none for an inner node.
     fn items_of(&self, node: &Node) -> &[(Bounds, u32)] {
         if node.count == 0 { &[] } else { &self.items[node.link as usize..(node.link + node.count) as usize] }
     }
 
+    /// Visits the overlapping pairs within a leaf.
     fn pairs_within(&self, leaf: &Node, visit: &mut impl FnMut(u32, u32)) {
         let items = self.items_of(leaf);
         for (k, (bounds, item)) in items.iter().enumerate() {
@@ -288,6 +297,7 @@ impl BoxTree {
         }
     }
 
+    /// Visits the overlapping pairs of two leaves.
     fn pairs_between(&self, a: &Node, b: &Node, visit: &mut impl FnMut(u32, u32)) {
         for (bounds, item) in self.items_of(a) {
             if !bounds.meets(&b.bounds) {
@@ -302,6 +312,7 @@ impl BoxTree {
     }
 }
 
+/// Builds the subtree of `items`, split at the median along the widest axis; `first` is the index of the first of them.
 fn build(nodes: &mut Vec<Node>, items: &mut [(Bounds, u32)], first: usize) {
     let bounds = items.iter().fold(Bounds::EMPTY, |b, (item, _)| b.joined(item));
     let at = nodes.len();
@@ -337,7 +348,7 @@ mod tests {
         (0..count)
             .map(|i| {
                 let min = Vec3::new(next(), next(), next()) * 10.0;
-                // One in sixteen spans everything along an axis.
+                // One in sixteen is long along an axis.
                 let long = if i % 16 == 0 { 10.0 } else { 0.3 };
                 Bounds { min, max: min + Vec3::new(next() * long, next(), next() * 0.1) }
             })

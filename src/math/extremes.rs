@@ -1,9 +1,9 @@
-//! The lower and the higher of two numbers, as one machine instruction on every target.
+//! Minimum and maximum of two numbers, as one machine instruction on every target.
 
-/// The lower of two numbers; the first if either is NaN.
+/// Returns the lower of two numbers; `a` if either is NaN or they are equal.
 #[inline]
 pub fn lower(a: f32, b: f32) -> f32 {
-    // Engines make a branch of a `select` of numbers, which is mispredicted half the time.
+    // Engines compile a `select` of numbers to a branch, which is mispredicted half the time.
     #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
     {
         use core::arch::wasm32::{f32x4_extract_lane, f32x4_pmin, f32x4_splat};
@@ -13,7 +13,7 @@ pub fn lower(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
 }
 
-/// The higher of two numbers; the first if either is NaN.
+/// Returns the higher of two numbers; `a` if either is NaN or they are equal.
 #[inline]
 pub fn higher(a: f32, b: f32) -> f32 {
     #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]

@@ -1,4 +1,5 @@
-//! Small geometry: the vector types every layer shares, quadric errors, and exact predicates on triangles.
+//! Basic geometry: the vector types shared by all layers, bounding boxes, triangles, exact predicates and quadric
+//! errors.
 
 mod bounds;
 mod extremes;

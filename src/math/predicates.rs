@@ -1,16 +1,17 @@
-//! Exact answers about points, segments and triangles: the sign of a determinant is never a rounding error.
+//! Exact predicates on points, segments and triangles: the sign of a determinant is never affected by rounding.
 //!
-//! Coordinates are `f32`, determinants are adaptive (Shewchuk's, by the `robust` crate): a plain `f64` evaluation
-//! with an error bound settles nearly all calls, and only what lies within the bound is worked out exactly. `f32`
-//! products of three can neither overflow nor vanish in `f64`, so the answers hold for every finite coordinate.
+//! Coordinates are `f32`, determinants are adaptive (Shewchuk's, by the `robust` crate): a plain `f64` evaluation with
+//! an error bound decides nearly all calls, and exact arithmetic only those within the bound. Products of three `f32`
+//! can neither overflow nor underflow in `f64`, so the results hold for all finite coordinates.
 //!
-//! Triangles, segments and boxes are closed sets: touching is meeting.
+//! Triangles, segments and boxes are closed sets: if they touch, they intersect.
 
 use super::{Bounds, DVec2, Vec3};
 use robust::{Coord, Coord3D};
 
-/// Six times the signed volume of the tetrahedron `a b c d`, with an exact sign: positive where `d` is on the side
-/// from which `a`, `b`, `c` look clockwise, that is behind the triangle; zero exactly where the four are coplanar.
+/// Returns six times the signed volume of the tetrahedron `a b c d`, with an exact sign: positive if `d` is on the side
+/// from which `a`, `b`, `c` appear clockwise, that is behind the triangle; zero exactly if the four points are
+/// coplanar.
 ///
 /// The inside of a closed surface with outward triangles `a b c` is on the positive side.
 #[inline]
@@ -23,19 +24,20 @@ fn coordinates(p: Vec3) -> Coord3D<f32> {
     Coord3D { x: p.x, y: p.y, z: p.z }
 }
 
-/// Twice the signed area of the triangle `a b c` in a plane, with an exact sign: positive where it is counter-clockwise.
+/// Returns twice the signed area of the triangle `a b c` in the plane, with an exact sign: positive if it is
+/// counter-clockwise.
 pub fn orient2d([a, b, c]: [DVec2; 3]) -> f64 {
     let [a, b, c] = [a, b, c].map(|p| Coord { x: p.x, y: p.y });
     robust::orient2d(a, b, c)
 }
 
-/// Whether the three points lie on one line, exactly; so whether the triangle has no area.
+/// Returns whether the three points are exactly collinear, so that the triangle has no area.
 pub fn collinear([a, b, c]: [Vec3; 3]) -> bool {
     Axis::ALL.into_iter().all(|axis| axis.orient(a, b, c) == 0.0)
 }
 
-/// Whether two triangles share at least a point. For triangles with no common corner: a common corner is a shared
-/// point, and the answer then is `true`.
+/// Returns whether two triangles share at least one point. Meant for triangles without a common corner: with one, the
+/// result is `true`.
 pub fn triangles_cross(a: [Vec3; 3], b: [Vec3; 3]) -> bool {
     if !Bounds::of(&a).meets(&Bounds::of(&b)) {
         return false;
@@ -51,7 +53,7 @@ pub fn triangles_cross(a: [Vec3; 3], b: [Vec3; 3]) -> bool {
     any_edge_meets(a, sides_of_a, b) || any_edge_meets(b, sides_of_b, a)
 }
 
-/// Whether the triangles `shared a[0] a[1]` and `shared b[0] b[1]` share a point other than the common corner.
+/// Returns whether the triangles `shared a[0] a[1]` and `shared b[0] b[1]` share a point other than the common corner.
 pub fn triangles_cross_sharing_vertex(shared: Vec3, a: [Vec3; 2], b: [Vec3; 2]) -> bool {
     let (triangle_a, triangle_b) = ([shared, a[0], a[1]], [shared, b[0], b[1]]);
     let sides_of_b = b.map(|p| orient3d(shared, a[0], a[1], p));
@@ -68,12 +70,13 @@ pub fn triangles_cross_sharing_vertex(shared: Vec3, a: [Vec3; 2], b: [Vec3; 2]) 
     if sides_of_a == [0.0; 2] && collinear(triangle_b) {
         return b.into_iter().any(|p| spoke_enters(shared, p, a));
     }
-    // Both triangles are stars about the shared corner: where they share more than it, the rim of one is met first.
+    // Both triangles are star-shaped about the shared corner: if they share another point, the opposite edge of one
+    // meets the other triangle.
     segment_meets_triangle(a, sides_of_a, triangle_b) || segment_meets_triangle(b, sides_of_b, triangle_a)
 }
 
-/// Whether the triangles `u v a` and `v u b` overlap beyond their common edge: coplanar, and on one side of it.
-/// A triangle without area lies on no side.
+/// Returns whether the triangles `u v a` and `v u b` overlap beyond their common edge: they are coplanar and on the
+/// same side of it. A triangle without area is on neither side.
 pub fn triangles_fold_sharing_edge(u: Vec3, v: Vec3, a: Vec3, b: Vec3) -> bool {
     orient3d(u, v, a, b) == 0.0
         && Axis::ALL.into_iter().any(|axis| {
@@ -82,12 +85,13 @@ pub fn triangles_fold_sharing_edge(u: Vec3, v: Vec3, a: Vec3, b: Vec3) -> bool {
         })
 }
 
-/// Whether the segments share at least a point.
+/// Returns whether two segments share at least one point.
 pub fn segments_meet([p, q]: [Vec3; 2], [r, s]: [Vec3; 2]) -> bool {
     if !Bounds::of(&[p, q]).meets(&Bounds::of(&[r, s])) || orient3d(p, q, r, s) != 0.0 {
         return false;
     }
-    // Along an axis where some three of the coplanar points stay a triangle, the plane is projected one to one.
+    // Along an axis in whose projection some three of the coplanar points are not collinear, the plane is projected one
+    // to one.
     for axis in Axis::ALL {
         let about_pq = [axis.orient(p, q, r), axis.orient(p, q, s)];
         let about_rs = [axis.orient(r, s, p), axis.orient(r, s, q)];
@@ -95,11 +99,12 @@ pub fn segments_meet([p, q]: [Vec3; 2], [r, s]: [Vec3; 2]) -> bool {
             return !one_side(&about_pq) && !one_side(&about_rs);
         }
     }
-    // All on one line, where overlapping boxes are overlapping segments.
+    // All points are collinear: the segments overlap because their boxes do.
     true
 }
 
-/// Whether the segment shares a point with the triangle `shared b[0] b[1]` other than `shared`, where it starts.
+/// Returns whether the segment from `shared` to `tip` shares a point with the triangle `shared b[0] b[1]` other than
+/// `shared`.
 fn spoke_enters(shared: Vec3, tip: Vec3, b: [Vec3; 2]) -> bool {
     if tip == shared {
         return false;
@@ -113,23 +118,25 @@ fn spoke_enters(shared: Vec3, tip: Vec3, b: [Vec3; 2]) -> bool {
         .any(|q| segments_meet([tip, tip], [shared, q]) || segments_meet([q, q], [shared, tip]))
 }
 
-/// On which side of the triangle's plane each of the points is; see [`orient3d`].
+/// Returns the side of the triangle's plane on which each of the points is, as the sign of [`orient3d`].
 fn sides(triangle: [Vec3; 3], points: [Vec3; 3]) -> [f64; 3] {
     points.map(|p| orient3d(triangle[0], triangle[1], triangle[2], p))
 }
 
-/// Whether all are positive, or all negative.
+/// Returns whether all values are positive, or all negative.
 fn one_side(sides: &[f64]) -> bool {
     sides.iter().all(|&side| side > 0.0) || sides.iter().all(|&side| side < 0.0)
 }
 
+/// Returns whether an edge of one triangle, whose corners `edges` are on `sides` of the other's plane, meets that
+/// triangle.
 fn any_edge_meets(edges: [Vec3; 3], sides: [f64; 3], triangle: [Vec3; 3]) -> bool {
     [(0, 1), (1, 2), (2, 0)]
         .into_iter()
         .any(|(i, j)| segment_meets_triangle([edges[i], edges[j]], [sides[i], sides[j]], triangle))
 }
 
-/// `sides`: of the triangle's plane, for the two ends.
+/// Returns whether a segment meets a triangle; `sides` are the sides of the triangle's plane on which its ends are.
 fn segment_meets_triangle(segment: [Vec3; 2], sides: [f64; 2], triangle: [Vec3; 3]) -> bool {
     if one_side(&sides) {
         return false;
@@ -143,14 +150,15 @@ fn segment_meets_triangle(segment: [Vec3; 2], sides: [f64; 2], triangle: [Vec3; 
     !(turns.iter().any(|&turn| turn > 0.0) && turns.iter().any(|&turn| turn < 0.0))
 }
 
-/// Also right for a triangle without area, which is the union of its edges.
+/// Returns whether a segment in the triangle's plane meets the triangle. Also correct for a triangle without area,
+/// which is the union of its edges.
 fn coplanar_segment_meets_triangle(segment: [Vec3; 2], triangle: [Vec3; 3]) -> bool {
     let [a, b, c] = triangle;
     point_in_triangle(segment[0], triangle)
         || [[a, b], [b, c], [c, a]].into_iter().any(|edge| segments_meet(segment, edge))
 }
 
-/// Whether `p` of the triangle's plane is in the triangle; `false` for one without area.
+/// Returns whether `p` is in the triangle; `false` if it is not in its plane or the triangle has no area.
 fn point_in_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> bool {
     if orient3d(a, b, c, p) != 0.0 {
         return false;
@@ -160,7 +168,7 @@ fn point_in_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> bool {
     !(turns.iter().any(|&turn| turn > 0.0) && turns.iter().any(|&turn| turn < 0.0))
 }
 
-/// A coordinate axis to look along.
+/// A coordinate axis along which points are projected.
 #[derive(Clone, Copy)]
 enum Axis {
     X,
@@ -171,7 +179,7 @@ enum Axis {
 impl Axis {
     const ALL: [Self; 3] = [Self::Z, Self::X, Self::Y];
 
-    /// Twice the signed area of the triangle as seen along the axis, with an exact sign.
+    /// Returns twice the signed area of the triangle projected along the axis, with an exact sign.
     fn orient(self, a: Vec3, b: Vec3, c: Vec3) -> f64 {
         let project = |p: Vec3| match self {
             Self::X => Coord { x: p.y, y: p.z },
@@ -194,7 +202,7 @@ mod tests {
 
     const A: [Vec3; 3] = [Vec3::new(0.0, 0.0, 0.0), Vec3::new(4.0, 0.0, 0.0), Vec3::new(0.0, 4.0, 0.0)];
 
-    /// A small seeded generator of integers in `-range..=range`.
+    /// Returns a small seeded generator of integers in `-range..=range`.
     fn integers(seed: u64, range: i64) -> impl FnMut() -> i64 {
         let mut state = seed;
         move || {
@@ -217,7 +225,7 @@ mod tests {
             for _ in 0..20_000 {
                 let mut p = [(); 4].map(|()| [(); 3].map(|()| next()));
                 if range > 2 {
-                    // The fourth beside the middle of the other three: a determinant of few ulps, often zero.
+                    // The fourth is near the centroid of the other three: a determinant of few ulps, often zero.
                     p[3] = [0, 1, 2].map(|k| (p[0][k] + p[1][k] + p[2][k]) / 3);
                 }
                 let [a, b, c, d] = p.map(|q| v(q[0] as f32, q[1] as f32, q[2] as f32));
@@ -322,7 +330,7 @@ mod tests {
         cross_product(u, v)
     }
 
-    /// By separating axes over integers: another road to the same answer, for triangles with an area.
+    /// Returns whether two triangles with an area are disjoint, by separating axes over integers: an independent test.
     fn separated(a: [Point; 3], b: [Point; 3]) -> bool {
         let mut axes = vec![normal(a), normal(b)];
         for u in edges(a) {
@@ -360,8 +368,8 @@ mod tests {
 
     #[test]
     fn triangles_at_a_corner_agree_with_separating_axes() {
-        // With the corner cut off one triangle (a hundredth, less than the other's rim can come near) nothing common
-        // is left.
+        // With the corner cut off one triangle (a hundredth, less than the distance of the other's opposite edge) no
+        // common point is left.
         const CUT: i64 = 100;
         let (mut next, mut crossing) = (integers(6, 3), 0);
         for _ in 0..20_000 {

@@ -1,13 +1,13 @@
-//! Sums of squared distances to planes and points, as functions of a place (Garland & Heckbert, *Surface
-//! simplification using quadric error metrics*, 1997).
+//! Quadric error metrics: sums of squared distances to planes and points, as functions of a position (Garland &
+//! Heckbert, *Surface simplification using quadric error metrics*, 1997).
 
 use super::{DMat3, DVec3};
 use std::ops::{Add, AddAssign};
 
-/// x ↦ xᵀ A x − 2 b·x + c, with A symmetric and never negative.
+/// A quadric x ↦ xᵀ A x − 2 b·x + c, with A symmetric and positive semidefinite.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Quadric {
-    /// A: xx, yy, zz, xy, yz, zx.
+    /// A: xx, yy, zz, then (in `mixed`) xy, yz, zx.
     diagonal: DVec3,
     mixed: DVec3,
     linear: DVec3,
@@ -15,7 +15,8 @@ pub struct Quadric {
 }
 
 impl Quadric {
-    /// `weight` times the squared distance to the plane through `point` across `normal`, of length 1.
+    /// Returns the quadric of `weight` times the squared distance to the plane through `point` with unit normal
+    /// `normal`.
     pub fn of_plane(point: DVec3, normal: DVec3, weight: f64) -> Self {
         let height = normal.dot(point);
         Self {
@@ -26,7 +27,7 @@ impl Quadric {
         }
     }
 
-    /// `weight` times the squared distance to `point`.
+    /// Returns the quadric of `weight` times the squared distance to `point`.
     pub fn of_point(point: DVec3, weight: f64) -> Self {
         Self {
             diagonal: DVec3::splat(weight),
@@ -36,20 +37,21 @@ impl Quadric {
         }
     }
 
-    /// The value at `p`; not negative.
+    /// Returns the value at `p`, which is never negative.
     pub fn at(&self, p: DVec3) -> f64 {
         let value = (self.matrix() * p - 2.0 * self.linear).dot(p) + self.constant;
-        // Rounding can take the difference below zero.
+        // Rounding can make the difference negative.
         value.max(0.0)
     }
 
-    /// Where the value is least; `None` where that is not one finite place.
+    /// Returns the position of the minimum; `None` if it is not a unique finite point.
     pub fn least(&self) -> Option<DVec3> {
         let matrix = self.matrix();
         let place = matrix.inverse() * self.linear;
         (matrix.determinant() > 0.0 && place.is_finite()).then_some(place)
     }
 
+    /// Returns the matrix A.
     fn matrix(&self) -> DMat3 {
         let ([xx, yy, zz], [xy, yz, zx]) = (self.diagonal.to_array(), self.mixed.to_array());
         DMat3::from_cols_array(&[xx, xy, zx, xy, yy, yz, zx, yz, zz])
@@ -102,7 +104,7 @@ mod tests {
         assert!((corner.least().unwrap() - P).length() < 1e-14);
     }
 
-    /// On a flat part the planes leave the place open, and a little of the points settles it.
+    /// On a flat region the planes do not determine the minimum, and a small weight of the points does.
     #[test]
     fn points_settle_what_planes_leave_open() {
         let mut flat = Quadric::default();

@@ -1,18 +1,18 @@
-//! Random numbers that are the same everywhere: PCG-XSH-RR (O'Neill, 2014).
+//! Random numbers that are the same on every platform: PCG-XSH-RR (O'Neill, 2014).
 
-/// A seeded stream of numbers.
+/// A seeded generator of random numbers.
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 
 impl Random {
-    /// The stream of a seed.
+    /// Creates the generator of a seed.
     pub fn new(seed: u64) -> Self {
         let mut random = Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x853C_49E6_748F_EA9B);
         random.bits();
         random
     }
 
-    /// 32 random bits.
+    /// Returns 32 random bits.
     pub fn bits(&mut self) -> u32 {
         let state = self.0;
         self.0 = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -20,12 +20,12 @@ impl Random {
         mixed.rotate_right((state >> 59) as u32)
     }
 
-    /// A whole number below `limit`.
+    /// Returns a random integer in `0..limit`.
     pub fn below(&mut self, limit: u32) -> u32 {
         ((u64::from(self.bits()) * u64::from(limit)) >> 32) as u32
     }
 
-    /// 0 to `count` − 1 in random order.
+    /// Returns a random permutation of 0 to `count` − 1.
     pub fn order(&mut self, count: usize) -> Vec<u32> {
         let mut order: Vec<u32> = (0..count as u32).collect();
         for i in (1..count).rev() {
@@ -37,7 +37,7 @@ impl Random {
 
 #[cfg(test)]
 impl Random {
-    /// At least 0, below 1.
+    /// Returns a random number in `0.0..1.0`.
     pub fn unit(&mut self) -> f64 {
         f64::from(self.bits()) / 4_294_967_296.0
     }

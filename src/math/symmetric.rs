@@ -1,14 +1,15 @@
-//! Eigenvalues and eigenvectors of symmetric matrices: all of 3×3, the least of any.
+//! Eigenvalues and eigenvectors of symmetric matrices by Jacobi rotations: all of 3×3, the least of any size.
 
 use super::{DMat3, DVec3};
 
-/// Sweeps after which rotations no longer change anything: Jacobi converges quadratically, and 6 were the most seen.
+/// Maximum number of Jacobi sweeps. Jacobi converges quadratically, and 6 sweeps were the most observed.
 const SWEEPS: usize = 16;
 
-/// The eigenvalues in ascending order, and their orthonormal eigenvectors as the columns of a rotation.
+/// Returns the eigenvalues of a symmetric matrix in ascending order, and their orthonormal eigenvectors as the columns
+/// of a rotation.
 ///
-/// Only the symmetric part of `matrix` is looked at. Every eigenvalue is right to rounding relative to the largest.
-/// A matrix with an entry that is not finite gives values that are not finite.
+/// Only the symmetric part of `matrix` is used. Every eigenvalue is accurate to rounding relative to the largest. A
+/// matrix with an entry that is not finite gives values that are not finite.
 pub fn eigen(matrix: DMat3) -> (DVec3, DMat3) {
     let (mut a, mut vectors) = ((matrix + matrix.transpose()) * 0.5, DMat3::IDENTITY);
     for _ in 0..SWEEPS {
@@ -24,7 +25,7 @@ pub fn eigen(matrix: DMat3) -> (DVec3, DMat3) {
     sorted(DVec3::new(a.x_axis.x, a.y_axis.y, a.z_axis.z), vectors)
 }
 
-/// The rotation in the plane of axes `p` and `q` after which the entry `(p, q)` is zero.
+/// Returns the Jacobi rotation in the plane of axes `p` and `q` that zeroes the entry `(p, q)`.
 fn rotation_clearing(a: &DMat3, p: usize, q: usize) -> DMat3 {
     let off = a.col(q)[p];
     let gap = a.col(q)[q] - a.col(p)[p];
@@ -41,7 +42,8 @@ fn rotation_clearing(a: &DMat3, p: usize, q: usize) -> DMat3 {
     rotation
 }
 
-/// Tangent, cosine and sine of the rotation that clears the entry `off` beside diagonal entries that differ by `gap`.
+/// Returns tangent, cosine and sine of the Jacobi rotation that zeroes the off-diagonal entry `off` of two diagonal
+/// entries that differ by `gap`.
 fn clearing_angle(off: f64, gap: f64) -> [f64; 3] {
     let ratio = gap / (2.0 * off);
     let sign = if ratio < 0.0 { -1.0 } else { 1.0 };
@@ -50,6 +52,7 @@ fn clearing_angle(off: f64, gap: f64) -> [f64; 3] {
     [tangent, cosine, tangent * cosine]
 }
 
+/// Returns eigenvalues in ascending order, with their eigenvectors as a right-handed basis.
 fn sorted(values: DVec3, vectors: DMat3) -> (DVec3, DMat3) {
     let mut order = [0, 1, 2];
     order.sort_by(|&i, &j| values[i].total_cmp(&values[j]));
@@ -57,7 +60,7 @@ fn sorted(values: DVec3, vectors: DMat3) -> (DVec3, DMat3) {
     (DVec3::from_array(order.map(|i| values[i])), DMat3::from_cols(x, y, x.cross(y)))
 }
 
-/// The eigenvector of length 1 of the least eigenvalue of a symmetric matrix.
+/// Returns the unit eigenvector of the least eigenvalue of a symmetric matrix.
 pub fn least<const N: usize>(mut a: [[f64; N]; N]) -> [f64; N] {
     let mut vectors = [[0.0; N]; N];
     (0..N).for_each(|k| vectors[k][k] = 1.0);
@@ -76,11 +79,12 @@ pub fn least<const N: usize>(mut a: [[f64; N]; N]) -> [f64; N] {
     vectors[least]
 }
 
-/// Clears the entry `(p, q)`, where it is not as good as clear; `vectors` has an eigenvector a row.
+/// Zeroes the entry `(p, q)` by a Jacobi rotation; returns false if it is negligible. The rows of `vectors` become the
+/// eigenvectors.
 #[inline]
 fn rotate<const N: usize>(a: &mut [[f64; N]; N], vectors: &mut [[f64; N]; N], p: usize, q: usize) -> bool {
     let (off, gap) = (a[p][q], a[q][q] - a[p][p]);
-    // Written so that what is not a number is left alone.
+    // Written so that NaN is left alone.
     let counts = off.abs() > f64::EPSILON * 1e-3 * (a[p][p].abs() + a[q][q].abs());
     if !counts {
         return false;
@@ -156,7 +160,7 @@ mod tests {
             let mut a = [[0.0; 4]; 4];
             for (p, q) in (0..4).flat_map(|p| (p..4).map(move |q| (p, q))) {
                 let value = 2.0 * random.unit() - 1.0;
-                // Now and then as good as diagonal, or wholly.
+                // Some are diagonal, or nearly so.
                 let size = if p == q { 1.0 } else { [1.0, 1e-9, 0.0][round % 3] };
                 (a[p][q], a[q][p]) = (size * value, size * value);
             }
@@ -174,7 +178,7 @@ mod tests {
             }
         }
         assert_eq!(least([[0.0; 4]; 4]), [1.0, 0.0, 0.0, 0.0]);
-        // Not a number in, not a number or an axis out; and an end.
+        // With NaN in the matrix the iteration ends, here with an axis.
         assert_eq!(least([[f64::NAN; 3]; 3]), [1.0, 0.0, 0.0]);
     }
 }

@@ -1,22 +1,23 @@
-//! Measures of a triangle, its nearest point, and a ray's hit; worked out in `f64`.
+//! Measures of a triangle, its closest point to a given one, and its intersection with a line; computed in `f64`.
 
 use super::{DVec3, Vec3};
 
-/// The cross product of two edges: along the normal of the counter-clockwise side, twice the area long.
+/// Returns the cross product of two edges: a vector along the normal, which points to the side from which the corners
+/// are counter-clockwise, of twice the triangle's area.
 #[inline]
 pub fn area_vector([a, b, c]: [Vec3; 3]) -> DVec3 {
     let a = a.as_dvec3();
     (b.as_dvec3() - a).cross(c.as_dvec3() - a)
 }
 
-/// The area.
+/// Returns the area of the triangle.
 #[inline]
 pub fn area(triangle: [Vec3; 3]) -> f64 {
     0.5 * area_vector(triangle).length()
 }
 
-/// The solid angle of the triangle seen from `p`, positive from the side from which it looks clockwise, that is from
-/// behind; from −2π to 2π. Those of a closed surface sum to 4π from inside and to 0 from outside.
+/// Returns the solid angle of the triangle at `p`, from −2π to 2π; positive if `p` is behind the triangle, on the side
+/// from which its corners are clockwise. The solid angles of a closed surface sum to 4π inside and to 0 outside.
 ///
 /// Van Oosterom & Strackee, *The solid angle of a plane triangle*, 1983.
 pub fn solid_angle(triangle: [Vec3; 3], p: Vec3) -> f64 {
@@ -26,15 +27,15 @@ pub fn solid_angle(triangle: [Vec3; 3], p: Vec3) -> f64 {
     2.0 * libm::atan2(a.dot(b.cross(c)), cosine)
 }
 
-/// The point with the given barycentric coordinates.
+/// Returns the point with the given barycentric coordinates.
 #[inline]
 pub fn at([a, b, c]: [Vec3; 3], barycentric: DVec3) -> DVec3 {
     a.as_dvec3() * barycentric.x + b.as_dvec3() * barycentric.y + c.as_dvec3() * barycentric.z
 }
 
-/// The barycentric coordinates (of `a`, `b`, `c`; none negative, sum 1) of the triangle's point nearest to `p`.
+/// Returns the barycentric coordinates (of `a`, `b`, `c`; none negative, sum 1) of the triangle's closest point to `p`.
 ///
-/// A triangle without area is taken as the segment or point that it is.
+/// A triangle without area is treated as the segment or point that it is.
 pub fn closest([a, b, c]: [Vec3; 3], p: Vec3) -> DVec3 {
     let [a, b, c] = [a, b, c].map(|q| q.as_dvec3() - p.as_dvec3());
     let (ab, ac) = (b - a, c - a);
@@ -46,11 +47,11 @@ pub fn closest([a, b, c]: [Vec3; 3], p: Vec3) -> DVec3 {
     let on_bc = || segment(b, c, |s| DVec3::new(0.0, 1.0 - s, s));
     let on_ca = || segment(c, a, |s| DVec3::new(s, 0.0, 1.0 - s));
     let is_sliver = size <= SLIVER * ab.length_squared() * ac.length_squared();
-    // Lengths beyond the range leave no number.
+    // Lengths beyond the range of `f64` give NaN.
     if is_sliver || size.is_nan() {
         return nearest([on_ab(), on_bc(), on_ca()]);
     }
-    // Across one edge the nearest point is on it; beyond a corner, on one of two.
+    // Outside one edge, the closest point is on it; outside two, on one of the two.
     match [u < 0.0, v < 0.0, w < 0.0] {
         [false, false, false] => DVec3::new(u, v, w),
         [false, false, true] => on_ab().0,
@@ -58,59 +59,60 @@ pub fn closest([a, b, c]: [Vec3; 3], p: Vec3) -> DVec3 {
         [false, true, false] => on_ca().0,
         [true, false, true] => nearest([on_ab(), on_bc()]),
         [false, true, true] => nearest([on_ab(), on_ca()]),
-        // All three would not sum to one.
+        // All three cannot be negative, as they sum to one.
         [true, true, _] => nearest([on_bc(), on_ca()]),
     }
 }
 
-/// The squared sine of an angle below which a triangle is taken as its edges: which side of one a point is on is lost in
-/// rounding there.
+/// Squared sine of the angle at `a` below which a triangle is treated as its edges: rounding then hides on which side
+/// of an edge a point is.
 const SLIVER: f64 = 1e-12;
 
-/// The first of those with the least squared distance.
+/// Returns the barycentric coordinates of the first candidate with the least squared distance.
 fn nearest<const N: usize>(candidates: [(DVec3, f64); N]) -> DVec3 {
     let nearer = |best: (DVec3, f64), next: (DVec3, f64)| if next.1 < best.1 { next } else { best };
     candidates.into_iter().fold((DVec3::X, f64::INFINITY), nearer).0
 }
 
-/// The point of a segment nearest to the origin, as `barycentric` of how far along it is, and its squared distance.
+/// Returns the closest point of a segment to the origin, as `barycentric` of its fraction along the segment, and its
+/// squared distance.
 #[inline]
 fn segment(a: DVec3, b: DVec3, barycentric: impl Fn(f64) -> DVec3) -> (DVec3, f64) {
     let s = fraction(a, b);
     (barycentric(s), (a * (1.0 - s) + b * s).length_squared())
 }
 
-/// How far from `a` to `b` the segment's point nearest to the origin is, in 0..=1.
+/// Returns the position of the segment's closest point to the origin, as a fraction from `a` to `b` in 0..=1.
 fn fraction(a: DVec3, b: DVec3) -> f64 {
     let ab = b - a;
     let size = ab.length_squared();
     if size > 0.0 { (-a.dot(ab) / size).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Where a line meets a triangle.
+/// Intersection of a line with a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineHit {
-    /// In lengths of the line's direction; negative behind its origin.
+    /// Distance along the line, in lengths of its direction; negative behind its origin.
     pub distance: f64,
-    /// Of the triangle's corners.
+    /// Barycentric coordinates of the point in the triangle.
     pub barycentric: DVec3,
 }
 
-/// A line made ready for many triangles: seen along it, by a shear that takes it to the axis it is nearest to (Woop, Benthin
-/// & Wald, *Watertight ray/triangle intersection*, 2013).
+/// A line prepared for tests against many triangles: points are sheared so that the line runs along the coordinate axis
+/// closest to its direction (Woop, Benthin & Wald, *Watertight ray/triangle intersection*, 2013).
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
     origin: DVec3,
-    /// Two axes across, and the one along.
+    /// The two axes across, and the one along the line.
     axes: [usize; 3],
-    /// How far the line goes along the first two on its way by one along the third.
+    /// Displacement of the line along the first two axes per unit along the third.
     tilt: [f64; 2],
-    /// Lengths of the direction to one along the third.
+    /// Lengths of the direction per unit along the third axis.
     scale: f64,
 }
 
 impl Line {
-    /// Through `origin`; `direction` is of any length but 0.
+    /// Creates the line through `origin` along `direction`, which may have any length but 0.
     pub fn new(origin: DVec3, direction: DVec3) -> Self {
         let along = direction.abs().max_position();
         let axes = [(along + 1) % 3, (along + 2) % 3, along];
@@ -118,10 +120,10 @@ impl Line {
         Self { origin, axes, tilt: [direction[axes[0]] * scale, direction[axes[1]] * scale], scale }
     }
 
-    /// Where the line meets the triangle, from either side, ahead or behind; `None` where it misses, or where the triangle
-    /// is edge-on.
+    /// Returns where the line meets the triangle, from either side, ahead or behind; `None` if it misses or the
+    /// triangle is edge-on.
     ///
-    /// Two triangles that share an edge leave no gap between them: the test of the edge is the same number for both, with
+    /// Two triangles that share an edge leave no gap between them: the edge function has the same value for both with
     /// opposite signs, and zero belongs to both.
     #[inline]
     pub fn hit(&self, triangle: [Vec3; 3]) -> Option<LineHit> {
@@ -137,7 +139,7 @@ impl Line {
         Some(LineHit { distance: way * self.scale, barycentric })
     }
 
-    /// Beside the line, and along it.
+    /// Returns the coordinates of a point across and along the line, after the shear.
     #[inline]
     fn seen(&self, q: Vec3) -> [f64; 3] {
         let p = (q.as_dvec3() - self.origin).to_array();

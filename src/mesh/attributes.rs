@@ -1,21 +1,21 @@
-//! Per-vertex data that follows every edit.
+//! Per-vertex attributes that are kept up to date by edits.
 
 use super::VertexId;
 use crate::math::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// Names one vector attribute of one mesh.
+/// A handle of a vector attribute of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VectorKey(usize);
 
-/// Names one scalar attribute of one mesh.
+/// A handle of a scalar attribute of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScalarKey(usize);
 
-/// All attributes of a mesh; one entry a vertex slot.
+/// The attributes of a mesh, one value per vertex slot.
 ///
-/// Edits say what becomes of the data through three words only: a slot is added, a slot takes a blend of two others,
-/// slots are reordered. So an attribute can never fall out of step with the mesh.
+/// Edits change attributes by three operations only: append a slot, interpolate between two slots, reorder slots. So
+/// their arrays always have the length of the mesh.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Attributes {
     vectors: Vec<Vec<Vec3>>,
@@ -62,7 +62,7 @@ impl Attributes {
         self.scalars.iter_mut().for_each(|s| s.push(0.0));
     }
 
-    /// `target` takes the data at fraction `t` of the way from `a` to `b`.
+    /// Sets the attributes of `target` to those of `a` and `b`, interpolated linearly at `t`.
     pub(super) fn blend(&mut self, target: VertexId, a: VertexId, b: VertexId, t: f32) {
         let (target, a, b) = (target.index(), a.index(), b.index());
         for v in &mut self.vectors {
@@ -73,13 +73,13 @@ impl Attributes {
         }
     }
 
-    /// Appends all data of one slot to `out`.
+    /// Appends the attributes of a slot to `out`, for the undo log.
     pub(super) fn get(&self, slot: usize, out: &mut Vec<f32>) {
         self.vectors.iter().for_each(|v| out.extend(v[slot].to_array()));
         out.extend(self.scalars.iter().map(|s| s[slot]));
     }
 
-    /// Takes back what [`Self::get`] gave.
+    /// Restores the attributes of a slot from the numbers appended by [`Self::get`].
     pub(super) fn set(&mut self, slot: usize, data: &[f32]) {
         let (vectors, scalars) = data.split_at(3 * self.vectors.len());
         for (to, from) in self.vectors.iter_mut().zip(vectors.chunks_exact(3)) {
@@ -95,7 +95,7 @@ impl Attributes {
         self.scalars.iter_mut().for_each(|s| s.truncate(slots));
     }
 
-    /// Keeps slot `order[i]` as the new slot `i`.
+    /// Moves the attributes of slot `order[i]` to slot `i`.
     pub(super) fn reorder(&mut self, order: &[VertexId]) {
         for v in &mut self.vectors {
             *v = order.iter().map(|id| v[id.index()]).collect();
@@ -105,7 +105,7 @@ impl Attributes {
         }
     }
 
-    /// How many vectors and scalars a vertex has.
+    /// Returns the numbers of vector and scalar attributes.
     pub(super) fn counts(&self) -> [usize; 2] {
         [self.vectors.len(), self.scalars.len()]
     }

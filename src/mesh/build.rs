@@ -1,19 +1,19 @@
-//! Meshes from triangles and from shapes, and back to triangles.
+//! Construction of meshes from triangle lists and simple shapes, and conversion back to triangle lists.
 
 use super::attributes::Attributes;
 use super::{Mesh, MeshError, Ring, TriangleMesh, VertexId};
 use crate::math::Vec3;
 
-/// More corners than this around one vertex are refused: rings are searched linearly.
+/// The largest valence that is accepted; rings are searched linearly.
 const LARGEST_VALENCE: usize = 4096;
 
 impl Mesh {
-    /// The dynamic mesh of a closed, oriented, manifold triangle list. Positions in no triangle are left out.
+    /// Creates a dynamic mesh from a closed, oriented, manifold triangle list. Unused positions are dropped.
     ///
     /// # Errors
-    /// [`MeshError::InvalidArgument`] for an index without a position, a position that is not finite or no triangle
-    /// at all; [`MeshError::NotClosed`] for a boundary, an edge of more than two triangles, triangles of opposite
-    /// orientation, a triangle with the same corner twice, or surfaces that touch in a vertex.
+    /// [`MeshError::InvalidArgument`] for an invalid index, a position that is not finite or an empty list;
+    /// [`MeshError::NotClosed`] for a boundary, an edge with more than two triangles, inconsistent orientation, a
+    /// triangle with two equal corners, surfaces that touch at a vertex, or a vertex with more than 4096 triangles.
     pub fn from_triangles(mesh: &TriangleMesh) -> Result<Self, MeshError> {
         check_indices(mesh)?;
         let corners = Corners::sort(mesh);
@@ -38,7 +38,8 @@ impl Mesh {
         Self { rings, positions, half_edges, euler, attributes: Attributes::default(), ..Self::default() }
     }
 
-    /// An icosahedron with corners at distance `radius` from `center`, counter-clockwise seen from outside.
+    /// Creates an icosahedron with all vertices at distance `radius` from `center`, counter-clockwise seen from
+    /// outside.
     pub fn icosahedron(center: Vec3, radius: f32) -> Self {
         let golden = 0.5 * (1.0 + 5.0_f32.sqrt());
         let scale = radius / (1.0 + golden * golden).sqrt();
@@ -51,11 +52,12 @@ impl Mesh {
         Self::from_rings(rings.collect(), positions)
     }
 
-    /// A sphere of √3-refined triangles with no edge longer than `max_edge`, all corners at distance `radius`.
+    /// Creates a sphere by √3 subdivision of an icosahedron until no edge is longer than `max_edge`; all vertices are
+    /// at distance `radius` from `center`.
     ///
     /// # Errors
     /// [`MeshError::InvalidArgument`] unless the centre is finite and radius and edge are positive and finite;
-    /// [`MeshError::TooLarge`] where more than about 16 million vertices would be needed.
+    /// [`MeshError::TooLarge`] if more than about 16 million vertices would be needed.
     pub fn icosphere(center: Vec3, radius: f32, max_edge: f32) -> Result<Self, MeshError> {
         positive("radius", radius)?;
         positive("maxEdge", max_edge)?;
@@ -76,13 +78,13 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// The length of the longest edge; 0 for the empty mesh.
+    /// Returns the length of the longest edge, 0 for the empty mesh.
     pub fn longest_edge(&self) -> f32 {
         let square = |(u, v)| self.position(u).distance_squared(self.position(v));
         self.edges().map(square).fold(0.0, |longest, d| if d > longest { d } else { longest }).sqrt()
     }
 
-    /// The mesh as compact arrays with area-weighted unit normals, vertices in the order of their slots.
+    /// Converts the mesh to a triangle list with area-weighted unit normals, vertices in slot order.
     pub fn to_triangles(&self) -> TriangleMesh {
         let mut names = vec![u32::MAX; self.slots()];
         let mut positions = Vec::with_capacity(self.vertex_count());
@@ -96,10 +98,11 @@ impl Mesh {
         TriangleMesh { positions, triangles, normals: Some(normals), ..TriangleMesh::default() }
     }
 
-    /// Adds the vertices of `other`, a mesh without attributes, and returns them; the two must not touch.
+    /// Adds a copy of `other`, a mesh without attributes that must not touch this one, and returns the new vertices.
+    /// Their attributes are unspecified; the caller sets them.
     ///
     /// # Errors
-    /// [`MeshError::TooLarge`] where ids would run out.
+    /// [`MeshError::TooLarge`] if there are not enough vertex ids left.
     pub fn append(&mut self, other: &Self) -> Result<Vec<VertexId>, MeshError> {
         if !self.has_room_for(other.vertex_count()) {
             return Err(MeshError::TooLarge { bytes: 64 * other.vertex_count() as u64 });
@@ -107,7 +110,6 @@ impl Mesh {
         let mut names = vec![NO_NAME; other.slots()];
         for v in other.vertices() {
             names[v.index()] = self.allocate(other.position(v));
-            // Taken at once: an empty ring would be handed out again.
             self.rings[names[v.index()].index()] = other.ring(v).clone();
         }
         for v in other.vertices() {
@@ -121,10 +123,10 @@ impl Mesh {
     }
 }
 
-/// The name of a slot that is not in use.
+/// The id of a free slot in a renumbering.
 const NO_NAME: VertexId = VertexId(u32::MAX);
 
-/// As many vertices as fit a browser's memory with room to work in.
+/// The largest vertex count of a sphere: as many as fit into a browser's memory with room to work.
 const LARGEST_SPHERE: usize = 16_000_000;
 
 fn positive(parameter: &'static str, value: f32) -> Result<(), MeshError> {
@@ -149,7 +151,7 @@ fn check_indices(mesh: &TriangleMesh) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// For every vertex, the edges (a, b) opposite it in its triangles.
+/// For every vertex, its links: the edges (a, b) opposite it in its triangles.
 struct Corners {
     starts: Vec<usize>,
     links: Vec<(u32, u32)>,
@@ -180,7 +182,7 @@ impl Corners {
     }
 }
 
-/// Orders the links of a vertex into one cycle.
+/// Orders the links of vertex `v` into its one-ring, or reports why they are not a single cycle.
 fn chain(v: usize, links: &[(u32, u32)]) -> Result<Ring, MeshError> {
     let fail = |what: &str| Err(MeshError::NotClosed { problem: format!("{what} at vertex {v}") });
     if links.len() > LARGEST_VALENCE {
@@ -211,7 +213,7 @@ fn chain(v: usize, links: &[(u32, u32)]) -> Result<Ring, MeshError> {
     Ok(Ring::new(ring))
 }
 
-/// Coordinates beyond one stand for the golden ratio.
+/// The vertices of an icosahedron, before scaling; ±2 stands for ± the golden ratio.
 const ICOSAHEDRON_CORNERS: [[f32; 3]; 12] = [
     [-1.0, 2.0, 0.0],
     [1.0, 2.0, 0.0],
@@ -227,6 +229,7 @@ const ICOSAHEDRON_CORNERS: [[f32; 3]; 12] = [
     [-2.0, 0.0, 1.0],
 ];
 
+/// The one-rings of the vertices of an icosahedron, counter-clockwise seen from outside.
 const ICOSAHEDRON_RINGS: [[u32; 5]; 12] = [
     [11, 5, 1, 7, 10],
     [5, 9, 8, 7, 0],

@@ -1,43 +1,43 @@
-//! The kernel's own invariants, one function each.
+//! Tests of the invariants of a dynamic mesh, one function each.
 
 use super::{Mesh, VertexId};
 
-/// One broken invariant.
+/// A violated invariant of a mesh, found by [`Mesh::check`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Flaw {
     /// A vertex has fewer than three neighbours.
     #[error("{0:?} has fewer than three neighbours")]
     LowValence(VertexId),
-    /// A neighbour stands twice in a ring: an edge is doubled.
+    /// A neighbour occurs twice in the ring of a vertex, so that an edge is doubled.
     #[error("the edge from {0:?} to {1:?} is doubled")]
     DoubledEdge(VertexId, VertexId),
-    /// A neighbour does not exist, is the vertex itself, or does not know the vertex.
+    /// A neighbour is not live, is the vertex itself, or does not have the vertex as its neighbour.
     #[error("{0:?} names {1:?} as a neighbour, which does not name it back")]
     OneSidedEdge(VertexId, VertexId),
-    /// The corners of a triangle do not agree on it: the surface is open or not oriented there.
+    /// The rings of the three corners of a triangle are inconsistent: the surface is open or not oriented there.
     #[error("the corners of ({0:?}, {1:?}, {2:?}) do not agree on this triangle")]
     BrokenTriangle(VertexId, VertexId, VertexId),
-    /// χ counted is not χ predicted by the edits, or the edge count is off.
+    /// The Euler characteristic or the number of half-edges maintained by the edits differs from the counted one.
     #[error("the edits predict χ = {predicted}, but {counted} is counted")]
     EulerMismatch {
-        /// What the edits add up to.
+        /// The Euler characteristic maintained by the edits.
         predicted: i64,
-        /// V − E + F.
+        /// The Euler characteristic V − E + F, counted.
         counted: i64,
     },
-    /// Per-vertex arrays, the free list and the rings are out of step.
+    /// Per-vertex arrays, rings and the free list are inconsistent.
     #[error("the arrays of the mesh are out of step")]
     OutOfStep,
-    /// A coordinate or an attribute is NaN or infinite.
+    /// A position or attribute of a vertex is NaN or infinite.
     #[error("{0:?} has a position or attribute that is not finite")]
     NotFinite(VertexId),
 }
 
 impl Mesh {
-    /// Every invariant, tested; see the module's documentation.
+    /// Tests all invariants of the mesh, listed in the documentation of the [module](super).
     ///
     /// # Errors
-    /// The first [`Flaw`] found.
+    /// The first violated invariant found.
     pub fn check(&self) -> Result<(), Flaw> {
         self.check_arrays()?;
         for v in self.vertices() {

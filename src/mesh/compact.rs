@@ -1,23 +1,24 @@
-//! Memory order: free slots squeezed out, neighbours brought close to each other.
+//! Renumbering of vertices for memory locality.
 
 use super::{Mesh, VertexId};
 
 impl Mesh {
-    /// The share of slots that hold a vertex.
+    /// Returns the fraction of slots that hold a vertex, 1 for the empty mesh.
     pub fn occupancy(&self) -> f32 {
         if self.slots() == 0 { 1.0 } else { self.vertex_count() as f32 / self.slots() as f32 }
     }
 
-    /// Renumbers the vertices breadth-first along the surface and drops free slots. Returns the new
-    /// id of each old slot, `None` for a free one; ids held outside mean nothing any more.
+    /// Renumbers the vertices breadth-first along the surface and removes free slots.
     ///
-    /// Loops over rings then read memory nearly in order; on a shuffled mesh they take 3–6 times as long.
+    /// Returns the new id of each old slot, `None` for a free one; previously stored ids are invalid afterwards. Loops
+    /// over rings then read memory nearly in order; on a shuffled mesh they take 3–6 times as long.
     pub fn reorder(&mut self) -> Vec<Option<VertexId>> {
         let order = self.component_members().concat();
         self.keep(&order)
     }
 
-    /// Makes `order[i]` the vertex in slot `i`; every live vertex is in `order` once.
+    /// Moves vertex `order[i]` to slot `i`; `order` contains every live vertex once. Returns the new id of each old
+    /// slot.
     fn keep(&mut self, order: &[VertexId]) -> Vec<Option<VertexId>> {
         let mut names = vec![None; self.slots()];
         for (i, &v) in order.iter().enumerate() {

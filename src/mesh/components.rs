@@ -1,12 +1,14 @@
-//! Connected components.
+//! Connected components of a dynamic mesh.
 
 use super::{Mesh, VertexId};
 
-/// Up to this size a component is searched for without an array over the whole mesh.
+/// The largest limit for which [`Mesh::component_of`] searches linearly instead of marking vertices in an array over
+/// the whole mesh.
 const SMALL: usize = 64;
 
 impl Mesh {
-    /// The vertices connected with `v` in breadth-first order, at most `limit` of them; none where `v` is not live.
+    /// Returns the vertices of the connected component of `v` in breadth-first order, at most `limit` of them; none if
+    /// `v` is not live.
     pub fn component_of(&self, v: VertexId, limit: usize) -> Vec<VertexId> {
         if !self.is_live(v) {
             return Vec::new();
@@ -19,12 +21,12 @@ impl Mesh {
         found
     }
 
-    /// The vertices of each component, components in the order of their lowest slot.
+    /// Returns the vertices of each connected component, components in the order of their lowest slot.
     pub fn component_members(&self) -> Vec<Vec<VertexId>> {
         self.components().collect()
     }
 
-    /// The number of components.
+    /// Returns the number of connected components.
     pub fn component_count(&self) -> usize {
         self.components().count()
     }
@@ -35,7 +37,7 @@ impl Mesh {
             .filter_map(move |v| if seen[v.index()] { None } else { Some(self.flood(v, &mut seen)) })
     }
 
-    /// Everything connected with `v`, breadth first.
+    /// Marks in `seen` and returns the vertices connected with `v`, in breadth-first order.
     fn flood(&self, v: VertexId, seen: &mut [bool]) -> Vec<VertexId> {
         let mut found = vec![v];
         seen[v.index()] = true;

@@ -1,4 +1,4 @@
-//! Pairs of triangles that cross, found through a tree of boxes and settled by exact predicates.
+//! Self-intersections of triangle meshes: pairs found by a bounding volume hierarchy, decided by exact predicates.
 
 use super::TriangleMesh;
 use crate::math::predicates::{
@@ -6,11 +6,12 @@ use crate::math::predicates::{
 };
 use crate::math::{Bounds, BoxTree, Vec3};
 
-/// The pairs of triangles that share more than their common corners and edges, lower index first, sorted.
+/// Returns the pairs of triangles that intersect beyond their common corners and edges, each with the lower index
+/// first, sorted.
 ///
-/// Exact, touching included; a coplanar fold over a common edge counts, and so do two triangles on the same three
-/// corners. Triangles that name a corner twice, a vertex that does not exist or one that is not finite are left out.
-/// The list is as long as the answer, which may be quadratic; [`count_crossings`] stores nothing.
+/// The test is exact and includes touching. Coplanar triangles folded onto each other at a common edge count, and so do
+/// two triangles with the same three corners. Triangles with two equal corners, an invalid index or a position that is
+/// not finite are ignored. The list may be quadratic in the number of triangles; [`count_crossings`] only counts.
 pub fn crossing_pairs(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     let mut pairs = Vec::new();
     for_each_crossing(mesh, |s, t| pairs.push([s, t]));
@@ -18,8 +19,10 @@ pub fn crossing_pairs(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     pairs
 }
 
-/// The number of [`crossing_pairs`]. Memory is linear in the number of triangles; time too, in a mesh where few boxes
-/// of triangles meet, and quadratic where all do.
+/// Returns the number of self-intersections: the length of [`crossing_pairs`], without storing the pairs.
+///
+/// Memory is linear in the number of triangles. So is time if few bounding boxes of triangles overlap; it is quadratic
+/// if all do.
 pub fn count_crossings(mesh: &TriangleMesh) -> usize {
     let mut count = 0;
     for_each_crossing(mesh, |_, _| count += 1);
@@ -50,17 +53,17 @@ fn facet(mesh: &TriangleMesh, triangle: u32) -> Facet {
     Facet { corners, points: corners.map(|v| mesh.positions[v as usize]) }
 }
 
-/// A triangle by the names of its corners and where they are.
+/// A triangle given by vertex indices and positions, the input of intersection tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facet {
-    /// Which vertices the corners are: equal names are a common corner.
+    /// The vertex indices of the corners; equal indices mean a common corner.
     pub corners: [u32; 3],
-    /// Where they are.
+    /// The positions of the corners.
     pub points: [Vec3; 3],
 }
 
 impl Facet {
-    /// The same triangle from the corner that is asked for.
+    /// Returns the corners rotated cyclically, so that the one that satisfies `is_first` comes first.
     fn rotated(&self, is_first: impl Fn(u32) -> bool) -> [Vec3; 3] {
         let [a, b, c] = self.points;
         match self.corners.map(is_first) {
@@ -71,8 +74,10 @@ impl Facet {
     }
 }
 
-/// Whether two triangles share more than their common corners and edges; exact, touching included. A coplanar fold over
-/// a common edge counts, and so do two triangles on the same three corners.
+/// Returns whether two triangles intersect beyond their common corners and edges.
+///
+/// The test is exact and includes touching. Coplanar triangles folded onto each other at a common edge count, and so do
+/// two triangles with the same three corners.
 pub fn facets_cross(s: &Facet, t: &Facet) -> bool {
     let in_s = |v: u32| s.corners.contains(&v);
     let in_t = |v: u32| t.corners.contains(&v);

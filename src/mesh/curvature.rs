@@ -1,30 +1,30 @@
-//! Mean and Gaussian curvature at the vertices (Meyer, Desbrun, Schröder & Barr, *Discrete differential-geometry
-//! operators for triangulated 2-manifolds*, 2003): sums in `f64`, in the order of the triangles.
+//! Discrete mean and Gaussian curvature per vertex (Meyer, Desbrun, Schröder & Barr, *Discrete differential-geometry
+//! operators for triangulated 2-manifolds*, 2003), summed in `f64` in the order of the triangles.
 
 use super::TriangleMesh;
 use super::edge_table::{by_edge, edge_uses};
 use crate::math::DVec3;
 
-/// Curvature per vertex, and the area it stands for.
+/// Mean and Gaussian curvature per vertex, and the area over which each is averaged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curvature {
-    /// H = (κ₁ + κ₂) / 2, per unit of length: positive where the surface bulges outwards, 1/r on a ball of radius r,
-    /// negative on the inside of a cavity and in a furrow.
+    /// The mean curvature H = (κ₁ + κ₂) / 2 per vertex, an inverse length: positive where the surface is convex, 1/r on
+    /// a ball of radius r, negative on the wall of a cavity and in a furrow.
     pub mean: Vec<f64>,
-    /// K = κ₁ κ₂, per unit of area: 1/r² on a ball, negative on a saddle.
+    /// The Gaussian curvature K = κ₁ κ₂ per vertex, an inverse area: 1/r² on a ball of radius r, negative on a saddle.
     pub gaussian: Vec<f64>,
-    /// The mixed Voronoi area around each vertex; they sum to the area of the mesh. K times it is the angle that the
-    /// triangles around the vertex lack of 2π, and sums to 2πχ where the mesh is closed.
+    /// The mixed Voronoi area around each vertex; their sum is the area of the mesh. K times this area is the angle
+    /// deficit from 2π; the deficits of a closed mesh sum to 2πχ.
     pub areas: Vec<f64>,
 }
 
-/// The curvature of `mesh` at its vertices: K by the angle deficit, H by the cotangent Laplacian, each over the mixed
-/// area.
+/// Computes the curvature of `mesh` at its vertices: K from the angle deficit, H from the cotangent Laplacian, both per
+/// mixed Voronoi area.
 ///
-/// Of the Laplacian the part along the vertex normal is taken, so that H keeps its sign and goes through zero without a
-/// jump. Every number is finite. Both are 0 at a vertex of no triangle, on the rim of an open mesh, and where the triangles
-/// around a vertex have no area; triangles without area give their angles to K and nothing to H. Indices must exist, as
-/// [`TriangleMesh::validate`] makes sure.
+/// H is the component of the Laplacian along the vertex normal, so that it has a sign and changes it continuously. All
+/// values are finite. Both are 0 at unused vertices, on the boundary of an open mesh, and where all triangles around a
+/// vertex have area 0; such triangles contribute their angles to K and nothing to H. Indices must be valid, see
+/// [`TriangleMesh::validate`].
 pub fn curvature(mesh: &TriangleMesh) -> Curvature {
     let mut sums = vec![Sums::default(); mesh.positions.len()];
     for triangle in &mesh.triangles {
@@ -40,14 +40,16 @@ pub fn curvature(mesh: &TriangleMesh) -> Curvature {
     }
 }
 
-/// What the triangles around a vertex add up to.
+/// The sums over the triangles around a vertex from which its curvature is computed.
 #[derive(Clone, Copy, Default)]
 struct Sums {
+    /// The sum of the angles at the vertex.
     angle: f64,
+    /// The mixed Voronoi area.
     area: f64,
-    /// ½ Σ (cot α + cot β)(x − y) over the neighbours y: 2 H n times the area.
+    /// ½ Σ (cot α + cot β)(x − y) over the neighbours y, which is 2 H n times the area.
     laplacian: DVec3,
-    /// Outwards; twice the area of the triangles long, where they are coplanar.
+    /// The sum of the cross products of the triangles, outwards; its length is twice their area if they are coplanar.
     normal: DVec3,
     on_rim: bool,
 }
@@ -61,7 +63,8 @@ impl Sums {
         self.per_area(std::f64::consts::TAU - self.angle)
     }
 
-    /// As it fits an `f32`: next to no area makes any number.
+    /// Returns an integral over the mixed area divided by the area, limited to the range of `f32`: a tiny area can give
+    /// any number.
     fn per_area(&self, integral: f64) -> f64 {
         let value = integral / self.area;
         if self.on_rim || self.area == 0.0 || value.is_nan() {
@@ -71,7 +74,7 @@ impl Sums {
     }
 }
 
-/// Adds a triangle to the sums of its corners.
+/// Adds the contributions of a triangle to the sums of its corners.
 fn add(sums: &mut [Sums], corners: [usize; 3], points: [DVec3; 3]) {
     let angles = angles(points);
     let normal = (points[1] - points[0]).cross(points[2] - points[0]);
@@ -82,7 +85,7 @@ fn add(sums: &mut [Sums], corners: [usize; 3], points: [DVec3; 3]) {
     if doubled_area == 0.0 {
         return;
     }
-    // The cotangent at a corner belongs to the edge opposite it.
+    // By corner; the cotangent at a corner is a weight of the opposite edge.
     let cotangents = [0, 1, 2].map(|k| {
         let [p, q, r] = [points[k], points[(k + 1) % 3], points[(k + 2) % 3]];
         (q - p).dot(r - p) / doubled_area
@@ -99,13 +102,13 @@ fn add(sums: &mut [Sums], corners: [usize; 3], points: [DVec3; 3]) {
     }
 }
 
-/// The angles at the corners; their sum is π for every triangle, also where it has no area.
+/// Returns the angles of a triangle; they sum to π, even if its area is 0.
 fn angles(points: [DVec3; 3]) -> [f64; 3] {
     let mut angles = [0, 1, 2].map(|k| {
         let (u, v) = (points[(k + 1) % 3] - points[k], points[(k + 2) % 3] - points[k]);
         libm::atan2(u.cross(v).length(), u.dot(v))
     });
-    // Corners in one place share what the third leaves.
+    // Coincident corners share the rest of π equally.
     let together = [0, 1, 2].map(|k| points[k] == points[(k + 1) % 3] || points[k] == points[(k + 2) % 3]);
     let count = together.iter().filter(|&&t| t).count();
     for k in (0..3).filter(|&k| together[k]) {
@@ -114,8 +117,8 @@ fn angles(points: [DVec3; 3]) -> [f64; 3] {
     angles
 }
 
-/// Each corner's share of the area: its Voronoi cell; where one corner is obtuse, half goes to it and a quarter to the
-/// others (figure 4 of the paper).
+/// Returns the share of each corner in the area of a triangle: its Voronoi region, or, if an angle is obtuse, half of
+/// the area at that corner and a quarter at the others (figure 4 of the paper).
 fn mixed_areas(points: [DVec3; 3], cotangents: [f64; 3], area: f64) -> [f64; 3] {
     if cotangents.iter().any(|&c| c < 0.0) {
         return cotangents.map(|c| if c < 0.0 { 0.5 * area } else { 0.25 * area });
@@ -141,7 +144,8 @@ mod tests {
         Mesh::icosphere(Vec3::new(1.0, -2.0, 3.0), radius, edge).unwrap().to_triangles()
     }
 
-    /// A ball whose vertices are shifted along it by up to 0.15 of an edge in each direction: triangles of all shapes.
+    /// Returns a sphere with vertices shifted on it by up to 0.15 of an edge in each direction, so that triangles have
+    /// all shapes.
     fn uneven_sphere(radius: f32, edge: f32) -> TriangleMesh {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, radius, edge).unwrap().to_triangles();
         let mut state = 7_u32;
@@ -159,7 +163,7 @@ mod tests {
         values.zip(weights).map(|(v, w)| v * w).sum::<f64>() / weights.iter().sum::<f64>()
     }
 
-    /// The largest and the mean departure from `expected`, relative to it.
+    /// Returns the largest and the mean relative error.
     fn off(values: &[f64], areas: &[f64], expected: f64) -> [f64; 2] {
         let off = |v: &f64| (v / expected - 1.0).abs();
         [values.iter().map(off).fold(0.0, f64::max), mean_of(values.iter().map(off), areas)]
@@ -180,7 +184,7 @@ mod tests {
     #[test]
     fn uneven_ball_has_one_over_r() {
         let mesh = uneven_sphere(2.0, 0.2);
-        // A few vertices are far off, nearly all are right.
+        // Few vertices have large errors.
         assert!(measure(&mesh).min_angle_degrees < 15.0);
         let found = curvature(&mesh);
         let [largest, mean] = off(&found.mean, &found.areas, 0.5);
@@ -220,7 +224,7 @@ mod tests {
         }
     }
 
-    /// Σ K A, and Σ A beside the area of the mesh.
+    /// Returns Σ K A, Σ A and the area of the mesh.
     fn integrals(mesh: &TriangleMesh) -> [f64; 3] {
         let found = curvature(mesh);
         let total = found.gaussian.iter().zip(&found.areas).map(|(k, a)| k * a).sum();
@@ -248,12 +252,12 @@ mod tests {
         let [o, x] = [DVec3::ZERO, DVec3::X];
         let areas_of = |tip: DVec3| lone_areas([tip, o, x]);
         assert_eq!(areas_of(DVec3::new(0.5, 0.125, 0.0)), [0.03125, 0.015625, 0.015625]);
-        // At a right angle both rules agree; of acute corners each has what is nearer to it.
+        // At a right angle both rules agree. In an acute triangle each corner gets its Voronoi region.
         assert_eq!(areas_of(DVec3::Y), [0.125, 0.25, 0.125]);
         assert_eq!(areas_of(DVec3::new(0.5, 1.0, 0.0)), [0.15625, 0.171875, 0.171875]);
     }
 
-    /// The areas of a lone triangle's corners.
+    /// Returns the mixed areas of the corners of a single triangle.
     fn lone_areas(points: [DVec3; 3]) -> [f64; 3] {
         let mut sums = [Sums::default(); 3];
         add(&mut sums, [0, 1, 2], points);

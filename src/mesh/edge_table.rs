@@ -1,25 +1,26 @@
-//! Every use of every edge by a triangle, sorted: what the measures and the report read.
+//! The half-edges of a triangle list sorted by edge, for its measures, report and connected components.
 
 use crate::math::order::sort_by_rank;
 
-/// One side of one triangle.
+/// A half-edge: the use of an edge by a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct EdgeUse {
-    /// Both ends, the lower index in the high half.
+    /// The ends as a sort key, the lower vertex index in the high half.
     key: u64,
+    /// The index of the triangle.
     pub triangle: u32,
-    /// Whether the triangle runs from the lower index to the higher.
+    /// Whether the half-edge runs from the lower vertex index to the higher one.
     pub forward: bool,
 }
 
 impl EdgeUse {
-    /// The lower and the higher vertex.
+    /// Returns the vertex indices of the ends, the lower one first.
     pub fn ends(&self) -> [u32; 2] {
         [(self.key >> 32) as u32, self.key as u32]
     }
 }
 
-/// The uses by all triangles of three different corners, ordered by edge, then by triangle.
+/// Returns the half-edges of all triangles with three different corners, sorted by edge, then by triangle.
 pub(super) fn edge_uses(triangles: &[[u32; 3]]) -> Vec<EdgeUse> {
     let mut uses = Vec::with_capacity(3 * triangles.len());
     for (&[a, b, c], triangle) in triangles.iter().zip(0..) {
@@ -36,7 +37,7 @@ pub(super) fn edge_uses(triangles: &[[u32; 3]]) -> Vec<EdgeUse> {
     uses
 }
 
-/// The uses grouped by edge.
+/// Iterates over the edges, each as the slice of its half-edges.
 pub(super) fn by_edge(uses: &[EdgeUse]) -> impl Iterator<Item = &[EdgeUse]> {
     uses.chunk_by(|a, b| a.key == b.key)
 }

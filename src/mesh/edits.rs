@@ -1,22 +1,22 @@
-//! Eulerian edits: split (creation), collapse (deletion), flip (inversion), and the end of a lone tetrahedron.
+//! Eulerian edits: split (creation), collapse (deletion), flip (inversion), and removal of components.
 
 use super::{EditError, Mesh, Ring, VertexId};
 use crate::math::Vec3;
 
-/// The two vertices that an edge's triangles add to it.
+/// The two vertices opposite an edge: the third corners of its two triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Opposite {
-    /// The third corner of the triangle to the left, going from the first end to the second, seen from outside.
+    /// The third corner of the triangle to the left of the directed edge, seen from outside.
     pub left: VertexId,
-    /// The third corner of the triangle to the right.
+    /// The third corner of the triangle to the right of the directed edge, seen from outside.
     pub right: VertexId,
 }
 
 impl Mesh {
-    /// The vertices opposite the edge `uv`.
+    /// Returns the third corners of the two triangles at the edge `uv`.
     ///
     /// # Errors
-    /// [`EditError::NotAnEdge`] where `u` and `v` are not neighbours.
+    /// [`EditError::NotAnEdge`] if `u` and `v` are not adjacent.
     pub fn opposite(&self, u: VertexId, v: VertexId) -> Result<Opposite, EditError> {
         let ring = self.rings.get(u.index()).ok_or(EditError::NotAnEdge(u, v))?;
         match (ring.after(v), ring.before(v)) {
@@ -25,7 +25,7 @@ impl Mesh {
         }
     }
 
-    /// Creates a vertex on the edge `uv` at `position` and returns it (the paper's creation).
+    /// Splits the edge `uv` by a new vertex at `position` and returns the vertex (the paper's creation).
     ///
     /// ```text
     ///      a                a
@@ -54,7 +54,7 @@ impl Mesh {
         Ok(w)
     }
 
-    /// Replaces the edge `uv` by the edge between the two vertices opposite it (the paper's inversion).
+    /// Flips the edge `uv`: replaces it by the edge between its two opposite vertices (the paper's inversion).
     ///
     /// ```text
     ///      a              a
@@ -65,8 +65,7 @@ impl Mesh {
     /// ```
     ///
     /// # Errors
-    /// [`EditError::NotAnEdge`]; [`EditError::Adjacent`] where the new edge is there already;
-    /// [`EditError::ValenceTooLow`].
+    /// [`EditError::NotAnEdge`]; [`EditError::Adjacent`] if the new edge exists already; [`EditError::ValenceTooLow`].
     pub fn flip(&mut self, u: VertexId, v: VertexId) -> Result<(), EditError> {
         let Opposite { left: a, right: b } = self.opposite(u, v)?;
         if self.ring(a).contains(b) {
@@ -85,7 +84,8 @@ impl Mesh {
         Ok(())
     }
 
-    /// Whether [`Mesh::collapse`] of `uv` is possible (the link condition).
+    /// Tests whether [`Mesh::collapse`] of `uv` is possible (the link condition) and returns the vertices opposite the
+    /// edge.
     ///
     /// # Errors
     /// As [`Mesh::collapse`].
@@ -103,17 +103,17 @@ impl Mesh {
         Ok(opposite)
     }
 
-    /// Deletes `v` by drawing the edge `uv` together into `u`, which moves to `position` (the paper's deletion).
+    /// Collapses the edge `uv`: deletes `v` and moves `u` to `position` (the paper's deletion).
     ///
     /// # Errors
-    /// [`EditError::NotAnEdge`]; [`EditError::NeckInTheWay`] where `u` and `v` have more than two neighbours in
-    /// common; [`EditError::ValenceTooLow`] at a vertex opposite, as on a tetrahedron.
+    /// [`EditError::NotAnEdge`]; [`EditError::NeckInTheWay`] if `u` and `v` have more than two common neighbours;
+    /// [`EditError::ValenceTooLow`] if a vertex opposite the edge has three neighbours only, as on a tetrahedron.
     pub fn collapse(&mut self, u: VertexId, v: VertexId, position: Vec3) -> Result<(), EditError> {
         let Opposite { left: a, right: b } = self.can_collapse(u, v)?;
         self.touch(u);
         self.attributes.blend(u, u, v, 0.5);
         self.positions[u.index()] = position;
-        // Seen from v the order is u, b, outer neighbours, a; they take the place of v between b and a around u.
+        // The ring of v is u, b, outer neighbours, a: the outer neighbours replace v between b and a in the ring of u.
         let outer = self.ring(v).between(b, a);
         for &w in &outer {
             self.ring_mut(w).replace(v, u);
@@ -127,16 +127,16 @@ impl Mesh {
         Ok(())
     }
 
-    /// Whether `v` is a corner of a component of four vertices.
+    /// Returns whether `v` is a corner of an isolated tetrahedron, a connected component of four vertices.
     pub fn is_tetrahedron(&self, v: VertexId) -> bool {
         let ring = self.ring(v).as_slice();
         ring.len() == 3 && ring.iter().all(|&w| self.ring(w).valence() == 3)
     }
 
-    /// Deletes the tetrahedron that has `v` as a corner.
+    /// Deletes the isolated tetrahedron that has `v` as a corner.
     ///
     /// # Errors
-    /// [`EditError::NotATetrahedron`] where the component of `v` has more than four vertices.
+    /// [`EditError::NotATetrahedron`] if `v` is not live or its connected component has more than four vertices.
     pub fn remove_tetrahedron(&mut self, v: VertexId) -> Result<(), EditError> {
         if !self.is_live(v) || !self.is_tetrahedron(v) {
             return Err(EditError::NotATetrahedron(v));
@@ -145,7 +145,7 @@ impl Mesh {
         Ok(())
     }
 
-    /// Deletes the whole component of `v`, whatever its genus, and returns how many vertices it had; none where `v` is not
+    /// Deletes the connected component of `v`, whatever its genus, and returns its number of vertices, 0 if `v` is not
     /// live.
     pub fn remove_component(&mut self, v: VertexId) -> usize {
         let members = self.component_of(v, usize::MAX);
@@ -155,7 +155,7 @@ impl Mesh {
         let half_edges: usize = members.iter().map(|&w| self.ring(w).valence()).sum();
         self.euler -= members.len() as i64 + half_edges as i64 / 3 - half_edges as i64 / 2;
         self.half_edges -= half_edges;
-        // From the last to the first, so that ids are handed out again in the order they were found.
+        // In reverse, so that the slots are reused in breadth-first order.
         for &w in members.iter().rev() {
             self.release(w);
         }

@@ -1,63 +1,64 @@
-//! What can go wrong with a mesh as a whole, and why an edit was refused.
+//! Errors of building a mesh and of editing it.
 
 use super::VertexId;
 
-/// Why a mesh cannot be built or used.
+/// An error of building or validating a mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
-    /// An argument outside what is accepted.
+    /// An argument is outside its accepted range.
     #[error("{parameter}: {problem}")]
     InvalidArgument {
-        /// The argument's name.
+        /// The name of the argument.
         parameter: &'static str,
-        /// What was wrong and what is accepted.
+        /// The invalid value and the accepted range.
         problem: String,
     },
-    /// A boundary, a non-manifold edge or vertex, or triangles of opposite orientation.
+    /// The surface has a boundary, a non-manifold edge or vertex, or inconsistently oriented triangles.
     #[error("the mesh is not a closed surface: {problem}")]
     NotClosed {
-        /// Where and how.
+        /// The defect and its location.
         problem: String,
     },
-    /// Triangles cross where an embedded surface is needed.
+    /// The mesh intersects itself, but an embedded surface is required.
     #[error("the mesh crosses itself: {pairs} pairs of triangles; an embedded one is needed")]
     SelfIntersecting {
-        /// The number of crossing pairs of triangles.
+        /// The number of intersecting pairs of triangles.
         pairs: usize,
     },
-    /// More memory than there is.
+    /// The mesh needs more memory than is available.
     #[error("the mesh needs {bytes} bytes, more than there is")]
     TooLarge {
-        /// The memory asked for.
+        /// The memory required, in bytes.
         bytes: u64,
     },
 }
 
-/// Why an edit was refused; the mesh is then as it was.
+/// The reason why an edit was rejected; the mesh is unmodified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EditError {
-    /// The two vertices are not neighbours.
+    /// The two vertices are not adjacent.
     #[error("{0:?} and {1:?} are not joined by an edge")]
     NotAnEdge(VertexId, VertexId),
-    /// The two vertices are neighbours, or one vertex.
+    /// The two vertices are already adjacent, or are the same vertex.
     #[error("{0:?} and {1:?} are joined already")]
     Adjacent(VertexId, VertexId),
-    /// A vertex would be left with fewer than three neighbours.
+    /// The edit would leave this vertex with fewer than three neighbours.
     #[error("{0:?} would be left with fewer than three neighbours")]
     ValenceTooLow(VertexId),
-    /// The ends of the edge share a neighbour beyond the two opposite ones: a neck is in the way.
+    /// The ends of the edge have this common neighbour besides the two opposite vertices, so that a collapse would
+    /// pinch a neck (link condition).
     #[error("{0:?} closes a ring of three edges that is no triangle")]
     NeckInTheWay(VertexId),
-    /// The three edges bound a triangle.
+    /// The three edges to cut bound a triangle of the surface.
     #[error("the ring of three edges is a triangle of the surface")]
     IsTriangle,
-    /// The four vertices are not a component of their own.
+    /// This vertex is not a corner of a component of four vertices.
     #[error("{0:?} is not a corner of a lone tetrahedron")]
     NotATetrahedron(VertexId),
-    /// Triangles would cross.
+    /// The edit would make the mesh intersect itself.
     #[error("triangles would cross")]
     WouldCross,
-    /// No ids are left.
+    /// No vertex ids are left.
     #[error("the mesh holds as many vertices as it can name")]
     Full,
 }

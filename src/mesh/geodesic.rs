@@ -1,36 +1,37 @@
-//! Distance along the surface from a vertex.
+//! Geodesic distance from a vertex to all others, by propagation across unfolded triangles.
 //!
-//! Distances spread from vertex to vertex, nearest first, as in Dijkstra's algorithm, but also through triangles: from
-//! two corners to the third, by unfolding. In the triangle's plane there is a point as far from both corners as they
-//! are from the start; the third corner is as far as the straight line to it from that point, if that line enters
-//! through the edge between the two (Novotni & Klein, *Computing geodesic distances on triangular meshes*, 2002).
-//! In a plane, and across its folds, that is exact.
+//! Distances propagate from the nearest vertex outwards, as in Dijkstra's algorithm, but also across triangles. In the
+//! plane of a triangle, a virtual source has the known distances from two of its corners. The distance of the third
+//! corner is its straight distance from this source, if the line between them passes through the edge of the two
+//! (Novotni & Klein, *Computing geodesic distances on triangular meshes*, 2002). On planes, and across their folds,
+//! this is exact.
 //!
-//! A vertex whose distance is lowered later on spreads it again. So obtuse triangles, through which a shorter way may
-//! come late, need no care of their own.
+//! A vertex whose distance decreases later propagates it again. Obtuse triangles, through which a shorter path may be
+//! found late, thus need no special treatment.
 
 use super::{MeshError, TriangleMesh};
 use crate::math::{DVec3, Vec3};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// How often a vertex spreads its distance. Once is the rule and three times the most on ordinary surfaces; among needles
-/// two vertices may lower each other by ever less, and without a bound that would go on and on.
+/// The maximum number of times that a vertex propagates its distance. Usually it is one, and at most three on ordinary
+/// surfaces; among needle triangles, two vertices could reduce each other's distance by ever smaller amounts almost
+/// endlessly.
 const MOST_SPREADS: u8 = 30;
 
-/// A distance is lowered only by more than this share of it: less is rounding, and would be passed around for long.
+/// The relative decrease of a distance below which it counts as rounding error and is not propagated.
 const LEAST_GAIN: f64 = 1e-12;
 
-/// The distance along the surface from vertex `from` to every vertex, in the mesh's units; infinite where no triangles
-/// lead there.
+/// Returns the geodesic distance from vertex `from` to every vertex, in the length unit of the mesh; infinite if they
+/// are not connected.
 ///
-/// Exact to rounding on flat parts, and across folds where the shortest way is the only one. On curved surfaces, and
-/// where ways from two sides meet, a distance may be up to half an edge short: on a ball of radius 1 with edges of 0.1,
-/// 0.03 at the far end and 0.003 in the mean. Never shorter than the straight line, nor longer than along edges.
-/// O(n log n). Indices must exist, as [`TriangleMesh::validate`] makes sure.
+/// Exact up to rounding on flat regions, and across folds if the shortest path is unique. On curved surfaces, and where
+/// shortest paths from two sides meet, a distance may be up to half an edge too short: on a ball of radius 1 with edges
+/// of 0.1, 0.03 at the far end and 0.003 in the mean. Never shorter than the straight line, nor longer than the
+/// shortest path along edges. O(n log n). Indices must be valid, see [`TriangleMesh::validate`].
 ///
 /// # Errors
-/// [`MeshError::InvalidArgument`] where there is no vertex `from`.
+/// [`MeshError::InvalidArgument`] if there is no vertex `from`.
 pub fn geodesic(mesh: &TriangleMesh, from: u32) -> Result<Vec<f64>, MeshError> {
     let vertices = mesh.positions.len();
     if from as usize >= vertices {
@@ -44,14 +45,16 @@ pub fn geodesic(mesh: &TriangleMesh, from: u32) -> Result<Vec<f64>, MeshError> {
     Ok(front.distances)
 }
 
-/// The distances so far, and the vertices that have yet to spread theirs.
+/// The state of the propagation: tentative distances, and a queue of vertices whose distance is to be propagated.
 struct Front<'a> {
     positions: &'a [Vec3],
     fans: Fans,
     origin: DVec3,
     distances: Vec<f64>,
+    /// By vertex, how often it has propagated its distance.
     spreads: Vec<u8>,
-    /// Bits of a distance, which for positive numbers are in the order of the numbers; ties go to the lower index.
+    /// Distances as bits, which are ordered like the positive numbers they represent, and vertices; ties go to the
+    /// lower index.
     queue: BinaryHeap<Reverse<(u64, u32)>>,
 }
 
@@ -70,7 +73,7 @@ impl<'a> Front<'a> {
         }
     }
 
-    /// The nearest vertex that has a distance to spread.
+    /// Returns the vertex of least distance that has not propagated it yet.
     fn pop(&mut self) -> Option<usize> {
         while let Some(Reverse((bits, v))) = self.queue.pop() {
             let v = v as usize;
@@ -83,7 +86,7 @@ impl<'a> Front<'a> {
         None
     }
 
-    /// Offers the other corners of all triangles around `v` a way through them.
+    /// Propagates the distance of `v` to the other corners of the triangles around it.
     fn spread(&mut self, v: usize) {
         for k in self.fans.range(v) {
             let [a, b] = self.fans.edges[k].map(|w| w as usize);
@@ -92,13 +95,14 @@ impl<'a> Front<'a> {
         }
     }
 
-    /// The distance to `c` through the triangle `a b c`, from the distances to `a` and `b`.
+    /// Returns the distance of `c` by paths along the edges of the triangle `a b c` or through it, from the distances
+    /// of `a` and `b`.
     fn way(&self, a: usize, b: usize, c: usize) -> f64 {
         let [p, q, r] = [a, b, c].map(|v| self.positions[v].as_dvec3());
         let (to_a, to_b) = (self.distances[a], self.distances[b]);
         let along_edges = (to_a + p.distance(r)).min(to_b + q.distance(r));
         let through = through_edge([to_a, to_b], q - p, r - p);
-        // A curved surface taken as flat can make a way too short.
+        // Unfolding a curved surface can underestimate the distance.
         through.map_or(along_edges, |d| d.min(along_edges)).max(r.distance(self.origin))
     }
 
@@ -111,16 +115,16 @@ impl<'a> Front<'a> {
     }
 }
 
-/// How far the third corner of a triangle is, in its plane, from the point beyond the edge that is `to_a` and `to_b`
-/// away from the edge's ends. Nothing where there is no such point, or where the straight line from it does not enter
-/// through the edge.
+/// Returns the distance of the third corner of a triangle from the virtual source: the point in its plane, beyond an
+/// edge, at the distances `to_a` and `to_b` from the ends of the edge. `None` if there is no such point, or if the
+/// straight line from it to the corner misses the edge.
 ///
-/// `edge` and `spoke` go from the first end of the edge to the second and to the third corner.
+/// `edge` and `spoke` are the vectors from the first end of the edge to its second end and to the third corner.
 fn through_edge([to_a, to_b]: [f64; 2], edge: DVec3, spoke: DVec3) -> Option<f64> {
     let base = edge.length();
     let source_x = 0.5 * (base + (to_a - to_b) * ((to_a + to_b) / base));
     let square = (to_a - source_x) * (to_a + source_x);
-    // NaN where a distance is infinite or the edge has no length.
+    // NaN if a distance is infinite or the edge has length 0.
     if square.is_nan() || square < 0.0 {
         return None;
     }
@@ -132,7 +136,7 @@ fn through_edge([to_a, to_b]: [f64; 2], edge: DVec3, spoke: DVec3) -> Option<f64
     enters.then(|| ((x - source_x) * (x - source_x) + depth * depth).sqrt())
 }
 
-/// For each vertex the edges opposite it in its triangles.
+/// For each vertex, the edges opposite it in its triangles.
 struct Fans {
     starts: Vec<u32>,
     edges: Vec<[u32; 2]>,
@@ -169,13 +173,14 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// The largest and the mean departure of `found` from `expected`.
+    /// Returns the largest and the mean absolute error of `found`.
     fn off(found: &[f64], expected: impl Iterator<Item = f64>) -> [f64; 2] {
         let off: Vec<f64> = found.iter().zip(expected).map(|(d, e)| (d - e).abs()).collect();
         [off.iter().copied().fold(0.0, f64::max), off.iter().sum::<f64>() / off.len() as f64]
     }
 
-    /// The same for a ball of radius 1, against arcs of great circles.
+    /// Returns the largest and the mean error of geodesic distances on a ball of radius 1, where they are arcs of great
+    /// circles.
     fn off_on_ball(mesh: &TriangleMesh, from: u32) -> [f64; 2] {
         let start = mesh.positions[from as usize].as_dvec3();
         let arc = |p: &Vec3| libm::atan2(start.cross(p.as_dvec3()).length(), start.dot(p.as_dvec3()));
@@ -205,7 +210,7 @@ mod tests {
         assert!(largest < 0.06 && mean < 0.006, "{largest}, {mean}");
     }
 
-    /// A vector of coordinates from −1 to 1 that looks random.
+    /// Returns a pseudorandom vector with coordinates from −1 to 1.
     fn shift(seed: u32) -> Vec3 {
         let mut state = seed.wrapping_mul(2_654_435_761) ^ 99;
         Vec3::from_array([(); 3].map(|()| {
@@ -214,8 +219,8 @@ mod tests {
         }))
     }
 
-    /// A closed box from the origin, its faces in `cells` pieces each way, the inner vertices shifted within the
-    /// faces by `shake` of a cell.
+    /// Returns a closed box with a corner at the origin, each face a grid of `cells` × `cells` squares, inner vertices
+    /// shifted within the face by up to `shake` of a cell.
     fn plate(size: Vec3, cells: u32, shake: f32) -> TriangleMesh {
         let mut soup = TriangleMesh::default();
         for [p, q, r, s] in shapes::cuboid_faces(size) {
@@ -246,7 +251,8 @@ mod tests {
             let mesh = plate(Vec3::new(4.0, 4.0, 0.5), 12, shake);
             let found = geodesic(&mesh, vertex_at(&mesh, Vec3::ZERO)).unwrap();
             for (p, d) in mesh.positions.iter().zip(&found) {
-                // From a corner: straight on three faces; over one edge or the other to the far one.
+                // From a corner, shortest paths are straight on three faces; to the opposite face they cross one of two
+                // edges.
                 let [x, y, z] = p.as_dvec3().to_array();
                 let over = |x: f64, y: f64| (x * x + (y + 0.5) * (y + 0.5)).sqrt();
                 let short = match [x, y, z] {
@@ -254,7 +260,7 @@ mod tests {
                     [x, y, 0.5] => over(x, y).min(over(y, x)) - d,
                     _ => continue,
                 };
-                // Half an edge where the two ways meet, a little beyond, nothing before.
+                // Errors up to half an edge where the two paths meet, small ones around it, none elsewhere.
                 let allowed = match (z == 0.5, (x - y).abs() < 1.0) {
                     (false, _) => 1e-5,
                     (true, false) => 0.01,
@@ -269,7 +275,7 @@ mod tests {
     fn torus_along_its_circles() {
         let (major, minor) = (3.0, 1.0);
         let mesh = shapes::torus(major, minor, 240, 80);
-        // From the outermost circle: round the tube, and along the inner and outer circles where they are shortest.
+        // Around the tube from the outer equator, and along the inner equator as far as it is the shortest path.
         let found = geodesic(&mesh, 0).unwrap();
         for j in 0..80_u32 {
             let expected = std::f64::consts::TAU * minor * f64::from(j.min(80 - j)) / 80.0;
@@ -283,7 +289,7 @@ mod tests {
         }
     }
 
-    /// Never nearer than the straight line, nor further than along edges.
+    /// Returns whether distances are at least the straight distance and at most the distance along edges.
     fn is_between_bounds(mesh: &TriangleMesh, from: u32, found: &[f64]) -> bool {
         let at = |v: u32| mesh.positions[v as usize].as_dvec3();
         let straight = |v: usize| at(v as u32).distance(at(from));

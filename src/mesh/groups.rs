@@ -1,20 +1,20 @@
-//! Disjoint groups, for finding connected parts.
+//! A union-find structure, for connected components.
 
 use super::edge_table::{EdgeUse, by_edge};
 
-/// Disjoint groups of the numbers below a limit.
+/// A partition of the numbers below a limit into disjoint sets (union-find).
 pub(crate) struct Groups {
     parents: Vec<usize>,
     count: usize,
 }
 
 impl Groups {
-    /// Each number a group of its own.
+    /// Creates a partition in which each number below `limit` is a set by itself.
     pub fn new(limit: usize) -> Self {
         Self { parents: (0..limit).collect(), count: limit }
     }
 
-    /// The lowest number of the group of `i`.
+    /// Returns the lowest number in the set of `i`, its representative.
     pub fn find(&mut self, mut i: usize) -> usize {
         while self.parents[i] != i {
             self.parents[i] = self.parents[self.parents[i]];
@@ -23,21 +23,21 @@ impl Groups {
         i
     }
 
-    /// Makes one group of those of `i` and `j`.
+    /// Merges the sets of `i` and `j`.
     pub fn join(&mut self, i: usize, j: usize) {
         let (i, j) = (self.find(i), self.find(j));
         self.parents[i.max(j)] = i.min(j);
         self.count -= usize::from(i != j);
     }
 
-    /// Makes one group of the triangles at each edge.
+    /// Merges the sets of the triangles at each edge; the numbers are triangle indices.
     pub(super) fn join_across_edges(&mut self, uses: &[EdgeUse]) {
         for pair in by_edge(uses).flat_map(|edge| edge.windows(2)) {
             self.join(pair[0].triangle as usize, pair[1].triangle as usize);
         }
     }
 
-    /// The number of groups.
+    /// Returns the number of disjoint sets.
     pub fn count(&self) -> usize {
         self.count
     }

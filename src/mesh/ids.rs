@@ -1,23 +1,24 @@
-//! The handle of a vertex.
+//! Vertex handles.
 
 use serde::{Deserialize, Serialize};
 
-/// Names one vertex of one [`Mesh`](super::Mesh).
+/// A handle of a vertex of a [`Mesh`](super::Mesh).
 ///
-/// An id stays with its vertex until the vertex is deleted or the mesh is compacted; freed ids are used again.
+/// It stays valid until the vertex is deleted or the mesh is renumbered ([`Mesh::reorder`](super::Mesh::reorder)). Ids
+/// of deleted vertices are reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct VertexId(pub u32);
 
 impl VertexId {
-    /// The slot of this vertex in per-vertex arrays.
+    /// Returns the slot of this vertex, its index into per-vertex arrays.
     #[inline]
     pub fn index(self) -> usize {
         self.0 as usize
     }
 
-    /// The vertex in slot `index`.
+    /// Returns the id of the vertex in slot `index`.
     ///
-    /// Meshes hold at most `u32::MAX` vertices, which [`Mesh`](super::Mesh) makes sure of where it is built.
+    /// [`Mesh`](super::Mesh) ensures when it is built that it has at most `u32::MAX` vertices.
     #[inline]
     pub fn from_index(index: usize) -> Self {
         Self(index as u32)

@@ -1,25 +1,25 @@
-//! Edits that can be taken back.
+//! Transactions: edits are recorded and can be rolled back.
 
 use super::{Mesh, Ring, VertexId};
 use crate::math::Vec3;
 use smallvec::SmallVec;
 
-/// What edits have changed since [`Mesh::begin`]: each slot as it was before it was first touched.
+/// The undo log of the edits since [`Mesh::begin`]: the state of each slot before its first change.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Journal {
     touched: Vec<Touched>,
-    /// Attributes of the touched slots, one slot after the other.
+    /// The attributes of the touched slots, one slot after the other.
     attributes: Vec<f32>,
-    /// What became of the list of free slots, in order.
+    /// The changes of the free list, in order.
     slots_taken_and_freed: Vec<SlotChange>,
     slots: usize,
     half_edges: usize,
     euler: i64,
-    /// Storage kept from one journal to the next; `false` while nothing is recorded.
+    /// Whether edits are recorded. A closed journal keeps its storage for the next one.
     open: bool,
 }
 
-/// A vertex as it was.
+/// The state of a vertex before its first change.
 #[derive(Clone, Debug, PartialEq)]
 struct Touched {
     vertex: VertexId,
@@ -33,13 +33,16 @@ enum SlotChange {
     Freed,
 }
 
-/// Triangles by their corners, each from its lowest id on.
+/// A list of triangles by their corners, each starting at its lowest id.
 pub type Triangles = SmallVec<[[VertexId; 3]; 16]>;
 
 impl Mesh {
-    /// Records edits from now on, until [`Mesh::commit`] keeps them or [`Mesh::roll_back`] takes them back.
+    /// Starts to record edits, until [`Mesh::commit`] keeps them or [`Mesh::roll_back`] undoes them.
     ///
-    /// Edits that touch much of the mesh are slow while they are recorded. Recording begins anew where it was on already.
+    /// If edits are being recorded already, those so far are kept and recording restarts. Each edit searches the
+    /// vertices touched so far, so that edits of a large part of the mesh are slow. Bulk changes
+    /// ([`Mesh::positions_mut`], [`Mesh::refine`], [`Mesh::reorder`]) and direct changes of attributes are not
+    /// recorded.
     pub fn begin(&mut self) {
         let journal = &mut self.journal;
         journal.touched.clear();
@@ -51,12 +54,13 @@ impl Mesh {
         journal.open = true;
     }
 
-    /// Keeps the edits since [`Mesh::begin`].
+    /// Keeps the edits since [`Mesh::begin`] and stops recording.
     pub fn commit(&mut self) {
         self.journal.open = false;
     }
 
-    /// Takes back the edits since [`Mesh::begin`]; versions count on.
+    /// Undoes the edits since [`Mesh::begin`] and stops recording. The version counters are not restored; they
+    /// increase.
     pub fn roll_back(&mut self) {
         let journal = std::mem::take(&mut self.journal);
         if !journal.open {
@@ -86,14 +90,15 @@ impl Mesh {
         self.journal = Journal { open: false, ..journal };
     }
 
-    /// The vertices that edits since [`Mesh::begin`] touched, those that are gone included: moved, made, deleted or
-    /// given other neighbours.
+    /// Iterates over the vertices touched by edits since [`Mesh::begin`]: those moved, created or deleted, and those
+    /// whose one-ring changed.
     pub fn touched(&self) -> impl Iterator<Item = VertexId> + '_ {
         let made = (self.journal.slots..self.slots()).map(VertexId::from_index);
         self.journal.touched.iter().map(|was| was.vertex).chain(made)
     }
 
-    /// The triangles that edits since [`Mesh::begin`] made or moved, each once.
+    /// Returns the triangles that edits since [`Mesh::begin`] created or moved, each once, for the tests of collision
+    /// handling.
     pub fn changed_triangles(&self) -> Triangles {
         let mut found = Triangles::new();
         for was in &self.journal.touched {
@@ -110,7 +115,7 @@ impl Mesh {
         found
     }
 
-    /// To be called before the slot of `v` is changed in any way.
+    /// Records the state of `v` if edits are being recorded; must be called before its slot is changed.
     #[inline]
     pub(super) fn touch(&mut self, v: VertexId) {
         if self.journal.open {
@@ -141,14 +146,14 @@ impl Mesh {
         }
     }
 
-    /// The ring of `v`, to be changed.
+    /// Returns the ring of `v` for modification, after recording its state.
     #[inline]
     pub(super) fn ring_mut(&mut self, v: VertexId) -> &mut Ring {
         self.touch(v);
         &mut self.rings[v.index()]
     }
 
-    /// The triangles at some vertices, each once, by their corners.
+    /// Returns the triangles that have a corner in `vertices`, each once.
     pub fn triangles_at(&self, vertices: &[VertexId]) -> Triangles {
         let mut found: Triangles = vertices
             .iter()

@@ -1,51 +1,53 @@
-//! Measures of a mesh: sums in `f64`, in the order of the triangles.
+//! Geometric and topological measures of a triangle list, summed in `f64` in the order of the triangles.
 
 use super::TriangleMesh;
 use super::edge_table::{EdgeUse, by_edge, edge_uses};
 use super::groups::Groups;
 use crate::math::{DMat3, DVec3};
 
-/// Measures of a mesh, in its own units.
+/// Geometric and topological measures of a mesh, in the length unit of its positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measures {
-    /// Vertices that a triangle uses.
+    /// The number of vertices used by triangles.
     pub vertices: usize,
-    /// Triangles, degenerate ones included.
+    /// The number of triangles, including degenerate ones.
     pub triangles: usize,
-    /// Parts joined through edges; two parts that share a vertex alone are two.
+    /// The number of connected components. Components are connected through edges: two that share only a vertex count
+    /// as two.
     pub components: usize,
-    /// χ = V − E + F.
+    /// The Euler characteristic χ = V − E + F.
     pub euler: i64,
-    /// Sum over components, from χ = 2 components − 2 genus: for closed oriented manifolds.
+    /// The sum of the genera of the components, from χ = 2 components − 2 genus; valid for closed, oriented manifolds.
     pub genus: i64,
-    /// Area of all triangles.
+    /// The total area of the triangles.
     pub area: f64,
-    /// Signed volume enclosed: positive where triangles are counter-clockwise seen from outside. Of a mesh that is
-    /// not closed, the volume of the cones from its triangles to the middle of its bounds.
+    /// The signed enclosed volume, positive if triangles are counter-clockwise seen from outside. If the mesh is not
+    /// closed, the sum of the signed volumes of the tetrahedra from its triangles to the centre of its bounding box.
     pub volume: f64,
-    /// Centroid of the enclosed solid; of the surface, where the volume is nothing beside the area
-    /// (|volume| < 1e-9 area^1.5).
+    /// The centroid of the enclosed solid; the centroid of the surface if the volume is negligible (|volume| ≤ 1e-9
+    /// area^1.5).
     pub centroid: DVec3,
-    /// Second moments of the enclosed solid about `centroid`: ∫ (x − c)(x − c)ᵀ dV at density 1, in units to the
-    /// fifth power, row-major; signed as the volume is. (The inertia tensor is its trace times the identity, less
-    /// it.)
+    /// The second moments of the enclosed solid about `centroid`: ∫ (x − c)(x − c)ᵀ dV at density 1, row-major, in the
+    /// fifth power of the length unit, with the sign of the volume. (The inertia tensor is tr(M) I − M for this matrix
+    /// M.)
     pub inertia: [f64; 9],
-    /// Shortest edge.
+    /// The length of the shortest edge.
     pub edge_min: f64,
-    /// Mean over edges.
+    /// The mean length of the edges.
     pub edge_mean: f64,
-    /// Longest edge.
+    /// The length of the longest edge.
     pub edge_max: f64,
-    /// Smallest angle of a triangle, in degrees; 0 where two corners coincide.
+    /// The smallest angle of a triangle, in degrees; 0 if two corners coincide.
     pub min_angle_degrees: f64,
-    /// Largest angle of a triangle, in degrees.
+    /// The largest angle of a triangle, in degrees.
     pub max_angle_degrees: f64,
-    /// Lowest and highest corner of the box around the vertices in use.
+    /// The lowest and the highest corner of the bounding box of the used vertices.
     pub bounds: [DVec3; 2],
 }
 
-/// The measures of `mesh`. All zero for a mesh without triangles; triangles that name a vertex that does not exist
-/// are left out.
+/// Measures `mesh`: counts, area, volume, moments, edge lengths and angles.
+///
+/// All measures of a mesh without triangles are zero. Triangles with an invalid index are ignored.
 pub fn measure(mesh: &TriangleMesh) -> Measures {
     let sound = mesh.triangles.iter().filter(|t| t.iter().all(|&v| (v as usize) < mesh.positions.len()));
     let triangles: Vec<[u32; 3]> = sound.copied().collect();
@@ -102,11 +104,11 @@ struct Solid {
     moments: DMat3,
 }
 
-/// Below this multiple of area^1.5 (a ball has 0.094) a volume is rounding, and dividing by it would put the centroid
-/// anywhere.
+/// The volume, as a multiple of area^1.5 (0.094 for a ball), up to which it is regarded as rounding error; dividing by
+/// it would give an arbitrary centroid.
 const FLAT: f64 = 1e-9;
 
-/// Sums over the tetrahedra from each triangle to `reference`, which only keeps the numbers small.
+/// Sums area, volume and moments over the tetrahedra from each triangle to `reference`, which affects only rounding.
 fn solid(triangles: impl Iterator<Item = [DVec3; 3]>, reference: DVec3) -> Solid {
     let (mut area, mut surface_first) = (0.0, DVec3::ZERO);
     let (mut volume, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);
@@ -159,7 +161,7 @@ fn edges(uses: &[EdgeUse], position: impl Fn(u32) -> DVec3) -> Edges {
     Edges { count, min, mean: sum / count as f64, max }
 }
 
-/// Smallest and largest, in degrees.
+/// Returns the smallest and the largest angle of all triangles, in degrees.
 fn angles(triangles: impl Iterator<Item = [DVec3; 3]>) -> [f64; 2] {
     let mut range: Option<[Angle; 2]> = None;
     for [a, b, c] in triangles {
@@ -176,7 +178,8 @@ fn angles(triangles: impl Iterator<Item = [DVec3; 3]>) -> [f64; 2] {
     range.map_or([0.0; 2], |ends| ends.map(|angle| angle.degrees()))
 }
 
-/// An angle of 0 to 180° as its sine and cosine times one positive number: compared without trigonometry.
+/// An angle from 0 to 180°, as its sine and cosine times a common positive factor, so that angles are compared without
+/// trigonometric functions.
 #[derive(Clone, Copy)]
 struct Angle {
     sine: f64,
@@ -187,11 +190,11 @@ impl Angle {
     fn at(apex: DVec3, p: DVec3, q: DVec3) -> Self {
         let (u, v) = (p - apex, q - apex);
         let (sine, cosine) = (u.cross(v).length(), u.dot(v));
-        // Two corners in one place: no angle, taken as 0.
+        // Two coincident corners leave the angle undefined; it counts as 0.
         if sine == 0.0 && cosine == 0.0 { Self { sine: 0.0, cosine: 1.0 } } else { Self { sine, cosine } }
     }
 
-    /// By sin(other − self) > 0, which tells all angles of 0 to 180° apart but those two.
+    /// Tests sin(other − self) > 0, which decides for all angles from 0 to 180°, except between 0 and 180° themselves.
     fn is_less_than(&self, other: &Self) -> bool {
         let turn = self.cosine * other.sine - self.sine * other.cosine;
         turn > 0.0 || (turn == 0.0 && self.cosine > 0.0 && other.cosine < 0.0)
@@ -260,7 +263,8 @@ mod tests {
         near(m.min_angle_degrees, 60.0, 1e-5);
         near(m.max_angle_degrees, 60.0, 1e-5);
         let golden = (1.0 + five) / 2.0;
-        // Isotropic; ∫ x² is V r² / 5 times a factor of the shape, here through ∫ |x|² over one of 20 pyramids.
+        // The tensor is isotropic: its diagonal entries are a third of ∫ |x|², which is 20 times the integral over one
+        // pyramid.
         near(m.inertia[0], m.inertia[8], 1e-6);
         let inradius = golden * golden / (3.0_f64.sqrt()) * edge / 2.0;
         let pyramid = m.volume / 20.0 * 3.0 / 5.0 * (inradius * inradius + edge * edge / 12.0);

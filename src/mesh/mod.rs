@@ -1,14 +1,14 @@
-//! The dynamic mesh: closed, oriented, 2-manifold, edited in place.
+//! A closed, oriented, 2-manifold triangle mesh that is edited in place, and triangle lists without these guarantees.
 //!
-//! A vertex holds its position and the oriented ring of its neighbours (Lachaud & Montanvert, section 3.1); edges and
-//! triangles are read off the rings and exist nowhere else. An edit checks first and changes after: an error means
-//! the mesh is as it was.
+//! Each vertex of [`Mesh`] stores its position and its oriented one-ring (Lachaud & Montanvert, section 3.1). Edges and
+//! triangles are not stored; they are derived from the one-rings. An edit validates its preconditions before it changes
+//! anything, so the mesh is unmodified when it returns an error.
 //!
 //! # Invariants
-//! Every live vertex `u` has at least three neighbours, none of them twice, and for each consecutive pair `a`, `b` of
-//! its ring, `b` is followed by `u` in the ring of `a`, and `u` by `a` in the ring of `b`. So the triangle `(u, a, b)`
-//! is seen the same by its three corners, every edge has two triangles of opposite direction, and the link of every
-//! vertex is one cycle. [`Mesh::check`] tests all of it.
+//! Every live vertex `u` has at least three distinct neighbours. For consecutive neighbours `a`, `b` of `u`, `b` is
+//! followed by `u` in the ring of `a`, and `u` by `a` in the ring of `b`. So the rings of its three corners agree on
+//! the triangle `(u, a, b)`, every edge has two triangles of opposite direction, and the link of every vertex is one
+//! cycle. [`Mesh::check`] tests these invariants.
 
 mod attributes;
 mod build;
@@ -59,7 +59,7 @@ use attributes::Attributes;
 use journal::Journal;
 use serde::{Deserialize, Serialize};
 
-/// A closed oriented triangle mesh with dynamic connectivity.
+/// A closed, oriented triangle mesh with dynamic connectivity, stored as one oriented one-ring per vertex.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mesh {
     rings: Vec<Ring>,
@@ -77,85 +77,87 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// The number of vertices.
+    /// Returns the number of live vertices.
     #[inline]
     pub fn vertex_count(&self) -> usize {
         self.rings.len() - self.free.len()
     }
 
-    /// The number of triangles.
+    /// Returns the number of triangles.
     #[inline]
     pub fn triangle_count(&self) -> usize {
         self.half_edges / 3
     }
 
-    /// The number of edges.
+    /// Returns the number of undirected edges.
     #[inline]
     pub fn edge_count(&self) -> usize {
         self.half_edges / 2
     }
 
-    /// The number of vertex slots, free ones included: the length of per-vertex arrays.
+    /// Returns the number of vertex slots, including free ones; this is the length of per-vertex arrays.
     #[inline]
     pub fn slots(&self) -> usize {
         self.rings.len()
     }
 
-    /// χ = V − E + F as the edits predict it; [`Mesh::check`] compares it with a count.
+    /// Returns the Euler characteristic χ = V − E + F, updated incrementally by edits; [`Mesh::check`] compares it with
+    /// a full count.
     #[inline]
     pub fn euler(&self) -> i64 {
         self.euler
     }
 
-    /// Counts up when connectivity changes.
+    /// Returns a counter that increases whenever connectivity changes, so that caches can be invalidated.
     #[inline]
     pub fn topology_version(&self) -> u32 {
         self.topology_version
     }
 
-    /// Counts up when any vertex moves.
+    /// Returns a counter that increases whenever positions or connectivity change, so that caches can be invalidated.
     #[inline]
     pub fn geometry_version(&self) -> u32 {
         self.geometry_version
     }
 
-    /// Takes versions above those of a mesh that this one replaces, so that nobody takes it for the old one.
+    /// Advances both version counters beyond those of `replaced`, the mesh that this one replaces, so that caches built
+    /// for the old mesh are invalidated.
     pub fn count_on_from(&mut self, replaced: &Self) {
         self.topology_version = replaced.topology_version.wrapping_add(1);
         self.geometry_version = replaced.geometry_version.wrapping_add(1);
     }
 
-    /// Whether `v` names a vertex now.
+    /// Returns whether `v` is a vertex of the mesh and its slot is not free.
     #[inline]
     pub fn is_live(&self, v: VertexId) -> bool {
         self.rings.get(v.index()).is_some_and(|ring| !ring.is_empty())
     }
 
-    /// The live vertices in the order of their slots.
+    /// Iterates over the live vertices in slot order.
     pub fn vertices(&self) -> impl Iterator<Item = VertexId> + Clone + '_ {
         let live = |(i, ring): (usize, &Ring)| (!ring.is_empty()).then(|| VertexId::from_index(i));
         self.rings.iter().enumerate().filter_map(live)
     }
 
-    /// Every triangle once, by the corner with the lowest id.
+    /// Iterates over all triangles, each starting at its corner of lowest id.
     pub fn triangles(&self) -> impl Iterator<Item = [VertexId; 3]> + '_ {
         self.vertices().flat_map(|u| {
             self.ring(u).pairs().filter(move |&(a, b)| u < a && u < b).map(move |(a, b)| [u, a, b])
         })
     }
 
-    /// The triangle with these corners, as it is now.
+    /// Returns the triangle with these corners as a [`Facet`], with current positions, for intersection tests.
     #[inline]
     pub fn facet(&self, corners: [VertexId; 3]) -> Facet {
         Facet { corners: corners.map(|v| v.0), points: corners.map(|v| self.position(v)) }
     }
 
-    /// Every edge once, from the lower id to the higher.
+    /// Iterates over all edges, each once as (lower id, higher id).
     pub fn edges(&self) -> impl Iterator<Item = (VertexId, VertexId)> + '_ {
         self.edges_from(self.vertices())
     }
 
-    /// The edges that have one of `vertices` as their lower end, from the lower id to the higher.
+    /// Iterates over the edges whose lower-id end is in `vertices`, each as (lower id, higher id).
     pub fn edges_from<'a>(
         &'a self,
         vertices: impl Iterator<Item = VertexId> + 'a,
@@ -163,38 +165,38 @@ impl Mesh {
         vertices.flat_map(|u| self.ring(u).as_slice().iter().filter(move |&&v| u < v).map(move |&v| (u, v)))
     }
 
-    /// The oriented neighbours of `v`; empty where `v` is not live.
+    /// Returns the oriented one-ring of `v`, empty if its slot is free.
     #[inline]
     pub fn ring(&self, v: VertexId) -> &Ring {
         &self.rings[v.index()]
     }
 
-    /// All rings by slot, for loops over the whole mesh.
+    /// Returns the one-rings of all slots, indexed by slot, for loops over the whole mesh.
     #[inline]
     pub fn rings(&self) -> &[Ring] {
         &self.rings
     }
 
-    /// Where `v` is.
+    /// Returns the position of `v`.
     #[inline]
     pub fn position(&self, v: VertexId) -> Vec3 {
         self.positions[v.index()]
     }
 
-    /// All positions by slot; those of free slots mean nothing.
+    /// Returns the positions of all slots, indexed by slot; those of free slots are unspecified.
     #[inline]
     pub fn positions(&self) -> &[Vec3] {
         &self.positions
     }
 
-    /// All positions by slot, to be moved.
+    /// Returns the positions of all slots, indexed by slot, for modification.
     #[inline]
     pub fn positions_mut(&mut self) -> &mut [Vec3] {
         self.geometry_version = self.geometry_version.wrapping_add(1);
         &mut self.positions
     }
 
-    /// Puts `v` at `position`.
+    /// Moves `v` to `position`.
     #[inline]
     pub fn set_position(&mut self, v: VertexId, position: Vec3) {
         self.touch(v);
@@ -202,51 +204,51 @@ impl Mesh {
         self.positions[v.index()] = position;
     }
 
-    /// Adds a vector per vertex, zero at first, which follows every edit from now on.
+    /// Adds a vector attribute per vertex, initially zero and interpolated by later edits; returns its key.
     pub fn add_vector(&mut self) -> VectorKey {
         self.attributes.add_vector(self.slots())
     }
 
-    /// Adds a number per vertex, zero at first, which follows every edit from now on.
+    /// Adds a scalar attribute per vertex, initially zero and interpolated by later edits; returns its key.
     pub fn add_scalar(&mut self) -> ScalarKey {
         self.attributes.add_scalar(self.slots())
     }
 
-    /// How many vector and scalar attributes a vertex has.
+    /// Returns the numbers of vector and scalar attributes per vertex.
     pub fn attribute_counts(&self) -> [usize; 2] {
         self.attributes.counts()
     }
 
-    /// A vector attribute by slot.
+    /// Returns the values of a vector attribute, indexed by slot.
     #[inline]
     pub fn vector(&self, key: VectorKey) -> &[Vec3] {
         self.attributes.vector(key)
     }
 
-    /// A vector attribute by slot, to be written.
+    /// Returns the values of a vector attribute, indexed by slot, for modification.
     #[inline]
     pub fn vector_mut(&mut self, key: VectorKey) -> &mut [Vec3] {
         self.attributes.vector_mut(key)
     }
 
-    /// A scalar attribute by slot.
+    /// Returns the values of a scalar attribute, indexed by slot.
     #[inline]
     pub fn scalar(&self, key: ScalarKey) -> &[f32] {
         self.attributes.scalar(key)
     }
 
-    /// A scalar attribute by slot, to be written.
+    /// Returns the values of a scalar attribute, indexed by slot, for modification.
     #[inline]
     pub fn scalar_mut(&mut self, key: ScalarKey) -> &mut [f32] {
         self.attributes.scalar_mut(key)
     }
 
-    /// The positions, and a vector attribute to be written with them.
+    /// Borrows the positions and, mutably, a vector attribute, both indexed by slot.
     pub fn positions_and_vector_mut(&mut self, key: VectorKey) -> (&[Vec3], &mut [Vec3]) {
         (&self.positions, self.attributes.vector_mut(key))
     }
 
-    /// A vector and a scalar attribute to be written together.
+    /// Mutably borrows a vector and a scalar attribute at once, both indexed by slot.
     pub fn vector_and_scalar_mut(
         &mut self,
         vector: VectorKey,
@@ -255,12 +257,13 @@ impl Mesh {
         self.attributes.vector_and_scalar_mut(vector, scalar)
     }
 
-    /// The rings, and a scalar attribute to be written with them.
+    /// Borrows the one-rings and, mutably, a scalar attribute, both indexed by slot.
     pub fn rings_and_scalar_mut(&mut self, key: ScalarKey) -> (&[Ring], &mut [f32]) {
         (&self.rings, self.attributes.scalar_mut(key))
     }
 
-    /// The sum of the cross products of the triangles around `v`: twice their area, along the outward normal.
+    /// Returns the sum of the cross products of the triangles around `v`: the area-weighted outward normal, scaled by
+    /// two.
     #[inline]
     pub fn area_normal(&self, v: VertexId) -> Vec3 {
         let ring = self.ring(v).as_slice();
@@ -276,13 +279,13 @@ impl Mesh {
         sum
     }
 
-    /// Neighbours of both `u` and `v`, in the order of the ring of `u`.
+    /// Returns the vertices adjacent to both `u` and `v`, in the order of the ring of `u`.
     pub fn common_neighbours(&self, u: VertexId, v: VertexId) -> smallvec::SmallVec<[VertexId; 4]> {
         let other = self.ring(v);
         self.ring(u).as_slice().iter().copied().filter(|&w| other.contains(w)).collect()
     }
 
-    /// Takes a free slot, or makes one; the ring is set by the caller.
+    /// Returns a free slot, or appends one; the caller must set its ring.
     fn allocate(&mut self, position: Vec3) -> VertexId {
         self.geometry_version = self.geometry_version.wrapping_add(1);
         if let Some(v) = self.free.pop() {

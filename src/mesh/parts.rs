@@ -1,28 +1,29 @@
-//! Closed parts of a triangle list, by the volume they enclose.
+//! Connected components of a triangle list, connected through vertices, and the volumes they enclose.
 
 use super::TriangleMesh;
 use super::groups::Groups;
 use crate::math::DVec3;
 
 impl TriangleMesh {
-    /// The closed parts that enclose at least `volume`, whichever way they face; parts are joined through vertices.
+    /// Returns the connected components that enclose a volume of at least `volume`, whatever their orientation.
     ///
-    /// What lies inside a part counts as enclosed by it, so a small shell goes together with its hollow. Only positions and
-    /// triangles are kept.
+    /// Components are connected through vertices. Cavities are not subtracted from the surface around them, so a small
+    /// shell is removed together with its cavity. Only positions and triangles are kept.
     pub fn without_parts_below(&self, volume: f64) -> Self {
         let part_of = self.part_of_each_vertex();
         let enclosed = self.enclosed_volumes(&part_of);
         self.parts_where(|v| enclosed[part_of[v as usize] as usize].abs() >= volume)
     }
 
-    /// Appends the positions and triangles of another mesh.
+    /// Appends the positions and triangles of another mesh; other data of it is ignored.
     pub(crate) fn append(&mut self, other: &Self) {
         let first = self.positions.len() as u32;
         self.positions.extend(&other.positions);
         self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|v| v + first)));
     }
 
-    /// The triangles whose first vertex `keeps`, with the vertices they use; only positions and triangles are kept.
+    /// Returns the triangles whose first vertex satisfies `keeps`, with the vertices they use. Only positions and
+    /// triangles are kept.
     pub(crate) fn parts_where(&self, mut keeps: impl FnMut(u32) -> bool) -> Self {
         let mut slots = vec![u32::MAX; self.positions.len()];
         let mut kept = Self::default();
@@ -42,7 +43,7 @@ impl TriangleMesh {
         kept
     }
 
-    /// For each vertex, the lowest vertex of its part.
+    /// Returns for each vertex the lowest vertex index of its connected component.
     pub(crate) fn part_of_each_vertex(&self) -> Vec<u32> {
         let mut groups = Groups::new(self.positions.len());
         for [a, b, c] in &self.triangles {
@@ -52,7 +53,8 @@ impl TriangleMesh {
         (0..self.positions.len()).map(|v| groups.find(v) as u32).collect()
     }
 
-    /// The signed volume of each part, at its lowest vertex; positive where triangles face outwards.
+    /// Returns the signed volume of each connected component, stored at its lowest vertex index; positive if its
+    /// triangles face outwards.
     fn enclosed_volumes(&self, part_of: &[u32]) -> Vec<f64> {
         let mut volumes = vec![0.0; self.positions.len()];
         for triangle in &self.triangles {

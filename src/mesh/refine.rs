@@ -1,20 +1,21 @@
-//! Global √3 refinement.
+//! Global √3 subdivision.
 
 use super::{Mesh, MeshError, Ring, VertexId};
 
 impl Mesh {
-    /// Puts a vertex in the middle of every triangle and replaces every old edge by the edge between the two new
-    /// vertices beside it (section 3.4, figure 6): edges become 1/√3 as long, vertices about three times as many.
+    /// Subdivides all triangles: inserts a vertex at the centroid of each and replaces each old edge by the edge
+    /// between the new vertices on its two sides (√3 subdivision; section 3.4, figure 6). Edge lengths are divided by
+    /// √3, and the number of vertices is about tripled.
     ///
     /// # Errors
-    /// [`MeshError::TooLarge`] where the result would have more vertices than can be named.
+    /// [`MeshError::TooLarge`] if the result would have more vertices than there are ids.
     pub fn refine(&mut self) -> Result<(), MeshError> {
         let old = self.slots();
         if !self.has_room_for(self.triangle_count()) {
             let bytes = (self.triangle_count() as u64).saturating_mul(std::mem::size_of::<Ring>() as u64);
             return Err(MeshError::TooLarge { bytes });
         }
-        // New vertices get fresh slots, so that rings by old slots stay readable while the new ones are made.
+        // New vertices are appended, so that the old rings stay readable while the new ones are built.
         let before = std::mem::take(&mut self.rings);
         let mut points = FacePoints::new(&before);
         let mut rings = vec![Ring::default(); old];
@@ -46,12 +47,13 @@ impl Mesh {
     }
 }
 
-/// Numbers the triangles of a mesh by their corners.
+/// The new vertex of each triangle, its face point, looked up by half-edge.
 struct FacePoints {
-    /// For each vertex, where its ring begins in `ids`.
+    /// For each vertex, the start of its ring in `ids`.
     starts: Vec<usize>,
-    /// For each vertex and each pair of its ring, the face point.
+    /// For each vertex and each pair of its ring, the face point of their triangle.
     ids: Vec<VertexId>,
+    /// The corners of the triangles, in the order of their face points.
     corners: Vec<[VertexId; 3]>,
 }
 
@@ -78,7 +80,7 @@ impl FacePoints {
         points
     }
 
-    /// Remembers the face point of the triangle to the left of `p` → `q`.
+    /// Sets the face point of the triangle to the left of `p` → `q`.
     fn set(&mut self, rings: &[Ring], p: VertexId, q: VertexId, point: VertexId) {
         if let Some(at) = rings[p.index()].position(q) {
             self.ids[self.starts[p.index()] + at] = point;
@@ -93,7 +95,7 @@ impl FacePoints {
         self.left_of(rings, u, a)
     }
 
-    /// The face point on the other side of the edge `from` → `to`.
+    /// Returns the face point of the triangle to the right of `from` → `to`.
     fn across(&self, rings: &[Ring], from: VertexId, to: VertexId) -> VertexId {
         self.left_of(rings, to, from)
     }

@@ -1,4 +1,4 @@
-//! An independent look at a mesh: from its arrays alone, one function an invariant.
+//! Validation of a triangle list from its arrays alone, independent of the dynamic mesh; one function per invariant.
 
 use super::crossing::count_crossings;
 use super::edge_table::{EdgeUse, by_edge, edge_uses};
@@ -7,26 +7,28 @@ use super::{MeshError, TriangleMesh};
 use crate::math::order::{by_both, sort_by_rank};
 use crate::math::predicates::collinear;
 
-/// What an independent look at a mesh finds; a healthy one is closed, oriented and has all counts at zero.
+/// The result of validating a mesh; see [`Self::is_healthy`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshReport {
-    /// No edge belongs to a single triangle. (So is a mesh without triangles.)
+    /// Whether no edge belongs to exactly one triangle; true without triangles.
     pub closed: bool,
-    /// Every edge is run through as often in one direction as in the other, as far as its triangles pair up.
+    /// Whether the triangles at each edge traverse it equally often in both directions, apart from one unpaired
+    /// triangle.
     pub oriented: bool,
-    /// Edges of more than two triangles.
+    /// The number of edges with more than two triangles.
     pub non_manifold_edges: usize,
-    /// Vertices whose triangles do not form one fan, open or closed; the ends of a non-manifold edge are among them.
+    /// The number of vertices whose triangles do not form a single fan, open or closed; this includes the ends of
+    /// non-manifold edges.
     pub non_manifold_vertices: usize,
-    /// Triangles that name a corner twice or whose corners lie on one line, exactly.
+    /// The number of triangles with two equal corners or collinear corners, tested exactly.
     pub degenerate_triangles: usize,
-    /// Pairs of triangles that share more than their common corners and edges, exactly; see
+    /// The number of pairs of triangles that intersect beyond their common corners and edges, tested exactly; see
     /// [`crossing_pairs`](super::crossing_pairs).
     pub self_intersections: usize,
 }
 
 impl MeshReport {
-    /// Whether this is the report of a closed, oriented, embedded 2-manifold.
+    /// Returns whether the mesh is a closed, oriented, embedded 2-manifold without degenerate triangles.
     pub fn is_healthy(&self) -> bool {
         self.closed
             && self.oriented
@@ -37,11 +39,11 @@ impl MeshReport {
     }
 }
 
-/// The report on `mesh`. Triangles that name a corner twice are counted as degenerate and left out of all else.
+/// Validates `mesh`. Triangles with two equal corners count as degenerate and are ignored by all other tests.
 ///
 /// # Errors
-/// [`MeshError::InvalidArgument`] for a triangle that names a vertex that does not exist, and for a position that is
-/// not finite.
+/// [`MeshError::InvalidArgument`] if [`TriangleMesh::validate`] fails, for example for an invalid index or a position
+/// that is not finite.
 pub fn report(mesh: &TriangleMesh) -> Result<MeshReport, MeshError> {
     mesh.validate()?;
     let uses = edge_uses(&mesh.triangles);
@@ -71,7 +73,7 @@ fn non_manifold_edges(uses: &[EdgeUse]) -> usize {
 }
 
 fn degenerate_triangles(mesh: &TriangleMesh) -> usize {
-    // A corner named twice puts two points in one place: collinear too.
+    // Two equal corners have equal positions, so these triangles are collinear, too.
     mesh.corners().filter(|&corners| collinear(corners)).count()
 }
 
@@ -80,7 +82,7 @@ fn non_manifold_vertices(mesh: &TriangleMesh) -> usize {
     links.chunk_by(|a, b| a.vertex == b.vertex).filter(|link| !is_path_or_cycle(link)).count()
 }
 
-/// An edge of the link of a vertex: the side opposite to it in one of its triangles.
+/// An edge of the link of a vertex: the edge opposite the vertex in one of its triangles.
 #[derive(Clone, Copy)]
 struct LinkEdge {
     vertex: u32,
@@ -88,7 +90,7 @@ struct LinkEdge {
     to: u32,
 }
 
-/// All links, ordered by vertex.
+/// Returns the link edges of all vertices, sorted by vertex.
 fn links(mesh: &TriangleMesh) -> Vec<LinkEdge> {
     let sound = mesh.triangles.iter().filter(|&&[a, b, c]| a != b && b != c && c != a);
     let mut links: Vec<_> = sound
@@ -101,7 +103,7 @@ fn links(mesh: &TriangleMesh) -> Vec<LinkEdge> {
     links
 }
 
-/// Whether the link is connected, with at most two edges at each of its vertices.
+/// Returns whether the link is connected, with at most two edges at each of its vertices.
 fn is_path_or_cycle(link: &[LinkEdge]) -> bool {
     let mut ends: Vec<(u64, u32)> =
         link.iter().zip(0..).flat_map(|(edge, i)| [(edge.from.into(), i), (edge.to.into(), i)]).collect();
@@ -128,7 +130,7 @@ mod tests {
         report(&TriangleMesh::default()).unwrap()
     }
 
-    /// A tetrahedron with outward triangles.
+    /// Returns a tetrahedron with outward triangles.
     fn tetrahedron(corners: [Vec3; 4]) -> TriangleMesh {
         TriangleMesh {
             positions: corners.to_vec(),
@@ -210,8 +212,8 @@ mod tests {
 
     #[test]
     fn crossing_tetrahedra_counted_by_hand() {
-        // The tip of a thin spike stands in a large tetrahedron, through its base z = 0
-        // alone. Three sides of the spike meet the base; nothing else is near.
+        // The tip of a thin spike is inside a large tetrahedron and passes only through its base z = 0. Three sides of
+        // the spike intersect the base; nothing else is near.
         let large = tetrahedron([
             Vec3::new(-6.0, -6.0, 0.0),
             Vec3::new(6.0, -6.0, 0.0),
@@ -227,7 +229,7 @@ mod tests {
         let mesh = shapes::joined(&[large.clone(), spike.clone()]);
         assert_eq!(crossing_pairs(&mesh), [[0, 5], [0, 6], [0, 7]]);
         assert_eq!(report(&mesh).unwrap(), MeshReport { self_intersections: 3, ..healthy() });
-        // With the tip just at the base its three sides touch it; a hair lower nothing does.
+        // With the tip exactly on the base, its three sides touch the base; slightly below, nothing does.
         for (tip, pairs) in [(0.0, 3), (-1.0e-30, 0)] {
             let mut lower = spike.clone();
             lower.positions[3].z = tip;

@@ -4,76 +4,75 @@ use super::VertexId;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
-/// Neighbours held without a heap allocation: with fewer, common vertices spill over; with more, cache lines are
-/// wasted on the mean valence of six.
+/// The number of neighbours stored without heap allocation. With fewer, many vertices need an allocation; with more,
+/// cache lines are wasted, as the mean valence is six.
 const INLINE: usize = 10;
 
-/// The neighbours of a vertex as a cycle, counter-clockwise seen from outside.
+/// The one-ring of a vertex: its neighbours as a cycle, counter-clockwise seen from outside.
 ///
-/// Consecutive neighbours `a`, `b` (the last one is followed by the first) form the triangle `(vertex, a, b)`. The
-/// empty ring marks a free slot.
+/// Consecutive neighbours `a`, `b` (cyclically) form the triangle `(vertex, a, b)`. The ring of a free slot is empty.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ring(SmallVec<[VertexId; INLINE]>);
 
 impl Ring {
-    /// A ring of the given neighbours in order.
+    /// Creates a ring from the neighbours in cyclic order.
     pub fn new(neighbours: impl IntoIterator<Item = VertexId>) -> Self {
         Self(neighbours.into_iter().collect())
     }
 
-    /// The number of neighbours.
+    /// Returns the number of neighbours.
     #[inline]
     pub fn valence(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether the slot is free.
+    /// Returns whether the ring has no neighbours, which marks a free vertex slot.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// The neighbours in order.
+    /// Returns the neighbours in cyclic order.
     #[inline]
     pub fn as_slice(&self) -> &[VertexId] {
         &self.0
     }
 
-    /// Whether `v` is a neighbour.
+    /// Returns whether `v` is a neighbour.
     #[inline]
     pub fn contains(&self, v: VertexId) -> bool {
         self.0.contains(&v)
     }
 
-    /// Where `v` stands in the cycle.
+    /// Returns the index of `v` in the cycle, or `None` if it is not a neighbour.
     #[inline]
     pub fn position(&self, v: VertexId) -> Option<usize> {
         self.0.iter().position(|&w| w == v)
     }
 
-    /// The neighbour after `v`, or `None` where `v` is not a neighbour.
+    /// Returns the neighbour after `v` in the cycle, or `None` if `v` is not a neighbour.
     #[inline]
     pub fn after(&self, v: VertexId) -> Option<VertexId> {
         let next = self.position(v)? + 1;
         Some(if next == self.0.len() { self.0[0] } else { self.0[next] })
     }
 
-    /// The neighbour before `v`, or `None` where `v` is not a neighbour.
+    /// Returns the neighbour before `v` in the cycle, or `None` if `v` is not a neighbour.
     #[inline]
     pub fn before(&self, v: VertexId) -> Option<VertexId> {
         let here = self.position(v)?;
         Some(self.0[if here == 0 { self.0.len() - 1 } else { here - 1 }])
     }
 
-    /// Consecutive neighbours `(a, b)`: each forms a triangle with the ring's vertex.
+    /// Iterates over consecutive neighbours `(a, b)`; each pair forms a triangle with the vertex of the ring.
     pub fn pairs(&self) -> impl Iterator<Item = (VertexId, VertexId)> + '_ {
         let shifted = self.0.iter().skip(1).chain(self.0.first());
         self.0.iter().copied().zip(shifted.copied())
     }
 
-    /// The neighbours strictly between `from` and `to`, going round from `from`.
+    /// Returns the neighbours strictly between `from` and `to` in cyclic order.
     ///
-    /// Empty where either is missing.
+    /// Empty if either is not a neighbour.
     pub fn between(&self, from: VertexId, to: VertexId) -> SmallVec<[VertexId; INLINE]> {
         let (Some(start), Some(end)) = (self.position(from), self.position(to)) else {
             return SmallVec::new();
@@ -101,7 +100,7 @@ impl Ring {
         }
     }
 
-    /// Puts `new` in the place of `old`, in order.
+    /// Replaces `old` by the sequence `new`.
     pub(super) fn splice(&mut self, old: VertexId, new: &[VertexId]) {
         if let Some(i) = self.position(old) {
             self.0.remove(i);

@@ -1,9 +1,9 @@
-//! Exact shapes for tests.
+//! Simple shapes for tests.
 
 use super::TriangleMesh;
 use crate::math::Vec3;
 
-/// The faces of a box by their corners, counter-clockwise seen from outside.
+/// The faces of a box by vertex indices, counter-clockwise seen from outside.
 const FACES: [[u32; 4]; 6] =
     [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
 
@@ -11,12 +11,12 @@ fn cuboid_corner(i: u32, size: Vec3) -> Vec3 {
     Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * size
 }
 
-/// The corners of the faces of a box with a corner at the origin.
+/// Returns the corners of each face of the box from the origin to `size`, counter-clockwise seen from outside.
 pub fn cuboid_faces(size: Vec3) -> [[Vec3; 4]; 6] {
     FACES.map(|face| face.map(|i| cuboid_corner(i, size)))
 }
 
-/// A box with a corner at the origin.
+/// Returns a mesh of the box from the origin to `size`.
 pub fn cuboid(size: Vec3) -> TriangleMesh {
     TriangleMesh {
         positions: (0..8).map(|i| cuboid_corner(i, size)).collect(),
@@ -25,7 +25,7 @@ pub fn cuboid(size: Vec3) -> TriangleMesh {
     }
 }
 
-/// A regular icosahedron about the origin, edges of 2.
+/// Returns a regular icosahedron of edge length 2 centred at the origin.
 pub fn icosahedron() -> TriangleMesh {
     let g = 1.618_034_f32;
     let rectangle = [(-1.0, g), (1.0, g), (-1.0, -g), (1.0, -g)];
@@ -41,7 +41,7 @@ pub fn icosahedron() -> TriangleMesh {
     TriangleMesh { positions: [in_xy, in_yz, in_zx].concat(), triangles: fans.concat(), ..Default::default() }
 }
 
-/// A torus about z through `around × along` points.
+/// Returns a torus around the z axis with `around` × `along` vertices.
 pub fn torus(major: f64, minor: f64, around: u32, along: u32) -> TriangleMesh {
     let angle = |i: u32, n: u32| std::f64::consts::TAU * f64::from(i) / f64::from(n);
     let point = |i: u32, j: u32| {
@@ -63,14 +63,14 @@ pub fn torus(major: f64, minor: f64, around: u32, along: u32) -> TriangleMesh {
     }
 }
 
-/// The meshes as one, positions and triangles only.
+/// Returns the disjoint union of meshes; only positions and triangles are kept.
 pub fn joined(meshes: &[TriangleMesh]) -> TriangleMesh {
     let mut all = TriangleMesh::default();
     meshes.iter().for_each(|mesh| all.append(mesh));
     all
 }
 
-/// Triangles over points with small integer coordinates: all the coincidences there are.
+/// Returns random triangles over points with small integer coordinates, which include all kinds of degeneracies.
 pub fn soup(seed: u64, triangles: usize, range: u64) -> TriangleMesh {
     let mut state = seed;
     let mut next = |limit: u64| {

@@ -1,35 +1,37 @@
-//! Changes of topology: cut a ring of three edges and cap both sides (annular), join two discs by a tube (axial).
+//! Topological edits: cutting along a cycle of three edges and capping both sides (annular change), and joining two
+//! discs by a tube (axial change).
 
 use super::tube::shortest_tube;
 use super::{EditError, Mesh, Ring, VertexId};
 use crate::math::Vec3;
 
-/// The two triangles that close the surface after a cut.
+/// The two triangles that cap the surface after [`Mesh::cut`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {
-    /// The vertices that kept their ids, on the left going round the ring.
+    /// The original vertices, which bound the left side of the directed cycle.
     pub kept: [VertexId; 3],
-    /// Their copies on the right.
+    /// Their copies, in the same order, which bound the right side.
     pub copies: [VertexId; 3],
 }
 
-/// The two rims that a tube now joins.
+/// The two rims that [`Mesh::join`] connected by a tube.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Joint {
-    /// The vertices around the first centre.
+    /// The vertices of the rim around the first centre, in the order of its ring.
     pub first: Vec<VertexId>,
-    /// The vertices around the second centre.
+    /// The vertices of the rim around the second centre, in the order of its ring.
     pub second: Vec<VertexId>,
 }
 
 impl Mesh {
-    /// Cuts the surface along the edges `u v`, `v o`, `o u` and closes both sides by a triangle (annular change,
-    /// section 3.3, figure 5). χ grows by 2.
+    /// Cuts the surface along the cycle of edges `u v`, `v o`, `o u` and caps both sides with a triangle (annular
+    /// change, section 3.3, figure 5). χ increases by 2.
     ///
-    /// The copies lie where their originals are; the caller moves the two sides apart.
+    /// The copies have the positions of their originals; the caller moves the two sides apart.
     ///
     /// # Errors
-    /// [`EditError::NotAnEdge`]; [`EditError::IsTriangle`] where the ring bounds a triangle of the surface.
+    /// [`EditError::NotAnEdge`]; [`EditError::IsTriangle`] if the cycle bounds a triangle of the surface;
+    /// [`EditError::Full`].
     pub fn cut(&mut self, u: VertexId, v: VertexId, o: VertexId) -> Result<Cut, EditError> {
         for (a, b) in [(u, v), (v, o), (o, u)] {
             let opposite = self.opposite(a, b)?;
@@ -55,7 +57,7 @@ impl Mesh {
         Ok(Cut { kept, copies })
     }
 
-    /// Leaves the left half of ring `k` of a cut with the original and gives the right half to the copy.
+    /// Splits the ring of corner `k` of a cut: the original keeps the left half, the copy gets the right half.
     fn part_ring(&mut self, kept: [VertexId; 3], copies: [VertexId; 3], k: usize) {
         let (next, previous) = ((k + 1) % 3, (k + 2) % 3);
         let ring = self.ring(kept[k]);
@@ -71,14 +73,16 @@ impl Mesh {
         *self.ring_mut(copies[k]) = close(copies[previous], &right, copies[next]);
     }
 
-    /// Replaces the discs around `u` and `v` by a tube between them (axial change, section 3.3, figure 4). χ falls
+    /// Replaces the discs around `u` and `v` by a tube between them (axial change, section 3.3, figure 4). χ decreases
     /// by 2.
     ///
-    /// Intermediary points on the spokes of both, `reach` of the way from the centre (0 < reach < 1), form the ends
-    /// of the tube. They are new, so the result is simplicial even where `u` and `v` have neighbours in common.
+    /// The rims of the tube are new vertices on the edges around `u` and `v`, at the fraction `reach` of each edge from
+    /// the centre (0 < reach < 1). As they are new, the result is simplicial even if `u` and `v` have common
+    /// neighbours.
     ///
     /// # Errors
-    /// [`EditError::Adjacent`] where `u` and `v` are neighbours or the same.
+    /// [`EditError::Adjacent`] if `u` and `v` are adjacent or the same; [`EditError::NotAnEdge`] if either is not live;
+    /// [`EditError::Full`].
     pub fn join(&mut self, u: VertexId, v: VertexId, reach: f32) -> Result<Joint, EditError> {
         for w in [u, v] {
             if !self.is_live(w) {
@@ -101,7 +105,8 @@ impl Mesh {
         Ok(Joint { first, second })
     }
 
-    /// Removes `centre` from the middle of a new rim and returns the rim in the order of its ring.
+    /// Opens a hole around `centre`: inserts a rim of new vertices on its edges, deletes `centre`, and returns the rim in
+    /// the order of its ring.
     ///
     /// ```text
     ///   n1-----n0             n1-----n0
@@ -129,12 +134,13 @@ impl Mesh {
         point
     }
 
-    /// Fills the gap between two rims with the shortest tube.
+    /// Connects two rims by the tube of least total squared edge length.
     fn close_tube(&mut self, first: &[VertexId], second: &[VertexId]) {
         let at = |rim: &[VertexId]| rim.iter().map(|&w| self.position(w)).collect::<Vec<_>>();
         let tube = shortest_tube(&at(first), &at(second));
         for i in 0..first.len() {
-            // Met in the order of falling j; around the rim vertex they stand the other way round.
+            // met_by_first yields decreasing j; each is inserted right after `next`, which reverses them into ring
+            // order.
             let met: Vec<VertexId> = tube.met_by_first(i).map(|j| second[j]).collect();
             for &s in &met {
                 let next = first[(i + 1) % first.len()];

@@ -1,24 +1,24 @@
-//! The picture on a surface, as its file holds it.
+//! Texture images, kept in encoded form.
 
 use super::MeshError;
 use std::fmt;
 
-/// Encodings of a picture that every browser reads.
+/// An image encoding that every browser can decode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageKind {
-    /// Portable network graphics.
+    /// PNG (Portable Network Graphics).
     Png,
-    /// Of the Joint Photographic Experts Group.
+    /// JPEG (Joint Photographic Experts Group).
     Jpeg,
-    /// Google's, for the web.
+    /// WebP.
     Webp,
 }
 
 impl ImageKind {
-    /// All of them.
+    /// All supported image encodings.
     pub const ALL: [Self; 3] = [Self::Png, Self::Jpeg, Self::Webp];
 
-    /// The media type, such as `image/png`.
+    /// Returns the media type of the encoding, such as `image/png`.
     pub fn media_type(self) -> &'static str {
         match self {
             Self::Png => "image/png",
@@ -27,7 +27,7 @@ impl ImageKind {
         }
     }
 
-    /// The encoding that the first bytes tell; `None` where it is no other than these.
+    /// Detects the encoding from the first bytes of an image file; `None` if it is not a supported one.
     pub fn of(bytes: &[u8]) -> Option<Self> {
         match bytes {
             [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Some(Self::Png),
@@ -38,8 +38,9 @@ impl ImageKind {
     }
 }
 
-/// An encoded picture. Its upper left corner is at (0, 0), u runs right and v down, both are 1 at the far edges, and
-/// beyond them it repeats, as in glTF. The pixels are never looked at.
+/// An encoded texture image, shown on a mesh by its texture coordinates. As in glTF, (0, 0) is the upper left corner, u
+/// increases to the right and v downwards, both are 1 at the far edges, and beyond them the image repeats. Pixels are
+/// never decoded.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Texture {
     kind: ImageKind,
@@ -47,10 +48,10 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// The picture in the bytes of an image file.
+    /// Creates a texture from the bytes of an image file.
     ///
     /// # Errors
-    /// [`MeshError::InvalidArgument`] for bytes that do not begin as a PNG, JPEG or WebP file does.
+    /// [`MeshError::InvalidArgument`] if the bytes do not start like a PNG, JPEG or WebP file.
     pub fn new(bytes: Vec<u8>) -> Result<Self, MeshError> {
         let Some(kind) = ImageKind::of(&bytes) else {
             let problem = "the bytes are of no image; PNG, JPEG and WebP are accepted".into();
@@ -59,18 +60,18 @@ impl Texture {
         Ok(Self { kind, bytes })
     }
 
-    /// How the picture is encoded.
+    /// Returns the encoding of the image.
     pub fn kind(&self) -> ImageKind {
         self.kind
     }
 
-    /// The image file.
+    /// Returns the bytes of the encoded image file.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 }
 
-/// Without the bytes: nobody reads a hundred thousand of them in the message of a test.
+/// Omits the bytes, to keep the messages of failed tests short.
 impl fmt::Debug for Texture {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
         write!(out, "Texture({}, {} bytes)", self.kind.media_type(), self.bytes.len())

@@ -1,4 +1,4 @@
-//! A plain indexed triangle list, as files and graphics cards hold it.
+//! Indexed triangle lists, as in files and GPU buffers.
 
 use super::edge_table::edge_uses;
 use super::groups::Groups;
@@ -6,34 +6,34 @@ use super::{MeshError, Texture};
 use crate::math::{DAffine3, DVec3, Vec2, Vec3, triangle};
 use std::sync::Arc;
 
-/// Positions and triangles with optional extras; promises nothing about closedness.
+/// An indexed triangle list with optional normals, texture coordinates and colours. It need not be closed or manifold.
 ///
-/// Triangles index `positions` and are counter-clockwise seen from outside. Each extra, where there is one,
-/// has one entry per position; `corner_uvs` has one per triangle.
+/// Triangles index `positions` and are counter-clockwise seen from outside. Each optional array has one entry per
+/// position, except `corner_uvs`, which has one per triangle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
     /// Vertex positions.
     pub positions: Vec<Vec3>,
-    /// Indices of each triangle's corners.
+    /// The indices of the corners of each triangle, into `positions`.
     pub triangles: Vec<[u32; 3]>,
     /// Unit normals per vertex.
     pub normals: Option<Vec<Vec3>>,
     /// Texture coordinates per vertex.
     pub uvs: Option<Vec<Vec2>>,
-    /// Texture coordinates per corner of each triangle, in place of `uvs` where seams give a vertex several.
+    /// Texture coordinates per corner of each triangle; used instead of `uvs` if vertices on seams have several.
     pub corner_uvs: Option<Vec<[Vec2; 3]>>,
-    /// Colours per vertex, rgb in 0..1.
+    /// Colours per vertex, RGB in 0..1.
     pub colors: Option<Vec<Vec3>>,
-    /// The picture that `uvs` or `corner_uvs` lay on the surface; shared by the meshes made from this one.
+    /// The image to which `uvs` or `corner_uvs` refer; shared by the meshes derived from this one.
     pub texture: Option<Arc<Texture>>,
 }
 
 impl TriangleMesh {
-    /// Nothing, where every triangle names vertices that exist, every position is finite, every extra has its length,
-    /// and a texture has its coordinates.
+    /// Checks that all indices are valid, all positions are finite, all optional arrays have the right length, and a
+    /// texture comes with texture coordinates.
     ///
     /// # Errors
-    /// [`MeshError::InvalidArgument`] that names the array and the first bad entry.
+    /// [`MeshError::InvalidArgument`], which names the array and its first invalid entry.
     pub fn validate(&self) -> Result<(), MeshError> {
         let invalid = |parameter, problem| Err(MeshError::InvalidArgument { parameter, problem });
         let (vertices, triangles) = (self.positions.len(), self.triangles.len());
@@ -67,25 +67,26 @@ impl TriangleMesh {
         Ok(())
     }
 
-    /// Whether there are texture coordinates of either kind.
+    /// Returns whether there are texture coordinates, per vertex or per corner.
     pub fn has_uvs(&self) -> bool {
         self.uvs.is_some() || self.corner_uvs.is_some()
     }
 
-    /// Texture coordinates counted from the other edge of the picture, v as 1 − v, to single precision.
+    /// Replaces each texture coordinate v by 1 − v, rounded to single precision: converts between file formats whose
+    /// images start at the lower edge and those whose images start at the upper edge.
     pub(crate) fn turn_v_over(&mut self) {
         let turn = |uv: &mut Vec2| uv.y = 1.0 - uv.y;
         self.uvs.iter_mut().flatten().for_each(turn);
         self.corner_uvs.iter_mut().flatten().flatten().for_each(turn);
     }
 
-    /// The corners of each triangle. Indices must exist, as [`TriangleMesh::validate`] makes sure.
+    /// Iterates over the corner positions of the triangles. Indices must be valid, see [`TriangleMesh::validate`].
     pub fn corners(&self) -> impl Iterator<Item = [Vec3; 3]> + '_ {
         self.triangles.iter().map(|t| t.map(|v| self.positions[v as usize]))
     }
 
-    /// The mesh moved by `map`: normals stay normal, and a map that mirrors turns triangles over, so that outside
-    /// stays outside.
+    /// Returns the mesh transformed by `map`. Normals are transformed by the cofactor matrix, and a reflection reverses
+    /// the triangles, so that they still face outwards.
     pub fn transformed(&self, map: &DAffine3) -> Self {
         let mut moved = self.clone();
         moved.positions.iter_mut().for_each(|p| *p = map.transform_point3(p.as_dvec3()).as_vec3());
@@ -94,7 +95,7 @@ impl TriangleMesh {
             moved.triangles.iter_mut().for_each(|t| t.swap(1, 2));
             moved.corner_uvs.iter_mut().flatten().for_each(|corners| corners.swap(1, 2));
         }
-        // Cofactors instead of the inverse transpose: right for maps that flatten, too.
+        // Cofactors instead of the inverse transpose: they are correct for singular maps, too.
         let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis];
         let side = if mirrors { -1.0 } else { 1.0 };
         for normal in moved.normals.iter_mut().flatten() {
@@ -104,8 +105,10 @@ impl TriangleMesh {
         moved
     }
 
-    /// The parts joined through edges, each with its own vertices, in the order of their first triangles. Vertices of
-    /// no triangle are left out; a vertex of two parts is in both.
+    /// Returns the connected components as separate meshes, in the order of their first triangles.
+    ///
+    /// Components are connected through edges; a vertex where two of them touch is copied to both. Unused vertices are
+    /// dropped.
     pub fn components(&self) -> Vec<Self> {
         let mut groups = Groups::new(self.triangles.len());
         groups.join_across_edges(&edge_uses(&self.triangles));
@@ -115,8 +118,8 @@ impl TriangleMesh {
         members.iter().filter(|part| !part.is_empty()).map(|part| self.part(part, &mut slots)).collect()
     }
 
-    /// The given triangles with the vertices they use, numbered in order of first use. `slots` is scratch, all
-    /// `u32::MAX` before and after.
+    /// Returns the given triangles as a mesh, its vertices numbered in order of first use. `slots` is scratch space,
+    /// all `u32::MAX` before and after.
     fn part(&self, triangles: &[usize], slots: &mut [u32]) -> Self {
         let mut used = Vec::new();
         let renumbered = |t: &usize| {
@@ -136,7 +139,7 @@ impl TriangleMesh {
         Self { triangles: renumbered, corner_uvs, ..part }
     }
 
-    /// The given vertices with their extras, and no triangles.
+    /// Returns a mesh of the given vertices with their normals, texture coordinates and colours, without triangles.
     pub(super) fn gathered(&self, vertices: &[usize]) -> Self {
         Self {
             positions: gather(&self.positions, vertices),
@@ -149,8 +152,8 @@ impl TriangleMesh {
         }
     }
 
-    /// Unit normals per vertex: the mean of the normals of the triangles around it, weighted by area. Zero at a
-    /// vertex of no triangle, or where they cancel.
+    /// Returns a unit normal per vertex: the area-weighted mean of the normals of the triangles around it. Zero if the
+    /// vertex is unused or the normals cancel.
     pub fn vertex_normals(&self) -> Vec<Vec3> {
         let mut sums = vec![DVec3::ZERO; self.positions.len()];
         for (triangle, corners) in self.triangles.iter().zip(self.corners()) {
@@ -160,8 +163,9 @@ impl TriangleMesh {
         sums.into_iter().map(|sum| sum.normalize_or_zero().as_vec3()).collect()
     }
 
-    /// Texture coordinates per vertex: at a seam those of one of its sides, which stretches the texture over the triangles
-    /// of the others. [`Self::split_at_seams`] has them right, with more vertices.
+    /// Returns texture coordinates per vertex, for formats without seams: at a seam those of one side are used, which
+    /// distorts the texture on the triangles of the other sides. [`Self::split_at_seams`] avoids this with more
+    /// vertices.
     pub fn uvs_of_one_side(&self) -> Option<Vec<Vec2>> {
         let Some(corner_uvs) = &self.corner_uvs else { return self.uvs.clone() };
         let mut uvs = vec![Vec2::ZERO; self.positions.len()];
@@ -171,9 +175,8 @@ impl TriangleMesh {
         Some(uvs)
     }
 
-    /// The mesh with as many vertices as texture needs: one for each different pair of position and texture
-    /// coordinate, so that
-    /// `uvs` stands in for `corner_uvs`. A mesh without `corner_uvs` is given back as it is.
+    /// Returns the mesh with vertices on texture seams duplicated, one per distinct texture coordinate, so that `uvs`
+    /// replaces `corner_uvs`. Returns a copy if there are no `corner_uvs`.
     pub fn split_at_seams(&self) -> Self {
         let Some(corner_uvs) = &self.corner_uvs else { return self.clone() };
         let mut corners: Vec<([u32; 3], u32)> = Vec::with_capacity(3 * corner_uvs.len());

@@ -1,26 +1,28 @@
-//! The triangulation of a tube between two closed polygons.
+//! Triangulation of the tube between two closed polygons, the rims joined by an axial change
+//! ([`Mesh::join`](super::Mesh::join)).
 
 use crate::math::Vec3;
 
-/// A closed walk over pairs (corner `i` of the first polygon, corner `j` of the second): each pair is an edge of the
-/// tube, each step a triangle. `i` grows and `j` falls, because the two rims are oriented alike as holes of one
-/// oriented surface.
+/// A triangulated tube between two closed polygons, as a cyclic sequence of its edges.
+///
+/// Each edge is a pair (corner `i` of the first polygon, corner `j` of the second); consecutive edges span a triangle.
+/// `i` increases and `j` decreases, because both rims are oriented as holes of one oriented surface.
 pub(super) struct Tube {
     pairs: Vec<(usize, usize)>,
 }
 
 impl Tube {
-    /// The second polygon's corners joined to corner `i` of the first, in the order of the walk.
+    /// Returns the corners of the second polygon connected to corner `i` of the first, in the order of the walk.
     pub(super) fn met_by_first(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
         self.run(move |&(a, _)| a == i).map(|(_, j)| j)
     }
 
-    /// The first polygon's corners joined to corner `j` of the second, in the order of the walk.
+    /// Returns the corners of the first polygon connected to corner `j` of the second, in the order of the walk.
     pub(super) fn met_by_second(&self, j: usize) -> impl Iterator<Item = usize> + '_ {
         self.run(move |&(_, b)| b == j).map(|(i, _)| i)
     }
 
-    /// The one cyclic run of pairs that satisfy `holds`, from its beginning.
+    /// Returns the single cyclic run of pairs that satisfy `holds`, from its start.
     fn run<'a>(
         &'a self,
         holds: impl Fn(&(usize, usize)) -> bool + Copy + 'a,
@@ -32,19 +34,20 @@ impl Tube {
     }
 }
 
-/// How many changes of polygon a walk must make. With fewer, one polygon is walked all round while the other stands
-/// at one corner, and the edge at the beginning of that round is there twice.
+/// The minimum number of times that a walk switches between the two polygons. With fewer, a whole polygon is connected
+/// to a single corner of the other, and the first and last edge of that fan coincide.
 const TURNS: usize = 4;
 
-/// Squares of coordinates beyond this, and sums of them, may not fit `f32`; there places are made smaller, by a power of
-/// two, which rounds nothing.
+/// The largest coordinate for which squared distances, and sums of them, are sure to fit into `f32`. Polygons beyond it
+/// are scaled by [`SHRINK`] first.
 const FAR: f32 = (1u64 << 55) as f32;
-/// See [`FAR`].
+/// The scale of polygons beyond [`FAR`]; a power of two, so that scaling is exact.
 const SHRINK: f32 = 1.0 / (1u128 << 80) as f32;
 
-/// The walk with the least sum of squared edge lengths, over every offset between the polygons.
+/// Returns the tube with the least sum of squared edge lengths, over all offsets between the polygons.
 ///
-/// Dynamic programming over (i, j, polygon of the last step, turns so far); each polygon has at least three corners.
+/// Dynamic programming over (i, j, polygon of the last step, number of switches); each polygon has at least three
+/// corners.
 pub(super) fn shortest_tube(first: &[Vec3], second: &[Vec3]) -> Tube {
     if first.iter().chain(second).any(|p| p.abs().max_element() > FAR) {
         let nearer = |rim: &[Vec3]| rim.iter().map(|&p| p * SHRINK).collect::<Vec<_>>();
@@ -71,18 +74,19 @@ pub(super) fn shortest_tube(first: &[Vec3], second: &[Vec3]) -> Tube {
     Tube { pairs: best.map(|(_, pairs)| pairs).unwrap_or_default() }
 }
 
+/// The polygon along which a walk advances.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Step {
     First = 0,
     Second = 1,
 }
 
-/// The cheapest ways to each state of a walk with one offset and one first step.
+/// The table of the dynamic programming: the cheapest walk to each state, for one offset and one first step.
 struct Walks {
     rows: usize,
     columns: usize,
     first_step: Step,
-    /// Cost and predecessor's (step, turns), by state.
+    /// By state, the cost and the step and number of switches of its predecessor.
     states: Vec<(f32, u8, u8)>,
 }
 
@@ -104,7 +108,7 @@ impl Walks {
         walks
     }
 
-    /// Offers every way that ends at (i, j) to the two pairs after it.
+    /// Relaxes the two states that follow each state at (i, j).
     fn extend(&mut self, i: usize, j: usize, cost: &impl Fn(usize, usize) -> f32) {
         for last in 0..2 {
             for turns in 0..=TURNS {
@@ -114,14 +118,15 @@ impl Walks {
                 }
                 for step in 0..2 {
                     let (to_i, to_j) = if step == 0 { (i + 1, j) } else { (i, j + 1) };
-                    // The walk begins with its first step; else a start counted as a turn would be none.
+                    // The first step is fixed; otherwise a first step on the other polygon would be counted as a
+                    // switch.
                     let wrong_start = i == 0 && j == 0 && step != self.first_step as usize;
                     if to_i > self.rows || to_j > self.columns || wrong_start {
                         continue;
                     }
                     let now = if step == last || turns == TURNS { turns } else { turns + 1 };
                     let closes = to_i == self.rows && to_j == self.columns;
-                    // The last pair is the first one again and is not paid for twice.
+                    // The last pair is the first pair again; it is not counted twice.
                     let total = so_far + if closes { 0.0 } else { cost(to_i, to_j) };
                     let state = self.index(to_i, to_j, step, now);
                     if total < self.states[state].0 {
@@ -132,7 +137,7 @@ impl Walks {
         }
     }
 
-    /// The step and turns of the cheapest closed walk that turns often enough.
+    /// Returns the final step and number of switches of the cheapest closed walk with at least [`TURNS`] switches.
     fn best_end(&self) -> Option<(usize, usize)> {
         let other = 1 - self.first_step as usize;
         let ends = [(self.first_step as usize, TURNS), (other, TURNS - 1), (other, TURNS)];
@@ -145,7 +150,7 @@ impl Walks {
         self.best_end().map(|(step, turns)| self.states[self.index(self.rows, self.columns, step, turns)].0)
     }
 
-    /// The pairs of the cheapest walk from its beginning; the closing pair, equal to the first, is left out.
+    /// Returns the pairs of the cheapest walk in order, without the closing pair, which equals the first.
     fn trace(&self) -> Vec<(usize, usize)> {
         let Some((mut step, mut turns)) = self.best_end() else { return Vec::new() };
         let (mut i, mut j) = (self.rows, self.columns);

@@ -1,15 +1,15 @@
-//! Vertices at one position made one: files often repeat them per triangle, or along the seams of a texture.
+//! Vertex welding: merges vertices at the same position, which files often repeat per triangle or along texture seams.
 
 use super::TriangleMesh;
 use crate::math::{Vec2, Vec3};
 
 impl TriangleMesh {
-    /// The mesh with vertices at exactly one position made one (−0 is 0), in the order of their first use by a
-    /// triangle.
+    /// Returns the mesh with vertices at exactly the same position merged (−0 equals 0), numbered in the order of their
+    /// first use by a triangle.
     ///
-    /// Triangles left with a corner twice are dropped, and vertices of no triangle. Of the extras, a normal or colour
-    /// is the mean over the vertices made one; texture coordinates that differ there become `corner_uvs`. Indices
-    /// must exist, as [`TriangleMesh::validate`] makes sure.
+    /// Triangles with two equal corners and unused vertices are dropped. Normals and colours of merged vertices are
+    /// averaged; if their texture coordinates differ, they become `corner_uvs`. Indices must be valid, see
+    /// [`TriangleMesh::validate`].
     pub fn welded(&self) -> Self {
         let representatives = self.representatives();
         let mut slots = vec![u32::MAX; self.positions.len()];
@@ -30,7 +30,7 @@ impl TriangleMesh {
         welded
     }
 
-    /// For each vertex the first at its position.
+    /// Returns for each vertex the first vertex at the same position.
     fn representatives(&self) -> Vec<usize> {
         let key = |p: &Vec3| (*p + Vec3::ZERO).to_array().map(f32::to_bits);
         let mut order: Vec<([u32; 3], u32)> = self.positions.iter().map(key).zip(0..).collect();
@@ -42,8 +42,8 @@ impl TriangleMesh {
         representatives
     }
 
-    /// Texture coordinates for `welded`, whose triangles are those of `self` at `kept`: per vertex where that says it
-    /// all.
+    /// Sets the texture coordinates of `welded`, whose triangles are the triangles `kept` of `self`: per vertex if each
+    /// vertex has only one, else per corner.
     fn weld_uvs(&self, kept: &[usize], welded: &mut Self) {
         let corner_uvs: Vec<[Vec2; 3]> = match (&self.corner_uvs, &self.uvs) {
             (Some(corners), _) => kept.iter().map(|&t| corners[t]).collect(),
@@ -59,7 +59,7 @@ impl TriangleMesh {
     }
 }
 
-/// The new number of vertex `v`, given on first use.
+/// Returns the new index of vertex `v`, assigned on first use.
 fn slot(slots: &mut [u32], vertices: &mut Vec<usize>, v: usize) -> u32 {
     if slots[v] == u32::MAX {
         slots[v] = vertices.len() as u32;
@@ -68,7 +68,7 @@ fn slot(slots: &mut [u32], vertices: &mut Vec<usize>, v: usize) -> u32 {
     slots[v]
 }
 
-/// The mean of the values sent to each target; values sent to `u32::MAX` are dropped.
+/// Returns the mean of the values assigned to each target; values with target `u32::MAX` are ignored.
 fn means(values: &[Vec3], targets: &[u32], count: usize) -> Vec<Vec3> {
     let mut sums = vec![(Vec3::ZERO, 0.0_f32); count];
     for (&value, &target) in values.iter().zip(targets) {
@@ -91,7 +91,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Each triangle with corners of its own.
+    /// Returns the mesh with separate vertices for each triangle.
     fn soup(mesh: &TriangleMesh) -> TriangleMesh {
         let positions: Vec<Vec3> = mesh.corners().flatten().collect();
         let triangles = (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();

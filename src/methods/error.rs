@@ -1,53 +1,53 @@
-//! What can go wrong when a method is set up or restored.
+//! The error type of all methods.
 
 use crate::mesh::MeshError;
 use crate::volume::VolumeError;
 
-/// Why a method refuses its input.
+/// An error from setting up, stepping or restoring a method.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MethodError {
-    /// A parameter or option outside what is accepted.
+    /// A parameter or option is outside its accepted range.
     #[error("{parameter}: {problem}")]
     InvalidArgument {
-        /// The parameter's name, as in the public contract.
+        /// The name of the parameter in the public API.
         parameter: &'static str,
-        /// What was wrong and what is accepted.
+        /// The invalid value and the accepted range.
         problem: String,
     },
-    /// The mesh to start from cannot be used.
+    /// The start mesh cannot be used.
     #[error(transparent)]
     Mesh(#[from] MeshError),
     /// The volume cannot be used.
     #[error(transparent)]
     Volume(#[from] VolumeError),
-    /// The surface has grown beyond what this image and sampling can need.
+    /// The surface exceeds the largest number of vertices that the image and the sampling allow.
     #[error(
         "the surface would have more than {most} vertices: take longer edges, a smaller volume or ellipsoids, or forces that do not inflate it"
     )]
     TooManyVertices {
-        /// The number accepted.
+        /// The largest number of vertices accepted.
         most: usize,
     },
-    /// A linear system without a usable solution.
+    /// A linear system could not be solved.
     #[error("the system of {constraints} constraints cannot be solved to the tolerance asked for: {cause}")]
     Singular {
-        /// Its size.
+        /// The number of equations in the system.
         constraints: usize,
-        /// The likely cause, and what to do about it.
+        /// The likely cause, and how to avoid it.
         cause: &'static str,
     },
-    /// Bytes that are not a saved state of this model.
+    /// The bytes are not a saved state of this model.
     #[error("saved state, {field}: {problem}")]
     BadState {
-        /// The part of the state.
+        /// The invalid part of the state.
         field: &'static str,
-        /// What was wrong and what is accepted.
+        /// The defect, with the accepted range if there is one.
         problem: String,
     },
 }
 
 impl MethodError {
-    /// An [`MethodError::InvalidArgument`].
+    /// Makes a [`MethodError::InvalidArgument`].
     pub fn invalid(parameter: &'static str, problem: impl Into<String>) -> Self {
         Self::InvalidArgument { parameter, problem: problem.into() }
     }

@@ -1,12 +1,13 @@
-//! What is asked of a mesh of the caller's, whatever a method does with it.
+//! Validation of meshes passed in by the caller, shared by all methods.
 
 use super::MethodError;
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure};
 
-/// With shorter edges in the mean, what is reckoned of areas is rounded to few digits in single precision, or to 0.
+/// The shortest mean edge accepted. With shorter ones, areas in single precision are rounded to few digits, or to 0.
 const SHORTEST: f64 = 1e-12;
 
-/// The mesh as a surface to begin with: closed, its front outside, and not crossing itself.
+/// Converts a caller's mesh to a [`Mesh`] after checking that it is closed, faces outwards and does not intersect
+/// itself. `parameter` is the name used in errors.
 pub(super) fn surface(parameter: &'static str, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
     if mesh.triangles.is_empty() {
         return Err(MethodError::invalid(parameter, "the mesh is empty; a closed surface is needed"));
@@ -23,7 +24,7 @@ pub(super) fn surface(parameter: &'static str, mesh: &TriangleMesh) -> Result<Me
     }
 }
 
-/// Tests that edges are long enough to reckon with.
+/// Checks that the mean edge is long enough for computations in single precision.
 pub(super) fn check_edges(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MethodError> {
     let edge = measure(mesh).edge_mean;
     if edge < SHORTEST {

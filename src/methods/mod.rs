@@ -1,4 +1,4 @@
-//! Surfaces fitted to data, one folder a method, and the stepping contract they share.
+//! Methods that fit surfaces to data, each in a module of its own, and the stepping interface common to all.
 
 pub mod deformable;
 mod error;

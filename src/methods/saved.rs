@@ -1,32 +1,33 @@
-//! The envelope of saved states: a mark, a checksum, and the state itself.
+//! The binary envelope of saved states: a mark, a checksum, and the serialised state.
 
 use super::MethodError;
 use crate::mesh::Mesh;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// The mark of one method's states; its last byte counts versions of the layout.
+/// The first bytes of a saved state: they identify the method, and the last one is the version of the layout.
 pub type Mark = [u8; 8];
 
-/// More neighbours than any edit leaves a vertex.
+/// An upper bound of the valence of a vertex in a valid state; no edit creates more neighbours.
 pub const MOST_NEIGHBOURS: usize = 4096;
 
-/// Checking a mesh takes the square of the neighbours of a vertex; only a forged state has one with very many.
+/// Whether every vertex has at most [`MOST_NEIGHBOURS`] neighbours. Checking a mesh takes time quadratic in the
+/// valence, so a forged state could otherwise stall [`Mesh::check`].
 pub fn can_be_checked(mesh: &Mesh) -> bool {
     mesh.rings().iter().all(|ring| ring.valence() <= MOST_NEIGHBOURS)
 }
 
-/// The bytes of a state.
+/// Serialises a state of a method, preceded by the mark and a checksum.
 pub fn sealed<T: Serialize>(mark: &Mark, state: &T) -> Vec<u8> {
-    // Serialising plain data into memory has no way to fail.
+    // Serialising plain data into memory cannot fail.
     let body = postcard::to_allocvec(state).unwrap_or_default();
     [&mark[..], &Hash::of(&body).to_le_bytes(), &body].concat()
 }
 
-/// The state in bytes that [`sealed`] gave.
+/// Deserialises a state from bytes made by [`sealed`] with the same mark.
 ///
 /// # Errors
-/// [`MethodError::BadState`] for any others.
+/// [`MethodError::BadState`] if the mark or the checksum differs, or the bytes are not exactly one state.
 pub fn opened<T: DeserializeOwned>(mark: &Mark, bytes: &[u8]) -> Result<T, MethodError> {
     let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
     let Some((sum, body)) = bytes.strip_prefix(mark).and_then(|rest| rest.split_first_chunk::<8>()) else {
@@ -42,12 +43,12 @@ pub fn opened<T: DeserializeOwned>(mark: &Mark, bytes: &[u8]) -> Result<T, Metho
     }
 }
 
-/// FNV-1a, word by word: tells inputs apart.
+/// An FNV-1a hash over 64-bit words: the checksum of saved states, and the fingerprint of a method's input.
 #[derive(Clone, Copy, Debug)]
 pub struct Hash(u64);
 
 impl Hash {
-    /// Of nothing yet.
+    /// The hash of no words.
     pub fn new() -> Self {
         Self(0xcbf2_9ce4_8422_2325)
     }
@@ -57,7 +58,7 @@ impl Hash {
         self.0 = (self.0 ^ word).wrapping_mul(0x100_0000_01b3);
     }
 
-    /// What came out.
+    /// The hash of the words added so far.
     pub fn value(&self) -> u64 {
         self.0
     }

@@ -1,48 +1,48 @@
-//! Parameters that describe themselves, so that a page can build its controls from them.
+//! Descriptions of parameters, from which a user interface can build its controls.
 
 use super::MethodError;
 use serde::Serialize;
 
-/// One parameter of a method.
+/// The description of one parameter: its name, type, default and range, and the texts of its control.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct ParamSpec {
-    /// The name in the public contract.
+    /// The name in the public API.
     pub name: &'static str,
-    /// A short label.
+    /// A short label for the control.
     pub label: &'static str,
-    /// One sentence a student understands.
+    /// One sentence of help that a student understands.
     pub help: &'static str,
-    /// The letter in the paper.
+    /// The symbol in the paper.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub symbol: Option<&'static str>,
-    /// What values it takes.
+    /// The type of the values.
     #[serde(rename = "type")]
     pub kind: ParamKind,
-    /// The value when none is given.
+    /// The default value.
     pub default: ParamDefault,
-    /// The least value accepted.
+    /// The smallest value accepted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min: Option<f64>,
     /// The largest value accepted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<f64>,
-    /// A sensible step of a control.
+    /// A suitable increment for the control.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<f64>,
-    /// How a slider should run.
+    /// How values are spread over a slider.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<ParamScale>,
-    /// The unit, where there is one.
+    /// The unit, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<&'static str>,
-    /// The words a choice accepts; a number is accepted too where `min` is given.
+    /// The words that a choice accepts; a number is accepted, too, if `min` is set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub choices: Option<&'static [&'static str]>,
 }
 
 impl ParamSpec {
-    /// A number of any size, for the specs to differ from.
+    /// An unbounded number with default 0; specifications override the fields in which they differ.
     pub(super) const NUMBER: Self = Self {
         name: "",
         label: "",
@@ -58,10 +58,10 @@ impl ParamSpec {
         choices: None,
     };
 
-    /// Tests a number against the range.
+    /// Checks that a number is within the accepted range.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] that names the parameter and what it accepts.
+    /// [`MethodError::InvalidArgument`] with the name of the parameter and the accepted range.
     pub fn check(&self, value: f64) -> Result<(), MethodError> {
         let (low, high) = (self.min.unwrap_or(f64::MIN), self.max.unwrap_or(f64::MAX));
         if value >= low && value <= high {
@@ -81,7 +81,7 @@ impl ParamSpec {
 pub enum ParamKind {
     /// Any number in the range.
     Number,
-    /// A whole number in the range.
+    /// An integer in the range.
     Integer,
     /// One of the choices.
     Choice,
@@ -89,7 +89,7 @@ pub enum ParamKind {
     Boolean,
 }
 
-/// The default of a parameter.
+/// The default value of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum ParamDefault {
@@ -99,7 +99,7 @@ pub enum ParamDefault {
     Choice(&'static str),
     /// On or off.
     Boolean(bool),
-    /// Taken from the data; `null` for the reader.
+    /// Derived from the data; serialised as `null`.
     FromData,
 }
 
@@ -107,8 +107,8 @@ pub enum ParamDefault {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ParamScale {
-    /// Evenly.
+    /// Linearly.
     Linear,
-    /// By factors.
+    /// Logarithmically.
     Log,
 }

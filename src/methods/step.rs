@@ -1,39 +1,39 @@
-//! One stepping contract for every method.
+//! The stepping interface common to all methods.
 
 use crate::remesh::Changes;
 use serde::Serialize;
 
-/// What one step did, and how far the method is.
+/// The result of one step: the state of convergence, the size and topology of the mesh, and the edits made.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct StepReport {
-    /// Steps taken since the beginning.
+    /// The number of steps since the start.
     pub iteration: u32,
-    /// Whether the method has come to its end.
+    /// Whether the method has finished.
     pub done: bool,
-    /// What the method is doing now, in words.
+    /// The current phase as text for the user.
     pub phase: String,
-    /// 0..1 where it can be known, else NaN.
+    /// The progress of the method from 0 to 1, NaN if unknown.
     pub progress: f64,
-    /// The method's own convergence figure.
+    /// The convergence measure of the method.
     pub residual: f64,
-    /// What the residual is compared with.
+    /// The value below which the residual counts as converged.
     pub tolerance: f64,
-    /// Vertices of the mesh.
+    /// The number of vertices of the mesh.
     pub vertices: u32,
-    /// Triangles of the mesh.
+    /// The number of triangles of the mesh.
     pub triangles: u32,
-    /// Connected components of the mesh.
+    /// The number of connected components of the mesh.
     pub components: u32,
-    /// χ of the mesh, summed over its components.
+    /// The Euler characteristic χ of the mesh, summed over its components.
     pub euler: i32,
-    /// Edits since the last report.
+    /// The number of edits since the last report, by kind.
     pub events: Changes,
-    /// Milliseconds by part of the step; all 0 where no clock was given.
+    /// The time spent in each part of the step, in milliseconds; all 0 without a clock.
     pub times: Times,
 }
 
-/// Milliseconds by named part, in the order the parts ran.
+/// Durations in milliseconds of named parts of a step, in the order in which they ran.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Times(pub Vec<(&'static str, f64)>);
 
@@ -44,7 +44,7 @@ impl Serialize for Times {
 }
 
 impl Times {
-    /// Adds `milliseconds` to `part`.
+    /// Adds `milliseconds` to the duration of `part`.
     pub fn add(&mut self, part: &'static str, milliseconds: f64) {
         match self.0.iter_mut().find(|(name, _)| *name == part) {
             Some((_, sum)) => *sum += milliseconds,

@@ -3,27 +3,27 @@
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
-/// Numbers of edits, by the papers' names.
+/// Numbers of edits made to a mesh in one call, named as in the papers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Changes {
-    /// Edges split.
+    /// Number of edges split.
     pub creations: u32,
-    /// Edges collapsed.
+    /// Number of edges collapsed.
     pub deletions: u32,
-    /// Edges flipped.
+    /// Number of edges flipped.
     pub inversions: u32,
-    /// Contacts joined by a tube.
+    /// Number of contacts joined by a tube.
     pub axial: u32,
-    /// Necks cut.
+    /// Number of necks cut.
     pub annular: u32,
-    /// Components added for parts that the mesh left out.
+    /// Number of components added for regions of the image that the mesh does not cover.
     pub seeds: u32,
-    /// Components that vanished.
+    /// Number of components removed.
     pub vanished: u32,
 }
 
 impl Changes {
-    /// Whether topology changed, not only sampling.
+    /// Returns whether any edit changed the topology, not only the sampling.
     pub fn changed_topology(self) -> bool {
         self.axial + self.annular + self.seeds + self.vanished > 0
     }

@@ -1,19 +1,20 @@
-//! Simplification of a closed surface by clustering its vertices (Rossignac & Borrel, *Multi-resolution 3D approximations for rendering
-//! complex scenes*, 1993), here with the topology kept.
+//! Simplification of a closed surface by vertex clustering (Rossignac & Borrel, *Multi-resolution 3D approximations for
+//! rendering complex scenes*, 1993), here with the topology preserved.
 
 use crate::math::triangle::area_vector;
 use crate::math::{IVec3, Vec3};
 use crate::mesh::{Groups, TriangleMesh};
 
-/// The cosine of the largest angle by which a triangle may turn.
+/// The cosine of the largest angle by which a triangle may turn when vertices are merged, 60°.
 const LARGEST_TURN: f64 = 0.5;
 
-/// A vertex has at least this many triangles.
+/// The smallest valence of a vertex of the result.
 const LEAST_VALENCE: u32 = 3;
 
-/// A closed surface with the vertices of each cell that edges connect within it merged at their mean, where that neither changes the
-/// topology nor turns a triangle far, and none of them is further than `furthest` from it along its normal. Only positions and triangles are
-/// kept.
+/// Returns a closed surface simplified by vertex clustering; used to thin out the iso-surface from which a deformable
+/// model starts. Vertices in the same cell that are connected by edges within it are merged at their mean. A cluster is
+/// merged only if this neither changes the topology nor turns a triangle by more than 60°, and if each of its vertices
+/// is within `furthest` of the mean along its normal. Only positions and triangles are kept.
 pub fn clustered(mesh: &TriangleMesh, furthest: f32, cell: impl Fn(Vec3) -> IVec3) -> TriangleMesh {
     let mut clusters = Clusters::new(mesh, cell);
     clusters.keep_contractible(mesh);
@@ -26,9 +27,9 @@ pub fn clustered(mesh: &TriangleMesh, furthest: f32, cell: impl Fn(Vec3) -> IVec
     }
 }
 
-/// Disjoint connected sets of vertices.
+/// A partition of the vertices into connected clusters.
 struct Clusters {
-    /// The lowest vertex of the cluster of each vertex.
+    /// For each vertex, the lowest vertex of its cluster, which identifies the cluster.
     first: Vec<u32>,
 }
 
@@ -59,7 +60,8 @@ impl Clusters {
         vertices.map(|v| self.first[v as usize])
     }
 
-    /// Dissolves clusters with a loop, or of a whole component: merging any others does not change the topology.
+    /// Dissolves clusters whose Euler characteristic is not 1: those with a loop, and whole components. Merging any
+    /// others does not change the topology.
     fn keep_contractible(&mut self, mesh: &TriangleMesh) {
         let mut euler = vec![0; self.first.len()];
         self.first.iter().for_each(|&c| euler[c as usize] += 1);
@@ -72,7 +74,8 @@ impl Clusters {
         self.dissolve(|c| euler[c as usize] != 1);
     }
 
-    /// Dissolves clusters, named by their lowest vertex; returns whether one of them had more than one vertex.
+    /// Dissolves the clusters for which `goes` is true, identified by their lowest vertex; returns whether one of them
+    /// had more than one vertex.
     fn dissolve(&mut self, goes: impl Fn(u32) -> bool) -> bool {
         let mut any = false;
         for (v, c) in (0u32..).zip(&mut self.first).filter(|(v, c)| v != *c && goes(**c)) {
@@ -82,7 +85,7 @@ impl Clusters {
         any
     }
 
-    /// The mean position of each cluster, at its lowest vertex.
+    /// Returns the mean position of each cluster, stored at its lowest vertex.
     fn means(&self, mesh: &TriangleMesh) -> Vec<Vec3> {
         let mut means = vec![Vec3::ZERO; mesh.positions.len()];
         let mut members = vec![0u32; mesh.positions.len()];
@@ -99,8 +102,8 @@ impl Clusters {
         TriangleMesh { positions: self.means(mesh), triangles, ..TriangleMesh::default() }
     }
 
-    /// Dissolves the clusters at edges of more than two triangles, at vertices of less than three, and at triangles that turned far; returns
-    /// whether there were any.
+    /// Dissolves the clusters at edges of more than two triangles, at vertices of fewer than three, and at triangles
+    /// that turn by more than 60°; returns whether there were any.
     fn dissolve_where_wrong(&mut self, mesh: &TriangleMesh, merged: &TriangleMesh) -> bool {
         let mut is_wrong = vec![false; self.first.len()];
         let valences = valences(merged);
@@ -129,7 +132,7 @@ fn is_triangle([a, b, c]: &[u32; 3]) -> bool {
     a != b && b != c && c != a
 }
 
-/// The number of triangles at each vertex.
+/// Returns the number of triangles at each vertex.
 fn valences(mesh: &TriangleMesh) -> Vec<u32> {
     let mut valences = vec![0; mesh.positions.len()];
     mesh.triangles.iter().flatten().for_each(|&v| valences[v as usize] += 1);
@@ -140,15 +143,15 @@ fn directed_edges(mesh: &TriangleMesh) -> impl Iterator<Item = [u32; 2]> + '_ {
     mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
 }
 
-/// The edges of a closed surface.
+/// Returns the edges of a closed surface, each once.
 fn edges(mesh: &TriangleMesh) -> impl Iterator<Item = [usize; 2]> + '_ {
     directed_edges(mesh).filter(|[u, v]| u < v).map(|edge| edge.map(|v| v as usize))
 }
 
-/// The edges that more than one triangle has in the same direction, by the valences of the vertices.
+/// Returns the edges that several triangles contain in the same direction; `valences` are those of the vertices.
 fn doubled_edges(mesh: &TriangleMesh, valences: &[u32]) -> Vec<[u32; 2]> {
     let mut ends = vec![0u32; directed_edges(mesh).count()];
-    // The edges from each vertex, in one range of `ends` each.
+    // Ends of the edges from each vertex, in one range of `ends` each.
     let mut filled: Vec<u32> = Vec::with_capacity(valences.len());
     let mut begin = 0;
     for valence in valences {
@@ -180,7 +183,7 @@ mod tests {
         p.round().as_ivec3()
     }
 
-    /// The contour of a shape in a grid of 24 voxels along each side.
+    /// Returns the iso-surface of a shape in a grid of 24 voxels along each side.
     fn contour(depth: impl Fn(Vec3) -> f32) -> TriangleMesh {
         let n = 24;
         let at = |k: usize| Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32) - 11.5;
@@ -220,7 +223,7 @@ mod tests {
         assert!(near.positions.len() > rough.positions.len());
     }
 
-    /// Cells of a noisy shape hold tubes, walls of both sides and whole components.
+    /// Cells of a noisy shape contain tubes, both sides of thin walls, and whole components.
     #[test]
     fn noise_keeps_its_components_and_handles() {
         for seed in 0..40 {

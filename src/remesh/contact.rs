@@ -1,14 +1,15 @@
-//! Contacts between non-adjacent vertices: equation (3) and the axial change of figures 3 and 4.
+//! Contact queries between non-adjacent vertices: equation (3) and the axial change of figures 3 and 4.
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::order::{by_both, rank, sort_by_rank};
 use crate::mesh::{Mesh, VertexId};
 
-/// Positions of the rim of a joint along the spokes, from the centre. Nearer to the centre the tube is thin and is cut again at once;
-/// further out the strip around it is thinner than δ and collapses. The others are tried if the first would intersect something.
+/// Positions of the rim of a tube along the spokes, as fractions from the centre. Nearer to the centre the tube is thin
+/// and is cut again at once; further out the strip around it is thinner than δ and collapses. The others are tried if
+/// the first would cause a self-intersection.
 const JOINT_REACHES: [f32; 4] = [0.7, 0.5, 0.35, 0.85];
 
-/// Two vertices in contact, the lower one first.
+/// Two vertices in contact, the lower id first, with their squared distance.
 #[derive(Clone, Copy)]
 struct Contact {
     square: f32,
@@ -17,7 +18,7 @@ struct Contact {
 }
 
 impl Resolver {
-    /// Resolves the contacts of the marked vertices; returns whether anything changed.
+    /// Resolves the contacts of the vertices marked for a contact query; returns whether anything changed.
     pub(super) fn join_contacts(
         &mut self,
         mesh: &mut Mesh,
@@ -26,8 +27,8 @@ impl Resolver {
     ) -> bool {
         let contacts = self.find_contacts(mesh, sampling);
         let mut changed = false;
-        // Contacts next to a new tube wait until its edges are within bounds: joined at once, neighbouring pairs of two facing sheets
-        // would make a handle each.
+        // Contacts next to a new tube stay pending until its edges are within bounds: joined at once, neighbouring
+        // pairs of two facing sheets would create a handle each.
         let mut busy = vec![false; mesh.slots()];
         for Contact { square, u, v } in contacts {
             if !free(mesh, &busy, u) || !free(mesh, &busy, v) || mesh.ring(u).contains(v) {
@@ -53,7 +54,7 @@ impl Resolver {
         }
     }
 
-    /// The pairs in contact with at least one marked vertex, nearest first.
+    /// Returns the pairs in contact with at least one marked vertex, nearest first.
     fn find_contacts(&mut self, mesh: &Mesh, sampling: Sampling) -> Vec<Contact> {
         let mut stirred = self.take_stirred();
         stirred.retain(|&v| mesh.is_live(v));
@@ -81,7 +82,8 @@ impl Resolver {
         contacts
     }
 
-    /// Resolves one contact: by a flip if the two are opposite each other across an edge, else by a tube. `None` if nothing was to be done.
+    /// Resolves one contact: by a flip if the two vertices are opposite each other across an edge, otherwise by a tube.
+    /// `None` if nothing was changed.
     fn resolve_contact(
         &mut self,
         mesh: &mut Mesh,
@@ -91,7 +93,7 @@ impl Resolver {
     ) -> Option<bool> {
         if let Some(across) = longest_edge_between(mesh, u, v) {
             let (a, b, length) = across;
-            // A fold at a short edge is no contact: that edge is collapsed before its two triangles can meet.
+            // A fold at a short edge is no contact: that edge is collapsed before its two triangles can touch.
             if length <= square || self.embedding.attempt(mesh, |mesh| mesh.flip(a, b)).is_err() {
                 return None;
             }
@@ -113,7 +115,7 @@ fn free(mesh: &Mesh, busy: &[bool], v: VertexId) -> bool {
     mesh.is_live(v) && busy.get(v.index()) == Some(&false)
 }
 
-/// The longest edge across which `u` and `v` are opposite each other, and its squared length.
+/// Returns the longest edge across which `u` and `v` are opposite each other, and its squared length.
 fn longest_edge_between(mesh: &Mesh, u: VertexId, v: VertexId) -> Option<(VertexId, VertexId, f32)> {
     let across = mesh.ring(u).pairs().filter(|&(a, b)| mesh.ring(a).before(b) == Some(v));
     across

@@ -1,9 +1,9 @@
 //! Decimation: edges are collapsed in the order of their quadric error (Garland & Heckbert, *Surface simplification using quadric error
 //! metrics*, 1997).
 //!
-//! Guarantees: a closed, oriented manifold stays one, with the same components and χ; no triangle turns over; no self-intersections are
-//! added, and no component changes sides of another. All of this is tested before each collapse, intersections exactly. Not guaranteed: a
-//! bound on the error.
+//! Guarantees: a closed, oriented manifold stays one, with the same components and χ; no triangle turns over; no
+//! self-intersections are added, and no component changes sides of another (from inside to outside or back). All of
+//! this is tested before each collapse, intersections exactly. Not guaranteed: a bound on the error.
 
 use super::obstacles::Obstacles;
 use crate::math::predicates::collinear;
@@ -13,30 +13,33 @@ use smallvec::SmallVec;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// The weight of the squared distance from the original positions against that from the planes. It regularises flat parts, where the
-/// minimiser is undetermined and needles would grow; with a hundredth, detail is rounded off.
+/// The weight of the squared distance from the original vertices, relative to that from the planes. It regularises flat
+/// regions, where the minimiser is undetermined and needles would develop; at a hundredth, detail is rounded off.
 const POINT_WEIGHT: f64 = 1e-4;
 
-/// The highest valence: needles would meet in such a vertex, and the test for intersections is quadratic in it.
+/// The highest valence after a collapse: vertices of higher valence are surrounded by needles, and the intersection
+/// test is quadratic in it.
 const MOST_NEIGHBOURS: usize = 24;
 
 /// The cosine of the largest angle by which a triangle may turn, 78°.
 const LEAST_COSINE: f64 = 0.2;
 
-/// How often all edges are queued. A rejected edge may become possible once its neighbours are gone; rounds that free one edge each would
-/// make the work quadratic.
+/// The number of times all edges are queued. A rejected edge may become possible once its neighbours are gone; rounds
+/// that free one edge each would make the work quadratic.
 const ROUNDS: usize = 4;
 
-/// The work allowed, in pairs of boxes and triangles, per triangle of the mesh and for any mesh; 200 to 600 per triangle are common. With
-/// five times as much, 42,000 triangles whose boxes all overlap took 48 s.
+/// The work limit of the intersection tests, in pairs of boxes and triangles, per triangle of the mesh and for any
+/// mesh; 200 to 600 per triangle are common. With five times as much, 42,000 triangles whose boxes all overlap took 48
+/// s.
 const WORK_PER_TRIANGLE: u64 = 2_000;
 const WORK_AT_LEAST: u64 = 10_000_000;
 
-/// Collapses edges until at most `target_triangles` are left, no edge can be collapsed safely, or the work allowed is used up, as among
-/// thousands of needles in each other's way. Returns the number of collapses, each of which removes two triangles. Vertices are renumbered.
+/// Decimates a mesh: collapses edges in the order of their quadric error until at most `target_triangles` are left, no
+/// edge can be collapsed safely, or the work limit is reached, as among thousands of needles that block each other.
+/// Returns the number of collapses, each of which removes two triangles. Vertices are renumbered.
 ///
-/// A component keeps at least four triangles. Intersecting triangles are kept unless a collapse resolves the intersection. The attributes
-/// of the remaining vertex are the mean of both.
+/// A component keeps at least four triangles. Intersecting triangles are kept unless a collapse resolves the
+/// intersection. The attributes of the remaining vertex are the means of both.
 pub fn decimate(mesh: &mut Mesh, target_triangles: usize) -> usize {
     if mesh.triangle_count() <= target_triangles {
         return 0;
@@ -58,29 +61,29 @@ pub fn decimate(mesh: &mut Mesh, target_triangles: usize) -> usize {
 struct Decimation<'a> {
     mesh: &'a mut Mesh,
     target: usize,
-    /// The quadric of each vertex slot, about `origin`.
+    /// The quadric of each vertex slot, relative to `origin`.
     quadrics: Vec<Quadric>,
     /// The origin of the quadrics, near the mesh for precision.
     origin: DVec3,
-    /// The number of collapses at each vertex slot.
+    /// The number of collapses at each vertex slot, which tells outdated candidates.
     stamps: Vec<u32>,
     queue: BinaryHeap<Reverse<Candidate>>,
     obstacles: Obstacles,
 }
 
-/// A candidate edge, ordered by error, then by ids.
+/// A candidate edge in the priority queue, ordered by error, then by ids.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Candidate {
-    /// The bits of the error; those of non-negative numbers are ordered like the numbers.
+    /// The bits of the error; for non-negative numbers they are ordered like the numbers.
     error: u64,
     ends: [VertexId; 2],
-    /// The index of the position to be tried, by increasing error.
+    /// The index of the position to be tried, in [`Decimation::positions`].
     choice: u8,
     /// The sum of the stamps of both ends; the candidate is outdated if it has changed.
     stamp: u32,
 }
 
-/// A position for the remaining vertex, and its error.
+/// The quadric error of a candidate position for the remaining vertex, and that position.
 type Place = (f64, Vec3);
 
 impl<'a> Decimation<'a> {
@@ -117,7 +120,7 @@ impl<'a> Decimation<'a> {
         }
     }
 
-    /// Collapses the edge if that is safe; else queues it with the next position.
+    /// Collapses the edge into its candidate position if that is safe; otherwise queues it with the next position.
     fn attempt(&mut self, u: VertexId, v: VertexId, choice: u8) {
         if self.mesh.can_collapse(u, v).is_err() {
             return;
@@ -140,7 +143,7 @@ impl<'a> Decimation<'a> {
         ring.as_slice().iter().for_each(|&w| self.offer(u.min(w), u.max(w), 0));
     }
 
-    /// Queues the edge with the error of the given position, if there is one.
+    /// Queues the edge with the error of its candidate position number `choice`, if there is one.
     fn offer(&mut self, u: VertexId, v: VertexId, choice: u8) {
         if let Some(&(error, _)) = self.positions(u, v).get(choice as usize) {
             let stamp = self.stamp(u, v);
@@ -152,7 +155,8 @@ impl<'a> Decimation<'a> {
         self.stamps[u.index()] + self.stamps[v.index()]
     }
 
-    /// Positions for the remaining vertex by increasing error: the minimiser, the midpoint, both ends.
+    /// Returns candidate positions for the remaining vertex by increasing error: the minimiser, the midpoint, both
+    /// ends.
     fn positions(&self, u: VertexId, v: VertexId) -> SmallVec<[Place; 4]> {
         let quadric = self.quadrics[u.index()] + self.quadrics[v.index()];
         let (p, q) = (self.mesh.position(u).as_dvec3(), self.mesh.position(v).as_dvec3());
@@ -166,7 +170,7 @@ impl<'a> Decimation<'a> {
         positions
     }
 
-    /// Whether no triangle turns over, degenerates or intersects another after the collapse.
+    /// Returns whether no triangle turns over, degenerates or intersects another after the collapse.
     fn is_safe(&mut self, u: VertexId, v: VertexId, place: Vec3) -> bool {
         // Two triangles are removed: each end loses the other, and the two opposite vertices are counted twice.
         let neighbours = self.mesh.ring(u).valence() + self.mesh.ring(v).valence() - 4;
@@ -188,14 +192,16 @@ impl<'a> Decimation<'a> {
     }
 }
 
-/// Whether a triangle keeps its orientation and an area. One without area has no orientation to lose.
+/// Returns whether a triangle may be replaced by another: it keeps its orientation and a nonzero area. A degenerate
+/// triangle has no orientation to keep.
 fn may_become(old: &Facet, new: &Facet) -> bool {
     let (before, after) = (triangle::area_vector(old.points), triangle::area_vector(new.points));
     let turns = before.dot(after) < LEAST_COSINE * before.length() * after.length();
     !turns && !collinear(new.points)
 }
 
-/// By vertex, the quadric of the planes around it and, with a small weight, of its position; weighted by a third of the area.
+/// Returns, by vertex slot, the quadric of the planes of its triangles and, with a small weight, of its position; each
+/// triangle is weighted by a third of its area.
 fn quadrics(mesh: &Mesh, origin: DVec3) -> Vec<Quadric> {
     let mut quadrics = vec![Quadric::default(); mesh.slots()];
     for corners in mesh.triangles() {

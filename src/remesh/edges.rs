@@ -1,16 +1,17 @@
-//! Edge bounds: equations (1) and (2), figure 1.
+//! Restores the edge bounds of equations (1) and (2), figure 1, by splits, flips and collapses.
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::Vec3;
 use crate::math::order::sort_by_rank;
 use crate::mesh::{EditError, Mesh, Opposite, VertexId};
 
-/// The longest edge that a collapse may produce, in the upper bound. While all edges are within bounds none exceeds 1.4; in a surface much
-/// finer than δ and too crowded for splits, repeated collapses would produce needles.
+/// The longest edge that a collapse may produce, as a factor of the upper bound. While all edges are within bounds,
+/// none exceeds 1.4; in a surface much finer than δ and too crowded for splits, repeated collapses would produce
+/// needles.
 const LENGTHENED: f32 = 1.6;
 
-/// Edits around one vertex in a call, after which it is skipped until it is marked again. Edits of edges with different bounds may undo
-/// each other; on a head that used up the work of a whole call, 20 s.
+/// The largest number of edits around one vertex in a call; it is then skipped until it is marked again. Edits of edges
+/// with different bounds may undo each other; on a head scan they used up the work of a whole call, 20 s.
 const MOST_EDITS: u8 = 40;
 
 impl Resolver {
@@ -24,7 +25,7 @@ impl Resolver {
         }
     }
 
-    /// Makes an edit at a vertex that changes sampling, not topology, unless the mesh would intersect itself.
+    /// Makes a split, flip or collapse at a vertex, and rolls it back if the mesh would intersect itself.
     fn edit<T>(
         &mut self,
         mesh: &mut Mesh,
@@ -38,7 +39,7 @@ impl Resolver {
         }
     }
 
-    /// Whether edges around `u` may still be edited in this call.
+    /// Returns whether edges around `u` may still be edited in this call.
     fn may_edit(&self, u: VertexId) -> bool {
         self.edits.get(u.index()).is_none_or(|&edits| edits < MOST_EDITS)
     }
@@ -50,7 +51,7 @@ impl Resolver {
         self.edits[u.index()] += 1;
     }
 
-    /// Brings the first edge around `u` within bounds that is not and can be.
+    /// Brings the first edge around `u` that is out of bounds and can be edited within bounds.
     fn settle_vertex(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide, u: VertexId) {
         let from = mesh.position(u);
         for k in 0..mesh.ring(u).valence() {
@@ -71,7 +72,8 @@ impl Resolver {
         }
     }
 
-    /// Shortens an edge that is too long: flips it if a new vertex would be too near the opposite ones, else splits it.
+    /// Shortens an edge that is too long: flips it if a new vertex would be too near the opposite ones, otherwise
+    /// splits it.
     fn shorten(
         &mut self,
         mesh: &mut Mesh,
@@ -98,7 +100,8 @@ impl Resolver {
         Ok(true)
     }
 
-    /// Removes an edge that is too short: collapses it, cuts the neck in its way, or removes a lone tetrahedron.
+    /// Removes an edge that is too short: collapses it, cuts the neck that blocks the collapse, or removes an isolated
+    /// tetrahedron.
     fn remove_short(
         &mut self,
         mesh: &mut Mesh,
@@ -118,7 +121,7 @@ impl Resolver {
         }
     }
 
-    /// Collapses the edge into the best position without self-intersections.
+    /// Collapses the edge into the best position that causes no self-intersection.
     fn collapse(
         &mut self,
         mesh: &mut Mesh,
@@ -134,7 +137,7 @@ impl Resolver {
             match self.edit(mesh, u, |mesh| mesh.collapse(u, v, position)) {
                 Ok(()) => {
                     self.changes.deletions += 1;
-                    // Appended to the queue: processed at once, its valence would grow.
+                    // Appended to the queue: if it were processed at once, its valence would grow.
                     self.touch_edited(u);
                     return Ok(true);
                 }
@@ -146,7 +149,8 @@ impl Resolver {
     }
 }
 
-/// The middle of the edge and its ends, in this order, but positions at which a triangle turns over last.
+/// Returns the candidate positions of a collapse: the midpoint of the edge and its ends, in this order, but positions
+/// at which a triangle turns over last.
 fn collapse_positions(mesh: &Mesh, u: VertexId, v: VertexId) -> [Vec3; 3] {
     let (p, q) = (mesh.position(u), mesh.position(v));
     let mut positions = [(p + q) * 0.5, p, q];
@@ -154,7 +158,7 @@ fn collapse_positions(mesh: &Mesh, u: VertexId, v: VertexId) -> [Vec3; 3] {
     positions
 }
 
-/// Whether collapsing `ends` into a position makes an edge longer than `most` and than before.
+/// Returns whether collapsing `ends` into a position makes an edge longer than `most` and than before.
 fn lengthens(mesh: &Mesh, ends: [VertexId; 2], at: Vec3, most: f32) -> bool {
     ends.into_iter().any(|end| {
         let from = mesh.position(end);
@@ -165,7 +169,7 @@ fn lengthens(mesh: &Mesh, ends: [VertexId; 2], at: Vec3, most: f32) -> bool {
     })
 }
 
-/// Whether moving `u` turns over a triangle around it that does not have `v` as a corner.
+/// Returns whether moving `u` turns over a triangle around it that does not contain `v`.
 fn turns_over(mesh: &Mesh, u: VertexId, v: VertexId, to: Vec3) -> bool {
     let from = mesh.position(u);
     mesh.ring(u).pairs().filter(|&(a, b)| a != v && b != v).any(|(a, b)| {

@@ -1,11 +1,13 @@
-//! Passes that keep a moving mesh well sampled and change its topology on contact (Lachaud & Montanvert, sections
-//! 3.2, 3.3 and figure 9).
+//! Algorithms that keep a moving mesh well sampled and change its topology on contact (Lachaud & Montanvert, sections
+//! 3.2, 3.3 and figure 9), and remeshing of static meshes.
 //!
-//! [`Resolver::resolve`] repeats these steps until all bounds hold: edges out of bounds are split, flipped or collapsed (`edges`), necks in
-//! the way are cut (`necks`), vertices in contact are joined (`contact`). After eight rounds the rest stays pending for the next call.
-//! Small parts without volume are removed (`specks`). [`Embedding`] keeps the mesh free of self-intersections.
+//! [`Resolver::resolve`] repeats these steps until all bounds hold: edges out of bounds are split, flipped or collapsed
+//! (`edges`), necks that block a collapse are cut (`necks`), vertices in contact are joined (`contact`). After eight
+//! rounds the rest stays pending for the next call. Small components without volume are removed (`specks`).
+//! [`Embedding`] keeps the mesh free of self-intersections.
 //!
-//! [`decimate`] reduces a static mesh, [`remesh`] makes its triangles even; neither changes topology.
+//! [`decimate()`] reduces a static mesh, [`remesh`] remeshes it isotropically, with even edge lengths and well-shaped
+//! triangles; neither changes topology.
 
 mod changes;
 mod clustering;

@@ -1,19 +1,21 @@
-//! Necks thinner than the lower bound of edges: the annular change of figure 5.
+//! Cuts necks thinner than the lower bound of edges: the annular change of figure 5.
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::Vec3;
 use crate::math::order::{rank, sort_by_rank};
 use crate::mesh::{Cut, EditError, Mesh, VertexId};
 
-/// Distances by which the two sides of a cut are moved apart, in δ; the first without self-intersections is taken. At shorter ones they
-/// are soon in contact again.
+/// Distances by which the two sides of a cut are moved apart, in δ; the first that causes no self-intersection is used.
+/// At shorter ones the sides are soon in contact again.
 const CUT_PUSHES: [f32; 4] = [0.75, 0.4, 0.2, 0.05];
 
-/// The largest push of a side, as a share of the distance to its neighbours: no triangle turns over.
+/// The largest displacement of a side, as a share of the distance to the mean of its neighbours: no triangle turns
+/// over.
 const CUT_PUSH_LIMIT: f32 = 0.6;
 
 impl Resolver {
-    /// Cuts along the edge `uv` and a common neighbour (annular change): the shortest ring without self-intersections afterwards.
+    /// Cuts the neck along a ring of three edges through the edge `uv` and a common neighbour (annular change): the
+    /// shortest such ring whose cut causes no self-intersection.
     pub(super) fn cut_neck(
         &mut self,
         mesh: &mut Mesh,
@@ -43,7 +45,8 @@ impl Resolver {
         Ok(true)
     }
 
-    /// Cuts along a ring of three edges and moves the two sides apart as far as possible without self-intersections.
+    /// Cuts along a ring of three edges and moves the two sides apart by the largest of [`CUT_PUSHES`] that causes no
+    /// self-intersection.
     fn cut_apart(&mut self, mesh: &mut Mesh, sampling: Sampling, [u, v, o]: [VertexId; 3]) -> Option<Cut> {
         let mut apart = |push: f32| {
             self.embedding.attempt(mesh, |mesh| {
@@ -55,8 +58,8 @@ impl Resolver {
         CUT_PUSHES.into_iter().find_map(|push| apart(push).ok())
     }
 
-    /// Cuts necks at vertices that could not move: where a neck is pressed together until its vertices are held, no edge becomes short, and
-    /// it would stay.
+    /// Cuts necks at vertices that could not move: in a neck compressed until its vertices are held, no edge becomes
+    /// short, and it would never be cut otherwise.
     pub(super) fn cut_crushed(
         &mut self,
         mesh: &mut Mesh,
@@ -89,7 +92,7 @@ fn part(mesh: &mut Mesh, cut: Cut, push: f32) {
     }
 }
 
-/// The mean of the neighbours of one side of a cut, without its own corners.
+/// Returns the mean position of the neighbours of one side of a cut, excluding its own three vertices.
 fn side_centre(mesh: &Mesh, side: [VertexId; 3]) -> Vec3 {
     let outer = side.iter().flat_map(|&v| mesh.ring(v).as_slice()).filter(|w| !side.contains(w));
     let (sum, count) =

@@ -1,27 +1,30 @@
-//! Intersection tests for decimation: new triangles against the rest of the surface, by a bounding volume hierarchy that follows the edits.
+//! Intersection tests for decimation: new triangles against the rest of the surface, by a bounding volume hierarchy
+//! that is updated with the edits.
 
 use crate::math::{Bounds, Vec3, triangle};
 use crate::mesh::{Facet, Mesh, VertexId, facets_cross};
 
-/// A balanced tree of boxes around the one-rings of all vertices, in the order of a space-filling curve.
+/// A bounding volume hierarchy over the one-rings of all vertices: a balanced tree of boxes in the order of a
+/// space-filling curve.
 ///
-/// The tree keeps its form while vertices are removed, so an edit costs O(log n); it is meant for passes that coarsen a mesh.
+/// The tree structure is fixed while vertices are removed, so an update costs O(log n); it is meant for algorithms that
+/// coarsen a mesh.
 pub(super) struct Obstacles {
-    /// A heap: node i has the children 2i and 2i + 1, and the leaves are the last half.
+    /// Nodes in heap order: node i has the children 2i and 2i + 1, and the leaves are the last half.
     nodes: Vec<Bounds>,
     /// The leaf of each vertex slot, counted from the first leaf.
     leaves: Vec<u32>,
     /// The vertex of each leaf.
     vertices: Vec<VertexId>,
-    /// The component of each vertex slot.
+    /// The connected component of each vertex slot.
     components: Vec<u32>,
-    /// The work left, in pairs of a box and a triangle; see [`Self::is_exhausted`].
+    /// The remaining work budget, in pairs of a box and a triangle; see [`Self::is_exhausted`].
     work_left: u64,
     stack: Vec<u32>,
 }
 
 impl Obstacles {
-    /// The tree of `mesh`, for at most `work` pairs.
+    /// Builds the tree of `mesh`, with a work budget of `work` pairs.
     pub fn new(mesh: &Mesh, work: u64) -> Self {
         let vertices = along_a_curve(mesh);
         let first_leaf = vertices.len().next_power_of_two();
@@ -38,10 +41,11 @@ impl Obstacles {
         Self { nodes, leaves, vertices, components, work_left: work, stack: Vec::new() }
     }
 
-    /// Whether the triangles `fresh` may not replace the one-rings of `replaced`: they share more than common corners and edges with each other
-    /// or with other triangles of `mesh` (exact, touching included), or a whole component would change sides without being touched.
+    /// Returns whether the triangles `fresh` may not replace the one-rings of `replaced`: they have more than common
+    /// corners and edges in common with each other or with other triangles of `mesh` (exact, touching included), or a
+    /// whole component would change sides without being touched.
     ///
-    /// `mesh` is the mesh before the edit; the first of `replaced` is in the component that is edited.
+    /// `mesh` is the mesh before the edit; the first of `replaced` is in the edited component.
     pub fn block(&mut self, mesh: &Mesh, fresh: &[Facet], replaced: &[VertexId]) -> bool {
         let boxes: Vec<Bounds> = fresh.iter().map(|facet| Bounds::of(&facet.points)).collect();
         if cross_each_other(fresh, &boxes) {
@@ -78,7 +82,8 @@ impl Obstacles {
         self.star_crosses(mesh, v, edit) || is_apart && changes_sides(mesh, mesh.position(v), edit)
     }
 
-    /// Whether a triangle with `v` as its lowest corner, and none in `replaced`, intersects a fresh one.
+    /// Returns whether a triangle that has `v` as its lowest vertex, and no vertex in `replaced`, intersects a new
+    /// triangle.
     fn star_crosses(&mut self, mesh: &Mesh, v: VertexId, edit: &Edit) -> bool {
         for (a, b) in mesh.ring(v).pairs().filter(|&(a, b)| v < a && v < b) {
             self.work_left = self.work_left.saturating_sub(1);
@@ -96,7 +101,8 @@ impl Obstacles {
         false
     }
 
-    /// Whether the work allowed is used up: it is quadratic in the number of triangles whose boxes all overlap.
+    /// Returns whether the work budget is used up: the work is quadratic in the number of triangles whose boxes all
+    /// overlap.
     pub fn is_exhausted(&self) -> bool {
         self.work_left == 0
     }
@@ -124,12 +130,12 @@ impl Obstacles {
     }
 }
 
-/// New triangles and those they replace.
+/// An edit to be tested: the new triangles, and the vertices whose one-rings they replace.
 struct Edit<'a> {
     fresh: &'a [Facet],
     boxes: &'a [Bounds],
     replaced: &'a [VertexId],
-    /// The box around both.
+    /// The bounding box of the old and the new triangles.
     around: Bounds,
 }
 
@@ -138,7 +144,7 @@ fn around(mesh: &Mesh, boxes: &[Bounds], replaced: &[VertexId]) -> Bounds {
     boxes.iter().copied().chain(before).fold(Bounds::EMPTY, |all, one| all.joined(&one))
 }
 
-/// Whether `p` is enclosed between the old and the new triangles.
+/// Returns whether `p` is enclosed between the old and the new triangles, and would change sides of the surface.
 fn changes_sides(mesh: &Mesh, p: Vec3, edit: &Edit) -> bool {
     if !edit.around.contains(p) {
         return false;
@@ -152,11 +158,11 @@ fn changes_sides(mesh: &Mesh, p: Vec3, edit: &Edit) -> bool {
         mesh.ring(v).pairs().filter(counted).map(move |(a, b)| [v, a, b])
     });
     let old: f64 = old.map(|corners| triangle::solid_angle(mesh.facet(corners).points, p)).sum();
-    // The solid angle is 4π between them, else 0.
+    // The difference of solid angles is 4π between them, 0 elsewhere.
     (fresh - old).abs() > std::f64::consts::TAU
 }
 
-/// The component of each slot.
+/// Returns the connected component of each vertex slot.
 fn components(mesh: &Mesh) -> Vec<u32> {
     let mut components = vec![0; mesh.slots()];
     for (number, members) in (0..).zip(mesh.component_members()) {
@@ -169,19 +175,19 @@ fn cross_each_other(fresh: &[Facet], boxes: &[Bounds]) -> bool {
     (0..fresh.len()).any(|i| (0..i).any(|j| boxes[i].meets(&boxes[j]) && facets_cross(&fresh[i], &fresh[j])))
 }
 
-/// The box around all triangles at `v`.
+/// Returns the bounding box of the one-ring of `v`.
 fn star(mesh: &Mesh, v: VertexId) -> Bounds {
     let point = |p: Vec3| Bounds { min: p, max: p };
     let ring = mesh.ring(v).as_slice().iter();
     ring.fold(point(mesh.position(v)), |all, &w| all.joined(&point(mesh.position(w))))
 }
 
-/// The vertices in the order of a Z-curve through their box.
+/// Returns the vertices in the order of a Z-curve through their bounding box.
 fn along_a_curve(mesh: &Mesh) -> Vec<VertexId> {
     let bounds = mesh
         .vertices()
         .fold(Bounds::EMPTY, |all, v| all.joined(&Bounds { min: mesh.position(v), max: mesh.position(v) }));
-    // In f64, where the size of finite coordinates cannot overflow.
+    // In `f64`, where the size of a box of finite coordinates cannot overflow.
     let (low, size) = (bounds.min.as_dvec3(), (bounds.max.as_dvec3() - bounds.min.as_dvec3()).max_element());
     let mut keyed: Vec<(u64, u32)> = mesh
         .vertices()
@@ -195,10 +201,11 @@ fn along_a_curve(mesh: &Mesh) -> Vec<VertexId> {
     keyed.into_iter().map(|(_, v)| VertexId(v)).collect()
 }
 
-/// The binary logarithm of the cells along an axis: more than enough to separate the vertices of a mesh.
+/// The binary logarithm of the number of cells along an axis of the Z-curve: more than enough to separate the vertices
+/// of a mesh.
 const CURVE_BITS: u32 = 16;
 
-/// The bits of a number below 2^16 with two zeros after each.
+/// Returns the bits of a number below 2^16, each followed by two zeros.
 fn spread(cell: u32) -> u64 {
     let mut bits = u64::from(cell);
     let steps = [(16, 0xff00_00ff), (8, 0x00f0_0f00_f00f), (4, 0x0c30_c30c_30c3), (2, 0x2492_4924_9249)];
@@ -214,7 +221,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Two spheres beside each other, and the triangles around `v` after a move to `place`.
+    /// Returns two adjacent spheres, a vertex `v` of the first, and the triangles around it after a move to `place`.
     fn moved(place: Vec3) -> (Mesh, VertexId, Vec<Facet>) {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
         mesh.append(&Mesh::icosphere(Vec3::X * 2.2, 1.0, 0.3).unwrap()).unwrap();
@@ -229,7 +236,7 @@ mod tests {
         (mesh, v, fan)
     }
 
-    /// The x of a vertex of the first sphere.
+    /// Returns the x of a vertex of the first sphere, and `f32::MIN` for the second.
     fn first_x(mesh: &Mesh, v: VertexId) -> f32 {
         let x = mesh.position(v).x;
         if x < 1.1 { x } else { f32::MIN }

@@ -8,70 +8,73 @@ use crate::spatial::CellSet;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// Rounds of edges and contacts in one call. Each repairs what the one before broke. Hard scenes never needed more than five; the rest
-/// stays pending for the next call.
+/// The largest number of rounds of edge and contact processing in one call. Each repairs bounds that the one before
+/// violated. Hard scenes never needed more than five; the rest stays pending for the next call.
 const PASSES: usize = 8;
 
-/// The work of a call in nearby vertices visited, per vertex of the mesh and for any mesh; the rest stays pending for the next call. An
-/// edit visits about 60, and ordinary iterations make less than one edit per ten vertices. Without this limit a call might never return: edits
-/// can undo each other, and on a needle pulled out of the surface edges cannot be brought within bounds.
+/// The work limit of a call in nearby vertices visited, per vertex of the mesh and for any mesh; the rest stays pending
+/// for the next call. An edit visits about 60, and ordinary iterations make less than one edit per ten vertices.
+/// Without this limit a call might never return: edits can undo each other, and on a needle pulled out of the surface
+/// edges cannot be brought within bounds.
 const EFFORT_PER_VERTEX: u64 = 400;
 const LEAST_EFFORT: u64 = 100_000;
 
-/// Keeps a moving mesh within the bounds of a [`Sampling`] and free of self-intersections.
+/// Keeps a moving mesh within the bounds of a [`Sampling`] and free of self-intersections; the deformable model runs it
+/// after moves.
 #[derive(Clone, Debug)]
 pub struct Resolver {
     most_vertices: usize,
     contact: Contact,
-    /// The cells in which splits, flips and collapses are tested in full; everywhere if `None`.
+    /// The cells in which splits, flips and collapses are tested in full for self-intersections; everywhere if `None`.
     pub(super) tested: Option<CellSet>,
     full: bool,
-    /// The [`Embedding::effort`] at which this call ends.
+    /// The value of [`Embedding::effort`] at which this call ends.
     pub(super) most_effort: u64,
     queue: VecDeque<VertexId>,
     queued: Vec<bool>,
-    /// By vertex, the number of edits around it in this call.
+    /// Number of edits around each vertex in this call.
     pub(super) edits: Vec<u8>,
-    /// Vertices moved or made since the last contact query.
+    /// Vertices moved or created since the last contact query.
     stirred: Vec<VertexId>,
     is_stirred: Vec<bool>,
     /// Vertices that could not move at all in the last move.
     pub(super) stuck: Vec<VertexId>,
-    /// Components small enough to vanish.
+    /// Components small enough to be removed.
     pub(super) small: SmallParts,
-    /// Vertices made or displaced by the last call.
+    /// Vertices created or displaced by the last call.
     pub(super) edited: Vec<VertexId>,
     pub(super) embedding: Embedding,
     pub(super) changes: Changes,
 }
 
-/// How contacts are resolved.
+/// Treatment of contacts between non-adjacent vertices.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Contact {
-    /// The two vertices are joined by a tube.
+    /// The two vertices are joined by a tube (axial change).
     #[default]
     Join,
-    /// They stay in contact and press against each other.
+    /// The topology is kept: the two sides stay in contact, and the collision handling keeps them apart.
     Leave,
 }
 
-/// Decides which topology changes are made of those that the sampling asks for.
+/// Decides which of the topology changes required by the sampling are made; the deformable model implements it from the
+/// image.
 pub trait TopologyGuide {
-    /// Whether two vertices in contact may be joined by a tube (axial change).
+    /// Returns whether two vertices in contact may be joined by a tube (axial change).
     fn may_join(&self, mesh: &Mesh, pair: [VertexId; 2]) -> bool;
 
-    /// Whether the mesh may be cut along a ring of three edges (annular change).
+    /// Returns whether the mesh may be cut along a ring of three edges (annular change).
     fn may_cut(&self, mesh: &Mesh, ring: [VertexId; 3]) -> bool;
 
-    /// Whether a short edge may be collapsed.
+    /// Returns whether a short edge may be collapsed.
     fn may_collapse(&self, mesh: &Mesh, edge: [VertexId; 2]) -> bool;
 
-    /// Whether there is matter inside a small solid component, or background inside a small hollow. If not, a component pressed on itself
-    /// is removed; a hollow would otherwise grow in matter.
+    /// Returns whether there is foreground inside a small solid component, or background inside a small cavity. If not,
+    /// a crushed component is removed; a cavity would otherwise grow inside the foreground.
     fn has_content(&self, mesh: &Mesh, members: &[VertexId], is_solid: bool) -> bool;
 }
 
-/// Allows every topology change, as in the paper.
+/// A [`TopologyGuide`] that allows every topology change, as in the paper.
 #[derive(Clone, Copy, Debug)]
 pub struct Unguided;
 
@@ -93,7 +96,7 @@ impl TopologyGuide for Unguided {
     }
 }
 
-/// The vertices left pending by the last call, in order.
+/// The vertices left pending by the last call, in order; part of a saved run.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Waiting {
     /// Vertices whose edges have to be checked.
@@ -103,7 +106,7 @@ pub struct Waiting {
 }
 
 impl Waiting {
-    /// The same vertices after renumbering, without deleted ones.
+    /// Returns the pending vertices after renumbering, without deleted ones; `names` maps old ids to new ones.
     pub fn renamed(&self, names: &[Option<VertexId>]) -> Self {
         let rename = |list: &[VertexId]| list.iter().filter_map(|v| *names.get(v.index())?).collect();
         Self { queue: rename(&self.queue), stirred: rename(&self.stirred) }
@@ -111,7 +114,7 @@ impl Waiting {
 }
 
 impl Resolver {
-    /// A resolver that splits no edge once the mesh has `most_vertices`.
+    /// Creates a resolver that stops splitting edges once the mesh has `most_vertices`.
     pub fn with_room_for(most_vertices: usize) -> Self {
         Self {
             most_vertices,
@@ -137,47 +140,48 @@ impl Resolver {
         self.contact = contact;
     }
 
-    /// Tests splits, flips and collapses in full only in `cells`, and elsewhere as [`Embedding::attempt_in_one_rings`] does; everywhere in
-    /// full if `None`. That halves the time; the whole mesh has to be tested afterwards.
+    /// Tests splits, flips and collapses in full only in `cells`, and elsewhere as [`Embedding::attempt_in_one_rings`]
+    /// does; everywhere in full if `None`. Restricting the tests halves the time; the whole mesh has to be tested
+    /// afterwards.
     pub fn test_in(&mut self, cells: Option<CellSet>) {
         self.tested = cells;
     }
 
-    /// The collision guard, in sync with `mesh`, for other edits.
+    /// Returns the collision guard, synchronised with `mesh`, for edits made by the caller.
     pub fn guard(&mut self, mesh: &Mesh, sampling: Sampling) -> &mut Embedding {
         self.embedding.follow_with(mesh, sampling.longest());
         &mut self.embedding
     }
 
-    /// As [`Embedding::watch_output`].
+    /// Enables the test of output positions, as [`Embedding::watch_output`] does.
     pub fn watch_output(&mut self, map: DAffine3, bounds: &Bounds) {
         self.embedding.watch_output(map, bounds);
     }
 
-    /// The number of vertices at which splitting stops.
+    /// Returns the number of vertices at which splitting stops.
     pub fn most_vertices(&self) -> usize {
         self.most_vertices
     }
 
-    /// That number, if the last call left an edge too long because of it; reported once.
+    /// Returns [`Self::most_vertices`] if the last call left an edge too long because of this limit; reported once.
     pub fn take_overflow(&mut self) -> Option<usize> {
         std::mem::take(&mut self.full).then_some(self.most_vertices)
     }
 
-    /// Whether a vertex may be added; if not, [`Self::take_overflow`] reports it.
+    /// Returns whether a vertex may be added; if not, [`Self::take_overflow`] reports it.
     pub(super) fn has_room(&mut self, mesh: &Mesh) -> bool {
         self.full |= mesh.vertex_count() >= self.most_vertices;
         !self.full
     }
 
-    /// Restores the bounds around the `active` vertices and returns the changes made.
+    /// Restores the edge bounds and resolves contacts around the `active` vertices, and returns the changes made.
     ///
-    /// Other vertices are checked only if an edit or a contact reaches them.
+    /// Other vertices are processed only if an edit or a contact reaches them.
     pub fn resolve(&mut self, mesh: &mut Mesh, sampling: Sampling, active: &[VertexId]) -> Changes {
         self.resolve_guided(mesh, sampling, active, &Unguided)
     }
 
-    /// [`Self::resolve`], changing the topology only where `guide` allows it.
+    /// Does the same as [`Self::resolve`], but changes the topology only if `guide` allows it.
     pub fn resolve_guided(
         &mut self,
         mesh: &mut Mesh,
@@ -200,7 +204,7 @@ impl Resolver {
         }
         for _ in 0..PASSES {
             self.settle_edges(mesh, sampling, guide);
-            // While edges are out of bounds nearly all pairs of vertices are in contact, and joints add more.
+            // While edges are out of bounds, nearly all pairs of vertices are in contact, and joins add more.
             if self.is_waiting()
                 || self.contact == Contact::Leave
                 || !self.join_contacts(mesh, sampling, guide)
@@ -215,13 +219,15 @@ impl Resolver {
         self.changes
     }
 
-    /// Moves the vertices as [`Embedding::carry`] does.
+    /// Moves all vertices by the displacements `ways`, scaled down to prevent self-intersections, as
+    /// [`Embedding::carry`] does.
     pub fn carry(&mut self, mesh: &mut Mesh, sampling: Sampling, ways: &mut [Vec3]) -> Vec<(VertexId, f32)> {
         let all: Vec<VertexId> = mesh.vertices().collect();
         self.carry_some(mesh, sampling, &all, ways)
     }
 
-    /// Moves some of the vertices as [`Embedding::carry_some`] does.
+    /// Moves the vertices `moving` by the displacements `ways`, as [`Embedding::carry_some`] does, and records those
+    /// that could not move.
     pub fn carry_some(
         &mut self,
         mesh: &mut Mesh,
@@ -237,12 +243,12 @@ impl Resolver {
         held
     }
 
-    /// Whether no two triangles intersect; exact.
+    /// Returns whether the mesh is free of self-intersections; exact.
     pub fn is_embedded(&mut self, mesh: &Mesh) -> bool {
         self.embedding.is_embedded(mesh)
     }
 
-    /// Refines the mesh as [`Embedding::refine`] does; `sampling` is that before refinement.
+    /// Refines the mesh as [`Embedding::refine`] does; `sampling` is the one before refinement.
     ///
     /// # Errors
     /// As [`Mesh::refine`].
@@ -251,22 +257,22 @@ impl Resolver {
         self.embedding.refine(mesh)
     }
 
-    /// The vertices that edits of the last call made or displaced; some may have been deleted since.
+    /// Returns the vertices that edits of the last call created or displaced; some may have been deleted since.
     pub fn edited(&self) -> &[VertexId] {
         &self.edited
     }
 
-    /// Whether vertices are pending for the next call.
+    /// Returns whether edges are pending for the next call.
     pub fn is_waiting(&self) -> bool {
         !self.queue.is_empty()
     }
 
-    /// The vertices pending for the next call.
+    /// Returns the vertices pending for the next call, to be saved with a run.
     pub fn waiting(&self) -> Waiting {
         Waiting { queue: self.queue.iter().copied().collect(), stirred: self.stirred.clone() }
     }
 
-    /// Replaces the pending vertices.
+    /// Replaces the pending vertices, when a saved run is restored.
     pub fn set_waiting(&mut self, waiting: Waiting) {
         self.queued.clear();
         self.is_stirred.clear();
@@ -276,7 +282,7 @@ impl Resolver {
         self.stirred = waiting.stirred;
     }
 
-    /// Appends `v` to the queue, and marks it for the next contact query.
+    /// Marks `v` as dirty: appends it to the queue of edges to check, and marks it for the next contact query.
     pub(super) fn touch(&mut self, v: VertexId) {
         if mark(&mut self.queued, v) {
             self.queue.push_back(v);
@@ -286,7 +292,7 @@ impl Resolver {
         }
     }
 
-    /// [`Self::touch`] for a vertex that an edit made or displaced.
+    /// Does the same as [`Self::touch`], for a vertex that an edit created or displaced.
     pub(super) fn touch_edited(&mut self, v: VertexId) {
         self.edited.push(v);
         self.touch(v);
@@ -298,7 +304,7 @@ impl Resolver {
         Some(v)
     }
 
-    /// Takes the vertices marked for a contact query, in the order they were marked.
+    /// Removes and returns the vertices marked for a contact query, in the order they were marked.
     pub(super) fn take_stirred(&mut self) -> Vec<VertexId> {
         let stirred = std::mem::take(&mut self.stirred);
         for v in &stirred {
@@ -308,7 +314,7 @@ impl Resolver {
     }
 }
 
-/// Sets a flag; returns whether it was clear.
+/// Sets the flag of a vertex; returns whether it was clear.
 fn mark(flags: &mut Vec<bool>, v: VertexId) -> bool {
     if v.index() >= flags.len() {
         flags.resize(v.index() + 1, false);
@@ -343,7 +349,7 @@ mod tests {
             assert!(resolver.embedding.effort() - effort < most);
             effort = resolver.embedding.effort();
         }
-        // Joints add a few vertices even where splitting has stopped.
+        // Joins add a few vertices even after splitting has stopped.
         assert!(mesh.vertex_count() <= 520);
     }
 }

@@ -1,16 +1,16 @@
-//! Restructuring: edges within bounds and valences near six (Kobbelt, Bareuther & Seidel, *Multiresolution shape deformations for meshes with
-//! dynamic vertex connectivity*, section 4).
+//! Restructuring: edge lengths within bounds and valences near six (Kobbelt, Bareuther & Seidel, *Multiresolution shape
+//! deformations for meshes with dynamic vertex connectivity*, section 4).
 //!
-//! Guarantees: a closed, oriented manifold stays one, with the same components and χ; no triangle turns by more than 78°; no collapse makes
-//! an edge longer than the upper bound, or leaves a vertex with fewer than four neighbours. Not guaranteed: that all edges come within
-//! bounds, and, with [`Unchecked`] edits, that no triangles intersect.
+//! Guarantees: a closed, oriented manifold stays one, with the same components and χ; no triangle turns by more than
+//! 78°; no collapse makes an edge longer than the upper bound, or leaves a vertex with fewer than four neighbours. Not
+//! guaranteed: that all edges are brought within bounds, and, with [`Unchecked`] edits, that no triangles intersect.
 
 use super::{Changes, Embedding};
 use crate::math::order::{by_both, rank, sort_by_rank};
 use crate::math::{Vec3, triangle};
 use crate::mesh::{EditError, Mesh, MeshError, Opposite, VertexId};
 
-/// The shortest and the longest edge allowed (ε_min and ε_max of the paper).
+/// The shortest and the longest edge allowed (ε_min and ε_max of the paper), in units of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeBounds {
     /// Shorter edges are collapsed.
@@ -20,28 +20,29 @@ pub struct EdgeBounds {
 }
 
 impl EdgeBounds {
-    /// Both bounds times `factor`.
+    /// Returns both bounds multiplied by `factor`.
     pub fn scaled(self, factor: f32) -> Self {
         Self { min: self.min * factor, max: self.max * factor }
     }
 }
 
-/// The largest number of vertices of a result, and the memory of each while it is made: what fits a browser.
+/// The largest number of vertices of a result, and the memory in bytes per vertex during remeshing: limits for use in a
+/// browser.
 pub(super) const MOST_VERTICES: usize = 8_000_000;
 const BYTES_PER_VERTEX: f64 = 250.0;
 
-/// Vertices per area of equilateral triangles, in squared edges: 2 / √3.
+/// Vertices per area of a mesh of equilateral triangles, in units of 1 / (squared edge length): 2 / √3.
 const VERTICES_PER_AREA: f64 = 1.1547;
 
 impl EdgeBounds {
-    /// Checks the bounds, and that a mesh of the shape of `mesh` with such edges fits into memory.
+    /// Checks the bounds, and that a mesh of the shape of `mesh` with edges within them fits into memory.
     ///
     /// # Errors
-    /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice as much;
-    /// [`MeshError::TooLarge`] where more than eight million vertices would be needed.
+    /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice `min`;
+    /// [`MeshError::TooLarge`] if more than eight million vertices would be needed.
     pub fn check_for(self, mesh: &Mesh) -> Result<(), MeshError> {
         let Self { min, max } = self;
-        // Also refuses NaN.
+        // Also rejects NaN.
         if !(min > 0.0 && max > 2.0 * min && max.is_finite()) {
             let problem = format!(
                 "min {min} and max {max}; a min above 0 and a finite max of more than twice as much are needed"
@@ -49,7 +50,7 @@ impl EdgeBounds {
             return Err(MeshError::InvalidArgument { parameter: "edge", problem });
         }
         let area: f64 = mesh.triangles().map(|corners| triangle::area(mesh.facet(corners).points)).sum();
-        // Needles have long edges and hardly any area.
+        // The edge lengths account for needles, which have long edges and hardly any area.
         let length = |(u, v)| mesh.position(u).as_dvec3().distance(mesh.position(v).as_dvec3());
         let length: f64 = mesh.edges().map(length).sum();
         let [min, max] = [min, max].map(f64::from);
@@ -61,42 +62,43 @@ impl EdgeBounds {
     }
 }
 
-/// The memory of a number of vertices.
+/// Returns the memory needed for a number of vertices, in bytes.
 pub(super) fn bytes(vertices: f64) -> u64 {
     // Saturates beyond the range.
     (vertices * BYTES_PER_VERTEX) as u64
 }
 
-/// Whether and how edits are made.
+/// Decides which edits restructuring makes, and how they are checked.
 pub trait EditPolicy {
-    /// Makes an edit, or leaves the mesh unchanged.
+    /// Makes an edit, or leaves the mesh unchanged on an error.
     ///
     /// # Errors
-    /// The error of the edit, or why it was rolled back.
+    /// The error of the edit, or the reason it was rolled back.
     fn attempt<T>(
         &mut self,
         mesh: &mut Mesh,
         edit: impl FnOnce(&mut Mesh) -> Result<T, EditError>,
     ) -> Result<T, EditError>;
 
-    /// Whether `gone` may be collapsed into `kept`, beyond the tests of the mesh itself.
+    /// Returns whether `gone` may be collapsed into `kept`, in addition to the tests of the mesh itself.
     fn may_collapse(&mut self, _mesh: &Mesh, _kept: VertexId, _gone: VertexId) -> bool {
         true
     }
 
-    /// Whether the edge between `ends` may be flipped to `across`, beyond the tests of the mesh itself.
+    /// Returns whether the edge between `ends` may be flipped to `across`, in addition to the tests of the mesh itself.
     fn may_flip(&mut self, _mesh: &Mesh, _ends: [VertexId; 2], _across: [VertexId; 2]) -> bool {
         true
     }
 
-    /// Called after the edge that was asked about last was collapsed into `kept`.
+    /// Called after the last edge passed to [`Self::may_collapse`] was collapsed into `kept`.
     fn collapsed(&mut self, _kept: VertexId) {}
 
     /// Called after an edge at `u` was split by the new vertex `fresh`.
     fn was_split(&mut self, _fresh: VertexId, _u: VertexId) {}
 }
 
-/// Makes edits without checks for self-intersections: ten times as fast as with an [`Embedding`]. The caller checks the result.
+/// An [`EditPolicy`] without tests for self-intersections: ten times as fast as with an [`Embedding`]. The caller
+/// checks the result.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unchecked;
 
@@ -120,20 +122,23 @@ impl EditPolicy for Embedding {
     }
 }
 
-/// The cosine of the largest angle by which an edit may turn a triangle. A larger angle lets folds develop over many edits; with a smaller
-/// one edges on ridges stay out of bounds.
+/// The cosine of the largest angle by which an edit may turn a triangle, 78°. A larger angle lets folds develop over
+/// many edits; with a smaller one, edges on ridges stay out of bounds.
 const LEAST_COSINE: f32 = 0.2;
 
 /// The lowest valence after a collapse: a vertex of valence three lies inside a triangle.
 pub(super) const LEAST_VALENCE: usize = 4;
 
-/// The highest valence: among many short edges it would grow without bound, and rings are searched linearly.
+/// The highest valence after a collapse: among many short edges it would grow without bound, and rings are searched
+/// linearly.
 const MOST_VALENCE: usize = 16;
 
-/// Passes of one kind in one call. Each halves the longest edges, so this many reach any bound; flips never needed more than six.
+/// The largest number of passes of splits or flips in one call. Each pass halves the longest edges, so this many reach
+/// any bound; flips never needed more than six.
 const PASSES: usize = 24;
 
-/// One round: collapses short edges, splits long ones, and flips edges to bring valences near six. Rejected edits are skipped.
+/// Performs one round of restructuring: collapses short edges, splits long ones, and flips edges to bring valences near
+/// six. Rejected edits are skipped.
 pub fn restructure(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = collapse_short(mesh, bounds, edits);
     changes += split_long(mesh, bounds, usize::MAX, edits);
@@ -141,7 +146,8 @@ pub fn restructure(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPol
     changes
 }
 
-/// Collapses edges shorter than the lower bound into the end of higher valence, else into the other (figure 4).
+/// Collapses edges shorter than the lower bound into the end of higher valence, or into the other if that is rejected
+/// (figure 4).
 pub fn collapse_short(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
     let shortest = bounds.min * bounds.min;
@@ -162,7 +168,7 @@ pub fn collapse_short(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Edit
     changes
 }
 
-/// The first edge at `u` that is too short and may be collapsed: the end that stays, and the one removed.
+/// Returns the first edge at `u` that is too short and may be collapsed: the vertex to keep and the one to remove.
 fn short_edge(
     mesh: &Mesh,
     u: VertexId,
@@ -181,7 +187,7 @@ fn short_edge(
     })
 }
 
-/// Whether `gone` may be collapsed into `kept`.
+/// Returns whether `gone` may be collapsed into `kept` within the bounds on edge lengths, angles and valences.
 pub(super) fn may_collapse(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone: VertexId) -> bool {
     // The most frequent reasons for rejection first.
     if !may_move(mesh, bounds, kept, gone) {
@@ -193,7 +199,7 @@ pub(super) fn may_collapse(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone
         && [left, right].iter().all(|&w| mesh.ring(w).valence() > LEAST_VALENCE)
 }
 
-/// Whether collapsing `gone` into `kept` makes no edge too long and turns over no triangle.
+/// Returns whether collapsing `gone` into `kept` makes no edge too long and turns over no triangle.
 fn may_move(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone: VertexId) -> bool {
     let (to, from) = (mesh.position(kept), mesh.position(gone));
     let longest = bounds.max * bounds.max;
@@ -207,15 +213,16 @@ fn may_move(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone: VertexId) -> 
     })
 }
 
-/// Whether two normals of any positive length are within the angle by which a triangle may turn.
+/// Returns whether two normals of any positive length differ by less than the angle by which a triangle may turn.
 pub(super) fn faces_alike(before: Vec3, after: Vec3) -> bool {
     let cosine = before.dot(after);
-    // Squares avoid roots; the comparison is false for NaN.
+    // Squares avoid square roots; the comparison is false for NaN.
     cosine > 0.0
         && cosine * cosine > LEAST_COSINE * LEAST_COSINE * before.length_squared() * after.length_squared()
 }
 
-/// Splits edges longer than the upper bound at their midpoint, longest first, until none is left (figure 5) or the mesh has `most` vertices.
+/// Splits edges longer than the upper bound at their midpoint, longest first, until there are none (figure 5) or the
+/// mesh has `most` vertices.
 pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
     let longest = bounds.max * bounds.max;
@@ -246,7 +253,7 @@ pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut 
 /// Flips edges while that lowers Σ (valence − 6)² over the four corners around them (figure 6).
 pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
-    // Vertices whose edges may have become worth a flip since they were tested.
+    // Vertices whose edges have to be tested again since a flip changed valences near them.
     let mut stale = vec![true; mesh.slots()];
     for _ in 0..PASSES {
         let before = changes.inversions;
@@ -271,7 +278,7 @@ pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl Ed
     changes
 }
 
-/// Flips the edge if that lowers the sum, and marks the vertices of all edges with changed corners.
+/// Flips the edge if that lowers the valence sum, and marks the vertices of all edges with changed corners as stale.
 fn flip_if_wanted(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
@@ -312,7 +319,8 @@ fn wants_flip(
         && edits.may_flip(mesh, [u, v], [left, right])
 }
 
-/// Whether the new edge is within bounds, or nearer to them than the old one, and neither triangle turns over.
+/// Returns whether a flip is allowed: the new edge is within bounds, or nearer to them than the old one, and neither
+/// triangle turns over.
 pub(super) fn may_flip(mesh: &Mesh, bounds: EdgeBounds, ends: [VertexId; 2], across: [VertexId; 2]) -> bool {
     let [[p, q], [a, b]] = [ends, across].map(|pair| pair.map(|v| mesh.position(v)));
     let (old, new) = (p.distance_squared(q), a.distance_squared(b));
@@ -320,7 +328,7 @@ pub(super) fn may_flip(mesh: &Mesh, bounds: EdgeBounds, ends: [VertexId; 2], acr
     if new > longest && new >= old || new < shortest && new <= old {
         return false;
     }
-    // p q a and q p b become p b a and q a b.
+    // Triangles p q a and q p b become p b a and q a b.
     let before = [(q - p).cross(a - p), (b - p).cross(q - p)];
     let after = [(b - p).cross(a - p), (a - q).cross(b - q)];
     before.into_iter().all(|old| after.into_iter().all(|new| faces_alike(old, new)))

@@ -2,32 +2,37 @@
 
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
-/// The sampling density of a mesh.
+/// The sampling density of a mesh: δ and the bounds on edge length and contact distance derived from it, used by
+/// [`Resolver`](super::Resolver).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
     delta: f32,
-    /// The scalar attribute size − 1; 0 for new vertices without a source.
+    /// The scalar attribute that stores size − 1, where size is the local factor on δ; 0 for new vertices without a
+    /// source.
     sizes: Option<ScalarKey>,
 }
 
-/// Upper bound of an edge in δ, equation (2): above 2, so that halves of a split edge respect the lower bound.
+/// Upper bound of the edge length in δ, equation (2): above 2, so that the halves of a split edge respect the lower
+/// bound.
 const LONGEST: f32 = 2.5;
 
-/// Contact distance in δ, 2.5/√3, equation (3): the longest distance between a vertex passing through a triangle and the nearest corner.
+/// Contact distance in δ, 2.5/√3, equation (3): the longest distance between a vertex passing through a triangle and
+/// its nearest corner.
 const CONTACT: f32 = 1.443_375_7;
 
 impl Sampling {
-    /// Uniform sampling with δ, a positive length.
+    /// Creates a uniform sampling with δ = `delta`, a positive length.
     pub fn new(delta: f32) -> Self {
         Self { delta, sizes: None }
     }
 
-    /// The same with δ · (1 + scalar) at each vertex, by a scalar attribute above −1. Small parts are still measured by δ.
+    /// Returns this sampling with δ · (1 + scalar) at each vertex, read from a scalar attribute above −1. Small
+    /// components are still measured by δ.
     pub fn with_sizes(self, sizes: ScalarKey) -> Self {
         Self { sizes: Some(sizes), ..self }
     }
 
-    /// The sampling between two vertices.
+    /// Returns the uniform sampling that applies to a pair of vertices: δ scaled by the mean of their sizes.
     #[inline]
     pub(super) fn between(self, mesh: &Mesh, u: VertexId, v: VertexId) -> Self {
         let Some(sizes) = self.sizes else { return self };
@@ -35,25 +40,25 @@ impl Sampling {
         Self::new(self.delta * (1.0 + 0.5 * (of[u.index()] + of[v.index()])))
     }
 
-    /// δ, the lower bound of an edge (1).
+    /// Returns δ, the lower bound of the edge length (1).
     #[inline]
     pub fn shortest(self) -> f32 {
         self.delta
     }
 
-    /// 2.5 δ, the upper bound of an edge (2).
+    /// Returns 2.5 δ, the upper bound of the edge length (2).
     #[inline]
     pub fn longest(self) -> f32 {
         LONGEST * self.delta
     }
 
-    /// 2.5/√3 δ, the distance below which two non-adjacent vertices are in contact (3).
+    /// Returns 2.5/√3 δ, the distance below which two non-adjacent vertices are in contact (3).
     #[inline]
     pub fn contact(self) -> f32 {
         CONTACT * self.delta
     }
 
-    /// δ³, the volume below which a small closed part is a speck.
+    /// Returns δ³, the volume below which a small closed component is removed.
     #[inline]
     pub fn smallest_volume(self) -> f32 {
         self.delta * self.delta * self.delta

@@ -1,34 +1,35 @@
-//! Removal of small components: specks without volume, crushed ones, inverted ones.
+//! Removal of small components: those without volume, crushed ones and inverted ones.
 
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::triangle::solid_angle;
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, VertexId};
 
-/// Components with more vertices are never removed, whatever their volume; that of a cavity is negative.
+/// The largest number of vertices of a component that may be removed, whatever its volume; the volume of a cavity is
+/// negative.
 const LARGEST_SPECK: usize = 32;
 
-/// The volume of an icosahedron with edges of δ, in δ³: the smallest sphere that can be sampled.
+/// The volume of an icosahedron with edges of length δ, in δ³: the smallest sphere that can be sampled.
 const SMALLEST_BALL: f32 = 2.18;
 
-/// The components of a mesh small enough to vanish.
+/// The components of a mesh small enough to be removed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SmallParts {
-    /// A vertex of each, and whether it is solid, with a positive volume.
+    /// A vertex of each component, and whether it is solid, with a positive volume.
     parts: Vec<(VertexId, bool)>,
-    /// The topology version of the mesh they were found in.
+    /// The topology version of the mesh for which the list is valid.
     topology_version: Option<u32>,
 }
 
 impl SmallParts {
-    /// Finds the small parts, unless they are up to date.
+    /// Finds the small components, unless the list is up to date.
     pub(super) fn find(&mut self, mesh: &Mesh) {
         if self.topology_version != Some(mesh.topology_version()) {
             self.find_among(mesh, mesh.vertices());
         }
     }
 
-    /// Updates the small parts after edits of the components of `edited`.
+    /// Updates the small components after edits of the components of `edited`.
     fn find_again(&mut self, mesh: &Mesh, edited: &[VertexId]) {
         let known = std::mem::take(&mut self.parts);
         let members = known.into_iter().map(|(v, _)| v).chain(edited.iter().copied());
@@ -42,7 +43,7 @@ impl SmallParts {
             if seen[v.index()] {
                 continue;
             }
-            // If this is not all of a component, it belongs to a large one.
+            // A search that stops early is within a large component.
             let found = mesh.component_of(v, LARGEST_SPECK + 1);
             found.iter().for_each(|w| seen[w.index()] = true);
             if found.len() <= LARGEST_SPECK {
@@ -54,12 +55,12 @@ impl SmallParts {
 }
 
 impl Resolver {
-    /// Removes the component of `v` if it is a speck; returns whether it does not exist any more.
+    /// Removes the component of `v` if it is negligibly small; returns whether it no longer exists.
     ///
     /// It may have been removed before: the two sides of a cut handle are one component.
     ///
-    /// A speck has at most 32 vertices and less than δ³ of volume. One of negative volume would grow in empty space, unless `guide` finds a
-    /// hollow there.
+    /// Such a component has at most 32 vertices and a volume less than δ³. One of negative volume would grow in empty
+    /// space, unless `guide` finds a cavity there.
     pub(super) fn remove_speck(
         &mut self,
         mesh: &mut Mesh,
@@ -84,8 +85,9 @@ impl Resolver {
 
     /// Removes small components that were crushed or inverted by a move.
     ///
-    /// Where two sides are pressed on each other, vertices are held, no edge becomes short, and a component would stay for ever; so it is
-    /// removed if it is flat, or if none of its vertices could move. One so small can also be inverted between two states without
+    /// When two sides press against each other, vertices are held, no edge becomes short, and a component would persist
+    /// for ever. So it is removed if it is flat, if none of its vertices could move, or if more than half of them could
+    /// not and `guide` finds it empty. A component this small can also be inverted between two states without
     /// self-intersections, as when the apex of a tetrahedron passes through its base.
     pub(super) fn remove_crushed(
         &mut self,
@@ -113,8 +115,8 @@ impl Resolver {
         }
     }
 
-    /// Updates the small parts after the edits of a call, and removes cavities smaller than the smallest sphere: an edit may have inverted a
-    /// solid, which would grow in empty space.
+    /// Updates the small components after the edits of a call, and removes cavities smaller than the smallest sphere:
+    /// an edit may have inverted a solid, which would grow in empty space.
     pub(super) fn note_small_parts(
         &mut self,
         mesh: &mut Mesh,
@@ -141,7 +143,8 @@ impl Resolver {
         self.small.topology_version = Some(mesh.topology_version());
     }
 
-    /// Removes the component of `v` and, if it is small, those inside it, which would be on the wrong side of the surface around them.
+    /// Removes the component of `v` and, if it is small, the components inside it, which would otherwise be on the
+    /// wrong side of the surface around them.
     pub(super) fn remove_part(&mut self, mesh: &mut Mesh, v: VertexId) {
         let members = mesh.component_of(v, LARGEST_SPECK + 1);
         let within =
@@ -154,7 +157,7 @@ impl Resolver {
         }
     }
 
-    /// The vertices of other components inside a component.
+    /// Returns the vertices of other components that lie inside a component.
     fn vertices_within(&mut self, mesh: &Mesh, members: &[VertexId]) -> Vec<VertexId> {
         let positions: Vec<Vec3> = members.iter().map(|&v| mesh.position(v)).collect();
         let mut found = self.embedding.vertices_in(mesh, &Bounds::of(&positions));
@@ -162,7 +165,7 @@ impl Resolver {
         found
     }
 
-    /// Removes all specks and returns their number.
+    /// Removes all negligibly small components, and returns their number.
     pub fn sweep(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide) -> u32 {
         let before = self.changes.vanished;
         for members in mesh.component_members() {
@@ -172,7 +175,8 @@ impl Resolver {
     }
 }
 
-/// Whether a component with stuck vertices is crushed: flat, or all stuck, or more than half stuck and empty by `guide`.
+/// Returns whether a component with stuck vertices is crushed: flat, all stuck, or more than half stuck and empty
+/// according to `guide`.
 fn is_crushed(
     mesh: &Mesh,
     members: &[VertexId],
@@ -186,19 +190,20 @@ fn is_crushed(
     is_flat || stuck == members.len() || 2 * stuck > members.len() && is_empty()
 }
 
-/// The volume of a component that counts against its removal: positive for a hollow that `guide` confirms.
+/// Returns the signed volume of a component, as compared with the threshold of removal: positive for a cavity that
+/// `guide` confirms.
 fn kept_volume(mesh: &Mesh, members: &[VertexId], volume: f32, guide: &dyn TopologyGuide) -> f32 {
     if volume < 0.0 && guide.has_content(mesh, members, false) { -volume } else { volume }
 }
 
-/// Whether a point is inside a component.
+/// Returns whether a point is inside a component, by its solid angle.
 fn is_within(mesh: &Mesh, members: &[VertexId], p: Vec3) -> bool {
-    // 4π for points inside, 0 for points outside.
+    // The total is 4π for points inside, 0 for points outside.
     let angle: f64 = triangles(mesh, members).map(|corners| solid_angle(corners, p)).sum();
     angle.abs() > std::f64::consts::TAU
 }
 
-/// The corners of the triangles of a component, each once.
+/// Returns the corner positions of the triangles of a component, each triangle once.
 fn triangles(mesh: &Mesh, members: &[VertexId]) -> impl Iterator<Item = [Vec3; 3]> {
     members.iter().flat_map(move |&u| {
         let counted_here = mesh.ring(u).pairs().filter(move |&(a, b)| u < a && u < b);
@@ -206,7 +211,7 @@ fn triangles(mesh: &Mesh, members: &[VertexId]) -> impl Iterator<Item = [Vec3; 3
     })
 }
 
-/// The signed volume of a component; positive if its triangles face outwards.
+/// Returns the signed volume of a component; positive if its triangles face outwards.
 fn volume(mesh: &Mesh, members: &[VertexId]) -> f32 {
     let origin = mesh.position(members[0]);
     let below = |corners: [Vec3; 3]| {
@@ -348,7 +353,8 @@ mod tests {
         assert_shrinks_away(part, Sampling::new(1.324), 0.02);
     }
 
-    /// Regression: a solid in a small hollow lay in matter after that was removed (deformable fuzz, seed 21981).
+    /// Regression: a solid inside a small cavity was left in the foreground after the cavity was removed (deformable
+    /// fuzz, seed 21981).
     #[test]
     fn what_is_within_a_part_vanishes_with_it() {
         let (mut both, hollow) = nested();
@@ -358,7 +364,7 @@ mod tests {
         assert!(both.vertices().all(|v| both.position(v).x > 1.0));
     }
 
-    /// The inner component is in the list of small parts after the one it is removed with.
+    /// The inner component is listed after the one with which it is removed.
     #[test]
     fn parts_that_vanished_with_others_are_not_asked_for_again() {
         let (mut both, hollow) = nested();
@@ -369,7 +375,7 @@ mod tests {
         assert_eq!(both.vertex_count(), 12);
     }
 
-    /// A solid in a hollow, and another solid beside them; with the vertices of the hollow.
+    /// Returns a solid in a cavity, and another solid beside them, with the vertices of the cavity.
     fn nested() -> (Mesh, Vec<VertexId>) {
         let mut hollow = Mesh::icosahedron(Vec3::ZERO, 1.0).to_triangles();
         hollow.triangles.iter_mut().for_each(|t| t.swap(1, 2));
@@ -380,7 +386,7 @@ mod tests {
         (both, members)
     }
 
-    /// In steps of a share of δ.
+    /// Asserts that a component shrinks and is removed, in steps of `share` times δ.
     fn assert_shrinks_away(mut part: Mesh, sampling: Sampling, share: f32) {
         for _ in 0..20 {
             let normals = part.to_triangles().vertex_normals();

@@ -1,9 +1,9 @@
-//! The neighbourhood of a set of points, as grid cells.
+//! Grid cells that cover a neighbourhood of a set of points.
 
 use crate::math::Vec3;
 use std::collections::BTreeSet;
 
-/// The cells of a grid that contain a point or are adjacent to one that does.
+/// The cells of a regular grid that contain a point of a set or are adjacent to such a cell.
 #[derive(Clone, Debug)]
 pub struct CellSet {
     side: f32,
@@ -11,12 +11,12 @@ pub struct CellSet {
 }
 
 impl CellSet {
-    /// An empty set of cells with the given side.
+    /// Creates an empty set of cells of edge length `side`.
     pub fn new(side: f32) -> Self {
         Self { side, cells: BTreeSet::new() }
     }
 
-    /// Adds the cell of a point and the 26 around it.
+    /// Adds the cell that contains a point and its 26 adjacent cells.
     pub fn add(&mut self, p: Vec3) {
         let at: [i32; 3] = self.cell(p);
         for k in 0..27 {
@@ -25,7 +25,7 @@ impl CellSet {
         }
     }
 
-    /// Whether a point is in one of the cells. All points within one side of an added point are.
+    /// Returns whether a point is in one of the cells; always true within distance `side` of an added point.
     pub fn contains(&self, p: Vec3) -> bool {
         self.cells.contains(&self.cell(p))
     }

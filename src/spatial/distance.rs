@@ -1,34 +1,38 @@
-//! The distance between two surfaces.
+//! Distances between two surfaces, for comparing meshes.
 
 use super::TriangleTree;
 use crate::math::order::{rank_f64, sort_by_rank};
 use crate::math::triangle;
 use crate::mesh::{MeshError, TriangleMesh};
 
-/// Distances between two surfaces, in the units of the meshes. All but `per_vertex` are symmetric, to the bit.
+/// Distances between two surfaces, in the length unit of the meshes. All except `per_vertex` are symmetric, bit for
+/// bit.
 ///
-/// One-way distances are from the vertices of one mesh to the surface of the other, weighted by a third of the area of the triangles
-/// around each vertex. Vertices without triangles are left out. Between its vertices a surface may be further away, by an edge at most.
+/// One-way distances are measured from the vertices of one mesh to the surface of the other and weighted by a third of
+/// the area of the triangles around each vertex. Unused vertices are ignored. Between vertices, a surface may be
+/// further away, by at most an edge length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceDistance {
     /// The unsigned distance of each vertex of the first mesh from the second surface.
     pub per_vertex: Vec<f64>,
-    /// The mean of the two one-way means.
+    /// The mean distance: the average of the two one-way means.
     pub mean: f64,
-    /// The root mean square of both ways.
+    /// The root mean square of the distances of both ways.
     pub rms: f64,
-    /// The larger of the two one-way 95th percentiles by area.
+    /// The larger one of the two area-weighted one-way 95th percentiles.
     pub p95: f64,
-    /// The Hausdorff distance, measured at vertices.
+    /// The Hausdorff distance, evaluated at the vertices.
     pub hausdorff: f64,
 }
 
-/// The distance between two surfaces. O(n log n), except for parts equally far from everything: each vertex of a speck at the centre of a
-/// sphere visits every triangle.
+/// Measures the distance between two surfaces, from each to the other.
+///
+/// O(n log n), except for parts equally far from everything: each vertex of a speck at the centre of a sphere visits
+/// every triangle.
 ///
 /// # Errors
-/// [`MeshError::InvalidArgument`] if either (`mesh` is the first, `other` the second) has no triangle, an invalid index, or a position that
-/// is not finite.
+/// [`MeshError::InvalidArgument`] if either (parameter `mesh` is the first, `other` the second) has no triangle, or if
+/// [`TriangleMesh::validate`] fails for it.
 pub fn surface_distance(mesh: &TriangleMesh, other: &TriangleMesh) -> Result<SurfaceDistance, MeshError> {
     not_empty("mesh", mesh)?;
     not_empty("other", other)?;
@@ -52,12 +56,12 @@ fn not_empty(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MeshErr
 }
 
 fn one_way(mesh: &TriangleMesh, surface: &TriangleTree) -> Vec<f64> {
-    // The tree has triangles, and positions are finite.
+    // There is a closest point unless `p` is not finite; such a mesh is rejected when its own tree is built.
     let distance = |p| surface.closest(p).map_or(0.0, |nearest| nearest.distance);
     mesh.positions.iter().map(|&p| distance(p)).collect()
 }
 
-/// One-way distances.
+/// Statistics of one-way distances, weighted by area.
 struct Summary {
     mean: f64,
     mean_square: f64,
@@ -84,7 +88,8 @@ impl Summary {
     }
 }
 
-/// By vertex, a third of the area of the triangles around it; `None` without triangles. Uniform if the total area is 0.
+/// Returns the weight of each vertex: a third of the area of the triangles around it, `None` if it is unused. Uniform
+/// if the total area is 0.
 fn weights(mesh: &TriangleMesh) -> Vec<Option<f64>> {
     let mut weights = vec![None; mesh.positions.len()];
     for (triangle, corners) in mesh.triangles.iter().zip(mesh.corners()) {
@@ -109,7 +114,7 @@ mod tests {
         Mesh::icosphere(Vec3::ZERO, radius, edge).unwrap().to_triangles()
     }
 
-    /// The square from the origin to (1, 1) at a height, in two triangles.
+    /// Returns the unit square from the origin to (1, 1) at height `z`, in two triangles.
     fn square(z: f32) -> TriangleMesh {
         TriangleMesh {
             positions: [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
@@ -134,7 +139,7 @@ mod tests {
             (there.per_vertex.len(), back.per_vertex.len()),
             (inner.positions.len(), outer.positions.len())
         );
-        // The flat triangles lie up to h² / 8 inside their sphere.
+        // The triangles are up to h² / 8 inside their sphere, for edges of length h.
         for d in there.per_vertex.iter().chain(&back.per_vertex).chain(&summaries(&there)) {
             assert!((d - 0.25).abs() < 0.1 * 0.1 / 7.0, "{d}");
         }
@@ -158,7 +163,7 @@ mod tests {
         assert_eq!(summaries(&found), [2.0; 4]);
     }
 
-    /// One corner pulled up, of a sixth of the area one way and of little more the other.
+    /// One corner is raised. Its weight is a sixth of the area in one direction and slightly more in the other.
     #[test]
     fn means_are_by_area_and_both_ways() {
         let mut bent = square(0.0);
@@ -166,7 +171,7 @@ mod tests {
         let (flat, bent) = (square(0.0), bent);
         let found = surface_distance(&flat, &bent).unwrap();
         let side = 0.5_f64.sqrt();
-        // Down from (1, 0, 1), and to the plane through the diagonal from (1, 0, 0).
+        // From (1, 0, 1) to the square, and from (1, 0, 0) to the plane through the diagonal.
         let (up, down) = (1.0, side / 1.5_f64.sqrt());
         assert!((found.per_vertex[1] - down).abs() < 1e-7 && found.per_vertex[0] == 0.0);
         let bent_area = 0.5 * 1.5_f64.sqrt() * 2.0_f64.sqrt();
@@ -180,7 +185,7 @@ mod tests {
     fn the_percentile_leaves_a_twentieth_out() {
         let mesh = sphere(1.0, 0.1);
         let mut dented = mesh.clone();
-        // A cap of height h has the share h / 2 of a sphere; pulled out it grows by its wall.
+        // A cap of height h has the fraction h / 2 of the area of a sphere; raised, it also gains a rim.
         let dent = |height: f32| {
             move |p: &mut Vec3| {
                 if p.z > 1.0 - 2.0 * height {

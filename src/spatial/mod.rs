@@ -1,4 +1,5 @@
-//! Spatial queries: points by points, triangles by points, rays and planes, surfaces by surfaces.
+//! Spatial queries: neighbours of points, pairs of vertices near each other, closest points and ray intersections of
+//! surfaces, cross-sections, and distances between surfaces.
 
 mod cells;
 mod distance;

@@ -1,44 +1,45 @@
-//! A hashed grid of points, added one by one.
+//! A hashed grid of points with incremental insertion.
 
 use crate::math::Vec3;
 use crate::math::order::by_both;
 
-/// No point.
+/// The end of a bucket's list of points.
 const NONE: u32 = u32::MAX;
 
-/// Points by cell. Cells are hashed into buckets, so empty space costs nothing.
+/// A hashed grid of points, for fixed-radius and nearest-neighbour queries. Cells are hashed into buckets, so that
+/// empty space needs no memory.
 #[derive(Clone, Debug)]
 pub struct PointGrid {
     cell: f32,
     points: Vec<Vec3>,
-    /// By bucket, the head of its list: the point added last.
+    /// By bucket, the head of its list: the point inserted last.
     heads: Vec<u32>,
-    /// By point, the next in the list of its bucket.
+    /// By point, the next point in the list of its bucket.
     next: Vec<u32>,
 }
 
 impl Default for PointGrid {
-    /// An empty grid for a few points about 1 apart.
+    /// Creates an empty grid for a few points about 1 apart.
     fn default() -> Self {
         Self::new(1.0, 0)
     }
 }
 
 impl PointGrid {
-    /// An empty grid with cells of edge `cell`, for about `expected` points.
+    /// Creates an empty grid with cells of side `cell`, for about `expected` points.
     pub fn new(cell: f32, expected: usize) -> Self {
         let buckets = (2 * expected).next_power_of_two().max(16);
         Self { cell, points: Vec::new(), heads: vec![NONE; buckets], next: Vec::new() }
     }
 
-    /// A grid of `points`, with their indices.
+    /// Creates a grid with cells of side `cell` that contains `points`, identified by their indices.
     pub fn of(points: &[Vec3], cell: f32) -> Self {
         let mut grid = Self::new(cell, points.len());
         points.iter().for_each(|&p| grid.insert(p));
         grid
     }
 
-    /// Adds a finite point; its index is the number of points before it.
+    /// Inserts a finite point; its index is the number of points inserted before.
     pub fn insert(&mut self, p: Vec3) {
         let bucket = self.bucket(self.cell_of(p));
         self.next.push(self.heads[bucket]);
@@ -46,13 +47,13 @@ impl PointGrid {
         self.points.push(p);
     }
 
-    /// All points, by index.
+    /// Returns all points, ordered by index.
     pub fn points(&self) -> &[Vec3] {
         &self.points
     }
 
-    /// Visits the points within `radius` of `p` with their squared distances, until `visit` returns false. The order is unspecified but
-    /// deterministic.
+    /// Calls `visit` with the index and squared distance of every point within `radius` of `p`, until it returns false.
+    /// The order is unspecified but deterministic.
     pub fn within(&self, p: Vec3, radius: f32, mut visit: impl FnMut(u32, f32) -> bool) {
         let [low, high] = [-radius, radius].map(|reach| self.cell_of(p + Vec3::splat(reach)));
         for z in low[2]..=high[2] {
@@ -66,7 +67,7 @@ impl PointGrid {
         }
     }
 
-    /// Whether a point is within `radius` of `p`.
+    /// Returns whether any point is within `radius` of `p`.
     pub fn has_within(&self, p: Vec3, radius: f32) -> bool {
         let mut found = false;
         self.within(p, radius, |_, _| {
@@ -76,14 +77,14 @@ impl PointGrid {
         found
     }
 
-    /// The `count` points nearest to `p`, or all if there are fewer, with their squared distances: nearest first, ties by index. Searches
-    /// within `radius` first, then further.
+    /// Returns the `count` nearest points to `p`, or all if there are fewer, as pairs of squared distance and index,
+    /// sorted by distance, then index. `radius` is the initial search radius, which is increased as needed.
     pub fn nearest(&self, p: Vec3, count: usize, radius: f32) -> Vec<(f32, u32)> {
         let mut found = Vec::new();
-        // A radius of 0 would not grow.
+        // A radius of 0 could not be increased by a factor.
         let mut reach = if radius > 0.0 { radius } else { self.cell };
         loop {
-            // Visiting this many cells takes longer than visiting all points. With a cell of 0 their number is not finite.
+            // With too many cells it is faster to visit all points. With a cell side of 0 their number is not finite.
             let across = 2.0 * reach / self.cell;
             let few = across * across * across <= 8.0 * self.points.len() as f32;
             found.clear();
@@ -106,7 +107,7 @@ impl PointGrid {
             ranked.truncate(count);
         }
         ranked.sort_unstable();
-        // The bits of non-negative numbers are ordered like the numbers.
+        // Bits of non-negative numbers are ordered like the numbers.
         ranked.into_iter().map(|rank| (f32::from_bits((rank >> 32) as u32), rank as u32)).collect()
     }
 
@@ -152,7 +153,7 @@ mod tests {
     fn points(count: usize) -> Vec<Vec3> {
         let mut random = Random::new(4);
         let mut unit = || random.bits() as f32 / 4_294_967_296.0;
-        // Even ones, then a distant cluster, then some equal ones.
+        // Uniformly distributed points, a distant cluster, and duplicates.
         let mut all: Vec<Vec3> = (0..count).map(|_| Vec3::new(unit(), unit(), unit()) * 2.0 - 1.0).collect();
         all.extend((0..count / 4).map(|_| Vec3::new(9.0 + 1e-4 * unit(), -3.0, 1e-4 * unit())));
         all.extend_from_within(..3);

@@ -1,13 +1,14 @@
-//! The cross-section of a surface by a plane.
+//! Cross-sections of surfaces by planes.
 
 use crate::math::{DVec3, Vec3};
 use crate::mesh::TriangleMesh;
 
-/// The segments in which the plane through `origin` intersects the surface, in the order of the triangles.
+/// Returns the line segments in which the plane through `origin` intersects the surface, in the order of the triangles.
 ///
-/// A vertex exactly on the plane counts as just above it, so that triangles with a common edge agree to the bit: segments of a closed mesh
-/// form closed loops. The inside is on the left of each segment, seen against `normal`. Segments without length, where the surface only
-/// touches the plane, are left out. Empty if `normal` is zero, or if it or `origin` is not finite. Indices must be valid.
+/// Vertices exactly on the plane count as above it. Triangles with a common edge yield bitwise equal end points on it,
+/// so that the segments of a closed mesh form closed loops. Seen from the side to which `normal` points, the inside is
+/// on the left of each segment. Segments of length 0, where the surface only touches the plane, are omitted. Empty if
+/// `normal` is zero, or if it or `origin` is not finite. Indices must be valid.
 pub fn cross_section(mesh: &TriangleMesh, origin: Vec3, normal: Vec3) -> Vec<[Vec3; 2]> {
     let (origin, normal) = (origin.as_dvec3(), normal.as_dvec3());
     if !origin.is_finite() || !normal.is_finite() || normal == DVec3::ZERO {
@@ -25,7 +26,7 @@ pub fn cross_section(mesh: &TriangleMesh, origin: Vec3, normal: Vec3) -> Vec<[Ve
     segments.filter(|[p, q]| p != q).collect()
 }
 
-/// The corner alone on its side, if the corners are on two sides.
+/// Returns the index of the corner that is alone on its side of the plane, `None` if all are on the same side.
 fn lone_corner([a, b, c]: [bool; 3]) -> Option<usize> {
     match (a == b, b == c) {
         (true, true) => None,
@@ -35,7 +36,7 @@ fn lone_corner([a, b, c]: [bool; 3]) -> Option<usize> {
     }
 }
 
-/// The intersection of an edge and the plane, the same for both directions of the edge.
+/// Returns the intersection of an edge with the plane; it does not depend on the direction of the edge.
 fn cut(mesh: &TriangleMesh, heights: &[f64], from: u32, to: u32) -> Vec3 {
     let (low, high) = (from.min(to) as usize, from.max(to) as usize);
     let fraction = heights[low] / (heights[low] - heights[high]);
@@ -48,7 +49,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// The octahedron |x| + |y| + |z| = 1.
+    /// Returns the octahedron |x| + |y| + |z| = 1.
     fn octahedron() -> TriangleMesh {
         let quarter = |[x, y]: [u32; 2]| [[x, y, 4], [y, x, 5]];
         TriangleMesh {
@@ -58,7 +59,7 @@ mod tests {
         }
     }
 
-    /// Whether every segment starts where another ends.
+    /// Returns whether every segment starts where another ends.
     fn closes(segments: &[[Vec3; 2]]) -> bool {
         let sorted = |end: usize| {
             let mut points: Vec<_> = segments.iter().map(|s| s[end].to_array().map(f32::to_bits)).collect();
@@ -68,7 +69,7 @@ mod tests {
         sorted(0) == sorted(1)
     }
 
-    /// Twice the area to the left of the segments, seen against `normal`.
+    /// Returns twice the area to the left of the segments, seen from the side to which `normal` points.
     fn doubled_area(segments: &[[Vec3; 2]], normal: Vec3) -> f32 {
         segments.iter().map(|[p, q]| p.cross(*q).dot(normal)).sum()
     }

@@ -1,15 +1,15 @@
-//! The closest point on a closed surface, by a walk from a nearby triangle (Kobbelt, Bareuther & Seidel, *Multiresolution shape deformations
-//! for meshes with dynamic vertex connectivity*, section 8).
+//! Closest points on a closed surface, found by walking from a nearby triangle (Kobbelt, Bareuther & Seidel,
+//! *Multiresolution shape deformations for meshes with dynamic vertex connectivity*, section 8).
 
 use super::{SurfacePoint, TriangleTree};
 use crate::math::{DVec3, Vec3, triangle};
 use crate::mesh::{MeshError, TriangleMesh};
 use std::cell::OnceCell;
 
-/// A static surface onto which many points are projected, each near the one before.
+/// A static surface for projecting many points, each near the previous one.
 ///
-/// A walk goes to neighbours as long as they are nearer, so it ends at a local minimum of the distance. Where that may not be the global one
-/// [`Self::closest`] queries a tree, which is built when first needed.
+/// A walk proceeds to adjacent triangles as long as they are closer, so it ends at a local minimum of the distance. If
+/// this may not be the global minimum, use [`Self::closest`], which queries a tree that is built on first use.
 #[derive(Clone, Debug)]
 pub struct SurfaceWalker {
     mesh: TriangleMesh,
@@ -19,46 +19,46 @@ pub struct SurfaceWalker {
 }
 
 impl SurfaceWalker {
-    /// For the surface of a closed, oriented manifold mesh.
+    /// Creates a walker on a closed, oriented manifold mesh.
     ///
     /// # Errors
-    /// As [`TriangleMesh::validate`]; [`MeshError::NotClosed`] if an edge has one triangle only.
+    /// As [`TriangleMesh::validate`]; [`MeshError::NotClosed`] if an edge has only one triangle.
     pub fn new(mesh: TriangleMesh) -> Result<Self, MeshError> {
         mesh.validate()?;
         let across = neighbours(&mesh)?;
         Ok(Self { mesh, across, tree: OnceCell::new() })
     }
 
-    /// The mesh.
+    /// Returns the mesh of the surface.
     pub fn mesh(&self) -> &TriangleMesh {
         &self.mesh
     }
 
-    /// The corners of a triangle.
+    /// Returns the corner positions of a triangle.
     #[inline]
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
         self.mesh.triangles[triangle as usize].map(|v| self.mesh.positions[v as usize])
     }
 
-    /// Interpolates values by vertex at a point.
+    /// Interpolates values given per vertex at a point of the surface, by its barycentric coordinates.
     #[inline]
     pub fn blend(&self, values: &[Vec3], at: &SurfacePoint) -> Vec3 {
         let [a, b, c] = self.mesh.triangles[at.triangle as usize].map(|v| values[v as usize]);
         a * at.barycentric.x + b * at.barycentric.y + c * at.barycentric.z
     }
 
-    /// The point closest to `p`; `None` if `p` is not finite.
+    /// Returns the closest point to `p` on the whole surface, by a tree query; `None` if `p` is not finite.
     pub fn closest(&self, p: Vec3) -> Option<SurfacePoint> {
         self.tree().closest(p)
     }
 
-    /// The tree of its triangles.
+    /// Returns the bounding volume hierarchy of the triangles, built on first use.
     pub fn tree(&self) -> &TriangleTree {
-        // The mesh was validated before.
+        // This cannot fail: `new` has validated the mesh.
         self.tree.get_or_init(|| TriangleTree::new(&self.mesh).unwrap_or_else(|_| TriangleTree::empty()))
     }
 
-    /// The closest point by testing every triangle, for a single point without a tree.
+    /// Returns the closest point to `p` by testing every triangle, for a single query without building the tree.
     pub fn closest_of_all(&self, p: Vec3) -> Option<SurfacePoint> {
         let found = |t: u32| self.nearest_on(t, p);
         (0..self.mesh.triangles.len() as u32)
@@ -68,7 +68,7 @@ impl SurfaceWalker {
             .map(|found| self.point(&found))
     }
 
-    /// A local minimum of the distance to `p`, by a walk from the triangle `start`.
+    /// Returns a local minimum of the distance to `p`, found by walking over the surface from the triangle `start`.
     pub fn march(&self, start: u32, p: Vec3) -> SurfacePoint {
         let mut here = self.nearest_on(start, p);
         while let Some(next) = self.step(&here, p) {
@@ -77,7 +77,8 @@ impl SurfaceWalker {
         self.point(&here)
     }
 
-    /// The closest point on the triangles at the edge or corner that the current one is on, if it is nearer.
+    /// Returns the closest point on the triangles that share the edge or corner on which `here` lies, if it is strictly
+    /// closer.
     fn step(&self, here: &Nearest, p: Vec3) -> Option<Nearest> {
         let weights = here.barycentric.to_array();
         let zeros = weights.iter().filter(|&&weight| weight == 0.0).count();
@@ -89,18 +90,18 @@ impl SurfaceWalker {
             }
             _ => self.nearest_around(here.triangle, weights.iter().position(|&weight| weight > 0.0)?, p),
         };
-        // Strictly nearer, so that the walk ends.
+        // Strictly closer, so that the walk terminates.
         (best.square < here.square).then_some(best)
     }
 
-    /// The closest point on the triangles around a corner.
+    /// Returns the closest point on the triangles around a corner of the triangle `start`.
     fn nearest_around(&self, start: u32, corner: usize, p: Vec3) -> Nearest {
         let hub = self.mesh.triangles[start as usize][corner];
         let mut best = self.nearest_on(start, p);
         let (mut t, mut k) = (start, corner);
-        // On a manifold the loop ends earlier.
+        // Bounded, in case the mesh is not a manifold.
         for _ in 0..self.across.len() {
-            // Across the edge from the centre to the next corner.
+            // Cross the edge from the centre to the next corner.
             t = self.across[t as usize][(k + 2) % 3];
             if t == start {
                 break;
@@ -137,11 +138,11 @@ impl SurfaceWalker {
 struct Nearest {
     triangle: u32,
     barycentric: DVec3,
-    /// The squared distance.
+    /// The squared distance from the query point.
     square: f64,
 }
 
-/// By triangle, the triangles across the edges opposite its corners.
+/// Returns for each triangle the triangles across the edges opposite its corners.
 fn neighbours(mesh: &TriangleMesh) -> Result<Vec<[u32; 3]>, MeshError> {
     let (first, sides) = sides_by_start(mesh);
     let across = |from: u32, to: u32| {
@@ -159,7 +160,8 @@ fn neighbours(mesh: &TriangleMesh) -> Result<Vec<[u32; 3]>, MeshError> {
     all.collect()
 }
 
-/// The half-edges by their start vertex: the first of each vertex, and all as pairs of end vertex and triangle.
+/// Returns the half-edges sorted by start vertex: the index of the first one of each vertex, and all as pairs of end
+/// vertex and triangle.
 fn sides_by_start(mesh: &TriangleMesh) -> (Vec<u32>, Vec<(u32, u32)>) {
     let mut first = vec![0_u32; mesh.positions.len() + 1];
     mesh.triangles.iter().flatten().for_each(|&v| first[v as usize + 1] += 1);

@@ -1,34 +1,38 @@
-//! Sweep and prune: all pairs of vertex balls that are near each other.
+//! Sweep and prune: all pairs of vertex balls near each other, for the broad phase over a whole mesh.
 //!
-//! Balls are grouped into classes by size. Each class is swept against itself, then against the smaller balls around it, so that the many
-//! tiny balls beside a huge one are not all compared with each other. In a class, space is cut into columns as wide as its reach. Balls are
-//! sorted by column and height, and each is compared with those of neighbouring columns at its height. All of it lies in flat arrays, and
-//! each pair is visited once.
+//! Balls are grouped into classes by size. Each class is tested against itself, then against the smaller balls around
+//! it, so that the many tiny balls beside a huge one are not all compared with each other. For each class, the xy-plane
+//! is divided into columns as wide as the search distance of the class. Balls are sorted by column and height (z), and
+//! each is compared with those of adjacent columns at its height. All data is in flat arrays, and each pair is visited
+//! once.
 
 use super::vertex_grid::{Proximity, VertexBall};
 use crate::math::order::{by_both, rank, sort_by_rank};
 
-/// The largest balls of the first class, in the ball in the middle. With less, the few long edges of an ordinary mesh need
-/// a class of their own; with more, all of its columns are wide because of them.
+/// The radius bound of the first class, as a multiple of the median radius. If smaller, the few long edges of an
+/// ordinary mesh need a class of their own; if larger, they make all columns of the first class wide.
 const FIRST: f32 = 1.6;
 
-/// The ratio of the largest balls of consecutive classes. A smaller one gives more classes, a larger one more pairs to reject.
+/// The ratio of the radius bounds of consecutive classes. If smaller, there are more classes; if larger, more pairs are
+/// tested and rejected.
 const FACTOR: f32 = 4.0;
 
-/// The width of columns in the reach of their class: balls more than a column apart are out of reach in spite of rounding.
+/// The width of columns, as a multiple of the search distance of their class; above 1, so that balls in non-adjacent
+/// columns are out of reach in spite of rounding.
 const WIDER: f64 = 1.001;
 
-/// The last column in both directions, so that all have neighbours. At this distance from the origin a column is finer than single
-/// precision resolves, unless its balls are.
+/// The largest absolute column index, so that adjacent indices do not overflow. At this distance from the origin,
+/// columns are narrower than the spacing of single-precision numbers.
 const LAST: f64 = 1_073_741_824.0;
 
-/// The number of empty columns per ball up to which columns are sorted by counting.
+/// The largest number of columns per ball, including empty ones, for which a counting sort is used.
 const MOST_EMPTY: usize = 8;
 
-/// Bits of the filter per column around a large ball; with fewer, more small balls pass in vain.
+/// The number of bits of the [`Filter`] per column near a large ball; with fewer, more small balls pass it needlessly.
 const BITS: usize = 8;
 
-/// Calls `found` once with every pair of `balls` within [`Proximity::between`]. The order is unspecified but deterministic.
+/// Calls `found` once with every pair of `balls` whose distance is at most [`Proximity::between`]. The order is
+/// unspecified but deterministic.
 pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut(&VertexBall, &VertexBall)) {
     let mut bound = FIRST * middle(&balls);
     let (mut smaller, mut left) = (Vec::new(), balls);
@@ -45,7 +49,7 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
     }
 }
 
-/// The median radius, above 0.
+/// Returns the median radius, but at least the smallest positive normal number.
 fn middle(balls: &[VertexBall]) -> f32 {
     let mut sizes: Vec<f32> = balls.iter().map(|ball| ball.longest).collect();
     let half = sizes.len() / 2;
@@ -56,7 +60,7 @@ fn middle(balls: &[VertexBall]) -> f32 {
     if middle > f32::MIN_POSITIVE { middle } else { f32::MIN_POSITIVE }
 }
 
-/// Finds the pairs within a class, and those with smaller balls.
+/// Finds the near pairs within a class, and those of its balls with smaller balls.
 fn sweep_class(
     class: &[VertexBall],
     smaller: &[VertexBall],
@@ -81,7 +85,7 @@ fn sweep_class(
     }
 }
 
-/// The inverse of the width of columns.
+/// The width of columns, stored as its inverse.
 #[derive(Clone, Copy)]
 struct Width(f64);
 
@@ -96,14 +100,15 @@ impl Width {
     }
 }
 
-/// The next integer below; a call of `f64::floor` is slow on processors taken for older than they are.
+/// Returns the largest integer not above `x`; faster than `f64::floor` when compiled for an older instruction set.
 #[inline]
 fn floor(x: f64) -> i32 {
     let whole = x as i32;
     whole - i32::from(f64::from(whole) > x)
 }
 
-/// The indices of `places`, sorted: by counting if they are as dense as the columns of a mesh, which is several times as fast.
+/// Returns the indices that sort `places`, columns of balls. A counting sort, several times as fast, is used if the
+/// columns are as densely occupied as those of a mesh.
 fn in_order_of_columns(places: &[[i32; 2]]) -> Vec<u32> {
     let extent = |axis: usize| {
         let of_axis = || places.iter().map(|place| i64::from(place[axis]));
@@ -139,7 +144,7 @@ fn in_order_of_columns(places: &[[i32; 2]]) -> Vec<u32> {
 /// Balls sorted by column, then by height.
 struct Columns {
     balls: Vec<VertexBall>,
-    /// The columns, sorted, each with the index of its first ball; and one more at the end.
+    /// The occupied columns in order, each with the index of its first ball, and a sentinel at the end.
     columns: Vec<([i32; 2], usize)>,
 }
 
@@ -181,7 +186,7 @@ impl Columns {
         &self.balls[self.columns[k].1..self.columns[k + 1].1]
     }
 
-    /// Visits the pairs in one column or in adjacent ones whose heights differ by at most `reach`.
+    /// Visits the pairs in the same or adjacent columns whose heights differ by at most `reach`.
     fn pairs(&self, reach: f32, test: &mut impl FnMut(&VertexBall, &VertexBall)) {
         let mut row = 0;
         for k in 0..self.count() {
@@ -198,7 +203,8 @@ impl Columns {
         }
     }
 
-    /// Visits the pairs with the balls of `other`, in the same column or in adjacent ones.
+    /// Visits the pairs of own balls and balls of `other` in the same or adjacent columns whose heights differ by at
+    /// most `reach`.
     fn pairs_with(&self, other: &Self, reach: f32, test: &mut impl FnMut(&VertexBall, &VertexBall)) {
         let mut rows = [0; 3];
         for k in 0..self.count() {
@@ -209,8 +215,8 @@ impl Columns {
         }
     }
 
-    /// Visits the pairs of `balls` with those of the column `[x, y]` and of the two adjacent along y. `row` is at or before the first of the
-    /// three, and is moved there: columns are visited in order.
+    /// Visits the pairs of `balls` with those of the columns `[x, y − 1]` to `[x, y + 1]`. `row` is an index at or
+    /// before the first of these columns and is advanced to it; columns are visited in order.
     fn meet_row(
         &self,
         balls: &[VertexBall],
@@ -230,7 +236,7 @@ impl Columns {
     }
 }
 
-/// Visits the pairs of two columns, both sorted by height.
+/// Visits the pairs of two columns whose heights differ by at most `reach`; both columns are sorted by height.
 #[inline]
 fn meet(
     balls: &[VertexBall],
@@ -248,7 +254,7 @@ fn meet(
     }
 }
 
-/// A filter that rejects most columns not adjacent to any of a set.
+/// A Bloom filter of the columns in or adjacent to a set of columns; it rejects most others.
 struct Filter {
     bits: Vec<u64>,
     mask: u32,
@@ -290,7 +296,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Balls in a box or on a sheet, some far from the rest, some at the same place; ordinary ones, tiny ones, huge ones.
+    /// Returns random balls in a box or on a plane, some outliers, some coincident, of ordinary, tiny and huge size.
     fn balls(random: &mut Random) -> Vec<VertexBall> {
         let middle = Vec3::splat([0.0, 5.0, 3e3, -2e6][random.below(4) as usize]);
         let flat = [Vec3::ONE, Vec3::new(1.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0)][random.below(3) as usize];

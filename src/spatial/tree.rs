@@ -1,34 +1,36 @@
-//! A bounding volume hierarchy of triangles: closest points and ray intersections.
+//! A bounding volume hierarchy of triangles, for closest-point and ray queries.
 
 use crate::math::triangle::{self, Line, LineHit};
 use crate::math::{Bounds, BoxTree, DVec3, Ray, Vec3};
 use crate::mesh::{MeshError, TriangleMesh};
 
-/// A tree of the triangles of a static mesh.
+/// A bounding volume hierarchy of the triangles of a static mesh.
 #[derive(Clone, Debug)]
 pub struct TriangleTree {
     boxes: BoxTree,
     corners: Vec<[Vec3; 3]>,
 }
 
-/// A point on a surface and its distance from a query.
+/// A point on a surface found by a query, with its distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// The index of the triangle; the lowest if the point is on several.
+    /// The index of a triangle that contains the point; a query of [`TriangleTree`] returns the lowest.
     pub triangle: u32,
-    /// Barycentric coordinates: not negative, with a sum of 1.
+    /// The barycentric coordinates in the triangle: not negative, with a sum of 1.
     pub barycentric: Vec3,
-    /// Its position.
+    /// The position of the point.
     pub point: Vec3,
-    /// The distance from the query point or the origin of the ray, in the units of the mesh.
+    /// The distance from the query point, or the signed distance from the origin of the ray or line, in the length unit
+    /// of the mesh.
     pub distance: f64,
 }
 
 impl TriangleTree {
-    /// The tree of the mesh's triangles.
+    /// Creates the tree of the triangles of a mesh.
     ///
     /// # Errors
-    /// [`MeshError::InvalidArgument`] for indices out of range and positions that are not finite.
+    /// As [`TriangleMesh::validate`], for example [`MeshError::InvalidArgument`] for an invalid index or a position
+    /// that is not finite.
     pub fn new(mesh: &TriangleMesh) -> Result<Self, MeshError> {
         mesh.validate()?;
         let corners: Vec<_> = mesh.corners().collect();
@@ -36,12 +38,12 @@ impl TriangleTree {
         Ok(Self { boxes: BoxTree::new(&bounds), corners })
     }
 
-    /// A tree over nothing.
+    /// Creates a tree without triangles.
     pub(super) fn empty() -> Self {
         Self { boxes: BoxTree::default(), corners: Vec::new() }
     }
 
-    /// The point of the surface closest to `p`; `None` without triangles, or if `p` is not finite.
+    /// Returns the closest point of the surface to `p`; `None` without triangles, or if `p` is not finite.
     pub fn closest(&self, p: Vec3) -> Option<SurfacePoint> {
         if !p.is_finite() {
             return None;
@@ -61,7 +63,7 @@ impl TriangleTree {
         })
     }
 
-    /// Whether any point of the surface is at most `distance` from `p`.
+    /// Returns whether the distance from `p` to the surface is at most `distance`.
     pub fn is_within(&self, p: Vec3, distance: f64) -> bool {
         let reach = distance * distance;
         let mut found = false;
@@ -74,7 +76,8 @@ impl TriangleTree {
         found
     }
 
-    /// Puts the labels of all triangles within `distance` of `p` into `found`, each once.
+    /// Collects into `found` the distinct labels of all triangles within `distance` of `p`; `label` maps a triangle to
+    /// its label.
     pub fn labels_within(&self, p: Vec3, distance: f64, label: impl Fn(u32) -> u32, found: &mut Vec<u32>) {
         let reach = distance * distance;
         found.clear();
@@ -91,8 +94,9 @@ impl TriangleTree {
         });
     }
 
-    /// The first intersection with the ray from `origin` along `direction` of any length, from either side; `None` if there is none, if
-    /// `direction` is zero, or if either is not finite.
+    /// Returns the first intersection with the ray from `origin` along `direction`, which need not be normalised.
+    /// Triangles are hit from either side. `None` if there is no intersection, if `direction` is zero, or if either is
+    /// not finite.
     pub fn ray_hit(&self, origin: Vec3, direction: Vec3) -> Option<SurfacePoint> {
         let (origin, direction) = finite(origin, direction)?;
         let (line, mut first) = (Line::new(origin, direction), FirstHit::within(f64::INFINITY));
@@ -103,8 +107,8 @@ impl TriangleTree {
         first.found(|item| self.corners[item as usize])
     }
 
-    /// The intersection with the line through `origin` along `direction` nearest to `origin`, within `most`; its `distance` is negative behind.
-    /// Else as [`Self::ray_hit`].
+    /// Returns the intersection with the line through `origin` along `direction` that is nearest to `origin`, at most
+    /// `most` away. Its `distance` is negative behind `origin`. Otherwise as [`Self::ray_hit`].
     pub fn line_hit(&self, origin: Vec3, direction: Vec3, most: f64) -> Option<SurfacePoint> {
         let (origin, direction) = finite(origin, direction)?;
         let (line, mut first) = (Line::new(origin, direction), FirstHit::within(most));
@@ -114,7 +118,7 @@ impl TriangleTree {
         first.found(|item| self.corners[item as usize])
     }
 
-    /// Calls `visit` with every triangle whose bounding box meets `bounds`.
+    /// Calls `visit` with every triangle whose bounding box intersects `bounds`.
     pub fn meeting(&self, bounds: &Bounds, visit: impl FnMut(u32)) {
         self.boxes.meeting(bounds, visit);
     }
@@ -127,25 +131,26 @@ impl SurfacePoint {
     }
 }
 
-/// The origin and unit direction of a ray; `None` if it has none.
+/// Returns the origin and unit direction of a ray; `None` if they are not finite or the direction is zero.
 fn finite(origin: Vec3, direction: Vec3) -> Option<(DVec3, DVec3)> {
     let direction = direction.as_dvec3().try_normalize()?;
     origin.is_finite().then(|| (origin.as_dvec3(), direction))
 }
 
-/// The nearest hit so far; ties go to the lower index.
+/// The nearest hit found so far by a ray or line query; among equally near ones, that of the lowest index.
 pub struct FirstHit {
     most: f64,
     found: Option<(u32, LineHit)>,
 }
 
 impl FirstHit {
-    /// For hits within `most`.
+    /// Starts a query for hits at most `most` away.
     pub fn within(most: f64) -> Self {
         Self { most, found: None }
     }
 
-    /// Adds the hit of an item; returns the distance within which others are searched.
+    /// Takes a hit of triangle `item` into account, if there is one; returns the distance up to which nearer hits
+    /// remain possible.
     #[inline]
     pub fn look_at(&mut self, item: u32, hit: Option<LineHit>) -> f64 {
         let Some(hit) = hit else { return self.most };
@@ -156,7 +161,7 @@ impl FirstHit {
         self.most
     }
 
-    /// The hit as a point of the triangle with these corners.
+    /// Returns the nearest hit as a surface point; `corners` returns the corner positions of a triangle.
     pub fn found(&self, corners: impl FnOnce(u32) -> [Vec3; 3]) -> Option<SurfacePoint> {
         let (item, hit) = self.found?;
         Some(SurfacePoint::on(item, corners(item), hit.barycentric, hit.distance))
@@ -169,7 +174,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Triangles of many sizes around the origin, and query points.
+    /// Returns triangles of various sizes around the origin, and query points.
     fn scattered() -> (TriangleMesh, Vec<Vec3>) {
         let mut state = 9_u32;
         let mut next = || {

@@ -1,62 +1,73 @@
-//! A hashed grid of the vertices of a moving mesh, each with the ball that holds its triangles.
+//! A hashed grid of the vertices of a moving mesh, for the broad phase of collision handling. Each vertex has a ball
+//! that contains its triangles.
 
 use crate::math::{Bounds, Vec3};
 use crate::mesh::VertexId;
 
-/// Levels of cells, a factor of four apart. Balls up to the size the grid was made for are on the first; those too large for the last
-/// are kept there, and queries reach further for them.
+/// The number of grid levels, whose cell sizes differ by [`FACTOR`]. Balls up to the size given to [`VertexGrid::new`]
+/// are on the first level. Balls too large for the last are stored there, and queries extend their search radius for
+/// them.
 const LEVELS: usize = 10;
+
+/// The ratio of the cell sizes of consecutive levels.
 const FACTOR: f32 = 4.0;
 
-/// Side of a cell in the largest radius on its level: twice the usual radius of a query, which then visits eight cells.
+/// The side of a cell, as a multiple of the largest ball radius on its level: twice the usual query radius, so that
+/// such a query visits eight cells.
 const CELL: f32 = 1.5;
 
-/// Mean number of vertices in a bucket.
+/// The mean number of vertices per hash bucket.
 const LOAD: usize = 2;
 
 /// The level of a vertex that is not in the grid.
 const ABSENT: u32 = u32::MAX;
 
-/// No vertex.
+/// The end of a bucket's list of vertices.
 const NONE: u32 = u32::MAX;
 
-/// Vertices in a hashed grid, each on the level of cells that fits its longest edge.
+/// A hierarchical hashed grid of vertices; the longest edge at a vertex determines its level.
 ///
-/// Vertices are entered, moved and removed one by one, so that the grid follows a mesh of which little changes. Queries are complete as
-/// long as no vertex is further than `blur` from where it was entered. The order of their results depends on earlier changes and must
-/// not be relied on.
+/// Vertices are inserted, moved and removed one by one, so that the grid can follow a mesh with few changes. Queries
+/// find all vertices as long as none has moved further than `blur` from the position last set. The order of results
+/// depends on earlier changes and must not be relied upon.
 ///
-/// When most of the mesh changes, cells are emptied first, and filled again by the next query.
+/// If most of the mesh changes, first unlink the cells by [`Self::empty_cells`], and relink them by
+/// [`Self::fill_cells`] before the next queries.
 #[derive(Clone, Debug, Default)]
 pub struct VertexGrid {
+    /// The distance that a vertex may have moved since its position was set.
     blur: f32,
-    /// By level, the bound of its longest edges, and the longest one entered.
+    /// By level, the largest ball radius assigned to it.
     bound: [f32; LEVELS],
+    /// By level, the largest radius inserted since the cells were filled.
     reach: [f32; LEVELS],
+    /// By level, the inverse of the cell side.
     inverse_cell: [f32; LEVELS],
     /// By level, the number of vertices.
     population: [u32; LEVELS],
+    /// The number of buckets, a power of two, minus 1.
     mask: u32,
-    /// By bucket, the head of its list: the vertex entered last.
+    /// By bucket, the head of its list: the vertex inserted last.
     heads: Vec<u32>,
     /// Whether vertices are linked into buckets.
     filled: bool,
-    /// By vertex slot.
+    /// By vertex slot, the entry of the vertex.
     entries: Vec<Entry>,
 }
 
-/// The ball around a vertex that holds its one-ring, as entered.
+/// A bounding ball of the one-ring of a vertex, as stored in a [`VertexGrid`].
 #[derive(Clone, Copy, Debug)]
 pub struct VertexBall {
-    /// The centre.
+    /// The position of the vertex, the centre of the ball.
     pub position: Vec3,
-    /// The radius: the longest edge at the vertex.
+    /// The length of the longest edge at the vertex, the radius of the ball.
     pub longest: f32,
-    /// The vertex.
+    /// The id of the vertex.
     pub vertex: VertexId,
 }
 
-/// The entry of a vertex: its level, and the hash of its cell, whose last bits are the bucket.
+/// The entry of a vertex in the grid: its level, and the hash `key` of its cell, whose low bits are the index of the
+/// bucket.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Entry {
     level: u32,
@@ -67,19 +78,20 @@ struct Entry {
     next: u32,
 }
 
-/// The distance up to which two vertices count as near each other, by their longest edges.
+/// The distance up to which two vertices are paired by the broad phase, as a function of their longest edges:
+/// max(`least`, `margin` + `share` × longer edge).
 #[derive(Clone, Copy, Debug)]
 pub struct Proximity {
-    /// The least distance.
+    /// The lower bound of the distance.
     pub least: f32,
-    /// Added to …
+    /// The constant term of the distance.
     pub margin: f32,
-    /// … this share of the longer of both edges.
+    /// The factor of the longer one of the two longest edges.
     pub share: f32,
 }
 
 impl Proximity {
-    /// The distance for two vertices with these longest edges.
+    /// Returns the distance up to which two vertices with the given longest edges are near each other.
     #[inline]
     pub fn between(self, longest: f32, other: f32) -> f32 {
         let reach = self.margin + self.share * if other > longest { other } else { longest };
@@ -90,7 +102,8 @@ impl Proximity {
 const ABSENT_ENTRY: Entry = Entry { level: ABSENT, key: 0, position: Vec3::ZERO, longest: 0.0, next: NONE };
 
 impl VertexGrid {
-    /// An empty grid for about `vertices` vertices, fastest if most longest edges are a little below `edge`, which is positive.
+    /// Creates an empty grid for about `vertices` vertices that may move by `blur` after insertion. It is fastest if
+    /// most longest edges are slightly shorter than `edge`, which must be positive.
     pub fn new(edge: f32, blur: f32, vertices: usize) -> Self {
         let mut grid = Self { blur, ..Self::default() };
         let mut bound = edge;
@@ -103,11 +116,11 @@ impl VertexGrid {
         grid
     }
 
-    /// Enters or moves `v`.
+    /// Inserts `v`, or updates its position and the length of its longest edge.
     pub fn set(&mut self, v: VertexId, position: Vec3, longest: f32) {
         if v.index() >= self.entries.len() {
             self.entries.resize(v.index() + 1, ABSENT_ENTRY);
-            // Lists have become long: they are rebuilt by the next query.
+            // The lists are too long: cells are unlinked, so that the next `fill_cells` builds more buckets.
             self.filled &= self.entries.len() <= 2 * LOAD * self.heads.len();
         }
         let level = self.level_of(longest);
@@ -128,12 +141,13 @@ impl VertexGrid {
         self.entries[v.index()] = entry;
     }
 
-    /// Unlinks all vertices from their cells until [`Self::fill_cells`]. Until then changes cost nothing, and queries visit all vertices.
+    /// Unlinks all vertices from their cells until [`Self::fill_cells`] is called. Meanwhile updates are cheap, and
+    /// queries visit all vertices.
     pub fn empty_cells(&mut self) {
         self.filled = false;
     }
 
-    /// Links all vertices into their cells, unless they are.
+    /// Links all vertices into their cells, if they are not linked.
     pub fn fill_cells(&mut self) {
         if self.filled {
             return;
@@ -143,7 +157,7 @@ impl VertexGrid {
         self.heads.clear();
         self.heads.resize(count, NONE);
         (self.population, self.reach) = ([0; LEVELS], [0.0; LEVELS]);
-        // Backwards, so that lists follow the order of memory.
+        // In reverse, so that lists are in memory order.
         for i in (0..self.entries.len()).rev() {
             let Entry { level, position, longest, .. } = self.entries[i];
             if level == ABSENT {
@@ -161,7 +175,7 @@ impl VertexGrid {
         self.filled = true;
     }
 
-    /// Raises the longest edge of `v`, which is in the grid, to `edge` if it is shorter.
+    /// Increases the longest edge of `v`, which must be in the grid, to `edge` if that is longer.
     pub fn stretch(&mut self, v: VertexId, edge: f32) {
         let Entry { position, longest, .. } = self.entries[v.index()];
         if edge > longest {
@@ -169,19 +183,19 @@ impl VertexGrid {
         }
     }
 
-    /// The position with which `v`, which is in the grid, was entered.
+    /// Returns the position last set for `v`, which must be in the grid.
     #[inline]
     pub fn position(&self, v: VertexId) -> Vec3 {
         self.entries[v.index()].position
     }
 
-    /// The longest edge with which `v`, which is in the grid, was entered.
+    /// Returns the longest edge last set for `v`, which must be in the grid.
     #[inline]
     pub fn longest(&self, v: VertexId) -> f32 {
         self.entries[v.index()].longest
     }
 
-    /// The ball of `v`, which is in the grid.
+    /// Returns the bounding ball last set for `v`, which must be in the grid.
     #[inline]
     pub fn ball(&self, v: VertexId) -> VertexBall {
         let Entry { position, longest, .. } = self.entries[v.index()];
@@ -196,7 +210,7 @@ impl VertexGrid {
         }
     }
 
-    /// Unlinks `v` from the bucket of `old`, its entry there.
+    /// Unlinks `v` from its bucket, given its entry `old`.
     fn leave(&mut self, v: VertexId, old: Entry) {
         if old.level == ABSENT || !self.filled {
             return;
@@ -217,36 +231,38 @@ impl VertexGrid {
         }
     }
 
-    /// Calls `found` with every vertex within `share` × its longest edge of the box, axis by axis, and with some a little further away.
+    /// Calls `found` with every vertex whose distance from the box, in each axis, is at most `share` times its longest
+    /// edge, and with some vertices further away.
     ///
-    /// With a share of 1/√3 every triangle that meets the box has a corner among them: no point of a triangle is further from its
-    /// nearest corner, in its longest edge.
+    /// With a share of 1/√3, these include a corner of every triangle that intersects the box: no point of a triangle
+    /// is further from its nearest corner, relative to the longest edge.
     pub fn near_box(&self, bounds: &Bounds, share: f32, mut found: impl FnMut(VertexId)) {
         let radius = |reach| share * (reach + 2.0 * self.blur);
         self.search(bounds, radius, &mut |ball: &VertexBall| found(ball.vertex));
     }
 
-    /// Calls `found` with every vertex within `radius` of the point, and with some a little further away.
+    /// Calls `found` with every vertex within `radius` of `p`, and with some vertices further away.
     pub fn near_point(&self, p: Vec3, radius: f32, mut found: impl FnMut(VertexId)) {
         let point = Bounds { min: p, max: p };
         self.search(&point, |_| radius, &mut |ball: &VertexBall| found(ball.vertex));
     }
 
-    /// Puts into `found` every vertex near a box of vertices with edges up to `longest`, by [`Proximity::between`] and axis by axis, and
-    /// some a little further away.
+    /// Collects into `found` the balls near a box of query vertices whose longest edges are at most `longest`: all
+    /// whose distance from the box, in each axis, is at most [`Proximity::between`], and some further away.
     pub fn near_balls(&self, bounds: &Bounds, longest: f32, near: Proximity, found: &mut Vec<VertexBall>) {
         found.clear();
         let radius = |other: f32| near.between(longest, other + 2.0 * self.blur) + self.blur;
         self.search(bounds, radius, &mut |ball: &VertexBall| found.push(*ball));
     }
 
-    /// The hash of the cell of `v`, which is in the grid with its cells filled.
+    /// Returns the hash of the cell of `v`, which must be in the grid with cells filled; used to group queries by cell.
     #[inline]
     pub fn cell_key(&self, v: VertexId) -> u32 {
         self.entries[v.index()].key
     }
 
-    /// Calls `found` with every vertex that may be within `radius` of the box, axis by axis; that is by the longest edge of its level.
+    /// Calls `found` with every vertex that may be within `radius` of the box, in each axis. `radius` is a function of
+    /// the longest edge; with cells filled, it is evaluated only for the largest ball of each level.
     #[inline]
     fn search(&self, bounds: &Bounds, radius: impl Fn(f32) -> f32, found: &mut impl FnMut(&VertexBall)) {
         if !self.filled {
@@ -291,7 +307,8 @@ impl VertexGrid {
         }
     }
 
-    /// Skips vertices of other cells in the same bucket, so that none is found twice.
+    /// Calls `found` with the vertices of one cell that are in the box; vertices of other cells in the same bucket are
+    /// skipped, so that none is found twice.
     #[inline]
     fn search_cell(&self, key: u32, wide: &Bounds, found: &mut impl FnMut(&VertexBall)) {
         let mut at = self.heads[(key & self.mask) as usize];
@@ -322,7 +339,8 @@ impl VertexGrid {
         [floor(scaled.x), floor(scaled.y), floor(scaled.z)]
     }
 
-    /// The hash of a cell: consecutive along z, scattered over columns and levels.
+    /// Returns the hash of a cell: consecutive along z, so that adjacent cells use adjacent buckets, and scattered over
+    /// columns and levels.
     #[inline]
     fn key(&self, [x, y, z]: [i32; 3], level: usize) -> u32 {
         let column = (x as u32).wrapping_mul(73_856_093) ^ (y as u32).wrapping_mul(19_349_663);
@@ -335,7 +353,7 @@ impl VertexGrid {
     }
 }
 
-/// The next integer below; a call of `f32::floor` is slow on processors taken for older than they are.
+/// Returns the largest integer not above `x`; faster than `f32::floor` when compiled for an older instruction set.
 #[inline]
 fn floor(x: f32) -> i32 {
     let whole = x as i32;
@@ -355,10 +373,11 @@ mod tests {
         }
     }
 
-    /// Positions and longest edges; `None` for removed vertices.
+    /// The position and longest edge of each vertex, `None` for removed vertices.
     type Known = Vec<Option<(Vec3, f32)>>;
 
-    /// Enters, moves and removes vertices at random, with cells filled and empty; most edges are ordinary, some tiny, some huge.
+    /// Inserts, moves and removes vertices at random, with cells filled and empty; most edges are ordinary, some tiny
+    /// or huge. Returns the expected contents.
     fn shuffled(grid: &mut VertexGrid, next: &mut impl FnMut() -> f32) -> Known {
         let mut known: Known = vec![None; 600];
         for _ in 0..3000 {
@@ -385,7 +404,7 @@ mod tests {
         (0..known.len()).filter(|&v| known[v].is_some_and(|(p, longest)| near(p, longest))).collect()
     }
 
-    /// `found` holds each vertex once, and all that are `expected`.
+    /// Asserts that `found` has no duplicates and contains all `expected` vertices.
     fn assert_complete(mut found: Vec<usize>, expected: &[usize]) {
         found.sort_unstable();
         assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "a vertex is found twice");

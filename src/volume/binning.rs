@@ -1,21 +1,21 @@
-//! Fewer, larger voxels: means of blocks.
+//! Binning: fewer, larger voxels, each the mean of a block.
 
 use super::error::{VolumeError, reserve};
 use super::{Volume, VolumeInit};
 use crate::math::{DAffine3, DMat3, DVec3};
 
-/// Most voxels of one along an axis.
+/// Largest binning factor along an axis.
 const MOST: usize = 16;
 
 impl Volume {
-    /// The volume with means of `factors` voxels along x, y and z as its voxels, in all frames; numbers keep their type. What
-    /// is left over at the far ends is left out.
+    /// Returns the volume binned by `factors` along x, y and z: each voxel is the mean of a block, in every frame, and
+    /// keeps the numeric type. Incomplete blocks at the far ends are dropped.
     ///
-    /// Images that were interpolated to smaller pixels than were measured, as magnetic resonance often is, say as much with fewer
-    /// voxels, and windows of as many voxels reach further.
+    /// Images that were interpolated to pixels smaller than measured, as is common in magnetic resonance, hold the same
+    /// information in fewer voxels, and windows of a fixed number of voxels then cover a larger region.
     ///
     /// # Errors
-    /// A factor not in 1..=16, or larger than the volume along its axis; [`VolumeError::TooLarge`].
+    /// A factor not in 1..=16, or larger than the number of voxels along its axis; [`VolumeError::TooLarge`].
     pub fn binned(&self, factors: [usize; 3]) -> Result<Volume, VolumeError> {
         let dims = self.dims();
         if (0..3).any(|axis| !(1..=MOST).contains(&factors[axis]) || factors[axis] > dims[axis]) {
@@ -52,7 +52,7 @@ impl Volume {
         Ok(volume.with_unit(self.unit))
     }
 
-    /// The mean of the numbers in a block that are numbers, as they are stored; not a number where there are none.
+    /// Returns the mean of the finite stored values in a block; NaN if there are none.
     fn block_mean(&self, start: usize, first: [usize; 3], size: [usize; 3]) -> f64 {
         let [nx, ny, _] = self.dims();
         let (mut sum, mut count) = (0.0, 0.0);
@@ -78,7 +78,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// A ramp in the world's x + 10 y + 100 z, doubled in the second frame.
+    /// Returns a volume whose intensity is x + 10 y + 100 z in world coordinates, doubled in the second frame.
     fn ramp() -> Volume {
         let affine = DAffine3 {
             matrix3: DMat3::from_diagonal(DVec3::new(1.0, 2.0, 5.0)),

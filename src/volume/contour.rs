@@ -1,8 +1,8 @@
-//! Iso-surfaces by marching cubes: closed, oriented, 2-manifold, free of crossings, for any grid.
+//! Iso-surfaces by marching cubes: closed, oriented, 2-manifold and free of self-intersections for any grid.
 //!
-//! Each grid edge with one end inside carries one vertex; [`super::cube_cases`] says how a cube joins them. The
-//! grid is taken as if padded by one layer that is outside, with the surface half a voxel beyond the border voxels,
-//! which is where their cells end.
+//! Each grid edge with exactly one end inside has one vertex; [`super::cube_cases`] connects the vertices within a
+//! cube. The grid is treated as if padded by one layer outside, with the surface half a voxel beyond the border voxels,
+//! at the ends of their cells.
 
 use super::cube_cases::{Case, EDGES, FAR_EDGES, cases};
 use super::error::VolumeError;
@@ -11,15 +11,15 @@ use crate::math::{DAffine3, Vec3};
 use crate::mesh::TriangleMesh;
 use std::collections::TryReserveError;
 
-/// Least distance of a vertex from the ends of its grid edge, in voxels. At 0 triangles around a voxel that equals
-/// the iso value have no area; much smaller and `f32` positions of a large volume fall together. The surface moves
-/// by no more than this.
+/// Smallest distance of a vertex from the ends of its grid edge, in voxels. At 0, triangles around a voxel that equals
+/// the iso value would have no area; much smaller, and vertices of a large volume coincide in `f32`. It moves the
+/// surface by at most this distance.
 pub(super) const MARGIN: f32 = 1.0 / 256.0;
 
-/// The surface where the intensity of one frame passes `iso`, in world space.
+/// Extracts the iso-surface of one frame at intensity `iso` by marching cubes, in world space.
 ///
-/// Closed at the volume's border, half a voxel beyond the outermost voxel centres; counter-clockwise seen from where
-/// intensities are below `iso`.
+/// Closed at the volume's border, half a voxel beyond the outermost voxel centres; counter-clockwise seen from the side
+/// where intensities are below `iso`.
 ///
 /// # Errors
 /// `iso` not finite, `frame` out of range, [`VolumeError::TooLarge`].
@@ -29,10 +29,11 @@ pub fn marching_cubes_world(volume: &Volume, iso: f64, frame: usize) -> Result<T
     Ok(mesh)
 }
 
-/// The surface where a grid passes `iso`, in index coordinates; empty where it never does.
+/// Extracts the iso-surface of a grid at `iso` by marching cubes, in index coordinates; empty if no value reaches
+/// `iso`.
 ///
-/// Values of `iso` and above are inside (NaN is outside), triangles counter-clockwise seen from outside. Each
-/// triangle has some area. Where inside voxels touch only along an edge or a corner of a cube they stay separate.
+/// Values of `iso` and above are inside (NaN is outside); triangles are counter-clockwise seen from outside and have
+/// nonzero area. Inside voxels that share only an edge or a corner stay separate.
 ///
 /// # Errors
 /// `iso` not finite, a grid whose values do not match its dimensions, [`VolumeError::TooLarge`].
@@ -48,7 +49,8 @@ pub fn marching_cubes(grid: &Grid, iso: f32) -> Result<TriangleMesh, VolumeError
     Ok(march.mesh)
 }
 
-/// Makes room for more elements, by a quarter at least: doubling the arrays of a large surface would take more memory than the rest of a run.
+/// Reserves memory for `additional` elements, growing by at least a quarter: doubling the arrays of a large surface would
+/// take more memory than the rest of a run.
 fn grow<T>(vector: &mut Vec<T>, additional: usize) -> Result<(), TryReserveError> {
     if vector.capacity() - vector.len() >= additional {
         return Ok(());
@@ -57,7 +59,7 @@ fn grow<T>(vector: &mut Vec<T>, additional: usize) -> Result<(), TryReserveError
     vector.try_reserve_exact(if additional > quarter { additional } else { quarter })
 }
 
-/// Maps positions to world, and turns triangles over where the map is a reflection.
+/// Maps positions to world space, and reverses the triangles if the map is a reflection.
 fn place(mesh: &mut TriangleMesh, affine: &DAffine3) {
     for p in &mut mesh.positions {
         *p = affine.transform_point3(p.as_dvec3()).as_vec3();
@@ -69,19 +71,20 @@ fn place(mesh: &mut TriangleMesh, affine: &DAffine3) {
     }
 }
 
-/// The state of one scan. Nodes are voxels of the padded grid: node (x, y, z) is voxel (x-1, y-1, z-1).
+/// State of marching cubes over one grid, processed layer by layer. Nodes are voxels of the padded grid: node (x, y, z)
+/// is voxel (x-1, y-1, z-1).
 struct March<'a> {
     grid: &'a Grid,
     iso: f32,
     cases: &'static [Case],
-    /// Nodes along a row and down a slice.
+    /// Number of nodes along x and along y.
     size: [usize; 2],
-    /// Per node of two slices, whether it (bit 0) and the next one in y (bit 1) are inside.
+    /// For each node of two slices, whether it (bit 0) and the next one in y (bit 1) are inside.
     pairs: [Vec<u8>; 2],
     /// Case of each cube in the current row.
     row: Vec<u8>,
-    /// Vertex on each grid edge, by the node where the edge starts: x edges of an even and an odd slice, y edges of
-    /// an even and an odd slice, z edges between the two.
+    /// Vertex on each grid edge, indexed by the node where the edge starts: x edges of an even and an odd slice, y
+    /// edges of an even and an odd slice, z edges between the two.
     vertices: Vec<u32>,
     mesh: TriangleMesh,
 }
@@ -102,7 +105,7 @@ impl<'a> March<'a> {
         })
     }
 
-    /// All cubes between node slices `z` and `z + 1`.
+    /// Processes all cubes between node slices `z` and `z + 1`.
     fn layer(&mut self, z: usize) -> Result<(), VolumeError> {
         self.classify(z + 1);
         let offsets = self.edge_offsets(z);
@@ -146,7 +149,7 @@ impl<'a> March<'a> {
         }
     }
 
-    /// Room for all that one row of cubes can add: three vertices and five triangles a cube.
+    /// Reserves memory for the most that one row of cubes can add: three vertices and five triangles per cube.
     fn make_room(&mut self) -> Result<(), VolumeError> {
         let (vertices, triangles) = (3 * self.row.len(), 5 * self.row.len());
         let mesh = &mut self.mesh;
@@ -159,7 +162,7 @@ impl<'a> March<'a> {
         room.map_err(|_| too_large)
     }
 
-    /// Vertices and triangles of one row of cubes.
+    /// Appends the vertices and triangles of one row of cubes.
     fn emit_row(&mut self, y: usize, z: usize, offsets: &[usize; 12]) {
         let row = std::mem::take(&mut self.row);
         for (chunk, cubes) in row.chunks(16).enumerate() {
@@ -191,7 +194,7 @@ impl<'a> March<'a> {
         }
     }
 
-    /// Where the surface cuts an edge of the cube at `origin`.
+    /// Returns the position of the vertex on an edge of the cube at `origin`.
     fn vertex(&self, origin: [usize; 3], edge: usize) -> Vec3 {
         let (axis, offset) = EDGES[edge];
         let from = [0, 1, 2].map(|k| origin[k] + offset[k]);
@@ -205,14 +208,15 @@ impl<'a> March<'a> {
         p
     }
 
-    /// The value at a node, or `None` in the padding.
+    /// Returns the value at a node, or `None` in the padding.
     fn value(&self, node: [usize; 3]) -> Option<f32> {
         let [nx, ny, nz] = self.grid.dims;
         let [x, y, z] = node.map(|k| k.wrapping_sub(1));
         if x < nx && y < ny && z < nz { self.grid.values.get((z * ny + y) * nx + x).copied() } else { None }
     }
 
-    /// Where the vertex of each edge of a cube at node n stands in `vertices`, less n, for the layer above slice `z`.
+    /// Returns, for each edge of a cube, the offset in `vertices` relative to the cube's node, for the layer above
+    /// slice `z`.
     fn edge_offsets(&self, z: usize) -> [usize; 12] {
         let plane = self.size[0] * self.size[1];
         EDGES.map(|(axis, [dx, dy, dz])| {
@@ -222,7 +226,8 @@ impl<'a> March<'a> {
     }
 }
 
-/// Fraction of the way from `a` to `b` at which a line reaches `iso`, kept [`MARGIN`] away from both ends.
+/// Returns the fraction of the way from `a` to `b` at which linear interpolation reaches `iso`, kept [`MARGIN`] away
+/// from both ends.
 fn fraction(a: f32, b: f32, iso: f32) -> f32 {
     let t = (iso - a) / (b - a);
     if t > 1.0 - MARGIN {
@@ -270,7 +275,8 @@ mod tests {
         grid
     }
 
-    /// V - E + F, after making sure that the mesh is closed, oriented, 2-manifold and without empty triangles.
+    /// Returns V - E + F, after asserting that the mesh is closed, oriented, 2-manifold and without degenerate
+    /// triangles.
     fn euler(mesh: &TriangleMesh) -> i64 {
         let mut edges = BTreeMap::new();
         let mut links: Vec<BTreeMap<u32, u32>> = vec![BTreeMap::new(); mesh.positions.len()];
@@ -341,7 +347,7 @@ mod tests {
     fn a_full_grid_is_its_box() {
         let mesh = marching_cubes(&field([3, 4, 5], |_| 1.0), 0.5).unwrap();
         assert_eq!(euler(&mesh), 2);
-        // The corners and rims of the box are cut off by the cubes outside them.
+        // The corners and edges of the box are cut off by the cubes outside them.
         let outer = 3.0 * 4.0 * 5.0;
         let rims = 0.125 * 4.0 * (2.0 + 3.0 + 4.0);
         let corners = 8.0 * (0.125 - 1.0 / 48.0);

@@ -1,19 +1,20 @@
-//! What marching cubes puts into a cube, derived from the cube's own geometry for each of the 256 cases.
+//! The triangles of marching cubes for each of the 256 cases, derived from the geometry of the cube.
 //!
-//! Corner c of a cube lies at dx = bit 2, dz = bit 1, dy = bit 0 of c, and bit c of a case says that corner c is
-//! inside. On each face the surface runs once round every connected run of inside corners; where two inside corners
-//! face each other diagonally they stay apart. The rule looks at one face only, so that the two cubes sharing it
+//! Corner c of a cube lies at dx = bit 2, dz = bit 1, dy = bit 0 of c, and bit c of a case is set if corner c is
+//! inside. On each face the surface separates every connected run of inside corners from the rest; two inside corners
+//! that are diagonally opposite on a face are separated. The rule depends on one face only, so the two cubes sharing it
 //! always agree, and every cut edge of a cube lies on exactly one closed loop.
 //!
-//! Each loop is filled by the triangulation of least area (vertices at the edges' midpoints) among those in which
-//! no diagonal joins two edges of one face. A diagonal within a face could be used by the neighbour too, and four
-//! triangles would meet there. For loops of up to six any such triangulation is free of crossings wherever the
-//! vertices lie on their edges; of the sixteen for a loop of seven some are not, and the least area is one that is.
-//! `tests::no_case_crosses_itself` holds us to it.
+//! Each loop is filled by the triangulation of least area (vertices at the edges' midpoints) among those in which no
+//! diagonal joins two edges of one face. A diagonal within a face could be used by the neighbouring cube, too, and the
+//! edge would then have four triangles. For loops of up to six, any such triangulation is free of self-intersections
+//! wherever the vertices lie on their edges. Of the sixteen for a loop of seven some are not, and that of least area is
+//! free of them; `tests::no_case_crosses_itself` verifies this.
 
 use std::sync::OnceLock;
 
-/// Axis of each of the twelve edges (0 = x, 1 = y, 2 = z) and its offset [dx, dy, dz] from the cube's origin.
+/// The twelve edges of a cube: the axis of each (0 = x, 1 = y, 2 = z) and its offset [dx, dy, dz] from the cube's
+/// origin.
 pub(super) const EDGES: [(usize, [usize; 3]); 12] = [
     (0, [0, 0, 0]),
     (0, [0, 1, 0]),
@@ -29,18 +30,19 @@ pub(super) const EDGES: [(usize, [usize; 3]); 12] = [
     (2, [1, 1, 0]),
 ];
 
-/// The edges along x, y, z that end in the cube's far corner. Scanning in index order, no earlier cube has them.
+/// The edges along x, y and z that end in the cube's far corner. When cubes are processed in index order, no earlier
+/// cube contains them, so their vertices are created here.
 pub(super) const FAR_EDGES: [usize; 3] = [3, 7, 11];
 
-/// The triangles of one case, as edge numbers, counter-clockwise seen from outside.
+/// The triangles of one marching cubes case, as edge numbers, counter-clockwise seen from outside.
 pub(super) struct Case {
-    /// Corners of the triangles.
+    /// The edge numbers of the three vertices of each triangle.
     pub(super) triangles: Vec<[u8; 3]>,
-    /// Which of [`FAR_EDGES`] are cut, bit by bit.
+    /// Bit mask of the [`FAR_EDGES`] that are cut.
     pub(super) far_cuts: u8,
 }
 
-/// All 256 cases, derived at the first call.
+/// Returns the table of all 256 cases, computed at the first call.
 pub(super) fn cases() -> &'static [Case] {
     static CASES: OnceLock<Vec<Case>> = OnceLock::new();
     CASES.get_or_init(|| (0..256).map(derive).collect())
@@ -58,12 +60,12 @@ fn derive(case: usize) -> Case {
     Case { triangles, far_cuts }
 }
 
-/// Corner number at an offset from the cube's origin.
+/// Returns the corner number of an offset from the cube's origin.
 pub(super) fn corner([dx, dy, dz]: [usize; 3]) -> usize {
     dy | dz << 1 | dx << 2
 }
 
-/// The edge between each two neighbouring corners; other entries mean nothing.
+/// Returns a table of the edge between each pair of adjacent corners; other entries are meaningless.
 fn edges_between() -> [[usize; 8]; 8] {
     let mut table = [[0; 8]; 8];
     for (edge, &(axis, offset)) in EDGES.iter().enumerate() {
@@ -75,7 +77,7 @@ fn edges_between() -> [[usize; 8]; 8] {
     table
 }
 
-/// The four corners of each face, counter-clockwise seen from outside the cube.
+/// Returns the four corners of each face, counter-clockwise seen from outside the cube.
 fn faces() -> [[usize; 4]; 6] {
     [0, 1, 2, 3, 4, 5].map(|face| {
         let (axis, side) = (face / 2, face % 2);
@@ -88,7 +90,7 @@ fn faces() -> [[usize; 4]; 6] {
     })
 }
 
-/// The closed loops of cut edges, oriented so that their triangles face outside.
+/// Returns the closed loops of cut edges of a case, oriented so that their triangles face outwards.
 fn loops(case: usize) -> Vec<Vec<usize>> {
     let mut next = follow_faces(case);
     let mut out = Vec::new();
@@ -106,7 +108,7 @@ fn loops(case: usize) -> Vec<Vec<usize>> {
     out
 }
 
-/// For each cut edge, the cut edge that the surface's border runs to next.
+/// Returns, for each cut edge, the next cut edge on its loop.
 fn follow_faces(case: usize) -> [Option<usize>; 12] {
     let inside = |corner: usize| case >> corner & 1 == 1;
     let between = edges_between();
@@ -128,14 +130,14 @@ fn follow_faces(case: usize) -> [Option<usize>; 12] {
     next
 }
 
-/// Whether two edges of the cube lie on one face.
+/// Returns whether two edges of the cube lie on a common face.
 fn share_face(a: usize, b: usize) -> bool {
     let on = |edge: usize, axis: usize, side: usize| EDGES[edge].0 != axis && EDGES[edge].1[axis] == side;
     (0..3).any(|axis| (0..2).any(|side| on(a, axis, side) && on(b, axis, side)))
 }
 
-/// Fills a loop, by dynamic programming over its stretches i..=j: best[i][j] is the least area of a fan-out of
-/// triangles over the stretch, closed by the diagonal from i to j, and the corner k that achieves it.
+/// Triangulates a loop with least area, by dynamic programming over its ranges i..=j: `best[i][j]` is the least area of a
+/// triangulation of the range, closed by the diagonal from i to j, and the vertex k that achieves it.
 fn triangulate(contour: &[usize], out: &mut Vec<[u8; 3]>) {
     let n = contour.len();
     let mut best = vec![vec![(0.0, 0); n]; n];
@@ -165,13 +167,13 @@ fn collect(contour: &[usize], best: &[Vec<(f64, usize)>], i: usize, j: usize, ou
     out.push([contour[i], contour[k], contour[j]].map(|edge| edge as u8));
 }
 
-/// Twice the area of the triangle between three edges' midpoints.
+/// Returns twice the area of the triangle between the midpoints of three edges.
 fn midpoint_area(edges: [usize; 3]) -> f64 {
     let [a, b, c] = edges.map(|edge| point_on(edge, 0.5));
     (b - a).cross(c - a).length()
 }
 
-/// The point at fraction `t` of an edge, in the unit cube.
+/// Returns the point at fraction `t` of an edge, in the unit cube.
 fn point_on(edge: usize, t: f64) -> crate::math::DVec3 {
     let (axis, offset) = EDGES[edge];
     let mut p = offset.map(|o| o as f64);
@@ -186,7 +188,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Fractions in [1/256, 255/256], crowded at both ends, where crossings are likeliest.
+    /// Returns a random fraction in [1/256, 255/256], concentrated at both ends, where intersections are likeliest.
     fn random_fraction(state: &mut u64) -> f64 {
         let mut next = || {
             *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -204,7 +206,7 @@ mod tests {
         (b - a).cross(c - a).dot(d - a)
     }
 
-    /// Whether the open segment p-q passes through the open triangle.
+    /// Returns whether the open segment p-q intersects the open triangle.
     fn pierces(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
         let ends = volume6(a, b, c, p) * volume6(a, b, c, q);
         let around = [volume6(p, q, a, b), volume6(p, q, b, c), volume6(p, q, c, a)];

@@ -1,4 +1,4 @@
-//! In-between slices for volumes whose slices are thick (dynamic surfaces from 4D cardiac MRI, section 5.2).
+//! Interpolated slices for volumes with thick slices (dynamic surfaces from 4D cardiac MRI, section 5.2).
 
 use super::error::{VolumeError, reserve};
 use super::flow::{Flow, Picture, symmetric_flow};
@@ -6,25 +6,26 @@ use super::voxels::Voxels;
 use super::{Volume, VolumeInit};
 use crate::math::{DAffine3, DVec3};
 
-/// How slices in between come about.
+/// Interpolation method of [`Volume::enrich_slices`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Enrichment {
-    /// What lies in both neighbours goes along the optical flow between them, and is averaged where it meets.
+    /// Both neighbours are warped along the optical flow between them and averaged.
     #[default]
     Flow,
-    /// Means of the neighbours, weighted by nearness.
+    /// Linear interpolation between the neighbours.
     Linear,
 }
 
-/// Most slices for one: beyond, in-between slices tell nothing.
+/// Largest factor of slice interpolation: beyond, further slices add no information.
 const MOST: usize = 16;
 
 impl Volume {
-    /// The volume with `factor` − 1 slices more between any two along the axis of the largest spacing.
+    /// Returns the volume with `factor` − 1 slices interpolated between each pair of neighbouring slices along the axis
+    /// of the largest spacing.
     ///
-    /// The slices that were there stay as they are, at their places in the world; numbers keep their type. `factor`, where
-    /// left out, is the whole number that brings the spacing nearest to the mean of the two others; 1 changes nothing. All
-    /// frames are enriched, each by itself.
+    /// The original slices are unchanged and keep their world positions; the numeric type is kept. If `factor` is
+    /// `None`, it is the integer that brings the spacing nearest to the mean of the two others; 1 changes nothing. Each
+    /// frame is interpolated separately.
     ///
     /// # Errors
     /// `factor` not in 1..=16; a single slice along that axis with a factor above 1; [`VolumeError::TooLarge`].
@@ -66,7 +67,7 @@ impl Volume {
         Ok(volume.with_unit(self.unit))
     }
 
-    /// The axis along which voxels are longest; the last of several.
+    /// Returns the axis of the largest spacing; of equal ones z, then the lowest.
     fn thick_axis(&self) -> usize {
         let spacing = self.spacing();
         (0..3).fold(2, |axis, other| if spacing[other] > spacing[axis] { other } else { axis })
@@ -79,7 +80,7 @@ impl Volume {
         if self.dims[axis] < 2 || factor < 1.0 { 1 } else { factor.min(MOST as f64) as usize }
     }
 
-    /// One frame, in stored numbers.
+    /// Returns one frame with its interpolated slices, as stored values.
     fn enriched_frame(
         &self,
         frame: usize,
@@ -96,7 +97,7 @@ impl Volume {
         let mut values = reserve(longer[0] * longer[1] * longer[2])?;
         values.resize(longer[0] * longer[1] * longer[2], 0.0f64);
         let stored = |index: usize| self.voxels.get(start + index).unwrap_or(f64::NAN);
-        // Flows are of what can be seen; what is not a number has been given one there.
+        // The flow is computed on normalised intensities, which are finite even for NaN voxels.
         let intensities = self.normalised_grid(frame)?.values;
         let mut before = slices.picture(0, &intensities)?;
         for slice in 0..dims[axis] {
@@ -120,15 +121,16 @@ impl Volume {
         self.voxels.like(&values)
     }
 
-    /// The stored number of an intensity on the scale of [`Self::normalised_grid`].
+    /// Converts an intensity on the scale of [`Self::normalised_grid`] to a stored value.
     fn stored(&self, normalised: f64) -> f64 {
         (self.range[0] + normalised * self.span() - self.intercept) / self.slope
     }
 }
 
-/// Where the voxels of a slice across an axis are.
+/// Memory layout of the slices perpendicular to one axis.
 struct Slices {
-    /// Voxels along, and steps in memory, of the two other axes and of the axis itself.
+    /// Number of voxels along the two axes within a slice; `steps` are the memory strides of these two axes and of the
+    /// slice axis.
     across: usize,
     down: usize,
     steps: [usize; 3],
@@ -145,7 +147,7 @@ impl Slices {
         }
     }
 
-    /// The indices of a slice's voxels, row by row.
+    /// Returns the voxel indices of a slice, row by row.
     fn places(&self, slice: usize) -> impl Iterator<Item = usize> + use<> {
         let Self { across, down, steps: [step, row, along] } = *self;
         (0..down).flat_map(move |y| (0..across).map(move |x| slice * along + y * row + x * step))
@@ -158,8 +160,8 @@ impl Slices {
     }
 }
 
-/// The flow by so much as it explains of the difference between the pictures: whole where they are alike along it, none
-/// where they are no more alike than as they are.
+/// Scales the flow at each pixel by its confidence: the share of the squared difference between the two images that
+/// warping removes. 1 if the warped images agree, 0 if warping does not reduce the difference.
 fn believable(before: &Picture, after: &Picture, mut flow: Flow) -> Result<Flow, VolumeError> {
     let (left, right) = (before.warped(&flow, -0.5)?, after.warped(&flow, 0.5)?);
     let moved = squared_differences(&left, &right)?;
@@ -173,14 +175,14 @@ fn believable(before: &Picture, after: &Picture, mut flow: Flow) -> Result<Flow,
     Ok(flow)
 }
 
-/// Summed over the window around each pixel.
+/// Returns the squared differences of two images, summed over the window around each pixel.
 fn squared_differences(one: &Picture, other: &Picture) -> Result<Picture, VolumeError> {
     let mut values = reserve(one.values.len())?;
     values.extend(one.values.iter().zip(&other.values).map(|(a, b)| (a - b) * (a - b)));
     Picture { values, ..*one }.window_sums()
 }
 
-/// The picture at a share of the way from one to the other.
+/// Returns the image interpolated at fraction `share` from `before` to `after`, along the flow if there is one.
 fn in_between(
     before: &Picture,
     after: &Picture,
@@ -222,14 +224,14 @@ mod tests {
         .unwrap()
     }
 
-    /// A slanted cone, as numbers from 0 to 200; x, y in pixels, z in slices.
+    /// Returns the intensity of a slanted cone, from 0 to 200; x, y in pixels, z in slices.
     fn cone(x: f64, y: f64, z: f64) -> u8 {
         let radius = 12.0 - 0.7 * z;
         let away = libm::hypot(x - 20.0 - 2.0 * z, y - 24.0 + 1.2 * z) - radius;
         (200.0 / (1.0 + libm::exp(away))).round() as u8
     }
 
-    /// `steps` slices for one of the cone's.
+    /// Returns the cone sampled with `steps` slices per unit of z.
     fn cone_volume(steps: usize) -> Volume {
         let (nx, ny, nz) = (56, 48, 6 * steps + 1);
         let at = |i: usize| {

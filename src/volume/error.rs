@@ -1,6 +1,6 @@
-//! What can be wrong with a volume or with a question put to it.
+//! Errors of volumes and of the operations on them.
 
-/// Why a volume could not be made or a question could not be answered.
+/// Error of creating a volume or of an operation on one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum VolumeError {
     /// An argument out of range, not finite, or of the wrong length.
@@ -11,25 +11,25 @@ pub enum VolumeError {
         /// What was wrong and what is accepted.
         problem: String,
     },
-    /// More memory than can be had.
+    /// An allocation failed.
     #[error("the volume needs {bytes} bytes, more than can be had")]
     TooLarge {
-        /// Bytes that would be needed.
+        /// Bytes that the operation would need.
         bytes: u64,
     },
 }
 
 impl VolumeError {
-    /// An [`InvalidArgument`](Self::InvalidArgument).
+    /// Creates an [`InvalidArgument`](Self::InvalidArgument) error.
     pub(crate) fn invalid(parameter: &'static str, problem: impl Into<String>) -> Self {
         Self::InvalidArgument { parameter, problem: problem.into() }
     }
 }
 
-/// An empty vector with room for `count` elements.
+/// Returns an empty vector with capacity for `count` elements; used for every allocation of the size of a volume.
 ///
 /// # Errors
-/// [`VolumeError::TooLarge`] where the memory cannot be had.
+/// [`VolumeError::TooLarge`] if the allocation fails.
 pub(crate) fn reserve<T>(count: usize) -> Result<Vec<T>, VolumeError> {
     let mut out = Vec::new();
     let bytes = (count as u64).saturating_mul(size_of::<T>() as u64);

@@ -1,37 +1,38 @@
-//! Symmetric optical flow between two pictures: how the one has to go, and the other to come back, to meet halfway.
+//! Symmetric optical flow between two images: the displacement that warps both to their midpoint.
 //!
-//! Local least squares (Lucas and Kanade), coarse to fine. The flow u lives on the picture in between: for the intensities
-//! there to be those of both, a(x − u/2) = b(x + u/2).
+//! Local least squares (Lucas and Kanade), coarse to fine. The flow u is defined on the midpoint image, where the
+//! intensities of both images agree: a(x − u/2) = b(x + u/2).
 
 use super::error::{VolumeError, reserve};
 use super::sampling::locate;
 
-/// Half the width of the window in which one flow is to explain all differences, pixels.
+/// Radius of the least-squares window, pixels: one flow vector explains all differences within (2 `RADIUS` + 1)²
+/// pixels.
 const RADIUS: usize = 5;
 
-/// Rows that are summed up along at once.
+/// Number of rows whose running sums are computed together, which hides the latency of dependent additions.
 const TOGETHER: usize = 4;
 
-/// Steps on each level.
+/// Iterations on each level of the pyramid.
 const STEPS: usize = 4;
 
-/// Steps on the finest where there are coarser ones: they take most of the time and change least.
+/// Iterations on the finest level if there are coarser ones: they take most of the time and change least.
 const LAST_STEPS: usize = 2;
 
-/// No step is longer than this, in pixels of its level: further away the gradients are those of something else.
+/// Largest change of the flow per iteration, in pixels of the level: the gradients are not valid further away.
 const LONGEST: f32 = 1.0;
 
-/// Pictures smaller than this are not made smaller for a coarser level.
+/// Smallest image size of a coarser level, pixels: images are halved only while both sides are at least twice this.
 const SMALLEST: usize = 24;
 
-/// Levels from coarse to fine: on the coarsest a step reaches 4 pixels of the finest.
+/// Largest number of pyramid levels: an iteration on the coarsest moves by up to 4 pixels of the finest.
 const LEVELS: usize = 3;
 
-/// Added to the diagonal of the equations, in the mean squared gradient of the picture: where there is nothing to be seen,
-/// nothing moves.
+/// Regularisation added to the diagonal of the normal equations, relative to the mean squared gradient of the image:
+/// the flow is 0 in regions without contrast.
 const STILLNESS: f32 = 0.2;
 
-/// One picture, rows one after the other.
+/// A 2D image, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Picture {
     pub width: usize,
@@ -39,14 +40,14 @@ pub(super) struct Picture {
     pub values: Vec<f32>,
 }
 
-/// Flow along x and y for each pixel of the picture in between, pixels.
+/// Optical flow along x and y for each pixel of the midpoint image, pixels.
 pub(super) struct Flow {
     pub x: Picture,
     pub y: Picture,
 }
 
 impl Picture {
-    /// The same value everywhere.
+    /// Returns an image of constant value.
     pub fn flat(width: usize, height: usize, value: f32) -> Result<Self, VolumeError> {
         let mut values = reserve(width * height)?;
         values.resize(width * height, value);
@@ -57,7 +58,7 @@ impl Picture {
         self.values.chunks_exact(self.width)
     }
 
-    /// Bilinear, the border replicated.
+    /// Returns the bilinearly interpolated value at (x, y); the border is replicated.
     #[inline]
     fn at(&self, x: f32, y: f32) -> f32 {
         let (x0, x1, fx) = between(x, self.width);
@@ -71,7 +72,7 @@ impl Picture {
         top + (bottom - top) * fy
     }
 
-    /// The picture as seen through a flow: at each pixel, what is `share` of the flow away.
+    /// Warps the image: each pixel is sampled at its position displaced by `share` times the flow.
     pub fn warped(&self, flow: &Flow, share: f32) -> Result<Self, VolumeError> {
         let mut values = reserve(self.values.len())?;
         for (y, (us, vs)) in flow.x.rows().zip(flow.y.rows()).enumerate() {
@@ -81,7 +82,7 @@ impl Picture {
         Ok(Self { values, ..*self })
     }
 
-    /// Half as wide and high: means of four pixels.
+    /// Returns the image at half the width and height: means of 2 × 2 pixels.
     fn halved(&self) -> Result<Self, VolumeError> {
         let (width, height) = (self.width / 2, self.height / 2);
         let mut values = reserve(width * height)?;
@@ -93,7 +94,8 @@ impl Picture {
         Ok(Self { width, height, values })
     }
 
-    /// As wide and high as told, about twice what it is: the flow of a coarser level, whose pixels are twice as long.
+    /// Resamples a flow component of a coarser level to `width` × `height`, about twice the size, and doubles its
+    /// values, since the pixels of the coarser level are twice as long.
     fn doubled(&self, width: usize, height: usize) -> Result<Self, VolumeError> {
         let mut values = reserve(width * height)?;
         for y in 0..height {
@@ -102,7 +104,7 @@ impl Picture {
         Ok(Self { width, height, values })
     }
 
-    /// Means over the same windows.
+    /// Returns the means over the windows of [`Self::window_sums`].
     fn window_means(&self) -> Result<Self, VolumeError> {
         let mut means = self.window_sums()?;
         let count = |at: usize, n: usize| (at.min(RADIUS) + (n - 1 - at).min(RADIUS) + 1) as f32;
@@ -114,7 +116,7 @@ impl Picture {
         Ok(means)
     }
 
-    /// Sums over windows of (2 `RADIUS` + 1)² pixels, cut at the border.
+    /// Returns the sums over windows of (2 `RADIUS` + 1)² pixels, clipped at the border.
     pub fn window_sums(&self) -> Result<Self, VolumeError> {
         let (width, height) = (self.width, self.height);
         let mut along = Self::flat(width, height, 0.0)?;
@@ -126,7 +128,7 @@ impl Picture {
         for (row, to) in last.chunks_exact(width).zip(last_to.chunks_exact_mut(width)) {
             running_sums::<1>(row, to);
         }
-        // Down the columns, a whole row at a time.
+        // Sums along columns, a whole row at a time.
         let mut out = Self::flat(width, height, 0.0)?;
         let mut sums = vec![0.0f32; width];
         let row = |y: usize| &along.values[y * width..][..width];
@@ -146,7 +148,7 @@ impl Picture {
     }
 }
 
-/// Along `R` rows at once: each addition has to wait for the one before it in its row.
+/// Computes windowed running sums along `R` rows at once, since each addition depends on the previous one in its row.
 fn running_sums<const R: usize>(rows: &[f32], out: &mut [f32]) {
     let width = rows.len() / R;
     let mut sums: [f32; R] = std::array::from_fn(|r| rows[r * width..][..RADIUS.min(width)].iter().sum());
@@ -162,7 +164,7 @@ fn running_sums<const R: usize>(rows: &[f32], out: &mut [f32]) {
     }
 }
 
-/// A quarter of the difference between the neighbours of each, the border replicated.
+/// Computes a quarter of the difference between the two neighbours of each pixel, the border replicated.
 fn slopes_along(row: &[f32], out: &mut [f32]) {
     let last = row.len() - 1;
     for (slope, pair) in out[1..].iter_mut().zip(row.windows(3)) {
@@ -172,14 +174,14 @@ fn slopes_along(row: &[f32], out: &mut [f32]) {
     out[last] = 0.25 * (row[last] - row[last.saturating_sub(1)]);
 }
 
-/// The two pixels around `x`, held within the picture, and the share of the way between them.
+/// Returns the two pixels around `x`, clamped to the image, and the fractional position between them.
 #[inline]
 fn between(x: f32, n: usize) -> (usize, usize, f32) {
     let (index, share) = locate(x, n);
     (index, if index + 1 < n { index + 1 } else { index }, share)
 }
 
-/// The flow between two pictures of one size.
+/// Returns the symmetric optical flow between two images of one size; used for interpolated slices.
 ///
 /// # Errors
 /// [`VolumeError::TooLarge`].
@@ -205,7 +207,7 @@ pub(super) fn symmetric_flow(a: &Picture, b: &Picture) -> Result<Flow, VolumeErr
     Ok(flow)
 }
 
-/// One step of least squares, and of smoothing.
+/// Performs one least-squares iteration on the flow and smooths it by window means.
 fn improve(a: &Picture, b: &Picture, flow: &mut Flow) -> Result<(), VolumeError> {
     let (before, after) = (a.warped(flow, -0.5)?, b.warped(flow, 0.5)?);
     let normal = Normal::of(&before, &after)?;
@@ -214,13 +216,14 @@ fn improve(a: &Picture, b: &Picture, flow: &mut Flow) -> Result<(), VolumeError>
         flow.x.values[i] += x;
         flow.y.values[i] += y;
     }
-    // Without smoothing, steps follow the noise: in-between slices of a heart were then no better than means.
+    // Without smoothing, the flow follows the noise: interpolated slices of a heart were then no better than means.
     flow.x = flow.x.window_means()?;
     flow.y = flow.y.window_means()?;
     Ok(())
 }
 
-/// Sums over the window of each pixel: of products of gradients, and of gradients with differences.
+/// Normal equations of the flow at each pixel, summed over its window: products of gradients (`xx`, `xy`, `yy`), and of
+/// gradients with differences (`xd`, `yd`).
 struct Normal {
     xx: Picture,
     xy: Picture,
@@ -240,7 +243,7 @@ impl Normal {
         let row = |y: usize| &both[y * width..][..width];
         let mut slopes = vec![0.0; width];
         for y in 0..height {
-            // Of the mean of both pictures, over two pixels.
+            // Gradient of the mean of both images, by central differences over two pixels.
             let (above, below) = (row(y.saturating_sub(1)), row((y + 1).min(height - 1)));
             slopes_along(row(y), &mut slopes);
             for x in 0..width {
@@ -261,7 +264,7 @@ impl Normal {
         Ok(Self { xx, xy, yy, xd: xd.window_sums()?, yd: yd.window_sums()?, stillness })
     }
 
-    /// What the flow changes by at a pixel.
+    /// Returns the change of the flow at a pixel: the solution of the normal equations, limited to [`LONGEST`].
     #[inline]
     fn step(&self, i: usize) -> (f32, f32) {
         let (xx, yy) = (self.xx.values[i] + self.stillness, self.yy.values[i] + self.stillness);
@@ -285,7 +288,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// A soft disc.
+    /// Returns an image of a disc with a smooth edge.
     fn disc(center: [f32; 2], radius: f32) -> Picture {
         let (width, height) = (64, 48);
         let value = |i: usize| {
@@ -299,7 +302,7 @@ mod tests {
     fn what_has_moved_is_followed_halfway_from_both_sides() {
         let (a, b) = (disc([28.0, 24.0], 9.0), disc([34.0, 21.0], 9.0));
         let flow = symmetric_flow(&a, &b).unwrap();
-        // On the rim of the disc in between.
+        // Pixels on the rim of the midpoint disc.
         for (x, y) in [(31 + 9, 22), (31 - 9, 23), (31, 22 + 9), (31, 23 - 9)] {
             let (u, v) = (flow.x.values[y * 64 + x], flow.y.values[y * 64 + x]);
             assert!((u - 6.0).abs() < 0.6 && (v + 3.0).abs() < 0.6, "{u} {v}");

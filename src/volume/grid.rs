@@ -1,10 +1,11 @@
-//! Fields on a regular grid, ready to be sampled in hot loops.
+//! Scalar and vector fields on a regular grid, for sampling in hot loops.
 
 use super::error::{VolumeError, reserve};
 use super::sampling::Cell;
 use crate::math::Vec3;
 
-/// A scalar per voxel, x fastest, then y, z. Positions are continuous voxel indices, voxel centres at integers.
+/// A scalar field: one value per voxel, x fastest, then y, z. Positions are continuous voxel indices, voxel centres at
+/// integers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     /// Number of voxels along x, y and z, each at least 1.
@@ -13,7 +14,8 @@ pub struct Grid {
     pub values: Vec<f32>,
 }
 
-/// The values around a point where a grid was sampled: memory of a large grid is slow to come.
+/// Cache of the eight voxel values around the last sampled point, for [`Grid::sample_padded`]: reading a large grid
+/// from memory is slow.
 #[derive(Clone, Copy, Debug)]
 pub struct KnownCell {
     base: usize,
@@ -21,13 +23,13 @@ pub struct KnownCell {
 }
 
 impl Default for KnownCell {
-    /// Nothing is known.
+    /// Returns an empty cache, which matches no cell.
     fn default() -> Self {
         Self { base: usize::MAX, corners: [0.0; 8] }
     }
 }
 
-/// A vector per voxel, laid out as in [`Grid`].
+/// A vector field: one vector per voxel, laid out as in [`Grid`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct VectorGrid {
     /// Number of voxels along x, y and z, each at least 1.
@@ -37,17 +39,17 @@ pub struct VectorGrid {
 }
 
 impl Grid {
-    /// A grid, checked.
+    /// Creates a grid after checking that `values` has one value per voxel.
     ///
     /// # Errors
-    /// A dimension of 0, or another number of values than the dimensions' product.
+    /// A dimension of 0, or a number of values other than the product of the dimensions.
     pub fn new(dims: [usize; 3], values: Vec<f32>) -> Result<Grid, VolumeError> {
         let grid = Grid { dims, values };
         grid.check()?;
         Ok(grid)
     }
 
-    /// An error unless the number of values is the product of the dimensions and not 0.
+    /// Returns an error unless the number of values is the product of the dimensions and not 0.
     pub(super) fn check(&self) -> Result<(), VolumeError> {
         let count = self.dims.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
         if count == Some(self.values.len()) && !self.values.is_empty() {
@@ -61,17 +63,18 @@ impl Grid {
         Err(VolumeError::invalid("values", problem))
     }
 
-    /// Trilinear value at `p`; outside the grid the border is replicated.
+    /// Returns the trilinearly interpolated value at `p`; outside the grid the border is replicated.
     #[inline]
     pub fn sample(&self, p: Vec3) -> f32 {
         let cell = Cell::at(self.dims, p);
         cell.blend(&cell.corners(|index| self.values[index]))
     }
 
-    /// Trilinear value at `p` as if the grid went on with voxels of value `beyond` on all sides; faster where `p` is in the
-    /// same cell as the last time with this `known`, which is of this grid only.
+    /// Returns the trilinearly interpolated value at `p` in the grid padded with voxels of value `beyond` on all sides.
+    /// Faster if `p` is in the same cell as in the previous call with this `known`, which must only be used with one
+    /// grid.
     ///
-    /// Continuous, unlike a cut at the border: a surface that looks for a value there comes to rest.
+    /// The padded field is continuous, so a surface that moves towards an iso value converges at the border, too.
     #[inline]
     pub fn sample_padded(&self, p: Vec3, beyond: f32, known: &mut KnownCell) -> f32 {
         let last = |n: usize| (n - 1) as f32;
@@ -89,8 +92,9 @@ impl Grid {
         }
     }
 
-    /// Sobel gradient in intensity per voxel: differences over two voxels, smoothed by [1 2 1] across, divided by
-    /// 32, so that a linear ramp gives its slope. Border replicated.
+    /// Returns the Sobel gradient in intensity per voxel: central differences over two voxels, smoothed by [1 2 1] in
+    /// the two other directions and divided by 32, so that the gradient of a linear ramp is its slope. The border is
+    /// replicated. Used by the gradient force of the deformable model.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].
@@ -107,7 +111,7 @@ impl Grid {
         Ok(VectorGrid { dims: self.dims, values })
     }
 
-    /// The sums over the 3 × 3 voxels across x, for every x of one row.
+    /// Computes the 3 × 3 sums in the y-z plane for every x of one row of voxels.
     fn fill_columns(&self, columns: &mut [Columns], y: usize, z: usize) {
         let [_, ny, nz] = self.dims;
         let [y0, y2] = [y.saturating_sub(1), if y + 1 < ny { y + 1 } else { y }];
@@ -119,7 +123,7 @@ impl Grid {
         }
     }
 
-    /// The voxels (0.., y, z).
+    /// Returns the row of voxels (0.., y, z).
     #[inline]
     pub(super) fn row(&self, y: usize, z: usize) -> &[f32] {
         let start = (z * self.dims[1] + y) * self.dims[0];
@@ -128,7 +132,7 @@ impl Grid {
 }
 
 impl VectorGrid {
-    /// Trilinear vector at `p`; outside the grid the border is replicated.
+    /// Returns the trilinearly interpolated vector at `p`; outside the grid the border is replicated.
     #[inline]
     pub fn sample(&self, p: Vec3) -> Vec3 {
         let cell = Cell::at(self.dims, p);
@@ -136,7 +140,8 @@ impl VectorGrid {
     }
 }
 
-/// 3 × 3 sums across x: smoothed both ways, and differenced along y or z while smoothed along the other.
+/// Weighted 3 × 3 sums in the y-z plane at one x, from which Sobel gradients are composed: smoothed along y and z, or
+/// differenced along one and smoothed along the other.
 #[derive(Clone, Copy, Default)]
 struct Columns {
     smooth: f32,
@@ -145,7 +150,7 @@ struct Columns {
 }
 
 impl Columns {
-    /// From values at [z][y].
+    /// Computes the sums of the 3 × 3 values at `[z][y]`.
     #[inline]
     fn of(at: [[f32; 3]; 3]) -> Self {
         let smooth_y = at.map(|[a, b, c]| a + 2.0 * b + c);
@@ -171,7 +176,8 @@ fn push_gradients(columns: &[Columns], out: &mut Vec<Vec3>) {
     }
 }
 
-/// 1 between the outermost voxel centres, falling to 0 one voxel beyond.
+/// Returns the weight of the grid against its padding along one axis: 1 between the outermost voxel centres, falling to
+/// 0 one voxel beyond.
 #[inline]
 fn inside(x: f32, last: f32) -> f32 {
     let beyond = if x < 0.0 { -x } else { x - last };

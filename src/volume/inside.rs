@@ -1,14 +1,15 @@
-//! Which voxels a closed surface encloses.
+//! Voxelisation: the voxels inside a closed surface.
 
 use crate::math::predicates::orient2d;
 use crate::math::{DVec2, Vec3};
 use crate::mesh::TriangleMesh;
 use fixedbitset::FixedBitSet;
 
-/// For each voxel of a grid of `dims`, x fastest, whether its centre is inside the closed `surface`, whose positions are voxel
-/// indices: whether a ray along x has passed the surface an odd number of times.
+/// Returns, for each voxel of a grid of `dims`, x fastest, whether its centre is inside the closed `surface`, whose
+/// positions are voxel indices: whether a ray along x has crossed the surface an odd number of times before it. Used to
+/// find regions that a deformable model does not cover.
 ///
-/// Exact but for centres within rounding of the surface: rays through edges and corners are decided by exact predicates.
+/// Exact except for centres within rounding of the surface: exact predicates decide rays through edges and vertices.
 pub fn voxels_inside(surface: &TriangleMesh, dims: [usize; 3]) -> FixedBitSet {
     let count = dims.iter().product();
     let mut passed = FixedBitSet::with_capacity(count);
@@ -25,14 +26,14 @@ pub fn voxels_inside(surface: &TriangleMesh, dims: [usize; 3]) -> FixedBitSet {
     inside
 }
 
-/// Notes, for each row of voxels that passes the triangle, the first voxel beyond it.
+/// Toggles, for each row of voxels along x that the triangle crosses, the first voxel beyond the triangle.
 fn pass_triangle(positions: &[Vec3], corners: [u32; 3], dims: [usize; 3], passed: &mut FixedBitSet) {
     let [a, b, c] = corners.map(|v| positions[v as usize].as_dvec3());
     let normal = (b - a).cross(c - a);
     let span = |axis: usize| {
         let low = a[axis].min(b[axis]).min(c[axis]).ceil().max(0.0);
         let high = a[axis].max(b[axis]).max(c[axis]).floor();
-        // Casts of negative numbers give 0: an empty span is told first.
+        // Casting a negative number to `usize` gives 0, so empty ranges are handled first.
         if high < low { 0..0 } else { low as usize..(high as usize + 1).min(dims[axis]) }
     };
     for z in span(2) {
@@ -50,21 +51,22 @@ fn pass_triangle(positions: &[Vec3], corners: [u32; 3], dims: [usize; 3], passed
     }
 }
 
-/// Whether the triangle, seen along x, lies over a point (y, z), which is moved by less than anything along y, and by less
-/// than that along z, so that it is on no edge.
+/// Returns whether the projection of the triangle along x contains the point (y, z). The point is perturbed
+/// symbolically by an infinitesimal amount along y and a smaller one along z, so that it lies on no edge.
 fn is_over(positions: &[Vec3], [a, b, c]: [u32; 3], at: DVec2) -> bool {
     let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|edge| is_left(positions, edge, at));
     ab.is_some() && ab == bc && bc == ca
 }
 
-/// Whether a point is to the left of an edge; `None` where the edge is a point. Both triangles of the edge get the same answer.
+/// Returns whether a point is to the left of a projected edge; `None` if the edge projects to a point. Consistent for
+/// the two triangles that share the edge.
 fn is_left(positions: &[Vec3], [from, to]: [u32; 2], at: DVec2) -> Option<bool> {
     let (low, high) = if from < to { (from, to) } else { (to, from) };
     let [p, q] = [low, high].map(|v| {
         let p = positions[v as usize].as_dvec3();
         DVec2::new(p.y, p.z)
     });
-    // Of the first of these that is not 0 the sign counts.
+    // The first nonzero value decides: the predicate, then the perturbations along y and z.
     let signs = [orient2d([p, q, at]), p.y - q.y, q.x - p.x];
     let sign = signs.into_iter().find(|sign| *sign != 0.0)?;
     Some((sign > 0.0) == (from < to))
@@ -105,7 +107,7 @@ mod tests {
         });
     }
 
-    /// All rays pass through edges or corners.
+    /// A cuboid all of whose rays pass through edges or vertices.
     #[test]
     fn rays_along_edges_count_once() {
         let surface = moved(cuboid(Vec3::splat(4.0)), Vec3::splat(3.0));

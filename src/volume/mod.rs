@@ -1,8 +1,9 @@
-//! Regular grids of intensities, and what is read from them.
+//! Volumes: regular grids of intensities, and the operations on them (sampling, slices, histograms, pyramids,
+//! iso-surfaces).
 //!
-//! A [`Volume`] is what a file or a caller gives: typed voxels, an affine map from voxel index to world, one or
-//! more frames. A [`Grid`] is one frame as `f32` intensities, for loops that sample millions of times.
-//! Index coordinates put voxel centres at integers, so the first voxel covers [-1/2, 1/2].
+//! A [`Volume`] holds typed voxels as stored in a file, an affine map from voxel index to world, and one or more
+//! frames. A [`Grid`] is one frame as `f32` intensities, for loops that sample millions of times. Index coordinates put
+//! voxel centres at integers, so the first voxel covers [-1/2, 1/2].
 //!
 //! ```
 //! use vesicle::math::{DAffine3, DVec3};
@@ -50,17 +51,17 @@ use error::reserve;
 use std::sync::Arc;
 use voxels::each;
 
-/// Which way the world axes of a patient volume point.
+/// Orientation of the world axes relative to the patient.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Space {
-    /// x to the right, y to the front, z to the head (NIfTI).
+    /// x points right, y anterior, z superior (NIfTI).
     #[default]
     Ras,
-    /// x to the left, y to the back, z to the head (DICOM, ITK).
+    /// x points left, y posterior, z superior (DICOM, ITK).
     Lps,
 }
 
-/// What one world unit is, where the file says so.
+/// Length of one world unit, if the file states it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LengthUnit {
     /// Not stated.
@@ -74,30 +75,30 @@ pub enum LengthUnit {
     Micrometre,
 }
 
-/// Everything a [`Volume`] is made of.
+/// Arguments of [`Volume::new`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct VolumeInit {
-    /// Stored numbers, x fastest, then y, z, t.
+    /// Stored values, x fastest, then y, z, t.
     pub voxels: Voxels,
     /// Number of voxels along x, y, z, and of frames.
     pub dims: [usize; 4],
-    /// Voxel index to world.
+    /// Map from voxel index to world coordinates.
     pub affine: DAffine3,
-    /// Intensity = stored number × slope + intercept.
+    /// Slope of the map to intensities: intensity = stored value × slope + intercept.
     pub slope: f64,
-    /// See `slope`.
+    /// Intercept of the same map.
     pub intercept: f64,
-    /// Seconds from one frame to the next; 0 where there is no such time.
+    /// Time from one frame to the next, in seconds; 0 if the frames have no time step.
     pub frame_seconds: f64,
-    /// Meaning of the world axes.
+    /// Orientation of the world axes.
     pub space: Space,
 }
 
-/// A 3D image, or a sequence of them, with its place in the world. Cheap to clone: the voxels are shared.
+/// A 3D image, or a sequence of 3D images, with its position in world space. Cheap to clone: the voxels are shared.
 ///
-/// Intensities are stored number × slope + intercept. A voxel that is not a number (or is infinite) counts
-/// nowhere in the statistics and reads as the end of [`range`](Self::range) nearest to it, NaN as the smallest
-/// intensity, so that no later stage meets one.
+/// Intensities are stored value × slope + intercept. NaN and infinite voxels are excluded from the statistics. When
+/// they are read, +∞ becomes the upper end of [`range`](Self::range), and −∞ and NaN become the lower end, so every
+/// sampled intensity is finite.
 #[derive(Clone, Debug)]
 pub struct Volume {
     voxels: Arc<Voxels>,
@@ -113,12 +114,13 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// A volume, checked.
+    /// Creates a volume after validating all fields of `init`.
     ///
     /// # Errors
-    /// [`VolumeError::InvalidArgument`] naming the field when a dimension is 0, the number of voxels is not the
-    /// product of the dimensions, the affine is not finite or not invertible or leads beyond what `f32` holds, the slope is 0 or not finite, the
-    /// frame time is negative, no voxel is a finite number, or an intensity exceeds what `f32` holds.
+    /// [`VolumeError::InvalidArgument`] naming the field when a dimension is 0, the number of voxels is not the product
+    /// of the dimensions, the affine is not finite, not invertible or maps a corner beyond the range of `f32`, the
+    /// slope is 0 or not finite, the frame time is negative, no voxel is a finite number, or an intensity exceeds the
+    /// range of `f32`.
     pub fn new(init: VolumeInit) -> Result<Volume, VolumeError> {
         check_dims(init.dims, init.voxels.len())?;
         check_scale(init.slope, init.intercept)?;
@@ -140,80 +142,80 @@ impl Volume {
         })
     }
 
-    /// The same volume with its length unit stated.
+    /// Sets the length unit of the world coordinates.
     pub fn with_unit(mut self, unit: LengthUnit) -> Volume {
         self.unit = unit;
         self
     }
 
-    /// Number of voxels along x, y and z.
+    /// Returns the number of voxels along x, y and z.
     pub fn dims(&self) -> [usize; 3] {
         [self.dims[0], self.dims[1], self.dims[2]]
     }
 
-    /// Number of frames, 1 for a still image.
+    /// Returns the number of frames, 1 for a still image.
     pub fn frames(&self) -> usize {
         self.dims[3]
     }
 
-    /// World length of one voxel step along x, y and z.
+    /// Returns the voxel size along x, y and z, in world units.
     pub fn spacing(&self) -> [f64; 3] {
         let axes = self.affine.matrix3;
         [axes.x_axis.length(), axes.y_axis.length(), axes.z_axis.length()]
     }
 
-    /// Voxel index to world.
+    /// Returns the map from voxel index to world coordinates.
     pub fn affine(&self) -> DAffine3 {
         self.affine
     }
 
-    /// World to voxel index.
+    /// Returns the map from world coordinates to voxel index.
     pub fn inverse_affine(&self) -> DAffine3 {
         self.inverse
     }
 
-    /// Meaning of the world axes.
+    /// Returns the orientation of the world axes.
     pub fn space(&self) -> Space {
         self.space
     }
 
-    /// What one world unit is.
+    /// Returns the length unit of the world coordinates.
     pub fn unit(&self) -> LengthUnit {
         self.unit
     }
 
-    /// Seconds from one frame to the next; 0 where there is no such time.
+    /// Returns the time from one frame to the next, in seconds; 0 if the frames have no time step.
     pub fn frame_seconds(&self) -> f64 {
         self.frame_seconds
     }
 
-    /// Intensity = stored number × this + [`intercept`](Self::intercept).
+    /// Returns the slope of the map to intensities: intensity = stored value × slope + [`intercept`](Self::intercept).
     pub fn slope(&self) -> f64 {
         self.slope
     }
 
-    /// See [`slope`](Self::slope).
+    /// Returns the intercept of the map to intensities; see [`slope`](Self::slope).
     pub fn intercept(&self) -> f64 {
         self.intercept
     }
 
-    /// The stored numbers of all frames, x fastest, then y, z, t.
+    /// Returns the stored values of all frames, x fastest, then y, z, t.
     pub fn voxels(&self) -> &Voxels {
         &self.voxels
     }
 
-    /// Smallest and largest intensity over all frames.
+    /// Returns the smallest and largest finite intensity over all frames.
     pub fn range(&self) -> [f64; 2] {
         self.range
     }
 
-    /// From the lowest to the highest intensity; 1 where all are the same, so that one can divide by it.
+    /// Returns the largest minus the smallest intensity, or 1 if they are equal, so that it is safe to divide by.
     pub fn span(&self) -> f64 {
         let [low, high] = self.range;
         if high > low { high - low } else { 1.0 }
     }
 
-    /// All intensities of one frame, x fastest, then y, z.
+    /// Returns all intensities of one frame, x fastest, then y, z.
     ///
     /// # Errors
     /// `frame` out of range; [`VolumeError::TooLarge`].
@@ -223,7 +225,7 @@ impl Volume {
         each!(self.voxels.as_ref(), values => self.convert(&values[start..end]))
     }
 
-    /// One frame as a grid of `f32` intensities in index coordinates.
+    /// Returns one frame as a grid of `f32` intensities in index coordinates.
     ///
     /// # Errors
     /// `frame` out of range; [`VolumeError::TooLarge`].
@@ -231,9 +233,9 @@ impl Volume {
         Ok(Grid { dims: self.dims(), values: self.intensities(frame)? })
     }
 
-    /// One frame as a grid of intensities on a scale where 0 and 1 are the ends of [`Self::range`].
+    /// Returns one frame as a grid with intensities scaled from [`Self::range`] to [0, 1].
     ///
-    /// Scaled before it is rounded to `f32`, so that small differences of large numbers stay.
+    /// Values are scaled before they are rounded to `f32`, so small differences between large values are kept.
     ///
     /// # Errors
     /// `frame` out of range; [`VolumeError::TooLarge`].
@@ -244,13 +246,13 @@ impl Volume {
         let (slope, intercept) = (self.slope * factor, (self.intercept - self.range[0]) * factor);
         let values = each!(self.voxels.as_ref(), values => converted(&values[start..end], |v| {
             let value = v * slope + intercept;
-            // Voxels that are not a number count as the lowest.
+            // NaN fails the comparison and becomes 0.
             if value > 0.0 { if value < 1.0 { value } else { 1.0 } } else { 0.0 }
         }))?;
         Ok(Grid { dims: self.dims(), values })
     }
 
-    /// Trilinear intensity at a world point; outside the volume the border is replicated.
+    /// Returns the trilinearly interpolated intensity at a world point; outside the volume the border is replicated.
     ///
     /// # Errors
     /// `world` not finite, `frame` out of range.
@@ -266,12 +268,12 @@ impl Volume {
         Ok(trilinear(self.dims(), p, |index| self.intensity_at(start + index)))
     }
 
-    /// Voxels in one frame.
+    /// Returns the number of voxels in one frame.
     fn frame_len(&self) -> usize {
         self.dims[0] * self.dims[1] * self.dims[2]
     }
 
-    /// Index of a frame's first voxel.
+    /// Returns the index of a frame's first voxel in the stored values.
     fn frame_start(&self, frame: usize) -> Result<usize, VolumeError> {
         if frame < self.dims[3] {
             return Ok(frame * self.frame_len());
@@ -282,13 +284,13 @@ impl Volume {
         ))
     }
 
-    /// The intensity of one voxel, made finite.
+    /// Returns the intensity of one voxel, made finite by [`Self::finite`].
     fn intensity_at(&self, index: usize) -> f64 {
         let stored = self.voxels.get(index).unwrap_or(f64::NAN);
         self.finite(stored * self.slope + self.intercept)
     }
 
-    /// The end of the range nearest to a value that is not finite; any other value as it is.
+    /// Returns `value` if it is finite, the upper end of the range for +∞, and the lower end for −∞ and NaN.
     fn finite(&self, value: f64) -> f64 {
         if value.is_finite() {
             value
@@ -351,7 +353,7 @@ fn check_frame_seconds(seconds: f64) -> Result<(), VolumeError> {
     ))
 }
 
-/// The inverse map, provided that it undoes the map to within rounding.
+/// Inverts the affine map of a volume; an error if it is singular or too ill-conditioned to invert accurately.
 fn invert(affine: DAffine3) -> Result<DAffine3, VolumeError> {
     let error = |problem: &str| Err(VolumeError::invalid("affine", problem));
     if !affine.is_finite() {
@@ -370,7 +372,7 @@ fn invert(affine: DAffine3) -> Result<DAffine3, VolumeError> {
     if inverse.is_finite() { Ok(inverse) } else { error("is not invertible") }
 }
 
-/// Surfaces hold their positions in `f32`.
+/// Checks that all corners of the volume lie within the range of `f32`, since surface positions are stored in `f32`.
 fn check_corners(affine: DAffine3, dims: [usize; 4]) -> Result<(), VolumeError> {
     let far = DVec3::new(dims[0] as f64, dims[1] as f64, dims[2] as f64);
     let corners = (0..8).map(|i| far * DVec3::from([0, 1, 2].map(|axis| f64::from(i >> axis & 1))));
@@ -382,12 +384,13 @@ fn check_corners(affine: DAffine3, dims: [usize; 4]) -> Result<(), VolumeError> 
     Err(VolumeError::invalid("affine", problem))
 }
 
-/// Spacings outside these ends come from broken headers only; products of three stay far from overflow.
+/// Smallest accepted voxel spacing, in world units. Spacings outside this range come from broken headers only; the
+/// product of three spacings within it is far from overflow.
 const MIN_SPACING: f64 = 1e-12;
-/// See [`MIN_SPACING`].
+/// Largest accepted voxel spacing, in world units; see [`MIN_SPACING`].
 const MAX_SPACING: f64 = 1e12;
-/// Volume of the box of unit voxel axes. Sheared gantry scans stay above 0.5; below this, inverting loses half of
-/// the digits of `f64` and more.
+/// Smallest accepted volume of the parallelepiped spanned by the normalised voxel axes. Sheared gantry scans stay above
+/// 0.5; below this, inversion loses half of the digits of `f64` or more.
 const MIN_AXIS_VOLUME: f64 = 1e-8;
 
 fn intensity_range(voxels: &Voxels, slope: f64, intercept: f64) -> Result<[f64; 2], VolumeError> {

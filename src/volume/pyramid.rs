@@ -1,10 +1,10 @@
-//! Coarser and coarser versions of a volume, by any factor.
+//! Multiresolution pyramids of a volume, with any reduction factor in (1, 2].
 //!
-//! Section 4.2 and appendix A of Lachaud & Montanvert, with the appendix's slips put right: the level counts up, the
-//! sizes carry on from level to level, and all three axes shrink. Level h + 1 has ⌊M/ρ⌋ voxels where level h has M;
-//! the world box stays. Each of its voxels is the [1 4 6 4 1]/16 mean of five samples of level h, one unit apart
-//! along each axis, where the unit U is the smallest voxel side at level 0 and grows by ρ a level. Samples between
-//! voxels are interpolated linearly, the border is replicated.
+//! Section 4.2 and appendix A of Lachaud & Montanvert, with errors of the appendix corrected: the level index
+//! increases, sizes are derived level by level, and all three axes are reduced. Level h + 1 has ⌊M/ρ⌋ voxels where
+//! level h has M; the world box is kept. Each of its voxels is the [1 4 6 4 1]/16 mean of five samples of level h, one
+//! unit apart along each axis. The unit U is the smallest voxel side at level 0 and grows by ρ per level. Samples
+//! between voxels are interpolated linearly; the border is replicated.
 
 use super::error::{VolumeError, reserve};
 use super::sampling::locate_f64;
@@ -12,17 +12,18 @@ use super::voxels::Voxels;
 use super::{Grid, Volume, VolumeInit};
 use crate::math::{DAffine3, DMat3, DVec3};
 
-/// The five weights of the Gaussian-like kernel.
+/// The five weights of the Gaussian-like reduction kernel.
 const KERNEL: [f64; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
 
 impl Volume {
-    /// `levels` volumes in all: the first is this one, each next is coarser by `factor` (ρ) along every axis.
+    /// Returns a pyramid of `levels` volumes: the first is this one, each of the others is coarser than the one before
+    /// by `factor` (ρ) along every axis.
     ///
-    /// All frames are kept; levels after the first are `f32` intensities.
+    /// All frames are kept; levels after the first store `f32` intensities.
     ///
     /// # Errors
-    /// `factor` not in (1, 2]; `levels` 0, or so many that an axis would have fewer than 2 voxels (the message
-    /// says how many are possible); [`VolumeError::TooLarge`].
+    /// `factor` not in (1, 2]; `levels` is 0, or so large that an axis would have fewer than 2 voxels (the message
+    /// gives the largest possible number); [`VolumeError::TooLarge`].
     pub fn pyramid(&self, levels: usize, factor: f64) -> Result<Vec<Volume>, VolumeError> {
         check_factor(factor)?;
         self.check_levels(levels, factor)?;
@@ -45,7 +46,8 @@ impl Volume {
         Ok(out)
     }
 
-    /// How many levels, this volume included, a pyramid of this factor can have before an axis falls below 2 voxels.
+    /// Returns the largest number of levels, this volume included, of a pyramid with this factor in which every axis
+    /// has at least 2 voxels; at least 1.
     ///
     /// # Errors
     /// `factor` not in (1, 2].
@@ -72,7 +74,7 @@ impl Volume {
         Err(VolumeError::invalid("levels", problem))
     }
 
-    /// A volume out of the frames of one level, filling the same world box as this one.
+    /// Builds the volume of one pyramid level from its frames, filling the same world box as this volume.
     fn level(&self, frames: &[Grid]) -> Result<Volume, VolumeError> {
         let dims = frames[0].dims;
         let ratio = DVec3::from([0, 1, 2].map(|axis| self.dims[axis] as f64 / dims[axis] as f64));
@@ -96,10 +98,11 @@ impl Volume {
 }
 
 impl Grid {
-    /// The next coarser level and its spacing: ⌊n/factor⌋ voxels an axis (at least 1) in the same box.
+    /// Returns the next coarser level of the pyramid and its spacing: ⌊n/factor⌋ voxels per axis (at least 1) in the
+    /// same box.
     ///
-    /// `spacing` is this grid's, `unit` (U) the distance between the five samples of the kernel, both in the same
-    /// length. The next level's unit is `unit * factor`.
+    /// `spacing` is the spacing of this grid, and `unit` (U) the distance between the five samples of the kernel, in
+    /// the same length unit. The next level's unit is `unit * factor`.
     ///
     /// # Errors
     /// `factor` not in (1, 2], `spacing` or `unit` not positive and finite; [`VolumeError::TooLarge`].
@@ -129,7 +132,7 @@ impl Grid {
         Ok(Grid { dims: [nx, self.dims[1], self.dims[2]], values })
     }
 
-    /// Resamples along y (`axis` 1) or z (`axis` 2): whole runs of contiguous values are blended at once.
+    /// Resamples along y (`axis` 1) or z (`axis` 2), blending whole runs of contiguous values at once.
     fn resample_rows(&self, taps: &Taps, count: usize, axis: usize) -> Result<Grid, VolumeError> {
         let run = if axis == 1 { self.dims[0] } else { self.dims[0] * self.dims[1] };
         let mut dims = self.dims;
@@ -157,15 +160,16 @@ fn add_scaled(to: &mut [f32], from: &[f32], weight: f32) {
     }
 }
 
-/// For each output voxel of one axis, the source voxels it draws from and their weights, which sum to 1.
+/// Resampling weights along one axis: for each output voxel, the range of source voxels and their weights, which sum to
+/// 1.
 struct Taps {
-    /// First source voxel and the span of its weights.
+    /// Per output voxel: the first source voxel, and start and end of its range in `weights`.
     spans: Vec<(usize, usize, usize)>,
     weights: Vec<f32>,
 }
 
 impl Taps {
-    /// `unit` is the kernel's step in source voxels.
+    /// Computes the weights that reduce `source` voxels to `count`; `unit` is the kernel's step in source voxels.
     fn new(source: usize, count: usize, unit: f64) -> Self {
         let mut taps = Self { spans: Vec::with_capacity(count), weights: Vec::new() };
         let mut dense = vec![0.0f64; source];
@@ -176,7 +180,8 @@ impl Taps {
         taps
     }
 
-    /// Spreads the kernel at `centre` over `dense`, stores what it touched, and clears it again.
+    /// Adds the kernel at `centre` to the zeroed buffer `dense`, stores the nonzero range as the next output voxel's
+    /// weights, and zeroes it again.
     fn push(&mut self, dense: &mut [f64], centre: f64, unit: f64) {
         let (mut low, mut high) = (usize::MAX, 0);
         for (k, weight) in KERNEL.iter().enumerate() {
@@ -205,7 +210,7 @@ fn check_factor(factor: f64) -> Result<(), VolumeError> {
     Err(VolumeError::invalid("factor", format!("{factor} given; more than 1 and at most 2 is accepted")))
 }
 
-/// ⌊n/factor⌋, at least 1.
+/// Returns ⌊n/factor⌋ for each dimension, at least 1.
 fn reduced_dims(dims: [usize; 3], factor: f64) -> [usize; 3] {
     dims.map(|n| {
         let reduced = (n as f64 / factor) as usize;
@@ -290,7 +295,7 @@ mod tests {
 
     #[test]
     fn one_level_is_the_kernel_of_the_paper() {
-        // One axis by hand: 6 voxels to 3, unit 1, centres at 0.5, 2.5, 4.5, each tap half way between two voxels.
+        // One axis by hand: 6 voxels to 3, unit 1, centres at 0.5, 2.5, 4.5, each tap halfway between two voxels.
         let row = [3.0f32, 8.0, 1.0, 4.0, 9.0, 2.0];
         let grid = Grid { dims: [6, 1, 1], values: row.to_vec() };
         let (coarse, spacing) = grid.reduce([1.0; 3], 1.0, 2.0).unwrap();
@@ -299,7 +304,7 @@ mod tests {
         let tap = |i: i32| 0.5 * (at(i) + at(i + 1));
         for (i, found) in coarse.values.iter().enumerate() {
             let c = 2 * i as i32;
-            // A tap outside the border reads the border itself, not a mean across it.
+            // A tap outside the border reads the border value itself, not a mean across it.
             let held = |i: i32| {
                 if i < 0 {
                     at(0)

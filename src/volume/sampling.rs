@@ -1,10 +1,10 @@
-//! Trilinear interpolation on a grid whose border is replicated.
+//! Trilinear interpolation on a grid with a replicated border.
 
 use crate::math::{DVec3, Vec3};
 use std::ops::{Add, Mul, Sub};
 
-/// The eight voxels around a point: index of the lowest, steps to the next along each axis (0 at the last voxel),
-/// and the fractions of the way there.
+/// The eight voxels around a point, for trilinear interpolation: the index of the lowest voxel, the index step to the
+/// next one along each axis (0 at the last voxel), and the fractional position along each axis.
 pub(super) struct Cell {
     base: usize,
     step: [usize; 3],
@@ -12,7 +12,7 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    /// The cell around `p`, moved to the border where `p` is outside (and to the first voxel where it is NaN).
+    /// Returns the cell around `p`, clamped to the border if `p` is outside (and to the first voxel if it is NaN).
     #[inline]
     pub(super) fn at(dims: [usize; 3], p: Vec3) -> Self {
         let (x, fx) = locate(p.x, dims[0]);
@@ -30,13 +30,13 @@ impl Cell {
         }
     }
 
-    /// The index of the lowest voxel.
+    /// Returns the index of the voxel with the lowest coordinates, which identifies the cell.
     #[inline]
     pub(super) fn base(&self) -> usize {
         self.base
     }
 
-    /// What `value` gives for the eight voxels, x fastest.
+    /// Evaluates `value` at the indices of the eight voxels, x fastest.
     #[inline]
     pub(super) fn corners<T>(&self, value: impl Fn(usize) -> T) -> [T; 8] {
         let [sx, sy, sz] = self.step;
@@ -44,7 +44,7 @@ impl Cell {
         [a, a + sx, a + sy, a + sx + sy, b, b + sx, b + sy, b + sx + sy].map(value)
     }
 
-    /// Interpolates what [`Self::corners`] gave.
+    /// Interpolates between the eight values returned by [`Self::corners`].
     #[inline]
     pub(super) fn blend<T>(&self, corners: &[T; 8]) -> T
     where
@@ -61,8 +61,8 @@ fn mix<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>>(a: T,
     a + (b - a) * fraction
 }
 
-/// Voxel at or below `x`, and the fraction of the way to the next, with `x` held in [0, n-1].
-/// Written with comparisons: `f32::clamp` by variables becomes two function calls in wasm.
+/// Returns the voxel at or below `x` and the fractional position from it to the next one, with `x` clamped to [0, n-1].
+/// Written with comparisons: `f32::clamp` with variable bounds becomes two function calls in wasm.
 #[inline]
 pub(super) fn locate(x: f32, n: usize) -> (usize, f32) {
     let last = (n - 1) as f32;
@@ -72,7 +72,7 @@ pub(super) fn locate(x: f32, n: usize) -> (usize, f32) {
     (index, x - index as f32)
 }
 
-/// Trilinear interpolation in `f64` of what `value` gives for a voxel's index.
+/// Interpolates trilinearly at `p`, in `f64`; `value` returns the value of a voxel by its index.
 pub(crate) fn trilinear(dims: [usize; 3], p: DVec3, value: impl Fn(usize) -> f64) -> f64 {
     let axes = [0, 1, 2].map(|axis| locate_f64(p[axis], dims[axis]));
     let at = |corner: [usize; 3]| {
@@ -85,7 +85,7 @@ pub(crate) fn trilinear(dims: [usize; 3], p: DVec3, value: impl Fn(usize) -> f64
     mix(along_xy(0), along_xy(1), 2)
 }
 
-/// The two voxels around `x` and the fraction between them, with `x` held in [0, n-1].
+/// Returns the two voxels around `x` and the fractional position between them, with `x` clamped to [0, n-1].
 pub(super) fn locate_f64(x: f64, n: usize) -> ([usize; 2], f64) {
     let last = (n - 1) as f64;
     let x = if x > 0.0 { x } else { 0.0 };

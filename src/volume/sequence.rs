@@ -1,21 +1,22 @@
-//! A sequence of volumes as the frames of one.
+//! Concatenation of 3D volumes into a 4D volume.
 
 use super::error::VolumeError;
 use super::voxels::Voxels;
 use super::{Volume, VolumeInit};
 use crate::math::DVec3;
 
-/// How far apart two frames' corners may lie, in voxels: rounding in a file's header, and no more.
+/// Largest accepted distance between the corners of two frames, in voxels: allows for rounding in file headers only.
 const GRID_TOLERANCE: f64 = 1e-3;
 
 impl Volume {
-    /// 3D volumes of one grid, in order, as the frames of a 4D one. A 4D volume gives all its frames.
+    /// Concatenates volumes on one grid, in order, into the frames of a 4D volume. A 4D volume contributes all its
+    /// frames.
     ///
-    /// `frame_seconds`, where left out, is that of the first volume. The affine is the first volume's.
+    /// If `frame_seconds` is `None`, that of the first volume is used. The affine is that of the first volume.
     ///
     /// # Errors
-    /// No frame; a frame with other dimensions, another place in the world or another space than the first; a
-    /// negative time; [`VolumeError::TooLarge`].
+    /// No frame; a frame whose dimensions, position, space or unit differ from those of the first; a negative time;
+    /// [`VolumeError::TooLarge`].
     pub fn from_frames(frames: &[Volume], frame_seconds: Option<f64>) -> Result<Volume, VolumeError> {
         let Some(first) = frames.first() else {
             return Err(VolumeError::invalid("frames", "none given; at least one volume is needed"));
@@ -39,8 +40,8 @@ impl Volume {
     }
 }
 
-/// The stored numbers with their common slope and intercept, or, where frames differ in those or in type, the
-/// intensities themselves.
+/// Returns the stored values with their common slope and intercept; if frames differ in these or in their type, the
+/// intensities as `f32`.
 fn join(frames: &[Volume]) -> Result<(Voxels, f64, f64), VolumeError> {
     let (slope, intercept) = (frames[0].slope, frames[0].intercept);
     if frames.iter().all(|f| f.slope == slope && f.intercept == intercept) {

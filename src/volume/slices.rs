@@ -1,17 +1,18 @@
-//! Reading a volume as pictures and as counts.
+//! Slices and histograms of a volume.
 
 use super::Volume;
 use super::error::{VolumeError, reserve};
 use super::voxels::{Voxels, each};
 
-/// More bins than this say nothing more about 16-bit data.
+/// Largest number of histogram bins: more do not resolve more in 16-bit data.
 const MAX_BINS: usize = 65_536;
 
 impl Volume {
-    /// How many voxels of one frame fall into each of `bins` equal parts of [`range`](Self::range).
+    /// Returns the histogram of one frame: the number of voxels in each of `bins` equal parts of
+    /// [`range`](Self::range).
     ///
-    /// The range is that of all frames, so that the histograms of two frames compare. The largest intensity counts
-    /// in the last bin; voxels that are not finite numbers count nowhere.
+    /// The range is that of all frames, so the histograms of two frames are comparable. The largest intensity is
+    /// counted in the last bin; NaN and infinite voxels are not counted.
     ///
     /// # Errors
     /// `bins` not in 1..=65536, `frame` out of range.
@@ -39,9 +40,9 @@ impl Volume {
         counts
     }
 
-    /// One slice as intensities, row-major.
+    /// Returns the intensities of one axis-aligned slice, row-major.
     ///
-    /// `axis` 0, 1, 2 fixes x, y, z at `index`. Of the two axes left, the lower one runs along the rows: a slice of
+    /// `axis` 0, 1, 2 fixes x, y, z at `index`. The lower one of the two other axes runs along the rows: a slice of
     /// fixed z has rows of x, one per y; fixed y rows of x, one per z; fixed x rows of y, one per z.
     ///
     /// # Errors

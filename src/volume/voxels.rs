@@ -1,8 +1,8 @@
-//! The stored numbers of a volume, in the type the file or the caller had.
+//! Stored voxel values, in the numeric type of the file or the caller.
 
 use super::error::{VolumeError, reserve};
 
-/// Voxels as stored: x fastest, then y, z and time.
+/// Array of voxel values as stored: x fastest, then y, z and time.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Voxels {
     /// Unsigned 8-bit integers.
@@ -23,7 +23,7 @@ pub enum Voxels {
     F64(Vec<f64>),
 }
 
-/// One expression for whichever type the voxels have.
+/// Evaluates an expression with `$values` bound to the typed vector of `$voxels`, whatever its type.
 macro_rules! each {
     ($voxels:expr, $values:ident => $body:expr) => {
         match $voxels {
@@ -41,32 +41,32 @@ macro_rules! each {
 pub(crate) use each;
 
 impl Voxels {
-    /// Number of voxels.
+    /// Returns the number of voxels.
     pub fn len(&self) -> usize {
         each!(self, values => values.len())
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no voxels.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The stored number at `index`, or `None` past the end.
+    /// Returns the stored value at `index`, or `None` past the end.
     pub fn get(&self, index: usize) -> Option<f64> {
         each!(self, values => number_at(values, index))
     }
 
-    /// Smallest and largest finite number, or `None` when there is none.
+    /// Returns the smallest and largest finite value, or `None` if there is none.
     pub(crate) fn finite_range(&self) -> Option<[f64; 2]> {
         each!(self, values => finite_range(values))
     }
 
-    /// The numbers as voxels of the same type, rounded where it holds whole numbers, and held within what it holds.
+    /// Converts `values` to the voxel type of `self`: rounded for integer types and clamped to the range of the type.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].
     pub(crate) fn like(&self, values: &[f64]) -> Result<Voxels, VolumeError> {
-        // `as` holds numbers within what a type holds.
+        // `as` saturates at the ends of the type's range.
         macro_rules! whole {
             ($kind:ident, $number:ty) => {{
                 let mut out = reserve(values.len())?;
@@ -94,7 +94,7 @@ impl Voxels {
         })
     }
 
-    /// Appends voxels of the same type; `false`, with nothing changed, when the types differ.
+    /// Appends voxels of the same type; returns `false`, and changes nothing, if the types differ.
     fn append(&mut self, other: &Voxels) -> bool {
         match (self, other) {
             (Voxels::U8(to), Voxels::U8(from)) => to.extend_from_slice(from),
@@ -110,7 +110,7 @@ impl Voxels {
         true
     }
 
-    /// No voxels of the same type, with room for `count`.
+    /// Returns an empty array of the same type with capacity for `count` voxels.
     fn empty_like(&self, count: usize) -> Result<Voxels, VolumeError> {
         Ok(match self {
             Voxels::U8(_) => Voxels::U8(reserve(count)?),
@@ -124,7 +124,7 @@ impl Voxels {
         })
     }
 
-    /// All parts one after the other, or `None` when they differ in type.
+    /// Concatenates arrays of voxels of one type (the frames of a sequence); `None` if their types differ.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].

@@ -14,7 +14,7 @@ import { sliceAndSurface } from './vtk-view';
 await page(async () => {
   const { voxels, size, spacing, directions, origin } = await loadScan('../data/heart.nii.gz');
   const image = new Image(new ImageType(3, 'int16', 'Scalar', 1));
-  // Directions are its columns; itk-wasm has rows.
+  // Transpose: the scan lists direction vectors as columns, itk-wasm stores the matrix row by row.
   image.direction = Float64Array.from([0, 1, 2].flatMap((row) => directions.map((column) => column[row] ?? 0)));
   Object.assign(image, { size, spacing, origin, data: voxels });
 

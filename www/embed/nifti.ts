@@ -1,12 +1,13 @@
-// Stands for your own reader: the first frame of a gzipped NIfTI-1 file, little-endian, with a matrix, of bytes or shorts.
+// Stand-in for your own reader: reads the first frame of a gzipped, little-endian NIfTI-1 file of 8- or 16-bit integers
+// that has an affine matrix (sform).
 
 export interface Scan {
   voxels: Uint8Array | Int16Array;
   size: number[];
   spacing: number[];
-  /** Unit vectors along x, y and z of the grid, LPS. */
+  /** Unit vectors along the x, y and z axes of the grid, LPS. */
   directions: number[][];
-  /** Place of the first voxel, LPS. */
+  /** Position of the first voxel, LPS. */
   origin: number[];
 }
 
@@ -16,7 +17,7 @@ export async function loadScan(address: string): Promise<Scan> {
   const file = await new Response(body.pipeThrough(new DecompressionStream('gzip'))).arrayBuffer();
   const header = new DataView(file);
   const size = [42, 44, 46].map((at) => header.getInt16(at, true));
-  // Rows of the matrix; the file is RAS.
+  // Rows of the matrix, with x and y negated: the file is RAS.
   const row = (k: number) => [0, 4, 8, 12].map((at) => (k < 2 ? -1 : 1) * header.getFloat32(280 + 16 * k + at, true));
   const matrix = [row(0), row(1), row(2)];
   const column = (k: number) => matrix.map((values) => values[k] ?? 0);

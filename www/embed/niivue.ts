@@ -6,7 +6,7 @@ import { page, shown } from './page';
 await page(async () => {
   const nv = new Niivue({
     ...{ backColor: [0.08, 0.09, 0.1, 1], multiplanarShowRender: SHOW_RENDER.ALWAYS },
-    // What of the surface is near a slice is seen on it, and all of it through the volume.
+    // Slices show the part of the surface near them; the surface also shows through the volume.
     ...{ meshThicknessOn2D: 2, meshXRay: 0.6 },
   });
   await nv.attachToCanvas(document.querySelector('canvas') as HTMLCanvasElement);

@@ -1,4 +1,4 @@
-// What the live pages share, and is nothing of Vesicle's: the line that says how it stands.
+// Shared by the live pages and independent of Vesicle: the status line.
 import type { StepReport } from 'vesicle';
 
 const line = document.querySelector<HTMLElement>('[data-state]');
@@ -7,14 +7,17 @@ function state(name: 'running' | 'done' | 'error', text: string): void {
   if (line) [line.dataset.state, line.textContent] = [name, text];
 }
 
-/** Says what the surface has become, and lets the browser draw it. */
+/**
+ * Shows the progress of a step in the status line, and resolves at the next animation frame, so that the browser can
+ * draw.
+ */
 export function shown({ iteration, phase, vertices, components }: StepReport): Promise<unknown> {
   const parts = components === 1 ? '1 part' : `${components} parts`;
   state('running', `Step ${iteration}, ${phase}: ${vertices.toLocaleString('en')} vertices, ${parts}`);
   return new Promise(requestAnimationFrame);
 }
 
-/** Runs the page, and says how it ended. */
+/** Runs the page's work, and shows in the status line how it ended: the final counts, or the error message. */
 export async function page(work: () => Promise<StepReport>): Promise<void> {
   try {
     const { iteration, vertices } = await work();

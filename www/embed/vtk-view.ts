@@ -1,4 +1,4 @@
-// A view of vtk.js as any page with it has one: a slice of an image and an actor.
+// A plain vtk.js view, shared by the pages that use it: one slice of an image and one actor.
 import '@kitware/vtk.js/Rendering/Profiles/Volume';
 import type vtkImageData from '@kitware/vtk.js/Common/DataModel/ImageData';
 import type vtkActor from '@kitware/vtk.js/Rendering/Core/Actor';
@@ -7,7 +7,7 @@ import { SlicingMode } from '@kitware/vtk.js/Rendering/Core/ImageMapper/Constant
 import vtkImageSlice from '@kitware/vtk.js/Rendering/Core/ImageSlice';
 import vtkGenericRenderWindow from '@kitware/vtk.js/Rendering/Misc/GenericRenderWindow';
 
-/** Shows both from the front, feet down; gives what draws them. */
+/** Shows the middle slice of `image` and `actor` from the front, head up; returns a function that renders the view. */
 export function sliceAndSurface(image: vtkImageData, actor: vtkActor): () => void {
   const view = document.querySelector('#view') as HTMLElement;
   const generic = vtkGenericRenderWindow.newInstance({ background: [0.08, 0.09, 0.1], listenWindowResize: false });

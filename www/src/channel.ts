@@ -1,6 +1,9 @@
 import type { Failure } from './protocol';
 
-/** A request that a worker could not fulfil. `code` is that of the library's VesicleError, or 'internal'. */
+/**
+ * A request that a worker could not fulfil. `code` is that of the library's VesicleError, or 'internal' if the engine
+ * broke.
+ */
 export class RequestError extends Error {
   readonly code: string;
 
@@ -11,7 +14,7 @@ export class RequestError extends Error {
   }
 }
 
-/** What went wrong, whoever threw it. */
+/** Converts any thrown value to a `Failure`; an error that is no `RequestError` gets the code 'page'. */
 export function toFailure(error: unknown): Failure {
   if (error instanceof RequestError) return { code: error.code, message: error.message };
   return { code: 'page', message: error instanceof Error ? error.message : String(error) };
@@ -22,22 +25,24 @@ interface Waiting {
   reject: (error: RequestError) => void;
 }
 
-/** What can be asked of a worker: by name, what is sent and what comes back. */
+/** Constraint on a protocol's request table: for each request its name, body and reply. */
 type Asked<Requests> = { [K in keyof Requests]: { body: unknown; reply: unknown } };
 
 type Reply = { id: number; ok: true; body: unknown } | { id: number; ok: false; failure: Failure };
 
-/** A worker that was started before anybody had something to ask of it. */
+/** A worker started before any channel needed it; see {@link spawnAhead}. */
 let ahead: { spawn: () => Worker; worker: Worker } | undefined;
 
-/** Starts a worker that a channel with the same `spawn` will take over: it loads while the page does. */
+/**
+ * Starts a worker for the next channel with the same `spawn`, so that it loads in parallel with the page's own code.
+ */
 export function spawnAhead(spawn: () => Worker): void {
   if (ahead?.spawn === spawn) return;
-  // That of a lab that was left before it was there.
+  // It belongs to a lab that was closed before it had opened.
   ahead?.worker.terminate();
   const worker = spawn();
   ahead = { spawn, worker };
-  // The channel's own attempt will tell what is wrong.
+  // Forget it: the channel then starts its own worker, and reports what is wrong.
   worker.onerror = () => {
     ahead = undefined;
   };
@@ -50,13 +55,13 @@ function takeWorker(spawn: () => Worker): Worker {
   return worker;
 }
 
-/** The page's end of a worker: requests as promises, events to one listener. */
+/** The page's connection to a worker: requests return promises, events go to one listener. */
 export class Channel<Requests extends Asked<Requests>, Event extends { event: string }> {
   readonly #spawn: () => Worker;
   readonly #onEvent: (event: Event | { event: 'failure'; failure: Failure }) => void;
   readonly #waiting = new Map<number, Waiting>();
   #worker: Worker;
-  /** What broke the worker, until it is started again. */
+  /** Failure that broke the worker; every request is rejected with it until the worker is restarted. */
   #failure: Failure | undefined;
   #lastId = 0;
 
@@ -79,12 +84,12 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
     });
   }
 
-  /** A message that has no reply. */
+  /** Posts a message that has no reply. */
   protected tell(message: { kind: string }, transfer: Transferable[] = []): void {
     this.#worker.postMessage(message, transfer);
   }
 
-  /** A fresh worker in place of one that broke; what was asked of the old one fails. */
+  /** Replaces the worker by a new one. Requests pending at the old one are rejected with `failure`. */
   restart(failure: Failure): void {
     this.#worker.terminate();
     this.#fail(failure);
@@ -92,7 +97,7 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
     this.#worker = this.#start();
   }
 
-  /** Ends the worker and gives its memory back. What was asked of it is never answered: nobody is there to hear it. */
+  /** Terminates the worker and frees its memory. Pending requests are never settled, since the lab is being closed. */
   close(): void {
     this.#worker.terminate();
     this.#waiting.clear();
@@ -102,7 +107,7 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
     const worker = takeWorker(this.#spawn);
     worker.onmessage = ({ data }: MessageEvent<Reply | Event>) => this.#receive(data);
     worker.onerror = (event) => {
-      // Told on the page, and not once more in the console.
+      // The page shows the error; the console need not repeat it.
       event.preventDefault();
       this.#broken(event.message || 'the worker could not be started');
     };
@@ -125,7 +130,7 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
   #broken(message: string): void {
     const failure: Failure = { code: 'internal', message };
     this.#failure = failure;
-    // Whatever it still did would be of no use.
+    // Its further results could not be trusted.
     this.#worker.terminate();
     this.#fail(failure);
     this.#onEvent({ event: 'failure', failure });

@@ -3,16 +3,17 @@ import type { Requests, ReturnMessage, SurfaceBuffers, WorkerEvent } from './pro
 
 export { RequestError, toFailure } from './channel';
 
+/** Starts the Extract lab's worker. */
 export const spawnExtract = () =>
   new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'vesicle' });
 
-/** The Extract lab's worker, from the page. */
+/** The page's client of the Extract lab's worker. */
 export class Client extends Channel<Requests, WorkerEvent> {
   constructor(onEvent: (event: WorkerEvent) => void) {
     super(spawnExtract, onEvent);
   }
 
-  /** Gives a snapshot's buffers back, which also tells the worker that the page is ready for another. */
+  /** Returns the buffers of a snapshot to the worker, which also tells it that the page is ready for the next one. */
   giveBack({ positions, normals, indices }: SurfaceBuffers): void {
     const message: ReturnMessage = { kind: 'return', buffers: { positions, normals, indices } };
     this.tell(message, [positions.buffer, normals.buffer, indices.buffer]);

@@ -1,18 +1,19 @@
 import type { ParamValues } from './protocol';
 import type { Shape } from './shapes';
 
+/** Unit of lengths in world space; empty if the file does not state one. */
 export type Unit = 'mm' | 'µm' | '';
 
-/** A volume that comes with the page, the settings that suit it, and whom to thank. */
+/** An example volume, with suitable settings and credits. */
 export interface Example {
   id: string;
   name: string;
-  /** A file beside the page, or a shape to compute. */
+  /** A file served with the page, or a computed shape. */
   source: { file: string } | { shape: Shape };
-  /** Of lengths in its world space; empty where the file does not say. */
+  /** Unit of lengths in world space; empty if the file does not state one. */
   unit: Unit;
   levels: number;
-  /** Mean edge in world units, where the model's own choice is too coarse. */
+  /** Mean edge length in world units, if the model's own choice is too coarse. */
   edge?: number;
   params: ParamValues & { iso: number };
   credit: string;
@@ -22,7 +23,7 @@ const HEAD_CREDIT =
   'Head CT: Visible Human Project, U.S. National Library of Medicine, public domain; volume from ipyvolume (MIT). Walls thinner than a voxel, as before the frontal sinus, come out with gaps.';
 const BONE = { iso: 95, isoForce: -1, rigidity: 0.1 };
 
-/** The first is shown when the page opens. */
+/** The example volumes. The first one opens by default. */
 export const EXAMPLES: [Example, ...Example[]] = [
   {
     id: 'head-bone',
@@ -30,7 +31,7 @@ export const EXAMPLES: [Example, ...Example[]] = [
     source: { file: 'visible-human-head.nii.gz' },
     unit: 'mm',
     levels: 1,
-    // Bone thinner than the contact distance is eaten from its rims: shorter edges keep more of it.
+    // Bone thinner than the contact distance is eroded from its rims; shorter edges preserve more of it.
     edge: 2.2,
     params: { ...BONE, isoForce: -3, rigidity: 0.05 },
     credit: HEAD_CREDIT,
@@ -59,7 +60,7 @@ export const EXAMPLES: [Example, ...Example[]] = [
     source: { file: 'tooth.nrrd' },
     unit: '',
     levels: 2,
-    // Half way between what the tooth stands in and dentine.
+    // Halfway between the intensities of the holder of the tooth and of dentine.
     params: { iso: 600, isoForce: -1, rigidity: 0.2 },
     credit: 'Tooth CT: Scientific Computing and Imaging Institute, University of Utah, Seg3D data (MIT).',
   },
@@ -92,7 +93,7 @@ export const EXAMPLES: [Example, ...Example[]] = [
   },
 ];
 
-/** Where a file that comes with the page lies. */
+/** Returns the address of a data file served with the page. */
 export function exampleUrl(file: string): string {
   return new URL(`data/${file}`, document.baseURI).href;
 }

@@ -1,9 +1,9 @@
 const DOCS = './docs/';
 
-/** What the documentation beside the app begins with. */
+/** Start page of the documentation that is served with the app. */
 export const DOCUMENTATION = `${DOCS}index.html`;
 
-/** Its pages on what each lab does, for who has not met the method before. */
+/** Documentation pages that introduce each lab to readers who are new to its method. */
 export const GUIDES = {
   extract: `${DOCS}documents/A_surface_out_of_a_volume.html`,
   reconstruct: `${DOCS}documents/A_surface_out_of_points.html`,
@@ -11,5 +11,5 @@ export const GUIDES = {
   sculpt: `${DOCS}documents/A_surface_under_your_hand.html`,
 };
 
-/** Its section on what a surface can miss. */
+/** Section of the documentation on what an extracted surface can miss. */
 export const COVERAGE_GUIDE = `${GUIDES.extract}#what-a-surface-can-miss-and-why`;

@@ -10,7 +10,7 @@ import { spawnSculpt } from './sculpt/client';
 import { spawnTrack } from './track/client';
 import { h } from './ui/dom';
 
-/** The first is what an empty or unknown address opens. */
+/** The labs, in the order of the navigation. An empty or unknown address opens the first one. */
 const LABS: [LabKind, ...LabKind[]] = [
   {
     id: 'extract',
@@ -46,14 +46,14 @@ const LABS: [LabKind, ...LabKind[]] = [
   },
 ];
 
-/** The labs on the one page: one is open at a time, the others keep nothing but their address. */
+/** Switches between the labs on the page: one is open at a time, and of the others only their address is kept. */
 class Labs {
   readonly #root: HTMLElement;
   readonly #help: HTMLElement;
   readonly #links = new Map<string, HTMLAnchorElement>();
   #kind: LabKind | undefined;
   #lab: Lab | undefined;
-  /** Counts what was opened: a lab whose code comes late is not wanted any more. */
+  /** Counts openings, so that a lab is dropped whose code arrives after another one was requested. */
   #turn = 0;
 
   constructor(root: HTMLElement, help: HTMLElement, nav: HTMLElement) {
@@ -64,9 +64,9 @@ class Labs {
       this.#links.set(id, link);
       nav.append(link);
     }
-    // Before the address changes, so that the way back leads to where one was.
+    // Remembers the address before it changes, so that the link leads back to the lab as it was.
     nav.addEventListener('click', () => this.#remember());
-    // In the capture phase of the window, ahead of what an open lab listens to.
+    // In the capture phase, before the listeners of the open lab.
     window.addEventListener('hashchange', () => this.#follow(), true);
     this.#follow();
   }
@@ -84,7 +84,7 @@ class Labs {
     this.#present(kind);
     this.#root.dataset.state = 'loading';
     try {
-      // The engine loads while the lab's own code does.
+      // The engine loads in parallel with the lab's own code.
       spawnAhead(kind.spawn);
       const Kind = await kind.load();
       if (turn !== this.#turn) return;
@@ -99,7 +99,7 @@ class Labs {
   #passOn(passedOn: PassedOn): void {
     this.#remember();
     const kind = LABS.find(({ id }) => id === passedOn.lab) ?? LABS[0];
-    // Without a hashchange: the lab is opened here, on what it is given.
+    // pushState fires no hashchange: the lab is opened here, with the data passed on.
     history.pushState(null, '', `#${kind.id}`);
     void this.#open(kind, passedOn);
   }
@@ -114,7 +114,7 @@ class Labs {
     for (const [one, link] of this.#links) {
       if (one === id) {
         link.setAttribute('aria-current', 'page');
-        // Where there is no room for all of them.
+        // On a narrow page the links scroll.
         link.scrollIntoView({ block: 'nearest', inline: 'center' });
       } else link.removeAttribute('aria-current');
     }

@@ -1,9 +1,12 @@
-/** Seconds that the example has the machine for itself. */
+/** Seconds after the page has loaded before files are cached, so that caching does not slow the first example down. */
 const PATIENCE = 3;
 
-/** Lets the page open without a network from the second time on; where the browser has no such thing, or refuses, nothing is lost. */
+/**
+ * Registers the service worker that caches the page's files, so that later visits need no network. If the browser does
+ * not support or allows no service workers, the page works as before.
+ */
 export function workOffline(): void {
-  // While developing, files have to be those of the moment.
+  // During development, files must not come from a cache.
   if (!import.meta.env.PROD || !('serviceWorker' in navigator)) return;
   window.addEventListener('load', () => setTimeout(() => void begin().catch(() => undefined), 1000 * PATIENCE));
 }

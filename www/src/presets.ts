@@ -1,8 +1,8 @@
-/** The paper's figures, on volumes that come with the page or are computed in it. */
+/** Presets of the Extract lab: the paper's figures, on volumes that are served with the page or computed in it. */
 import { EXAMPLES, type Example } from './examples';
 import type { ParamValues } from './protocol';
 
-/** What came of a run to rest, for the tests to hold the words against. */
+/** Result of a converged run; tests compare the texts of a variant with it. */
 export interface Outcome {
   iterations: number;
   vertices: number;
@@ -10,39 +10,46 @@ export interface Outcome {
   genus: number;
 }
 
-/** One of several pictures of a figure: the same volume under other parameters. */
+/** One picture of a figure: the preset's volume with other parameters. */
 export interface Variant {
   id: string;
-  /** As on a button. */
+  /** Label of its button. */
   name: string;
   params: ParamValues;
-  /** What comes out here. */
+  /** Result in this app, as a sentence. */
   came: string;
   outcome: Outcome;
 }
 
+/** A figure of the paper, as an example of the Extract lab. */
 export interface Preset extends Example {
   start: { kind: 'enclosing' } | { kind: 'bubbles'; bubbles: number } | { kind: 'isosurface' };
-  /** What the paper saw, in a sentence. */
+  /** Result reported in the paper, as a sentence. */
   saw: string;
-  /** The first is what the preset opens with. */
+  /** The pictures of the figure; the preset opens with the first. */
   variants: [Variant, ...Variant[]];
-  /** Whether another variant starts over; else the surface goes on from where it is. */
+  /**
+   * Whether choosing another variant restarts the model; by default the present surface continues with the new
+   * parameters.
+   */
   startsOver?: boolean;
-  /** What to look at beside the surface. */
+  /** Advice on what else to look at, such as a panel of the page. */
   hint?: string;
-  /** The comparison of direct with coarse to fine belongs to it. */
+  /** Whether the figure includes the comparison of a direct with a coarse-to-fine run; opens that panel. */
   compares?: boolean;
 }
 
 const ENCLOSING = { kind: 'enclosing' } as const;
 const COMPUTED = 'Computed in the page: the image of the paper cannot be passed on.';
 const CONTOUR = { kind: 'contour' } as const;
-/** The method as in the paper: one sampling distance everywhere, and Euler's steps. */
+/** Parameters of the method as published: one sampling distance everywhere, and Euler steps. */
 export const PAPER = { adaptivity: 0, integrator: 'euler' } as const;
-/** Every other force off, so that a preset says all that acts. */
+/** Base parameters of the presets: the iso force alone, so that each preset lists every other force that acts. */
 const BARE = { ...PAPER, isoForce: -1, gradientNormal: 0, gradientTangent: 0, rigidity: 0, stiffness: 0 };
-/** Only the force towards maxima of intensity; per voxel here, so that 1 does what 0.1 does in the paper. */
+/**
+ * Base parameters without the iso force, for presets that use the gradient force, towards maxima of intensity. It is
+ * per voxel here, so that 1 does what 0.1 does in the paper.
+ */
 const RIDGE = { ...BARE, isoForce: 0 };
 
 export const PRESETS: Preset[] = [
@@ -53,7 +60,7 @@ export const PRESETS: Preset[] = [
     unit: '',
     start: ENCLOSING,
     levels: 0,
-    // The gap between the rings is then four δ wide.
+    // Makes the gap between the rings four δ wide.
     edge: 3.15,
     params: { ...BARE, iso: 127.5, rigidity: 0.1, stiffness: 0.1 },
     credit: 'Computed: a potential that falls with the distance from two linked circles.',
@@ -265,6 +272,7 @@ export const PRESETS: Preset[] = [
   },
 ];
 
+/** Returns the example or preset with this id. */
 export function exampleById(id: string): Example | undefined {
   return [...EXAMPLES, ...PRESETS].find((one) => one.id === id);
 }
@@ -273,14 +281,14 @@ export function isPreset(example: Example | undefined): example is Preset {
   return example !== undefined && 'variants' in example;
 }
 
-/** The picture of a figure whose parameters are in force, if any is. */
+/** Returns the variant of a figure whose parameters are all in force, if there is one. */
 export function variantOf(preset: Preset, params: ParamValues): Variant | undefined {
   return preset.variants.find((one) =>
     Object.entries({ ...preset.params, ...one.params }).every(([name, value]) => Object.is(params[name], value)),
   );
 }
 
-/** The start shape that suits an example, or a file. */
+/** Returns the suitable start shape: a preset's own, else the contour, for other examples and for files. */
 export function startOf(example: Example | undefined): Preset['start'] | typeof CONTOUR {
   return isPreset(example) ? example.start : CONTOUR;
 }

@@ -1,8 +1,9 @@
 /**
- * The messages between page and worker. Both sides import this file and nothing else of each other.
+ * Messages between the page and the worker of the Extract lab. Both sides import this file, and neither imports the
+ * other's code.
  *
- * The page sends requests and gets exactly one reply each; the worker also sends events on its own.
- * Stopping a run is an ordinary request with an ordinary reply: a cancellation is not an error.
+ * Each request of the page gets exactly one reply; the worker also sends events of its own accord.
+ * Stopping a run is a request with an ordinary reply: a cancellation is not an error.
  */
 import type {
   Attractor,
@@ -27,7 +28,7 @@ export interface NamedBytes {
   bytes: Uint8Array;
 }
 
-/** Where the surface starts. Points are world coordinates, packed xyz. */
+/** Start shape of the surface. Lengths and positions are in world coordinates. */
 export type StartShape =
   | { kind: 'contour' }
   | { kind: 'enclosing' }
@@ -35,30 +36,31 @@ export type StartShape =
   | { kind: 'sphere'; center: Vec3; radius: number }
   | { kind: 'isosurface' };
 
-/** Where a volume comes from: one file, or a header and its data; or a computed shape. */
+/** Source of a volume: one file, or a header and its data; or a computed shape. */
 export type VolumeSource = { files: NamedBytes[] } | { shape: Shape };
 
+/** All that a model is built from, besides the volume. */
 export interface Setup {
   start: StartShape;
   /** Pyramid levels above the volume itself. */
   levels: number;
-  /** Mean edge at the end in world units; chosen by the model where undefined. */
+  /** Mean edge length on the finest level in world units; if undefined, the model chooses it. */
   edge: number | undefined;
-  /** What differs from the defaults; without `iso` the worker chooses one from the histogram. */
+  /** Parameters that differ from the defaults; without `iso` the worker chooses an iso value from the histogram. */
   params: ParamValues;
   attractors: Attractor[];
 }
 
-/** A coarser copy of the volume, reduced to 8 bits like the volume itself. */
+/** One coarser level of the volume's pyramid, reduced to 8 bits for display like the volume itself. */
 export interface LevelView {
   dims: Vec3;
   voxels: Uint8Array;
 }
 
-/** What can be told of each vertex beside its place; the names are shown. */
+/** A quantity computed at each vertex to colour the surface by; the names appear in the interface. */
 export type Shade = 'speed' | 'mean curvature' | 'gaussian curvature';
 
-/** Everything a run has, to come back to it. */
+/** A saved run, from which the worker can restore it; kept by the page for undo. */
 export interface SavedRun {
   state: Uint8Array;
   levels: number;
@@ -66,21 +68,21 @@ export interface SavedRun {
   done: boolean;
 }
 
-/** What the page needs to know of a volume, with its voxels reduced to 8 bits for display. */
+/** Description of a volume for the page, with its voxels reduced to 8 bits for display. */
 export interface VolumeView {
   name: string;
   dims: Vec3;
   frames: number;
   spacing: Vec3;
-  /** Voxel index to world, column-major, 16 numbers. */
+  /** Voxel indices to world coordinates: a 4 × 4 matrix, column-major. */
   affine: Float64Array;
   space: 'RAS' | 'LPS';
   /** Smallest and largest intensity. */
   range: [number, number];
   histogram: Uint32Array;
-  /** The intensities shown as black and as white. */
+  /** The intensities displayed as black and as white. */
   window: [number, number];
-  /** x fastest, 0 = black, 255 = white; where all frames are wanted, one after the other. */
+  /** x fastest, 0 = black, 255 = white. Frame after frame if all frames were requested, else the first alone. */
   voxels: Uint8Array;
 }
 
@@ -89,49 +91,56 @@ export interface Plane {
   normal: Vec3;
 }
 
-/** Buffers that travel to the page and back, so that none is allocated per frame. They may be longer than what is used. */
+/**
+ * Surface buffers that are transferred to the page and back, so that none is allocated per frame. They may be longer
+ * than the part in use.
+ */
 export interface SurfaceBuffers {
   positions: Float32Array;
   normals: Float32Array;
   indices: Uint32Array;
 }
 
+/** A surface to draw. */
 export interface Surface extends SurfaceBuffers {
-  /** How many vertices and triangles of the buffers are in use. */
+  /** Numbers of vertices and triangles in use; the buffers may be longer. */
   vertices: number;
   triangles: number;
-  /** One number a vertex, where a shade was asked for. */
+  /** One value per vertex, if a shade was requested. */
   values?: Float32Array;
-  /** rgb of each vertex, 0..1, where it has one of its own. */
+  /** Colours of the vertices, rgb in 0..1, if the mesh has them. */
   colors?: Float32Array;
-  /** Place of each vertex in a picture, where one was asked for. */
+  /** Texture coordinates of the vertices, if a textured surface was requested. */
   uvs?: Float32Array;
 }
 
-/** `report` is there when the surface was checked, which costs time and is done only when it stands still. */
+/**
+ * Measures of a surface. `report`, the result of the mesh checks, takes time, so it is present only when the model is
+ * not running.
+ */
 export interface Measures {
   info: MeshInfo;
   report?: MeshReport;
 }
 
-/** A model that was just built, before its first step. */
+/** Reply about a newly built model, before its first step. */
 export interface Ready {
   params: ParamValues;
-  /** Edge length the model starts with, world units. */
+  /** Edge length at the start of the run, in world units. */
   delta: number;
 }
 
-/** Coverage, and the iteration it was measured at. */
+/** Coverage, and the iteration at which it was measured. */
 export interface MeasuredCoverage extends Coverage {
   iteration: number;
 }
 
-/** One of the two ways in a comparison, and what it cost. */
+/** Result and cost of one of the two runs of a comparison, direct or coarse to fine. */
 export interface ComparedRun {
   levels: number;
-  /** How many iterations and milliseconds by part each level took, the coarsest first. */
+  /** Number of iterations, and milliseconds per part, of each level; the coarsest first. */
   byLevel: { level: number; iterations: number; times: Record<string, number> }[];
-  /** Of the last iteration. */
+  /** Report of the last iteration. */
   report: StepReport;
   info: MeshInfo;
 }
@@ -140,43 +149,43 @@ export interface Loaded extends Ready {
   volume: VolumeView;
 }
 
-/** Every request: what is sent, and what comes back. */
+/** Requests of the page: the body of each and its reply. */
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** When it fails, the former volume and model stay. */
+  /** Opens a volume and builds a model of it. On failure, the previous volume and model stay. */
   load: { body: { name: string; source: VolumeSource; setup: Setup }; reply: Loaded };
-  /** A new model on the same volume. When it fails, the former model stays. */
+  /** Builds a new model of the same volume. On failure, the previous model stays. */
   rebuild: { body: Setup; reply: Ready };
   play: { body: undefined; reply: undefined };
   pause: { body: undefined; reply: undefined };
   step: { body: { count: number }; reply: undefined };
-  /** Replies with all the parameters as they are now. */
+  /** Changes the given parameters of the live model; replies with all parameters in force. */
   setParams: { body: ParamValues; reply: ParamValues };
-  /** The planes whose cuts with the surface are to be sent. */
+  /** Sets the planes whose cross-sections with the surface are sent from now on. */
   planes: { body: Plane[]; reply: undefined };
   export: { body: { format: MeshFormat }; reply: Uint8Array };
-  /** So many coarser copies of the volume, the finest first. */
+  /** Replies with this many coarser levels of the volume, the finest first. */
   pyramid: { body: { levels: number }; reply: LevelView[] };
   setAttractors: { body: Attractor[]; reply: undefined };
-  /** What to tell of each vertex from now on. */
+  /** Sets the quantity sent for each vertex from now on. */
   shade: { body: Shade | undefined; reply: undefined };
-  /** The run as it is at this moment, also while it goes on. */
+  /** Saves the present state of the run, also while it is running. */
   save: { body: undefined; reply: SavedRun };
-  /** Back to a saved run of the same volume. */
+  /** Restores a saved run of the same volume. */
   restore: { body: SavedRun; reply: Ready };
-  /** The same extraction twice, direct and coarse to fine; nothing when it was cancelled. */
+  /** Runs the same extraction twice, direct and coarse to fine; undefined if cancelled. */
   compare: { body: Setup; reply: { direct: ComparedRun; coarseToFine: ComparedRun } | undefined };
   cancelCompare: { body: undefined; reply: undefined };
-  /** How much of the iso-surface is covered, now and also while a run goes on; nothing when it was cancelled. */
+  /** Measures how much of the iso-surface the present surface covers, also during a run; undefined if cancelled. */
   coverage: { body: undefined; reply: MeasuredCoverage | undefined };
   cancelCoverage: { body: undefined; reply: undefined };
-  /** Adds parts that the surface leaves out; replies with how many there were. */
+  /** Adds the parts of the object that the surface misses; replies with the number of seeds. */
   seed: { body: undefined; reply: number };
 }
 
 export type RequestKind = keyof Requests;
 export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
-/** Buffers the page is done with; has no reply. */
+/** Returns buffers that the page no longer draws; has no reply. */
 export interface ReturnMessage {
   kind: 'return';
   buffers: SurfaceBuffers;
@@ -184,7 +193,7 @@ export interface ReturnMessage {
 export type ToWorker = RequestMessage | ReturnMessage;
 
 export interface Failure {
-  /** A VesicleError's code, or 'internal' when the engine itself broke and has to be started again. */
+  /** Code of a VesicleError; 'internal' if the engine itself broke and has to be restarted. */
   code: string;
   message: string;
 }
@@ -193,15 +202,15 @@ export type ReplyMessage = { id: number; ok: true; body: unknown } | { id: numbe
 export interface SnapshotEvent {
   event: 'snapshot';
   surface: Surface;
-  /** Pyramid level the model is on. */
+  /** Present pyramid level of the model; 0 is the finest. */
   level: number;
-  /** Cuts with the planes, pairs of world points. */
+  /** Cross-sections with the planes, as pairs of world points. */
   sections: Float32Array[];
-  /** One per step since the last snapshot. */
+  /** One report per step since the last snapshot or progress event. */
   reports: StepReport[];
   measures?: Measures;
 }
-/** Steps that came faster than the page draws, so that it need not take in too many at once. */
+/** Reports of steps without a snapshot, sent in batches when steps come faster than the page draws. */
 export interface ProgressEvent {
   event: 'progress';
   reports: StepReport[];
@@ -210,7 +219,7 @@ export interface SectionsEvent {
   event: 'sections';
   sections: Float32Array[];
 }
-/** Sent when a run has ended by itself or was stopped, after its last snapshot. */
+/** State of the run: sent when it starts and, after its last snapshot, when it is done or was stopped. */
 export interface StateEvent {
   event: 'state';
   state: 'running' | 'paused' | 'done';
@@ -219,13 +228,13 @@ export interface FailureEvent {
   event: 'failure';
   failure: Failure;
 }
-/** How far a comparison is. */
+/** Progress of a comparison: one step of one of its runs. */
 export interface ComparingEvent {
   event: 'comparing';
   run: 'direct' | 'coarseToFine';
   report: StepReport;
 }
-/** How far a measurement of coverage is, 0..1. */
+/** Progress of a coverage measurement, 0..1. */
 export interface CoveringEvent {
   event: 'covering';
   share: number;

@@ -1,5 +1,5 @@
 /**
- * `values` as bytes, 0 at `window[0]` and below, 255 at `window[1]` and above, written into `out` from `offset` on.
+ * Writes `values` as bytes into `out` from `offset` on: 0 at `window[0]` and below, 255 at `window[1]` and above.
  * NaN becomes 0.
  */
 export function quantize(values: Float32Array, window: [number, number], out: Uint8Array, offset: number): void {

@@ -1,7 +1,7 @@
-/** The states a lab can be in; the lab's element carries it as `data-state`. */
+/** State of a lab; its element carries it as `data-state`. */
 export type LabState = 'loading' | 'running' | 'paused' | 'done' | 'error';
 
-/** A value that others can follow. Setting an equal value tells nobody. */
+/** A value with subscribers. Setting an equal value notifies nobody. */
 export class Observable<T> {
   #value: T;
   readonly #followers = new Set<(value: T) => void>();
@@ -20,7 +20,7 @@ export class Observable<T> {
     for (const follower of this.#followers) follower(value);
   }
 
-  /** Calls `follower` now and at every change; returns how to stop. */
+  /** Calls `follower` now and at every change; returns a function that unsubscribes it. */
   follow(follower: (value: T) => void): () => void {
     this.#followers.add(follower);
     follower(this.#value);

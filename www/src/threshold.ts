@@ -1,6 +1,6 @@
 /**
- * The intensity that best splits a histogram in two (Otsu 1979): a first guess of the iso value.
- * `range` is the intensity at the histogram's two ends.
+ * Returns the intensity that best splits a histogram in two (Otsu 1979), as a first guess of the iso value.
+ * `range` holds the intensities at the two ends of the histogram.
  */
 export function otsu(histogram: ArrayLike<number>, range: [number, number]): number {
   const bins = histogram.length;
@@ -8,7 +8,7 @@ export function otsu(histogram: ArrayLike<number>, range: [number, number]): num
   let below = 0;
   let belowSum = 0;
   let best = 0;
-  // Empty bins between two peaks are all equally good: take the middle of them.
+  // All splits in an empty gap between two peaks are equally good: take the middle one.
   let first = 0;
   let last = 0;
   for (let bin = 0; bin < bins - 1; bin++) {
@@ -37,7 +37,7 @@ function totals(histogram: ArrayLike<number>): { count: number; sum: number } {
   return { count, sum };
 }
 
-/** Variance between the two classes, up to a constant factor. */
+/** Returns the variance between the two classes, up to a constant factor. */
 function variance(below: number, belowSum: number, count: number, sum: number): number {
   const above = count - below;
   if (below === 0 || above === 0) return 0;
@@ -45,7 +45,7 @@ function variance(below: number, belowSum: number, count: number, sum: number): 
   return below * above * difference * difference;
 }
 
-/** The intensities at which the given fractions of all voxels lie below, from a histogram. */
+/** Returns the quantiles of the intensities at the given fractions, from a histogram over `range`. */
 export function quantiles(histogram: ArrayLike<number>, range: [number, number], fractions: number[]): number[] {
   const { count } = totals(histogram);
   return fractions.map((fraction) => {

@@ -1,4 +1,4 @@
-/** The worker: with the files of the folder beside it the only one that uses the vesicle package. It holds one volume and one model, and does what the page asks. */
+/** Worker of the Extract lab: holds one volume and one model, and serves the page's requests. */
 import init, { type DeformableModel, type Mesh, paramSpecs, type StepReport, type Volume, version } from 'vesicle';
 import type {
   Attractor,
@@ -28,18 +28,24 @@ import { noArrays, surfaceIn, transferOf } from './worker/room';
 import { answer, buffersOf, givingAway, stop, type Work } from './worker/serving';
 import { levelsOf, viewOf, volumeFrom } from './worker/volumes';
 
-/** Two sets: one on the screen, one on its way there or being filled. With more, surfaces would be made that nobody sees. */
+/**
+ * Sets of surface buffers: one on the screen, one in transit or being filled. With more, surfaces would be made that
+ * are never drawn.
+ */
 const BUFFER_SETS = 2;
-/** Milliseconds between two looks at area and volume while running; they cost as much as a step on small meshes. */
+/**
+ * Least milliseconds between two measurements of area and volume during a run; on small meshes one costs as much as a
+ * step.
+ */
 const MEASURE_EVERY = 400;
 
-/** Milliseconds between two messages about the progress of a measurement. */
+/** Least milliseconds between two progress messages of a coverage measurement. */
 const TELL_EVERY = 100;
 
-/** Steps told in one message. With fewer, the messages themselves cost more than what is in them. */
+/** Step reports per progress message. With fewer, sending the messages costs more than making the reports. */
 const MOST_REPORTS = 50;
 
-/** How much is told of a surface beside itself. */
+/** What a snapshot includes besides the surface: nothing, its measures, or measures and mesh checks. */
 type Detail = 'plain' | 'measured' | 'checked';
 
 type Handlers = {
@@ -53,12 +59,12 @@ function send(event: WorkerEvent, transfer: Transferable[] = []): void {
 class Session {
   #volume: Volume | undefined;
   #model: DeformableModel | undefined;
-  /** The intensities shown as black and as white. */
+  /** The intensities displayed as black and as white. */
   #window: [number, number] = [0, 1];
   #planes: Plane[] = [];
   #shade: Shade | undefined;
   #free: SurfaceBuffers[] = Array.from({ length: BUFFER_SETS }, noArrays);
-  /** Steps the page has not heard of yet. */
+  /** Reports of steps that were not sent to the page yet. */
   #reports: StepReport[] = [];
   #done = false;
   #iteration = 0;
@@ -103,7 +109,7 @@ class Session {
     const volume = await volumeFrom(source);
     try {
       const view = viewOf(volume, name);
-      // The page plays it at once: what a check would find, it would not show.
+      // No checks: the page starts the run at once, and would not show their result.
       const ready = this.#adopt(buildModel(volume, setup), 'measured');
       this.#volume?.free();
       this.#volume = volume;
@@ -173,7 +179,10 @@ class Session {
     this.#snapshot(due ? 'measured' : 'plain');
   }
 
-  /** Lists that grow while the page draws are told in parts: a thousand steps in one message take it a tenth of a second. */
+  /**
+   * Sends reports in batches while snapshots are skipped: a thousand reports in one message cost the page a tenth of a
+   * second.
+   */
   #tell(): void {
     if (this.#reports.length < MOST_REPORTS) return;
     send({ event: 'progress', reports: this.#reports });
@@ -233,7 +242,10 @@ class Session {
     return givingAway({ state, levels: this.#levels, iteration: this.#iteration, done: this.#done }, [state]);
   }
 
-  /** A state fits only a model with as many levels; whatever that one starts from is replaced at once. */
+  /**
+   * A state fits only a model with the same number of levels; if necessary, one is built, whose own start is replaced
+   * at once.
+   */
   async #restore({ state, levels, iteration, done }: SavedRun): Promise<Ready> {
     await this.#pause();
     if (levels === this.#levels) this.#current().restore(state);
@@ -343,7 +355,7 @@ class Session {
   }
 }
 
-// At once, and not when it is asked for: the page is still on its way. What goes wrong is told then.
+// Load the engine at once, while the page still loads. A failure is reported when the page asks for it (`hello`).
 const starting = init();
 starting.catch(() => undefined);
 

@@ -1,7 +1,7 @@
-//! Project tasks that need Rust: the wasm glue generator and the wasm test runner.
+//! Project tasks in Rust: the generator of the wasm bindings and the runner of the wasm tests.
 //!
-//! Both are the programs of `wasm-bindgen-cli`, called as a library, so that their version is the one in
-//! `Cargo.lock` and nothing has to be installed.
+//! Both are the programs of `wasm-bindgen-cli`, called as a library, so that their version is the one in `Cargo.lock`
+//! and nothing has to be installed.
 //!
 //! ```text
 //! cargo xtask bindgen <arguments of wasm-bindgen>
@@ -27,7 +27,7 @@ fn main() -> ExitCode {
 fn run() -> Result<(), String> {
     let mut arguments = env::args_os().skip(1);
     let task = arguments.next().ok_or(USAGE)?;
-    // Both programs expect their own name first, as on a command line.
+    // Both programs expect their own name as first argument, as on a command line.
     let arguments: Vec<OsString> = [task.clone()].into_iter().chain(arguments).collect();
     match task.to_str() {
         Some("bindgen") => wasm_bindgen_cli::wasm_bindgen::run_cli_with_args(arguments),

@@ -1,7 +1,9 @@
-//! Which axes are in space and which is of frames, where they lie in the world and how far apart the frames are.
+//! Interpretation of the axes of an NRRD: which are spatial and which one counts frames, their directions in world
+//! space, and the time between frames.
 //!
-//! Where axes have directions, the one without is of frames. Elsewhere its kind says so, or a unit of time, or that its
-//! spacing is unknown and those of the others are not; of four axes that nothing tells apart it is the last.
+//! If axes have directions, the axis without one counts frames. Otherwise the frame axis is the one whose kind says so,
+//! or that has a unit of time, or whose spacing alone is unknown; of four axes that nothing distinguishes it is the
+//! last.
 
 use super::FORMAT;
 use super::axis::{Axis, KINDS, Kind, axes, words};
@@ -12,10 +14,10 @@ use crate::io::text::Field;
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::volume::{LengthUnit, Space};
 
-/// All axes, in the order of the file.
+/// The axes of an NRRD, in the order of the file, with the transform to world space.
 pub(super) struct Axes {
     axes: Vec<Axis>,
-    /// Which of them is of frames.
+    /// Index of the axis that counts frames, if there is one.
     frames: Option<usize>,
     world: World,
     affine: DAffine3,
@@ -23,6 +25,7 @@ pub(super) struct Axes {
 }
 
 impl Axes {
+    /// Reads the axes from the header and determines which one counts frames.
     pub(super) fn read(fields: &Fields) -> Result<Self, FormatError> {
         let world = World::read(fields)?;
         let axes = axes(fields, &world)?;
@@ -40,7 +43,7 @@ impl Axes {
         Ok(Self { axes, frames, world, affine, space_units: words(fields, "spaceunits") })
     }
 
-    /// Voxels along x, y and z, and the number of frames.
+    /// Returns the number of voxels along x, y and z, and the number of frames.
     pub(super) fn dims(&self) -> [usize; 4] {
         let mut dims = [1; 4];
         for (size, axis) in dims.iter_mut().zip(in_space(&self.axes, self.frames)) {
@@ -50,13 +53,13 @@ impl Axes {
         dims
     }
 
-    /// How many numbers of one frame are in a row in the file.
+    /// Returns how many consecutive numbers in the file belong to one frame.
     pub(super) fn run(&self) -> usize {
         let faster = self.frames.unwrap_or(self.axes.len());
         self.axes[..faster].iter().map(|axis| axis.size).fold(1, usize::saturating_mul)
     }
 
-    /// Voxel index to world.
+    /// Returns the transform from voxel indices to world space.
     pub(super) fn affine(&self) -> DAffine3 {
         self.affine
     }
@@ -65,6 +68,7 @@ impl Axes {
         self.world.space
     }
 
+    /// Returns the unit of length that all spatial axes share; unknown if they differ.
     pub(super) fn unit(&self) -> LengthUnit {
         let axes = in_space(&self.axes, self.frames);
         let units: Vec<&str> = match self.space_units[..] {
@@ -80,13 +84,13 @@ impl Axes {
         }
     }
 
-    /// Seconds from one frame to the next; 0 where the file does not say.
+    /// Returns the seconds between frames; 0 if the file does not give the time.
     pub(super) fn frame_seconds(&self) -> f64 {
         let Some(axis) = self.of_frames().filter(|axis| axis.size > 1) else { return 0.0 };
         let step = axis.direction.map_or(axis.spacing, |direction| direction.time);
         let unit = if axis.unit.is_empty() { self.space_units.get(3) } else { Some(&axis.unit) };
         let second = match unit.map_or("", String::as_str) {
-            // What is called time is in seconds; frames may be apart in something else.
+            // Without a unit, only an axis that is declared as time is in seconds.
             "" => f64::from(u8::from(axis.kind == Kind::Time || self.world.timed)),
             unit => seconds(unit).unwrap_or(0.0),
         };
@@ -94,16 +98,18 @@ impl Axes {
         if apart > 0.0 && apart.is_finite() { apart } else { 0.0 }
     }
 
+    /// Returns the axis that counts frames, if there is one.
     fn of_frames(&self) -> Option<&Axis> {
         self.axes.get(self.frames?)
     }
 }
 
+/// Returns the spatial axes, in the order of the file.
 fn in_space(axes: &[Axis], frames: Option<usize>) -> impl Iterator<Item = &Axis> {
     axes.iter().enumerate().filter(move |&(i, _)| Some(i) != frames).map(|(_, axis)| axis)
 }
 
-/// The axis that has no direction in space, if there is one.
+/// Returns the index of the axis without a direction in space, which counts frames, if there is one.
 fn undirected(field: &Field<'_>, axes: &[Axis]) -> Result<Option<usize>, FormatError> {
     let mut frames = Vec::new();
     for (i, axis) in axes.iter().enumerate() {
@@ -126,7 +132,8 @@ fn undirected(field: &Field<'_>, axes: &[Axis]) -> Result<Option<usize>, FormatE
     }
 }
 
-/// Without directions: the axis that is of frames as far as kinds, units and spacings tell, if there is one.
+/// Returns the index of the axis that counts frames according to kinds, units and spacings, if there is one; used if
+/// the file has no directions.
 fn least_in_space(axes: &[Axis]) -> Result<Option<usize>, FormatError> {
     let signs = |axis: &Axis| (axis.kind, seconds(&axis.unit).is_some(), axis.spacing.is_nan());
     let Some(most) = axes.iter().map(signs).max() else { return Ok(None) };
@@ -145,7 +152,7 @@ fn least_in_space(axes: &[Axis]) -> Result<Option<usize>, FormatError> {
     }
 }
 
-/// How many seconds a unit of time is.
+/// Returns the number of seconds in a unit of time; `None` if it is not one.
 fn seconds(unit: &str) -> Option<f64> {
     match unit {
         "s" | "sec" | "second" | "seconds" => Some(1.0),
@@ -155,7 +162,8 @@ fn seconds(unit: &str) -> Option<f64> {
     }
 }
 
-/// Three columns out of one to three directions: missing axes stand across the others, one unit long.
+/// Returns the columns of the affine from one to three directions; missing axes get unit vectors perpendicular to the
+/// others.
 fn with_normals(axes: &[&Axis]) -> [DVec3; 3] {
     let directions: Vec<DVec3> = axes.iter().filter_map(|axis| axis.direction).map(|v| v.space).collect();
     match directions[..] {
@@ -169,7 +177,8 @@ fn with_normals(axes: &[&Axis]) -> [DVec3; 3] {
     }
 }
 
-/// Axes along the world's, as long as `spacings` says; 1 where it is missing or NaN.
+/// Returns the columns of the affine for axes parallel to the world's, of the lengths in `spacings`; 1 if missing or
+/// NaN.
 fn spaced(fields: &Fields, axes: &[&Axis]) -> Result<[DVec3; 3], FormatError> {
     let Some(field) = fields.get("spacings") else {
         return match fields.get("axismaxs") {
@@ -190,7 +199,7 @@ fn spaced(fields: &Fields, axes: &[&Axis]) -> Result<[DVec3; 3], FormatError> {
     Ok([DVec3::X * lengths[0], DVec3::Y * lengths[1], DVec3::Z * lengths[2]])
 }
 
-/// The axes at the file's origin, in a space that Vesicle has.
+/// Returns the affine from the columns and the file's origin, converted to RAS or LPS.
 fn placed(fields: &Fields, world: &World, [x, y, z]: [DVec3; 3]) -> Result<DAffine3, FormatError> {
     let origin = fields.get("spaceorigin").map(|field| world.vector(&field, field.text)).transpose()?;
     let origin = origin.flatten().map(|v| v.space).filter(|v| !v.is_nan()).unwrap_or(DVec3::ZERO);

@@ -1,4 +1,4 @@
-//! What the header says of each axis.
+//! Reading of the header's fields about each axis.
 
 use super::FORMAT;
 use super::fields::Fields;
@@ -6,21 +6,21 @@ use super::world::{Vector, World};
 use crate::io::FormatError;
 use crate::io::text::Field;
 
-/// Kinds that can be read, for messages.
+/// Supported kinds of axes, listed in error messages.
 pub(super) const KINDS: &str = "domain or space for axes in space, list or time for one of frames";
 
-/// One axis.
+/// One axis of an NRRD, as described by the header.
 pub(super) struct Axis {
     pub(super) size: usize,
     pub(super) kind: Kind,
-    /// NaN where it is unknown.
+    /// NaN if it is unknown.
     pub(super) spacing: f64,
-    /// Empty where there is none.
+    /// Empty if the header gives none.
     pub(super) unit: String,
     pub(super) direction: Option<Vector>,
 }
 
-/// What an axis is along: the later, the less it may be in space.
+/// Kind of an axis, in ascending order of how unlikely it is to be spatial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
     Space,
@@ -31,13 +31,13 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Whether an axis of this kind cannot be in space.
+    /// Returns whether an axis of this kind counts frames, so that it cannot be spatial.
     pub(super) fn is_of_frames(self) -> bool {
         self >= Kind::List
     }
 }
 
-/// All axes, in the order of the file.
+/// Reads all axes, in the order of the file.
 pub(super) fn axes(fields: &Fields, world: &World) -> Result<Vec<Axis>, FormatError> {
     let rank = rank(&fields.need("dimension")?)?;
     let sizes = fields.need("sizes")?.sizes(rank)?;
@@ -55,6 +55,7 @@ pub(super) fn axes(fields: &Fields, world: &World) -> Result<Vec<Axis>, FormatEr
     Ok(sizes.into_iter().enumerate().map(axis).collect())
 }
 
+/// Returns the number of axes, 1 to 4.
 fn rank(field: &Field<'_>) -> Result<usize, FormatError> {
     match field.integer(1)? {
         n @ 1..=4 => Ok(n as usize),
@@ -62,13 +63,13 @@ fn rank(field: &Field<'_>) -> Result<usize, FormatError> {
     }
 }
 
-/// A field's words in double quotes; none where it is missing.
+/// Returns the double-quoted words of a field; none if it is missing.
 pub(super) fn words(fields: &Fields, key: &'static str) -> Vec<String> {
     let text = fields.get(key).map_or("", |field| field.text);
     text.split('"').skip(1).step_by(2).map(|word| word.trim().to_owned()).collect()
 }
 
-/// The kind of each axis, none of which may hold the parts of one voxel.
+/// Returns the kind of each axis; an error if one holds the components of a voxel, or if two count frames.
 fn kinds(fields: &Fields, sizes: &[usize]) -> Result<Vec<Kind>, FormatError> {
     let Some(field) = fields.get("kinds") else { return Ok(vec![Kind::Unknown; sizes.len()]) };
     let words: Vec<&str> = field.text.split_whitespace().collect();
@@ -84,13 +85,14 @@ fn kinds(fields: &Fields, sizes: &[usize]) -> Result<Vec<Kind>, FormatError> {
     Ok(kinds)
 }
 
+/// Returns the kind that a word of the header names.
 fn kind(axis: usize, word: &str, size: usize) -> Result<Kind, FormatError> {
     match word.to_ascii_lowercase().as_str() {
         "space" => Ok(Kind::Space),
         "domain" => Ok(Kind::Domain),
         "none" | "???" | "unknown" => Ok(Kind::Unknown),
         "list" => Ok(Kind::List),
-        // A place-holder: the only frame.
+        // A placeholder for an axis with a single frame.
         "stub" | "scalar" if size == 1 => Ok(Kind::List),
         "time" => Ok(Kind::Time),
         _ => {
@@ -100,7 +102,7 @@ fn kind(axis: usize, word: &str, size: usize) -> Result<Kind, FormatError> {
     }
 }
 
-/// The direction of each axis, `None` for one that has none; nothing at all where the file has no directions.
+/// Returns the direction of each axis, `None` for an axis without one; an empty list if the file has no directions.
 fn directions(fields: &Fields, world: &World, kinds: &[Kind]) -> Result<Vec<Option<Vector>>, FormatError> {
     let Some(field) = fields.get("spacedirections") else { return Ok(Vec::new()) };
     let vectors = vectors(&field, world)?;
@@ -114,14 +116,15 @@ fn directions(fields: &Fields, world: &World, kinds: &[Kind]) -> Result<Vec<Opti
     Ok(vectors.into_iter().zip(kinds).map(stated).collect())
 }
 
-/// Whether zeros in place of a direction say that an axis is not in space. With three axes it may be as well that nobody
-/// knew the distance of the slices: such a file has no place in the world.
+/// Returns whether a zero direction means that an axis is not spatial. With three axes it may also mean that the
+/// distance of the slices was unknown; such a file has no position in world space.
 fn means_none(kind: Kind, rank: usize) -> bool {
     kind.is_of_frames() || rank == 4 && kind != Kind::Space
 }
 
+/// Reads the vectors of a field, `None` for each `none`.
 fn vectors(field: &Field<'_>, world: &World) -> Result<Vec<Option<Vector>>, FormatError> {
-    // Blanks inside the parentheses are allowed: a vector ends at its ')'.
+    // Spaces inside the parentheses are allowed: a vector ends at its ')'.
     let mut entries = Vec::new();
     let mut rest = field.text.trim();
     while !rest.is_empty() {

@@ -1,10 +1,10 @@
-//! The header as fields: a name and a text each.
+//! Reading of an NRRD header into fields, each a name and a text.
 
 use super::FORMAT;
 use crate::io::FormatError;
 use crate::io::text::{Field, Lines};
 
-/// Fields of the standard, names without blanks; any other is an error, as the standard has it.
+/// Fields of the standard, without spaces in their names. Any other is an error, as the standard requires.
 const KNOWN: [&str; 31] = [
     "content",
     "number",
@@ -39,13 +39,13 @@ const KNOWN: [&str; 31] = [
     "measurementframe",
 ];
 
-/// The header's fields, names in lower case without blanks.
+/// The fields of an NRRD header, with names in lower case without spaces.
 pub(super) struct Fields {
     pairs: Vec<(String, String)>,
 }
 
 impl Fields {
-    /// Reads up to the blank line, or to the end of a detached header.
+    /// Reads the fields up to the blank line, or to the end of a detached header.
     pub(super) fn read(lines: &mut Lines<'_>) -> Result<Self, FormatError> {
         let magic = lines.next_line().unwrap_or_default();
         if !matches!(magic.as_str(), "NRRD0001" | "NRRD0002" | "NRRD0003" | "NRRD0004" | "NRRD0005") {
@@ -69,7 +69,8 @@ impl Fields {
         Ok(fields)
     }
 
-    /// Takes in one line. True when a list of files begins, which takes the rest of the header.
+    /// Adds the field on one line. Returns true if it starts a list of data files, which takes up the rest of the
+    /// header.
     fn add(&mut self, line: &str) -> Result<bool, FormatError> {
         let (name, value) = match (line.find(":="), line.find(": ")) {
             (Some(at), colon) if colon.is_none_or(|colon| at < colon) => return Ok(false),
@@ -93,11 +94,13 @@ impl Fields {
         Ok(files)
     }
 
+    /// Returns the field with that name, if the header has it.
     pub(super) fn get(&self, key: &'static str) -> Option<Field<'_>> {
         let (_, text) = self.pairs.iter().find(|(name, _)| name == key)?;
         Some(Field { format: FORMAT, name: key, text })
     }
 
+    /// Returns the field with that name; an error if it is missing.
     pub(super) fn need(&self, key: &'static str) -> Result<Field<'_>, FormatError> {
         self.get(key).ok_or_else(|| FormatError::invalid(FORMAT, key, "missing"))
     }

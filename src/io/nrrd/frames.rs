@@ -1,14 +1,14 @@
-//! Frames that alternate in a file, put one after the other.
+//! Reordering of the voxels of an NRRD whose frame axis is not the slowest.
 
 use super::DATA;
 use crate::io::FormatError;
 use crate::volume::Voxels;
 
-/// The voxels frame by frame, where the file has `run` of the first in a row, then of the second, and after the
-/// last of the `frames` of the first again.
+/// Returns the voxels reordered frame by frame. In the file, `run` consecutive numbers belong to the first frame, the
+/// next `run` to the second, and so on; after the last of the `frames` follows the first again.
 ///
 /// # Errors
-/// [`FormatError::TooLarge`].
+/// [`FormatError::TooLarge`] if there is not enough memory.
 pub(super) fn one_after_the_other(voxels: Voxels, run: usize, frames: usize) -> Result<Voxels, FormatError> {
     if run * frames == voxels.len() {
         return Ok(voxels);
@@ -29,7 +29,7 @@ fn separated<T: Copy>(values: &[T], run: usize, frames: usize) -> Result<Vec<T>,
     out.try_reserve_exact(values.len()).map_err(too_large)?;
     out.extend_from_slice(values);
     let frame = values.len() / frames;
-    // In the order they are read, so that each number is fetched from memory once.
+    // In the order of the source, so that each number is fetched from memory once.
     for (at, all) in values.chunks_exact(run * frames).enumerate() {
         for (t, part) in all.chunks_exact(run).enumerate() {
             let to = t * frame + at * run;
@@ -45,7 +45,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// 2 x 3 numbers in 4 frames, each number 10 times its place plus its frame.
+    /// 2 × 3 numbers in 4 frames, each number 10 times its index within the frame plus the index of the frame.
     fn alternating(run: usize) -> Vec<u8> {
         let one = |i: usize| 10 * (i / (4 * run) * run + i % run) + i / run % 4;
         (0..24).map(|i| one(i) as u8).collect()

@@ -1,11 +1,11 @@
-//! NRRD 1 to 5: header and voxels in one file, or apart with the voxels as detached payload.
+//! Reader of NRRD versions 1 to 5: header and voxels in one file, or separate with the voxels as detached payload.
 //!
-//! Up to three axes are in space; one before, between or after them, if any, is of frames. Vectors and colours per
-//! voxel are refused. Encodings: raw, text, hex, gzip. A space of left-posterior-superior stays LPS;
-//! right-anterior-superior is RAS; left-anterior-superior becomes RAS by the sign of x; spaces without anatomical
-//! names, and none, keep their coordinates and count as RAS. Lengths stay in the file's unit, which [`Volume::unit`]
-//! names. Without directions, spacings along the axes count, and 1 where they are unknown too. A list of data files
-//! is taken as their bytes one after the other.
+//! Up to three axes are spatial; one more, at any position among them, may count frames. Vectors and colours per voxel
+//! are rejected. Encodings: raw, text, hex, gzip. The space left-posterior-superior stays LPS; right-anterior-superior
+//! is RAS; left-anterior-superior becomes RAS by the sign of x; other spaces, and no space at all, keep their
+//! coordinates and are treated as RAS. Lengths stay in the file's unit, given by [`Volume::unit`]. Without directions,
+//! axes have the lengths in `spacings`, or 1 if those are unknown, too. The files of a list of data files are
+//! concatenated in order.
 
 mod axes;
 mod axis;
@@ -28,12 +28,12 @@ use frames::one_after_the_other;
 const FORMAT: &str = "NRRD";
 const DATA: Place = Place { format: FORMAT, field: "voxel data" };
 
-/// Whether the bytes begin as a NRRD does.
+/// Returns whether the bytes start with the signature of NRRD, to detect the format.
 pub(super) fn is_nrrd(bytes: &[u8]) -> bool {
     bytes.starts_with(b"NRRD")
 }
 
-/// Reads a volume; `detached` is the payload where the header names a data file.
+/// Reads an NRRD volume; `detached` is the payload if the header refers to a data file.
 ///
 /// # Errors
 /// [`FormatError`] naming the header field.
@@ -51,7 +51,7 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
     header.volume(source)
 }
 
-/// How numbers are written.
+/// Encoding of the voxels in the file.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Encoding {
     Raw,
@@ -60,17 +60,17 @@ enum Encoding {
     Gzip,
 }
 
-/// A header found consistent.
+/// A header that has been checked for consistency.
 struct Header {
     scalar: Scalar,
-    /// Voxels along x, y and z, and the number of frames.
+    /// Number of voxels along x, y and z, and of frames.
     dims: [usize; 4],
-    /// How many numbers of one frame are in a row.
+    /// Number of consecutive numbers in the file that belong to one frame.
     run: usize,
     encoding: Encoding,
     big: bool,
     line_skip: usize,
-    /// `None` (-1 in the file): voxels are the last bytes.
+    /// `None` (-1 in the file) if the voxels are the last bytes.
     byte_skip: Option<usize>,
     affine: DAffine3,
     space: Space,
@@ -79,6 +79,7 @@ struct Header {
 }
 
 impl Header {
+    /// Reads and checks all fields of the header.
     fn check(fields: &Fields) -> Result<Self, FormatError> {
         let scalar = scalar(&fields.need("type")?)?;
         let encoding = encoding(&fields.need("encoding")?)?;
@@ -98,6 +99,7 @@ impl Header {
         })
     }
 
+    /// Returns the volume, with its voxels read from `source`.
     fn volume(&self, source: &[u8]) -> Result<Volume, FormatError> {
         let voxels = self.voxels(self.after_lines(source)?)?;
         let volume = Volume::new(VolumeInit {
@@ -112,6 +114,7 @@ impl Header {
         Ok(volume.map_err(|error| refused(FORMAT, error))?.with_unit(self.unit))
     }
 
+    /// Returns the bytes after the lines to skip.
     fn after_lines<'a>(&self, source: &'a [u8]) -> Result<&'a [u8], FormatError> {
         let mut rest = source;
         for _ in 0..self.line_skip {
@@ -123,6 +126,7 @@ impl Header {
         Ok(rest)
     }
 
+    /// Decodes the voxels in the bytes after the lines to skip.
     fn voxels(&self, source: &[u8]) -> Result<Voxels, FormatError> {
         let size = payload_size(DATA, self.dims, self.scalar)?;
         let count = size / self.scalar.size();
@@ -137,18 +141,20 @@ impl Header {
         }
     }
 
+    /// Decodes binary voxels; `size` is their number of bytes.
     fn binary(&self, bytes: &[u8], size: usize) -> Result<Voxels, FormatError> {
         let skipped = if self.encoding == Encoding::Hex { bytes } else { self.after_bytes(bytes, size)? };
         decode(DATA, exact(DATA, skipped, size)?, self.scalar, self.big)
     }
 
-    /// What is left after the byte skip.
+    /// Returns the bytes after those to skip; with -1 in the header, the last `size` bytes.
     fn after_bytes<'a>(&self, bytes: &'a [u8], size: usize) -> Result<&'a [u8], FormatError> {
         let skip = self.byte_skip.unwrap_or_else(|| bytes.len().saturating_sub(size));
         bytes.get(skip..).ok_or_else(|| FormatError::truncated(FORMAT, "byte skip", skip, bytes.len()))
     }
 }
 
+/// Returns the number type that the field `type` names.
 fn scalar(field: &Field<'_>) -> Result<Scalar, FormatError> {
     let words: Vec<&str> = field.text.split_whitespace().collect();
     Ok(match words.join(" ").as_str() {
@@ -191,6 +197,7 @@ fn encoding(field: &Field<'_>) -> Result<Encoding, FormatError> {
     }
 }
 
+/// Returns whether numbers are big-endian; false if the byte order does not matter.
 fn big_endian(fields: &Fields, scalar: Scalar, encoding: Encoding) -> Result<bool, FormatError> {
     if scalar.size() == 1 || encoding == Encoding::Text {
         return Ok(false);
@@ -203,6 +210,7 @@ fn big_endian(fields: &Fields, scalar: Scalar, encoding: Encoding) -> Result<boo
     }
 }
 
+/// Returns the number of bytes before the voxels; `None` for -1.
 fn byte_skip(fields: &Fields, encoding: Encoding) -> Result<Option<usize>, FormatError> {
     let Some(field) = fields.get("byteskip") else { return Ok(Some(0)) };
     match field.integer(-1)? {
@@ -212,7 +220,8 @@ fn byte_skip(fields: &Fields, encoding: Encoding) -> Result<Option<usize>, Forma
     }
 }
 
-/// Bytes from pairs of hexadecimal digits, blanks skipped; at most `size` and a little more.
+/// Decodes pairs of hexadecimal digits to bytes, ignoring whitespace; an error if there are more than `size` plus
+/// [`SLACK`].
 fn unhex(text: &[u8], size: usize) -> Result<Vec<u8>, FormatError> {
     let digits = text.iter().filter(|b| !b.is_ascii_whitespace());
     let mut out = Vec::new();

@@ -1,4 +1,5 @@
-//! Frames along any axis, told in all the ways there are; what must not be taken for frames.
+//! Tests of NRRD files with frames along any axis, described in every way that the format allows, and of axes that must
+//! not be read as frames.
 
 use super::parse;
 use crate::io::FormatError;
@@ -9,8 +10,8 @@ use wasm_bindgen_test::wasm_bindgen_test as test;
 
 const DIRECTED: &str = "space directions: (2,0,0) (0,3,0) (0,0,4)";
 
-/// A file of 2 x 3 x 4 voxels in 2 frames, the axis of frames at a place among the others, in which each number is
-/// the one it must come out as: how many come before it, frame by frame.
+/// A file of 2 × 3 × 4 voxels in 2 frames whose frame axis has index `frames`. Each number is the index at which it
+/// must be read: voxels before it, frame by frame.
 fn file(frames: usize, fields: &[&str]) -> Vec<u8> {
     let mut sizes = vec![2, 3, 4];
     sizes.insert(frames, 2);
@@ -31,7 +32,7 @@ fn file(frames: usize, fields: &[&str]) -> Vec<u8> {
     [header.into_bytes(), (0..48).map(number).collect()].concat()
 }
 
-/// A field with one word an axis, that of the frames put where their axis is.
+/// A field with one word per axis, that of the frame axis at index `frames`.
 fn with(frames: usize, name: &str, others: [&str; 3], own: &str) -> String {
     let mut words = others.to_vec();
     words.insert(frames, own);
@@ -89,7 +90,7 @@ fn frames_by_the_time_of_the_world() {
             let units = "space units: \"mm\" \"mm\" \"mm\" \"ms\"";
             assert_read(frames, &[&space, &directions, units], 0.0005);
         }
-        // Nobody says that the fourth dimension is time, unless its kind does.
+        // The fourth dimension is time only if its kind says so.
         assert_read(frames, &["space dimension: 4", &directions], 0.0);
         let kinds = with(frames, "kinds", ["space"; 3], "time");
         assert_read(frames, &["space dimension: 4", &directions, &kinds], 0.5);
@@ -131,7 +132,7 @@ fn frames_by_kinds_units_and_spacings() {
     assert_eq!(volume.unit(), LengthUnit::Millimetre);
 }
 
-/// What a file of 24 numbers is read as, or that it is not.
+/// Reads a file of 24 numbers: its dimensions, its number of frames and the seconds between them.
 fn grid(fields: &[&str]) -> Result<([usize; 3], usize, f64), FormatError> {
     let fields = fields.join("\n");
     let header = format!("NRRD0004\ntype: uint8\nencoding: raw\n{fields}\n\n");
@@ -205,7 +206,7 @@ fn axes_that_contradict_each_other_are_refused() {
         let message = refusal(3, fields);
         assert!(message.starts_with(&format!("NRRD: {field}: ")), "{fields:?}: {message}");
     }
-    // An axis of slices whose distance nobody knew when the file was written.
+    // The distance of the slices was unknown when the file was written.
     for kinds in ["kinds: domain domain domain", "kinds: space space space"] {
         let unknown = "space directions: (1,0,0) (0,1,0) (0,0,0)";
         let found = grid(&["dimension: 3", "sizes: 2 3 4", kinds, unknown]);

@@ -1,4 +1,4 @@
-//! The world the axes lie in: what its name says, and vectors of as many numbers as it has dimensions.
+//! The world space of an NRRD: its name, and vectors with as many numbers as it has dimensions.
 
 use super::FORMAT;
 use super::fields::Fields;
@@ -10,18 +10,18 @@ use crate::volume::Space;
 const SPACES: &str = "right-anterior-superior, left-anterior-superior, left-posterior-superior, scanner-xyz, \
                       3D-right-handed, 3D-left-handed, each also with -time";
 
-/// The space that a header names or counts the dimensions of.
+/// The world space that a header names, or of which it gives the dimension.
 pub(super) struct World {
     pub(super) space: Space,
-    /// Whether x must change sign to get there.
+    /// Whether the sign of x must be flipped to convert to `space`.
     pub(super) flip_x: bool,
-    /// Whether it names time as its fourth dimension.
+    /// Whether its name declares time as fourth dimension.
     pub(super) timed: bool,
-    /// How many numbers a vector has, where the file says.
+    /// Number of components of a vector, if the header gives it.
     dimension: Option<usize>,
 }
 
-/// A vector of the world. What it has no number for is 0.
+/// A vector in world space and time; components that the file does not give are 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Vector {
     pub(super) space: DVec3,
@@ -29,6 +29,7 @@ pub(super) struct Vector {
 }
 
 impl World {
+    /// Reads the world space from the header; RAS if it names none.
     pub(super) fn read(fields: &Fields) -> Result<Self, FormatError> {
         match fields.get("space") {
             Some(field) => named(&field),
@@ -39,7 +40,7 @@ impl World {
         }
     }
 
-    /// `(x,y,z)` or `(x,y,z,t)`, or `None` for `none`.
+    /// Parses a vector of two to four numbers such as `(x,y,z)` or `(x,y,z,t)`; `None` for `none`.
     pub(super) fn vector(&self, field: &Field<'_>, text: &str) -> Result<Option<Vector>, FormatError> {
         let text = text.trim();
         if text == "none" {
@@ -65,7 +66,7 @@ impl World {
 }
 
 impl Vector {
-    /// Whether it says no more than `none` does.
+    /// Returns whether the spatial components are all NaN, which means the same as `none`.
     pub(super) fn is_unknown(&self) -> bool {
         self.space.is_nan_mask().all()
     }
@@ -75,7 +76,7 @@ impl Vector {
     }
 }
 
-/// The space of a name, which may have blanks or nothing in place of hyphens, or be short, as RAST is.
+/// Returns the space with a name, which may have spaces or nothing instead of hyphens, or be abbreviated like RAST.
 fn named(field: &Field<'_>) -> Result<World, FormatError> {
     let letters = field.text.chars().filter(|&c| c != '-' && !c.is_whitespace());
     let name: String = letters.flat_map(char::to_lowercase).collect();
@@ -94,6 +95,7 @@ fn named(field: &Field<'_>) -> Result<World, FormatError> {
     Ok(World { space, flip_x, timed, dimension: Some(if timed { 4 } else { 3 }) })
 }
 
+/// Returns the dimension of the space, 2 to 4.
 fn dimension(field: &Field<'_>) -> Result<usize, FormatError> {
     match field.integer(1)? {
         n @ 2..=4 => Ok(n as usize),

@@ -1,31 +1,33 @@
-//! Sleeping vertices: where the surface has settled, nothing is computed.
+//! Sleeping vertices: settled parts of the surface cost no computation.
 //!
-//! A vertex falls asleep after some still iterations, and wakes when a neighbour moves or an edit reaches it. Before a level ends the
-//! forces on all vertices are evaluated once, and those wake that are not at rest.
+//! A vertex falls asleep after some still iterations, and wakes when a neighbour moves or an edit reaches it. Before a
+//! level ends, the forces on all vertices are evaluated once, and vertices that have not settled wake.
 
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
-/// Still iterations after which a vertex sleeps.
+/// The number of still iterations after which a vertex sleeps.
 pub(super) const PATIENCE: f32 = 6.0;
 
-/// The speed of a still vertex, in that of a surface whose mean energy has converged.
+/// The speed below which a vertex is still, as a share of the speed that each vertex of a surface with the tolerated
+/// mean energy would have.
 const STILLNESS: f64 = 0.5;
 
-/// If a smaller share sleeps, all vertices are processed, which takes no longer.
+/// The share of sleeping vertices below which all vertices are processed, which takes no longer.
 const FEW_ASLEEP: f64 = 0.25;
 
-/// The vertices awake in an iteration.
+/// The vertices awake in an iteration; buffers are kept between iterations.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Awake {
-    /// The vertices awake.
+    /// The vertices awake, or all vertices: those that move in this iteration.
     pub(super) moving: Vec<VertexId>,
-    /// These and their neighbours.
+    /// The moving vertices and their neighbours, of which normals and L are needed.
     pub(super) around: Vec<VertexId>,
     is_around: Vec<bool>,
 }
 
 impl Awake {
-    /// Finds them by the number of still iterations; or takes all vertices.
+    /// Collects the vertices with fewer than [`PATIENCE`] still iterations, or all vertices if `all` is set or few
+    /// sleep.
     pub(super) fn find(&mut self, mesh: &Mesh, still: ScalarKey, all: bool) {
         let still = mesh.scalar(still);
         self.moving.clear();
@@ -51,7 +53,7 @@ impl Awake {
     }
 }
 
-/// The speed along the normal, in δ per unit of time, below which a vertex is still.
+/// Returns the speed along the normal, in δ per unit of time, below which a vertex is still.
 pub(super) fn stillness(mass: f64, energy_tolerance: f64) -> f32 {
     (STILLNESS * (2.0 * energy_tolerance / mass).sqrt()) as f32
 }

@@ -1,48 +1,52 @@
-//! What is different on the coarse levels of the pyramid: they need not be right, they need to be near, and soon.
+//! Adjustments on coarse levels of the pyramid, which need a surface near the result quickly, not an exact one; and the
+//! amplification of α_I in faint images.
 
 use super::image::Pyramid;
 use super::{DeformableParams, Integrator};
 
-/// How far outside π_I the surface settles on coarse levels of runs that do not seed, as a share of the way to the mean intensity out
-/// there.
+/// The offset of the surface from π_I on coarse levels of runs that do not seed, as a share of the difference between
+/// π_I and the mean intensity of the background.
 ///
-/// Right for images of two classes only: in a computed tomography all soft tissue then counts as bone. The mean next to the
-/// boundary was tried instead; it loses 1.7 % of the area of a skull. Runs that seed have no margin: what a coarse level
-/// loses comes back.
+/// A wall thinner than the contact distance of a coarse level is pierced and eroded from there, and rigidity keeps it
+/// from growing back on a finer one. At an iso value a little outside, where the blurred wall is thicker, it is kept;
+/// the finer level removes the excess, since the surface comes from outside anyway. On computed tomographies the area
+/// found through one coarse level was 1.2 % to 15 % too small with 0, and is up to 0.9 % off; with 0.4 and more the
+/// finest level takes many iterations.
 ///
-/// A wall thinner than the contact distance of a coarse level is pierced and eaten up, and rigidity keeps it from growing
-/// back on a finer one. A little outside, where the blurred wall is thicker, it is kept; the finer level takes back what
-/// is too much, since the surface comes from outside anyway. On computed tomographies the area found through one coarse
-/// level was 1.2 % to 15 % too small with 0, and is up to 0.9 % off; with 0.4 and more the finest level has much to do.
+/// This is right for images of two classes only: in a computed tomography all soft tissue then counts as bone. The mean
+/// intensity next to the boundary was tried instead; it loses 1.7 % of the area of a skull. Runs that seed have no
+/// margin, since parts lost on a coarse level come back.
 const MARGIN: f32 = 0.35;
 
-/// The most by which α_I is larger on coarse levels.
+/// The largest factor on α_I on coarse levels with the integrators of the paper.
 ///
-/// Where the image is hardly different from π_I, as in the soft tissue around bone, the surface creeps: with α_I as it is
-/// it took 2,500 iterations of 3,000 to cross a head. What is stiffer at the end than the finest level wants is let go
-/// there in a few iterations; area and volume come out the same within 0.1 %.
+/// Where the image hardly differs from π_I, as in the soft tissue around bone, the surface creeps: with α_I unchanged
+/// it took 2,500 iterations of 3,000 to cross a head. The finest level undoes the effect of the factor in a few
+/// iterations; area and volume are the same within 0.1 %.
 const MOST_GAIN: f32 = 8.0;
 
-/// The rigidity that is left on coarse levels, in α_I there. With less, the surface is drawn into holes that a coarse mesh
-/// cannot follow, and splits and merges there for ever.
+/// The smallest ratio of rigidity to amplified α_I on coarse levels. With less, the surface is drawn into holes that a
+/// coarse mesh cannot follow, and splits and merges there for ever.
 const LEAST_RIGIDITY: f32 = 0.025;
 
-/// The most that the image's force may grow by in δ over δ where the image is steep, in what one step of time takes to
-/// turn round. With more it swings.
+/// The largest stiffness of the amplified image force where the image is steep, in units of m/Δt². With more, the
+/// surface oscillates.
 const MOST_STIFFNESS: f32 = 1.0;
 
-/// How steep the image is at least where it passes π_I, in its range a voxel. A few voxels that are brighter than all others by far
-/// make the object faint; rigidity would then pull the surface off its contour, slowly. Computed tomographies have 0.1 to 0.6.
+/// The least steepness of the image at π_I, in ranges of intensity per voxel; if the median is smaller, the implicit
+/// integrator amplifies α_I, up to the factor below. A few voxels much brighter than all others make the object faint;
+/// rigidity would then pull the surface off its contour, slowly. Computed tomographies have 0.1 to 0.6.
 const LEAST_STEEPNESS: f32 = 0.1;
 const MOST_AMPLIFIED: f32 = 1e4;
 
-/// Iterations of a level with the full gain, and those after which half of it is taken each time from then on. A head takes
-/// 300. Where a vertex lies on an edge that is steeper than most, it swings for ever: a tooth did, at an intensity where the
-/// model takes it to rest with a gain of 4.
+/// The number of iterations of a level with the full factor on α_I, and the number after which it is halved each time
+/// from then on. A head takes 300. A vertex on an edge steeper than most would oscillate for ever: one on a tooth did,
+/// at an iso value at which the model converges with a factor of 4.
 const FULL: u32 = 600;
 const HALVED: u32 = 100;
 
-/// π_I as the surface meets it on this level, normalised.
+/// Returns the π_I that the surface settles at on a level of a run without seeding, normalised: on coarse levels it is
+/// moved by [`MARGIN`] towards the background.
 pub(super) fn iso(pyramid: &Pyramid, params: &DeformableParams, level: usize) -> f32 {
     let iso = pyramid.normalised(params.iso);
     let outside =
@@ -50,7 +54,8 @@ pub(super) fn iso(pyramid: &Pyramid, params: &DeformableParams, level: usize) ->
     outside.map_or(iso, |outside| iso + MARGIN * (outside - iso))
 }
 
-/// By how much α_I is larger on this level, where π_I is `iso` and δ is `delta`.
+/// Returns the factor on α_I on a level, at least 1, for the normalised π_I `iso` and the δ `delta` of that level. With
+/// the implicit integrator it makes up for faint images on all levels, with the others it speeds up coarse levels.
 pub(super) fn gain(
     pyramid: &Pyramid,
     params: &DeformableParams,
@@ -70,10 +75,10 @@ pub(super) fn gain(
     [turned / stiffness, rigid].into_iter().fold(MOST_GAIN, f32::min).max(1.0)
 }
 
-/// What is left of the gain of a level after so many iterations there.
+/// Returns the factor on α_I that is left of a level's `gain` after a number of iterations on that level.
 pub(super) fn left_of(gain: f32, iterations: u32) -> f32 {
     let times = iterations.saturating_sub(FULL).div_ceil(HALVED);
-    // None is left long before numbers end.
+    // Eight halvings reduce any gain up to 256 to 1.
     (0..times.min(8)).fold(gain, |gain, _| 0.5 * gain).max(1.0)
 }
 
@@ -85,7 +90,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// A ramp along x from 0 to 1, in `steps`.
+    /// The pyramid of a ramp along x from 0 to 1, quantised to `steps` steps.
     fn ramp(steps: f32) -> Pyramid {
         let value = |i: usize| ((i % 40) as f32 / 39.0 * steps).round_ties_even() / steps;
         let volume = Volume::new(VolumeInit {

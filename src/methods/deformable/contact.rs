@@ -1,8 +1,8 @@
-//! Topology changes that the image agrees with.
+//! Topology changes decided by the image.
 //!
-//! The paper joins whatever is nearer than 2.5/√3 δ (3), and cuts every neck whose edges are shorter than δ. So each wall, gap,
-//! strand and tunnel thinner than that is lost. Here the image is asked first: a wall or a strand that has matter in it stays, and
-//! so does a gap or a tunnel that has background in it.
+//! The paper joins all vertices nearer to each other than 2.5/√3 δ (3), and cuts every neck whose edges are shorter
+//! than δ. Each wall, gap, strand and tunnel thinner than that is lost. Here the image is sampled first: a wall or a
+//! strand is kept if there is object in it, a gap or a tunnel if there is background in it.
 
 use super::DeformableParams;
 use super::contour::ObjectIs;
@@ -12,19 +12,23 @@ use crate::mesh::{Mesh, VertexId};
 use crate::remesh::{TopologyGuide, Unguided};
 use crate::volume::KnownCell;
 
-/// Where between two vertices in contact the image is sampled, as shares of the way.
+/// The positions of the image samples between two vertices in contact, as shares of the distance.
 const SAMPLES: [f32; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-/// The cosine from which on a vertex in contact faces the other one.
+/// The least cosine for two vertices to face each other, between the normal of one and the direction to or from the
+/// other; for edges to collapse, between one normal and the reverse of the other.
 const FACING: f32 = 0.3;
 
-/// How far off the contour, in voxels, a surface at rest may be: what is no further beside it is no reason to join or cut.
+/// The largest distance of a settled surface from its contour, in voxels; intensities that differ by no more than over
+/// this distance are no reason to join or cut.
 const BLUR: f32 = 0.15;
 
-/// How far within a small component, from its vertices, the image is sampled, in voxels.
+/// The distance from the vertices of a small component, towards its enclosed side, at which the image is sampled, in
+/// voxels.
 const WITHIN: f32 = 0.35;
 
-/// Allows the topology changes that separate or unite what the image does.
+/// A topology guide that allows only changes that agree with the image: sheets are joined where all between them is
+/// object (a gap) or background (a wall), and necks are cut where the image separates the parts.
 #[derive(Clone, Copy)]
 pub(super) struct ImageGuide<'a> {
     pub(super) image: &'a LevelImage,
@@ -42,7 +46,8 @@ impl<'a> ImageGuide<'a> {
         self.object.depth(intensity, self.iso)
     }
 
-    /// Whether all points are object, or all are background, by more than what the surface may be off the contour at rest.
+    /// Whether all points are in the object, or all in the background, by more than `tolerance`, a difference of
+    /// intensity.
     fn are_all(&self, is_object: bool, points: &[Vec3], tolerance: f32) -> bool {
         points.iter().all(|&p| {
             let depth = self.depth(p);
@@ -50,20 +55,21 @@ impl<'a> ImageGuide<'a> {
         })
     }
 
-    /// By how much intensities change over [`BLUR`] along the normals of some vertices, at most. In the midst of matter or
-    /// background that is nothing; on the contour it tells what is beside it.
+    /// Returns the largest difference of intensity over [`BLUR`] along the normals of some vertices. It vanishes inside
+    /// object or background; on the contour it is the tolerance for settled vertices off the contour.
     fn tolerance(&self, mesh: &Mesh, vertices: &[VertexId]) -> f32 {
         vertices.iter().fold(0.0, |most, &v| {
             let (p, half) = (mesh.position(v), mesh.area_normal(v).normalize_or_zero() * 0.5);
             let [inside, here, outside] = [p - half, p, p + half].map(|p| self.depth(p));
-            // In a slit or a thin wall both sides are alike: each counts by itself.
+            // In a slit or a thin wall both sides have like intensities, and their difference tells nothing: each half
+            // counts separately.
             let tolerance = 2.0 * BLUR * (outside - here).abs().max((here - inside).abs());
             if tolerance > most { tolerance } else { most }
         })
     }
 }
 
-/// What decides on topology changes with those parameters.
+/// Returns the guide for topology changes: the image if sampling and topology adapt to it, else the rules of the paper.
 pub(super) fn guide<'a>(
     image: &'a LevelImage,
     iso: f32,
@@ -73,8 +79,9 @@ pub(super) fn guide<'a>(
 }
 
 impl TopologyGuide for ImageGuide<'_> {
-    /// Across a gap, where their outward sides face each other, if all between the two is object; across a wall, where their inward
-    /// sides do, if none of it is. Two that do not face each other are on one sheet.
+    /// Allows a tube across a gap, where the outward sides of the vertices face each other, if all samples in between
+    /// are object; and across a wall, where their inward sides do, if all are background. Two vertices that do not face
+    /// each other are on one sheet and are not joined.
     fn may_join(&self, mesh: &Mesh, [u, v]: [VertexId; 2]) -> bool {
         let (p, way) = (mesh.position(u), mesh.position(v) - mesh.position(u));
         let [m, n] = [u, v].map(|w| way.normalize_or_zero().dot(mesh.area_normal(w).normalize_or_zero()));
@@ -86,7 +93,7 @@ impl TopologyGuide for ImageGuide<'_> {
         self.are_all(is_gap, &SAMPLES.map(|share| p + way * share), self.tolerance(mesh, &[u, v]))
     }
 
-    /// A strand if its middle is background, a tunnel if its middle is object.
+    /// Allows a cut through a strand if its middle is background, and through a tunnel if its middle is object.
     fn may_cut(&self, mesh: &Mesh, ring: [VertexId; 3]) -> bool {
         let corners = ring.map(|w| mesh.position(w));
         let middle = (corners[0] + corners[1] + corners[2]) * (1.0 / 3.0);
@@ -96,8 +103,8 @@ impl TopologyGuide for ImageGuide<'_> {
         self.are_all(!is_strand, &[middle], self.tolerance(mesh, &ring))
     }
 
-    /// Not if the edge leads through a wall or across a gap, between sides that face away from each other or each other: the two would
-    /// become one, and at a rim so would the next.
+    /// Forbids collapsing an edge through a wall or across a gap if the image confirms the wall or the gap: the two
+    /// sides would merge, and at a rim the next pair of vertices, too.
     fn may_collapse(&self, mesh: &Mesh, [u, v]: [VertexId; 2]) -> bool {
         let [m, n] = [u, v].map(|w| mesh.area_normal(w).normalize_or_zero());
         if m.dot(n) >= -FACING {

@@ -1,4 +1,5 @@
-//! Closed iso-surfaces of a pyramid level: what a contour start begins from, and what coverage is measured against.
+//! Contours: closed iso-surfaces of a pyramid level without small parts. A contour start begins with one, seeding adds
+//! parts of one, and coverage is measured against one.
 
 use super::DeformableParams;
 use super::image::LevelImage;
@@ -8,29 +9,30 @@ use crate::methods::MethodError;
 use crate::remesh::clustered;
 use crate::volume::{Grid, marching_cubes};
 
-/// δ, in voxels, below which clusters the size of a voxel would be too coarse.
+/// The least δ, in voxels of the level, for which a contour is simplified; for finer meshes, clusters as large as a
+/// voxel are too coarse.
 const LEAST_SIDE: f32 = 0.7;
 
-/// The largest distance along its normal, in voxels, between a vertex and the mean of its cluster. Without this bound, a tube of radius 1.2
-/// became a square prism.
+/// The largest distance along its normal, in voxels, between a vertex and the mean of its cluster. Without this bound,
+/// a tube of radius 1.2 became a square prism.
 const FLATNESS: f32 = 0.15;
 
-/// Which side of the iso value the object is on.
+/// The side of the iso value on which the object is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ObjectIs {
-    /// α_I < 0.
+    /// The object is brighter than the iso value, α_I < 0.
     Brighter,
-    /// α_I > 0.
+    /// The object is darker than the iso value, α_I > 0.
     Darker,
 }
 
 impl ObjectIs {
-    /// What the sign of α_I says; without an iso force the object is what is brighter.
+    /// Returns the side given by the sign of α_I; without an image force the object is brighter.
     pub(super) fn by(params: &DeformableParams) -> Self {
         if params.iso_force > 0.0 { Self::Darker } else { Self::Brighter }
     }
 
-    /// A field that is at least 0 in the object: how far an intensity is on its side of `iso`.
+    /// Returns the difference between an intensity and `iso`, at least 0 in the object and negative in the background.
     #[inline]
     pub(super) fn depth(self, intensity: f32, iso: f32) -> f32 {
         match self {
@@ -39,7 +41,7 @@ impl ObjectIs {
         }
     }
 
-    /// The intensity taken for granted beyond the image, so that every object ends at its border.
+    /// Returns the normalised intensity assumed outside the image, so that every object ends at the border.
     pub(super) fn background(self) -> f32 {
         match self {
             Self::Brighter => 0.0,
@@ -48,8 +50,9 @@ impl ObjectIs {
     }
 }
 
-/// The iso-surface of a level, in the space of the model: closed, its front outside the object, less the closed parts (matter or
-/// hollow) that enclose less than `smallest_part` voxels of the finest level. Empty where the image never passes `iso`.
+/// Extracts the iso-surface of a level in model space, closed and facing away from the object. Closed parts, of the
+/// object or around cavities, that enclose less than `smallest_part` voxels of the finest level are left out. Empty if
+/// the image never passes `iso`.
 pub(super) fn contour(
     image: &LevelImage,
     iso: f32,
@@ -67,8 +70,8 @@ pub(super) fn contour(
     Ok(placed(surface, position).without_parts_below(smallest_part))
 }
 
-/// A contour simplified by clustering: connected vertices in a voxel, or in a cube of side δ if that is larger, are merged. This saves more than
-/// half of the edits that bring edges within bounds.
+/// Simplifies a contour by clustering: connected vertices in a voxel, or in a cube of side δ if that is larger, are
+/// merged. This saves more than half of the edits that bring edges within bounds.
 pub(super) fn simplified(contour: TriangleMesh, image: &LevelImage, delta: f32) -> TriangleMesh {
     let side = delta * image.voxels_per_unit();
     if side < LEAST_SIDE {
@@ -78,7 +81,7 @@ pub(super) fn simplified(contour: TriangleMesh, image: &LevelImage, delta: f32) 
     clustered(&contour, FLATNESS / image.voxels_per_unit(), |p| (image.index(p) / side).round().as_ivec3())
 }
 
-/// The surface with its positions in the space of the model.
+/// Maps the positions of a surface, given in voxel indices, by `position`.
 pub(super) fn placed(mut surface: TriangleMesh, position: impl Fn(Vec3) -> Vec3) -> TriangleMesh {
     surface.positions.iter_mut().for_each(|p| *p = position(*p));
     surface

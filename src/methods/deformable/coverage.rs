@@ -1,4 +1,4 @@
-//! How much of the iso-surface the model has found, and where it has not.
+//! Coverage: recall and precision of the model's surface against the iso-surface of the volume.
 
 use super::DeformableModel;
 use super::contour::{ObjectIs, contour};
@@ -7,50 +7,51 @@ use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::spatial::TriangleTree;
 
-/// Two surfaces cover each other where they are at most this far apart, in voxels of the finest level.
+/// The largest distance at which a surface covers a point of the other, in voxels of the finest level.
 const REACH: f64 = 1.0;
 
-/// Longest side of the pieces that triangles are tested by, in voxels.
+/// The largest side of the pieces by which triangles are tested, in voxels.
 const PIECE: f32 = 1.0;
 
-/// The direction of rays that tell inside from outside; along no grid line, so that they rarely meet an edge.
+/// The direction of rays that classify points as inside or outside; along no grid line, so that they rarely hit an
+/// edge.
 const RAY: Vec3 = Vec3::new(0.846_3, 0.311_7, 0.432_1);
 
-/// How well the model's surface and the iso-surface of the volume itself agree.
+/// The agreement between the model's surface and the iso-surface of the volume.
 ///
-/// The iso-surface is that of the finest level by marching cubes, closed at the border, less the closed parts below
-/// [`super::DeformableParams::smallest_part`].
+/// The iso-surface is extracted from the finest level by marching cubes, closed at the border, without closed parts
+/// below [`super::DeformableParams::smallest_part`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Coverage {
-    /// Share of the iso-surface's area within a voxel of the model; 1 where there is no iso-surface.
+    /// The share of the iso-surface's area within one voxel of the model; 1 if there is no iso-surface.
     pub recall: f64,
-    /// Share of the model's area within a voxel of the iso-surface; 1 where the model is empty.
+    /// The share of the model's area within one voxel of the iso-surface; 1 if the model is empty.
     pub precision: f64,
-    /// Connected parts of the iso-surface that are further away, largest first.
+    /// Connected parts of the iso-surface whose triangles are not fully covered, largest first.
     pub uncovered: Vec<Uncovered>,
 }
 
 /// A connected part of the iso-surface that the model does not cover.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Uncovered {
-    /// A point of it near its middle, in world space.
+    /// A point on the part near its centroid, in world space.
     pub position: DVec3,
-    /// Its area in square world units.
+    /// The area of the part in square world units.
     pub area: f64,
-    /// What the model leaves out there.
+    /// Whether the model lacks object or a cavity there.
     pub kind: Missing,
 }
 
-/// What a model can leave out.
+/// The kind of part that a model lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Missing {
     /// Part of the object is outside the surface.
     Matter,
-    /// Background is inside the surface.
+    /// Part of the background is inside the surface.
     Hollow,
 }
 
-/// A measurement of [`Coverage`] under way; it belongs to the surface as it was when it began.
+/// A measurement of [`Coverage`] that can be advanced in slices; it refers to the surface at the time it began.
 #[derive(Clone, Debug)]
 pub struct CoverageSurvey {
     to_world: DAffine3,
@@ -58,11 +59,11 @@ pub struct CoverageSurvey {
     iso_tree: TriangleTree,
     model: TriangleMesh,
     model_tree: TriangleTree,
-    /// Triangles of the iso-surface, then of the model, that have been tested.
+    /// The number of triangles tested, first of the iso-surface, then of the model.
     tested: usize,
-    /// Whether each triangle of the iso-surface is covered.
+    /// Whether each triangle of the iso-surface tested so far is covered.
     is_covered: Vec<bool>,
-    /// Area covered, and area in all, of the iso-surface and of the model.
+    /// Covered area and total area of the triangles tested so far, of the iso-surface and of the model.
     areas: [[f64; 2]; 2],
 }
 
@@ -70,7 +71,7 @@ impl DeformableModel {
     /// Begins to measure [`Coverage`]; [`CoverageSurvey::advance`] does the work in slices.
     ///
     /// # Errors
-    /// Where the iso-surface does not fit memory.
+    /// If the iso-surface does not fit into memory.
     pub fn survey_coverage(&self) -> Result<CoverageSurvey, MethodError> {
         let iso = self.pyramid.normalised(self.params.iso);
         let object = ObjectIs::by(&self.params);
@@ -88,7 +89,7 @@ impl DeformableModel {
         })
     }
 
-    /// Measures [`Coverage`] at once.
+    /// Measures [`Coverage`] in one call.
     ///
     /// # Errors
     /// As [`Self::survey_coverage`].
@@ -100,7 +101,7 @@ impl DeformableModel {
 }
 
 impl CoverageSurvey {
-    /// Tests up to so many further triangles and returns the share of all that have been tested.
+    /// Tests at most `triangles` more triangles, and returns the share of all triangles tested so far.
     pub fn advance(&mut self, triangles: usize) -> f64 {
         let [of_iso, of_model] = [&self.iso_surface, &self.model].map(|mesh| mesh.triangles.len());
         let all = of_iso + of_model;
@@ -117,7 +118,7 @@ impl CoverageSurvey {
         if all == 0 { 1.0 } else { end as f64 / all as f64 }
     }
 
-    /// Adds the pieces of a triangle to the areas, and says whether all of them are covered.
+    /// Adds a triangle to the areas, piece by piece, and returns whether all of its pieces are covered.
     fn test(&mut self, which: usize, t: usize) -> bool {
         let (mesh, other) = [(&self.iso_surface, &self.model_tree), (&self.model, &self.iso_tree)][which];
         let corners = mesh.triangles[t].map(|v| mesh.positions[v as usize]);
@@ -134,7 +135,7 @@ impl CoverageSurvey {
         covered == count
     }
 
-    /// The result, after all triangles have been tested.
+    /// Returns the result; all triangles must have been tested.
     pub fn finish(self) -> Coverage {
         let share = |[covered, whole]: [f64; 2]| if whole > 0.0 { covered / whole } else { 1.0 };
         Coverage {
@@ -194,7 +195,8 @@ impl CoverageSurvey {
     }
 }
 
-/// The middles of the equal pieces that a triangle is cut into so that none is longer than [`PIECE`].
+/// Calls `visit` with the centroids of equal pieces of a triangle, whose sides are no longer than [`PIECE`] unless that
+/// takes more than 64 along a side.
 fn for_each_piece([a, b, c]: [Vec3; 3], mut visit: impl FnMut(Vec3)) {
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
     let n = (longest / PIECE).ceil().clamp(1.0, 64.0) as u32;

@@ -1,4 +1,4 @@
-//! Internal and external forces on every vertex (sections 3.7 and 3.8).
+//! Internal and external forces on the vertices (sections 3.7 and 3.8).
 
 use super::contour::ObjectIs;
 use super::image::LevelImage;
@@ -7,30 +7,31 @@ use crate::math::{Mat3, Vec3};
 use crate::mesh::{Ring, VertexId};
 use crate::volume::KnownCell;
 
-/// The speed along the normal, in δ per unit of time, from which on the tangential part of rigidity acts in full.
+/// The speed along the normal, in δ per unit of time, above which the tangential part of rigidity acts in full.
 ///
-/// The tangential part of f_c spaces vertices evenly while the surface moves. On a settled surface it would not end: vertices slide off
-/// ridges, edges there grow and are split, those beside shrink and are collapsed, and each edit displaces vertices, so that the energy
-/// never falls. Below 0.02 the sampling of slow fronts suffers; from 0.3 on sliding does not fade everywhere.
+/// The tangential part of f_c spaces vertices evenly while the surface moves. On a settled surface it would not end:
+/// vertices slide off ridges, edges there grow and are split, those beside shrink and are collapsed, and each edit
+/// displaces vertices, so that the energy never falls. Below 0.02 the sampling of slow fronts suffers; from 0.3 on
+/// sliding does not fade everywhere.
 const SLIDE_SPEED: f32 = 0.1;
 
-/// About the largest distance from the contour, in voxels, to which rigidity may pull the surface: with more, thin strands shrink; with
-/// less, noise is not smoothed.
+/// The approximate distance from the contour, in voxels, to which rigidity may pull the surface: with more, thin
+/// strands shrink; with less, noise is not smoothed.
 const YIELD: f32 = 0.1;
 
-/// The largest depth of the mean surface below its vertices that is compensated, in voxels.
+/// The largest offset between a vertex and the mean of its triangles that is compensated, in voxels.
 const MOST_INSET: f32 = 0.15;
 
-/// A point that pulls the surface, in the space of the model.
+/// An attractor in model space.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pull {
     pub(super) point: Vec3,
     pub(super) strength: f32,
-    /// From displacements in the model to displacements in the world, in radii of the attractor.
+    /// Maps displacements in model space to world space, in radii of the attractor.
     pub(super) in_radii: Mat3,
 }
 
-/// The parameters of the forces in the units of the model: lengths in voxels, intensities in 0..1.
+/// The parameters of the forces in model units: lengths in voxels, intensities in 0..1.
 #[derive(Clone, Debug)]
 pub(super) struct ForceScale {
     iso: f32,
@@ -44,14 +45,15 @@ pub(super) struct ForceScale {
     rest: RestLength,
     voxel: f64,
     delta: f32,
-    /// Whether rigidity yields to the image.
+    /// Whether the normal part of rigidity is limited by the image.
     yields: bool,
     /// Whether [`Forces::slope`] is needed.
     needs_slope: bool,
 }
 
 impl ForceScale {
-    /// `iso` is normalised, `gain` the factor on α_I, `voxel` the world length of a unit of the model.
+    /// Converts parameters to model units. `iso` is normalised, `gain` is the factor on α_I, and `voxel` is the length
+    /// of a model unit in the world.
     pub(super) fn new(params: &DeformableParams, [iso, gain]: [f32; 2], voxel: f64, delta: f32) -> Self {
         let yields = params.yields_to_image();
         Self {
@@ -71,7 +73,7 @@ impl ForceScale {
         }
     }
 
-    /// δ |α_I|: the image force for a difference of the whole range from π_I.
+    /// Returns δ |α_I|: the image force per unit of |π_I − Π|.
     pub(super) fn pull(&self) -> f32 {
         self.delta * self.iso_force.abs()
     }
@@ -81,37 +83,38 @@ impl ForceScale {
     }
 }
 
-/// External forces.
+/// The image and the attractors that exert external forces, with the parameters of all forces.
 pub(super) struct Field<'a> {
     pub(super) image: &'a LevelImage,
     pub(super) scale: ForceScale,
     pub(super) pulls: &'a [Pull],
 }
 
-/// Forces and their parts, by vertex slot; buffers are kept between steps.
+/// The forces on the vertices and the quantities they depend on, by slot; buffers are kept between iterations.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Forces {
-    /// L(x): from a vertex to the mean of its neighbours.
+    /// L(x), the vector from a vertex to the mean of its neighbours.
     laplacian: Vec<Vec3>,
     /// Unit normals, outwards.
     pub(super) normal: Vec<Vec3>,
-    /// The change of Π over a voxel along the normal.
+    /// The absolute difference of Π over one voxel along the normal; the stiffness of the image force is proportional
+    /// to it.
     pub(super) slope: Vec<f32>,
     /// The image cell around each vertex at its last sample.
     cells: Vec<KnownCell>,
     /// The sum of all forces.
     pub(super) force: Vec<Vec3>,
-    /// Milliseconds of force evaluation not reported yet.
+    /// The time spent on force evaluation and not yet reported, in milliseconds.
     pub(super) spent: f64,
 }
 
 impl Forces {
-    /// Discards the image cells, when the image changes.
+    /// Discards the cached image cells, since the image changes.
     pub(super) fn forget_image(&mut self) {
         self.cells.fill(KnownCell::default());
     }
 
-    /// Updates normals and L of some vertices.
+    /// Computes normals and L of some vertices.
     pub(super) fn update_normals(&mut self, rings: &[Ring], positions: &[Vec3], vertices: &[VertexId]) {
         self.laplacian.resize(rings.len(), Vec3::ZERO);
         self.normal.resize(rings.len(), Vec3::ZERO);
@@ -135,7 +138,8 @@ impl Forces {
         }
     }
 
-    /// The forces on some vertices; needs [`Self::update_normals`] of them and their neighbours at the same positions.
+    /// Computes the forces on some vertices; needs [`Self::update_normals`] of them and their neighbours at the same
+    /// positions.
     pub(super) fn evaluate(
         &mut self,
         rings: &[Ring],
@@ -170,8 +174,8 @@ impl Forces {
         }
     }
 
-    /// f_c = α_c (L(x) − mean of L over the neighbours) (5); its tangential part fades out as the surface settles, its normal part is at most
-    /// `most`.
+    /// Returns f_c = α_c (L(x) − mean of L over the neighbours) (5). Its tangential part fades out as the surface
+    /// settles; its normal part is at most `most`.
     #[inline]
     fn curvature(&self, v: usize, ring: &Ring, velocity: Vec3, scale: &ForceScale, most: f32) -> Vec3 {
         let sum: Vec3 = ring.as_slice().iter().map(|w| self.laplacian[w.index()]).sum();
@@ -186,8 +190,9 @@ impl Forces {
         (yielding + along) * scale.rigidity
     }
 
-    /// The mean position of the triangles at a vertex: with corners on a sphere, triangles of edge l are l²/8r inside, a quarter of L. The image
-    /// is sampled there, so that the surface encloses the volume of the contour; with vertices on the contour it would be too small.
+    /// Returns the approximate mean position of the triangles at a vertex: with corners on a sphere of radius r,
+    /// triangles of edge l are l²/8r inside, a quarter of L. The image is sampled there, so that the surface encloses
+    /// the volume of the contour; with vertices on the contour the volume would be too small.
     #[inline]
     fn middle_of_star(&self, v: usize, x: Vec3) -> Vec3 {
         let normal = self.normal[v];
@@ -195,7 +200,7 @@ impl Forces {
         x + normal * inset.clamp(-MOST_INSET, MOST_INSET)
     }
 
-    /// The change of Π over a voxel along the normal.
+    /// Returns the absolute difference of Π over one voxel along the normal.
     #[inline]
     fn slope_along_normal(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
         let half = self.normal[v] * 0.5;
@@ -203,14 +208,16 @@ impl Forces {
         (at(x + half) - at(x - half)).abs()
     }
 
-    /// The largest normal part of rigidity that the image balances, so that no settled vertex is further than 4/3 [`YIELD`] from the contour.
+    /// Returns the largest normal part of rigidity that the image balances, so that no settled vertex is further than
+    /// 4/3 [`YIELD`] from the contour.
     #[inline]
     fn hold_of_image(&self, v: usize, miss: f32, scale: &ForceScale) -> f32 {
         scale.pull() * (YIELD * self.slope[v] + 0.25 * miss.abs())
     }
 
-    /// A force whose tangential part fades out as the surface settles, faster than that of rigidity: it would draw the vertices around into a
-    /// point, where they vanish, again and again.
+    /// Returns a force with its tangential part faded out as the surface settles, faster than that of rigidity; used
+    /// for attractors. Their tangential part would otherwise draw the surrounding vertices to a point, where they are
+    /// collapsed, again and again.
     fn without_slide(&self, v: usize, force: Vec3, velocity: Vec3, delta: f32) -> Vec3 {
         let normal = self.normal[v];
         let across = normal * force.dot(normal);
@@ -218,20 +225,20 @@ impl Forces {
         across + (force - across) * (speed * speed).min(1.0)
     }
 
-    /// π_I − Π(x), with x the mean position of the one-ring if the surface yields to the image.
+    /// Returns π_I − Π(x), with x the mean position of the triangles at the vertex if the surface adapts to the image.
     #[inline]
     fn miss(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
         let p = if scale.yields { self.middle_of_star(v, x) } else { x };
         scale.iso - image.intensity(p, scale.background, &mut self.cells[v])
     }
 
-    /// f_I = δ α_I (π_I − Π(x)) n (7).
+    /// Returns f_I = δ α_I (π_I − Π(x)) n (7).
     #[inline]
     fn iso_attraction(&self, v: usize, miss: f32, scale: &ForceScale) -> Vec3 {
         self.normal[v] * (scale.delta * scale.iso_force * miss)
     }
 
-    /// f_∇I = δ ((α_g − β_g)(∇Π·n) n + β_g ∇Π) (8).
+    /// Returns f_∇I = δ ((α_g − β_g)(∇Π·n) n + β_g ∇Π) (8).
     fn ridge_attraction(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> Vec3 {
         let gradient = image.gradient(x, scale.gradient_bound);
         let normal = self.normal[v];
@@ -240,7 +247,7 @@ impl Forces {
     }
 }
 
-/// d in the units of the model.
+/// Returns the rest length d of the springs in model units.
 fn rest_length(rings: &[Ring], positions: &[Vec3], scale: &ForceScale) -> f32 {
     match scale.rest {
         RestLength::Zero => 0.0,
@@ -259,7 +266,7 @@ fn rest_length(rings: &[Ring], positions: &[Vec3], scale: &ForceScale) -> f32 {
     }
 }
 
-/// f_e / α_e = Σ (|y − x| − d)(y − x)/|y − x| (6).
+/// Returns f_e / α_e = Σ (|y − x| − d)(y − x)/|y − x| (6).
 fn springs(ring: &Ring, positions: &[Vec3], x: Vec3, rest: f32) -> Vec3 {
     ring.as_slice().iter().fold(Vec3::ZERO, |sum, w| {
         let edge = positions[w.index()] - x;
@@ -268,7 +275,7 @@ fn springs(ring: &Ring, positions: &[Vec3], x: Vec3, rest: f32) -> Vec3 {
     })
 }
 
-/// A spring to the point that fades out smoothly at its radius.
+/// Returns the force of an attractor: a spring to its point that fades out smoothly at its radius.
 fn attraction(pull: &Pull, x: Vec3) -> Vec3 {
     let offset = pull.point - x;
     let far = (pull.in_radii * offset).length_squared();

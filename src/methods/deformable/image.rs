@@ -1,16 +1,16 @@
-//! The image as the model feels it: one level of the pyramid, intensities scaled to 0..1.
+//! Images: levels of the pyramid, with intensities normalised to 0..1, as forces and topology changes sample them.
 //!
-//! The model lives in the index space of the finest level, where every voxel is a cube of side 1 (section 4.4, second
-//! way); world space is reached through the volume's affine transform.
+//! Model space is the index space of the finest level, where every voxel is a cube of side 1 (section 4.4, second way);
+//! the volume's affine transform maps it to world space.
 
 use crate::math::Vec3;
 use crate::methods::MethodError;
 use crate::volume::{Grid, KnownCell, VectorGrid, Volume};
 
-/// Reduction factor ρ of the pyramid: the one that belongs to √3 refinement (15).
+/// The reduction factor ρ of the pyramid, which belongs to √3 refinement (15).
 pub(super) const REDUCTION: f64 = 1.732_050_807_568_877_2;
 
-/// Normalised intensities that are told apart; no force overflows with them.
+/// The bound of the absolute value of normalised intensities; within it no force overflows.
 const FURTHEST: f64 = 100.0;
 
 /// One level of the pyramid.
@@ -34,14 +34,15 @@ impl LevelImage {
         p * self.scale + self.offset
     }
 
-    /// Π: trilinear intensity in 0..1, and `background` beyond the image, so that every object ends at its border. `known` is
-    /// what the last call for the same vertex left there.
+    /// Returns Π, the trilinearly interpolated intensity in 0..1, and `background` outside the image, so that every
+    /// object ends at its border. `known` caches the image cell of the last call for the same vertex.
     #[inline]
     pub(super) fn intensity(&self, p: Vec3, background: f32, known: &mut KnownCell) -> f32 {
         self.grid.sample_padded(self.index(p), background, known)
     }
 
-    /// ∇Π by the Sobel operator, per voxel of this level, no longer than `bound`; zero where none was prepared.
+    /// Returns ∇Π by the Sobel operator, per voxel of this level and with a length of at most `bound`; zero if
+    /// [`Self::prepare_gradient`] was not called.
     #[inline]
     pub(super) fn gradient(&self, p: Vec3, bound: f32) -> Vec3 {
         let Some(field) = &self.gradient else { return Vec3::ZERO };
@@ -50,7 +51,7 @@ impl LevelImage {
         if length > bound { gradient * (bound / length) } else { gradient }
     }
 
-    /// Makes [`Self::gradient`] usable.
+    /// Computes the gradient image for [`Self::gradient`], unless that was done before.
     pub(super) fn prepare_gradient(&mut self) -> Result<(), MethodError> {
         if self.gradient.is_none() {
             self.gradient = Some(self.grid.sobel()?);
@@ -58,14 +59,15 @@ impl LevelImage {
         Ok(())
     }
 
-    /// The mean of all intensities above `iso`, or of all below. `None` where there are none.
+    /// Returns the mean of all intensities above `iso`, or of all below; `None` if there are none.
     pub(super) fn mean_beyond(&self, iso: f32, above: bool) -> Option<f32> {
         let beyond = self.grid.values.iter().filter(|&&value| if above { value > iso } else { value < iso });
         let (sum, count) = beyond.fold((0.0, 0), |(sum, count), &value| (sum + f64::from(value), count + 1));
         (count > 0).then(|| (sum / f64::from(count)) as f32)
     }
 
-    /// The first and the last voxel brighter than `iso` of each row that has one, as positions of the model.
+    /// Returns, in model space, the first and the last voxel brighter than `iso` of each row that has one; the
+    /// enclosing start surface is made around them.
     pub(super) fn ends_of_rows(&self, iso: f32) -> Vec<Vec3> {
         let (Grid { dims: [nx, ny, _], values }, position) = (&self.grid, self.grid().1);
         let mut ends = Vec::new();
@@ -77,8 +79,8 @@ impl LevelImage {
         ends
     }
 
-    /// How steep the image is where it passes `iso`: the root mean square of the differences between neighbouring voxels on
-    /// either side, per unit of the model. 0 where there are none.
+    /// Returns the steepness of the image at `iso`: the root mean square of the differences between neighbouring voxels
+    /// on opposite sides of it, per model unit; 0 if there are none.
     pub(super) fn steepness(&self, iso: f32) -> f32 {
         let (mut sum, mut count) = (0.0f64, 0usize);
         self.for_each_passage(iso, |difference| {
@@ -89,7 +91,8 @@ impl LevelImage {
         mean.sqrt() as f32 * self.voxels_per_unit()
     }
 
-    /// As [`Self::steepness`], but the median: a few edges that are steeper than all others by far do not count.
+    /// Returns the steepness of the image at `iso` as [`Self::steepness`], but by the median, which a few edges much
+    /// steeper than the others do not affect.
     pub(super) fn ordinary_steepness(&self, iso: f32) -> f32 {
         let mut differences = Vec::new();
         self.for_each_passage(iso, |difference| differences.push(difference.abs()));
@@ -100,7 +103,7 @@ impl LevelImage {
         *differences.select_nth_unstable_by(middle, f32::total_cmp).1 * self.voxels_per_unit()
     }
 
-    /// Calls `visit` with the difference between neighbouring voxels on either side of `iso`.
+    /// Calls `visit` with the difference of each pair of neighbouring voxels on opposite sides of `iso`.
     fn for_each_passage(&self, iso: f32, mut visit: impl FnMut(f32)) {
         let [nx, ny, nz] = self.grid.dims;
         let mut pass = |a: &[f32], b: &[f32]| {
@@ -119,18 +122,18 @@ impl LevelImage {
         }
     }
 
-    /// Voxels of this level in a unit of the model, along the axis where they are smallest.
+    /// Returns the number of voxels of this level per model unit, along the axis on which it is largest.
     pub(super) fn voxels_per_unit(&self) -> f32 {
         self.scale.max_element()
     }
 
-    /// The grid of this level, and the way from its voxel indices to positions of the model.
+    /// Returns the grid of this level, and a map from its voxel indices to model space.
     pub(super) fn grid(&self) -> (&Grid, impl Fn(Vec3) -> Vec3) {
         (&self.grid, |index| (index - self.offset) / self.scale)
     }
 }
 
-/// The pyramid of one frame, [0] the finest, and the scale of its intensities.
+/// The image pyramid of one frame, finest level first, and the range by which its intensities are normalised.
 #[derive(Clone, Debug)]
 pub(super) struct Pyramid {
     pub(super) levels: Vec<LevelImage>,
@@ -139,7 +142,7 @@ pub(super) struct Pyramid {
 }
 
 impl Pyramid {
-    /// `above` levels above the volume itself.
+    /// Builds a pyramid with `above` levels above the volume itself.
     pub(super) fn new(volume: &Volume, frame: usize, above: usize) -> Result<Self, MethodError> {
         let possible = volume.max_pyramid_levels(REDUCTION)? - 1;
         if above > possible {
@@ -162,12 +165,12 @@ impl Pyramid {
         Ok(Self { levels, low: volume.range()[0], range: volume.span() })
     }
 
-    /// An intensity of the volume on the scale 0..1, and a little beyond: what is further out pushes with all force.
+    /// Normalises an intensity to the range of the volume, 0..1. Values outside are clamped to ±[`FURTHEST`].
     pub(super) fn normalised(&self, intensity: f64) -> f32 {
         ((intensity - self.low) / self.range).clamp(-FURTHEST, FURTHEST) as f32
     }
 
-    /// Voxels of the finest level.
+    /// Returns the dimensions of the finest level in voxels.
     pub(super) fn dims(&self) -> [usize; 3] {
         self.levels[0].grid.dims
     }

@@ -2,17 +2,18 @@
 //!
 //! Lachaud & Montanvert, *Deformable meshes with automated topology changes for coarse-to-fine 3D surface extraction*.
 //! A closed mesh moves under internal forces and forces of the image (`forces`, `motion`; sections 3.5–3.8). After each
-//! move its edges are kept within bounds derived from δ, parts that meet are joined and necks cut (the `remesh` layer;
-//! sections 3.2–3.3). It converges on a coarse level of an image pyramid first (`image`; section 4), is refined by √3, and continues
-//! one level down (`schedule`; section 5.1).
+//! move its edges are brought within bounds derived from δ, parts in contact are joined and necks are cut (the `remesh`
+//! layer; sections 3.2–3.3). The mesh converges on a coarse level of an image pyramid first (`image`; section 4), is
+//! refined by √3, and continues one level down (`schedule`; section 5.1).
 //!
 //! # Guarantees
-//! After every step the mesh is a closed, oriented 2-manifold without self-intersections, and χ is as predicted by the edits. The same input gives the same bits, natively and in wasm, also after [`DeformableModel::save`] and
+//! After every step the mesh is a closed, oriented 2-manifold without self-intersections, and χ is as predicted by the
+//! edits. The same input gives the same bits, natively and in wasm, also after [`DeformableModel::save`] and
 //! [`DeformableModel::restore`].
 //!
 //! # Limits
-//! With `adaptivity: 0` sheets nearer to each other than the contact distance, 2.5/√3 δ, merge: holes and walls thinner than that are lost,
-//! on coarse levels those thinner than the contact distance there.
+//! With `adaptivity: 0`, sheets nearer to each other than the contact distance, 2.5/√3 δ, merge: holes and walls thinner
+//! than that are lost, on coarse levels those thinner than the contact distance there.
 //!
 //! # Example
 //! ```
@@ -76,19 +77,20 @@ use schedule::Rest;
 use start::{Frame, on_contour};
 use std::ops::RangeInclusive;
 
-/// The setup of a [`DeformableModel`].
+/// Options for creating a [`DeformableModel`].
 #[derive(Clone, Debug)]
 pub struct DeformableOptions {
-    /// The frame of a 4D volume.
+    /// The frame of a 4D volume that the surface is fitted to.
     pub frame: usize,
-    /// The start shape.
+    /// The start surface.
     pub start: Start,
-    /// Pyramid levels above the volume itself; 0 is direct. In runs without seeding the surface settles a little outside the iso value on
-    /// coarse levels, so that thin walls are not lost there.
+    /// The number of pyramid levels above the volume itself; 0 evolves on the volume directly. Without seeding, the
+    /// surface settles a little outside the iso value on coarse levels, so that thin walls are not lost there.
     pub levels: usize,
-    /// Mean edge length at the finest level in world units, averaged over directions if voxels are not cubes; by default from the voxel size.
+    /// The mean edge length on the finest level in world units, averaged over directions if voxels are not cubes. By
+    /// default derived from the voxel size.
     pub edge: Option<f64>,
-    /// Parameters; by default [`DeformableParams::for_volume`].
+    /// The parameters; by default [`DeformableParams::for_volume`].
     pub params: Option<DeformableParams>,
 }
 
@@ -98,56 +100,59 @@ impl Default for DeformableOptions {
     }
 }
 
-/// An attachment point that pulls the surface within `radius`.
+/// A point set by the user that attracts, or repels, the surface within `radius`.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Attractor {
-    /// Position in world space.
+    /// The position in world space.
     pub point: DVec3,
-    /// Spring constant; negative pushes away.
+    /// The spring constant; negative values repel.
     pub strength: f64,
-    /// Reach of the force in world units.
+    /// The distance in world units beyond which the force is zero.
     pub radius: f64,
 }
 
-/// Mean edge of a resolved mesh in δ, measured on converged spheres and skulls.
+/// The mean edge length of a mesh within its edge bounds, in δ, measured on converged spheres and skulls.
 const MEAN_EDGE: f64 = 1.7;
 
-/// The default δ at the finest level in voxels: near the upper end of 0.693 ≤ δ/U ≤ 1 (14), since the number of vertices grows as 1/δ².
+/// The default δ on the finest level in voxels. It is near the upper end of 0.693 ≤ δ/U ≤ 1 (14), since the number of
+/// vertices grows as 1/δ².
 const DEFAULT_DELTA: f64 = 0.9;
 
-/// The accepted range of δ in voxels: below, a mesh of the whole image does not fit into memory; above, it misses the object.
+/// The accepted range of δ on the finest level in voxels: with less, a mesh of the whole image does not fit into
+/// memory; with more, the mesh misses the object.
 const DELTA_RANGE: RangeInclusive<f64> = 0.2..=20.0;
 
-/// The strongest attractor, and the largest distance of one in voxels: beyond, forces overflow.
+/// The largest strength of an attractor, and its largest radius and coordinate in voxels; beyond them, forces overflow.
 const STRONGEST: f64 = 1e3;
 const FURTHEST: f64 = 1e6;
 
-/// The bounds at a vertex are checked when it has moved this far since the last check, in δ…
+/// The distance in δ that a vertex travels before its edge bounds and contacts are checked again.
 const CHECK_TRAVEL: f32 = 0.1;
 
-/// …and once in this many iterations. A criterion on speed would miss slow vertices that move far.
+/// The number of iterations in which each vertex that has moved at all is checked at least once. A criterion on speed
+/// would miss slow vertices that travel far.
 const CHECK_PERIOD: usize = 50;
 
-/// The share of used slots below which the mesh is renumbered.
+/// The share of live vertex slots below which the mesh is renumbered.
 const LEAST_OCCUPANCY: f32 = 0.7;
 
-/// The per-vertex attributes of the model.
+/// The keys of the model's vertex attributes.
 #[derive(Clone, Copy, Debug)]
 struct Keys {
     velocity: VectorKey,
-    /// The position at the last check of bounds.
+    /// The position at the last check of edge bounds and contacts.
     checked: VectorKey,
-    /// The number of still iterations in a row.
+    /// The number of still iterations in a row; from [`awake::PATIENCE`] on the vertex sleeps.
     still: ScalarKey,
     /// The number of iterations since an edit made or displaced the vertex.
     calm: ScalarKey,
-    /// The count of recent reversals of the velocity along the normal.
+    /// The decaying count of recent reversals of the velocity along the normal.
     reversals: ScalarKey,
-    /// The size of edges at the vertex, in δ, less 1.
+    /// The size of the vertex less 1: the local δ is δ · (1 + this).
     size: ScalarKey,
 }
 
-/// The deformable model.
+/// A closed mesh that evolves in an image under internal and external forces and changes its topology automatically.
 #[derive(Clone, Debug)]
 pub struct DeformableModel {
     pyramid: Pyramid,
@@ -157,13 +162,13 @@ pub struct DeformableModel {
     fingerprint: u64,
     params: DeformableParams,
     attractors: Vec<Attractor>,
-    /// Whether the run started from the contour.
+    /// Whether the run started from the contour ([`Start::Contour`]).
     from_contour: bool,
     finest_delta: f64,
     level: usize,
-    /// π_I on this level, normalised.
+    /// π_I on this level, normalised to the range of the volume.
     level_iso: f32,
-    /// The factor on α_I on this level.
+    /// The factor by which α_I is multiplied on this level.
     gain: f32,
     mesh: Mesh,
     keys: Keys,
@@ -177,10 +182,10 @@ pub struct DeformableModel {
 }
 
 impl DeformableModel {
-    /// A model of one frame of `volume`, before its first step.
+    /// Creates the model of one frame of `volume` on the coarsest level, with its start surface within edge bounds.
     ///
     /// # Errors
-    /// [`MethodError`] that names the invalid option or parameter and the accepted values.
+    /// A [`MethodError`] that names the invalid option or parameter and the accepted values.
     pub fn new(volume: &Volume, options: DeformableOptions) -> Result<Self, MethodError> {
         let params = options.params.unwrap_or_else(|| DeformableParams::for_volume(volume));
         params.validate()?;
@@ -256,13 +261,13 @@ impl DeformableModel {
         Ok(model)
     }
 
-    /// One iteration of figure 9; descends one level if the surface has converged.
+    /// Runs one iteration of figure 9, and descends one level if the surface has converged.
     ///
-    /// After the end nothing changes, and the report says `done`.
+    /// Once the finest level has converged, calls change nothing and report `done`.
     ///
     /// # Errors
-    /// [`MethodError::TooManyVertices`] if the surface grows without bound. It stays valid, but some edges are too long; other parameters may
-    /// bring it back.
+    /// [`MethodError::TooManyVertices`] if the surface grows without bound. It remains valid, but some edges are too
+    /// long; other parameters may reduce it again.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
         let mut changes = Changes::default();
@@ -320,7 +325,8 @@ impl DeformableModel {
         times.add("motion", (self.clock)() - normals - forces - embedding);
     }
 
-    /// The vertices that have moved far enough since their last check, and those that have moved at all and whose turn it is.
+    /// Returns the vertices whose bounds have to be checked, and marks them as checked: those that have travelled
+    /// [`CHECK_TRAVEL`] since their last check, and one in [`CHECK_PERIOD`] slots in turn if it has moved at all.
     fn vertices_to_check(&mut self) -> Vec<VertexId> {
         let limit = CHECK_TRAVEL * self.model_delta();
         let turn = self.iteration as usize % CHECK_PERIOD;
@@ -335,7 +341,7 @@ impl DeformableModel {
         active
     }
 
-    /// Restores the bounds around `active`, and renumbers the mesh if its slots are sparse.
+    /// Restores edge bounds and contacts around `active`, and renumbers the mesh if too few of its slots are live.
     fn restore_bounds(&mut self, active: &[VertexId], times: &mut Times) -> Changes {
         let begin = (self.clock)();
         let sampling = self.sampling();
@@ -362,7 +368,7 @@ impl DeformableModel {
         Sampling::new(self.model_delta()).with_sizes(self.keys.size)
     }
 
-    /// Whether levels are searched for missing parts.
+    /// Whether each level is searched for parts of its contour that the mesh lacks.
     fn seeds_levels(&self) -> bool {
         match self.params.seeding {
             Seeding::Auto => self.from_contour,
@@ -371,7 +377,7 @@ impl DeformableModel {
         }
     }
 
-    /// Keeps the surface free of self-intersections in world space, too, where it is returned in single precision.
+    /// Makes the resolver prevent self-intersections also in the output: world space, in single precision.
     fn watch_output(&mut self) {
         self.resolver.watch_output(self.to_world, &self.domain.bounds);
     }
@@ -388,7 +394,7 @@ impl DeformableModel {
         }
     }
 
-    /// Marks every vertex as checked.
+    /// Marks every vertex as checked, and counts the components.
     fn mark_checked(&mut self) {
         let positions = self.mesh.positions().to_vec();
         self.mesh.vector_mut(self.keys.checked).copy_from_slice(&positions);
@@ -413,10 +419,11 @@ impl DeformableModel {
         }
     }
 
-    /// Sets all parameters from the next step on.
+    /// Replaces all parameters from the next step on, and wakes all vertices.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`], with nothing changed. [`MethodError::Volume`] if the gradient image does not fit into memory.
+    /// [`MethodError::InvalidArgument`] for values out of range, [`MethodError::Volume`] if the gradient image does not
+    /// fit into memory; nothing is changed then.
     pub fn set_params(&mut self, params: DeformableParams) -> Result<(), MethodError> {
         params.validate()?;
         let before = std::mem::replace(&mut self.params, params);
@@ -433,7 +440,7 @@ impl DeformableModel {
         &self.params
     }
 
-    /// Sets the attachment points from the next step on.
+    /// Replaces the attractors from the next step on, and wakes all vertices.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if a number is not finite or too large, or a radius is not positive.
@@ -466,7 +473,7 @@ impl DeformableModel {
         self.attractors.iter().map(local).collect()
     }
 
-    /// What the forces need from level and parameters.
+    /// Computes the quantities that depend on the level and the parameters: gradient image, π_I and the factor on α_I.
     fn prepare_level(&mut self) -> Result<(), MethodError> {
         if self.params.gradient_normal != 0.0 || self.params.gradient_tangent != 0.0 {
             self.pyramid.levels[self.level].prepare_gradient()?;
@@ -482,12 +489,12 @@ impl DeformableModel {
         Ok(())
     }
 
-    /// The pyramid level the surface is on; 0 is the volume itself.
+    /// The current pyramid level; 0 is the volume itself.
     pub fn level(&self) -> usize {
         self.level
     }
 
-    /// The current δ in world units, averaged over directions if voxels are not cubes.
+    /// The δ of the current level in world units, averaged over directions if voxels are not cubes.
     pub fn delta(&self) -> f64 {
         f64::from(self.model_delta()) * self.voxel
     }
@@ -496,18 +503,19 @@ impl DeformableModel {
         delta_at(self.finest_delta, self.level)
     }
 
-    /// The mesh in the space of the model, where voxels are unit cubes.
+    /// The mesh in model space, the index space of the volume, where voxels are unit cubes.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
 
-    /// The surface in world space with normals, counter-clockwise seen from outside.
+    /// Returns the surface in world space with normals, its triangles counter-clockwise seen from outside.
     pub fn surface(&self) -> TriangleMesh {
         self.mesh.to_triangles().transformed(&self.to_world)
     }
 
-    /// Speed of each vertex of [`Self::surface`] along its outward normal, in world units per unit of time (Δt per iteration, however long the
-    /// step of the integrator); negative inwards. New vertices have the speed of their neighbourhood.
+    /// Returns the speed of each vertex of [`Self::surface`] along its outward normal, negative inwards. The unit is
+    /// world units per unit of time, where Δt passes in one iteration whatever the step of the integrator. New vertices
+    /// have the speed of their neighbourhood.
     pub fn speeds(&self) -> Vec<f32> {
         let normals = self.surface().normals.unwrap_or_default();
         let velocities = self.mesh.vector(self.keys.velocity);
@@ -519,13 +527,13 @@ impl DeformableModel {
         self.mesh.vertices().zip(normals).map(along).collect()
     }
 
-    /// Sets a clock in milliseconds, by which reports time each part.
+    /// Sets the clock, in milliseconds, with which steps measure the duration of each part.
     pub fn set_clock(&mut self, clock: fn() -> f64) {
         self.clock = clock;
     }
 }
 
-/// δ at the finest level in voxels.
+/// Converts the option `edge`, in world units, to δ on the finest level in voxels.
 fn finest_delta(edge: Option<f64>, voxel: f64) -> Result<f64, MethodError> {
     let Some(edge) = edge else { return Ok(DEFAULT_DELTA) };
     let delta = edge / voxel / MEAN_EDGE;
@@ -539,7 +547,7 @@ fn finest_delta(edge: Option<f64>, voxel: f64) -> Result<f64, MethodError> {
     ))
 }
 
-/// δ in voxels of the finest level, on any level: it grows with the unit of the image (15).
+/// Returns the δ of a level in voxels of the finest level; it grows with the unit of the image (15).
 fn delta_at(finest: f64, level: usize) -> f32 {
     (0..level).fold(finest, |delta, _| delta * image::REDUCTION) as f32
 }

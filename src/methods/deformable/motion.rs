@@ -1,4 +1,4 @@
-//! The law of motion m ẍ + γ ẋ = f (4), integrated over one iteration.
+//! Integration of the law of motion m ẍ + γ ẋ = f (4) over one iteration.
 
 use super::Keys;
 use super::awake::{Awake, PATIENCE, stillness};
@@ -8,62 +8,65 @@ use super::params::{DeformableParams, Integrator};
 use crate::math::{Vec3, higher};
 use crate::mesh::{Mesh, VertexId};
 
-/// The motion of the mesh in one iteration.
+/// The speed of the mesh in one iteration, by which convergence is judged.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Movement {
     /// The mean of ½ m (v·n)² / δ², the criterion of section 5.1.
     pub(super) energy: f64,
-    /// The largest speed along a normal, in δ per unit of time, of vertices that no edit displaced recently. Edits displace single vertices of
-    /// a settled surface, which return in a few iterations.
+    /// The largest speed along a normal, in δ per unit of time, of vertices that no edit displaced recently. Edits
+    /// displace single vertices of a settled surface, which return in a few iterations.
     pub(super) fastest: f32,
 }
 
-/// Iterations after which a vertex has returned from an edit.
+/// The number of iterations that a vertex needs to return after an edit.
 pub(super) const CALM: f32 = 6.0;
 
-/// Still iterations counted in addition for a vertex that could not move at all: it is pressed against others and will not in the next
-/// iteration either.
+/// The number of still iterations counted in addition for a vertex that could not move at all: it is pressed against
+/// others and will not move in the next iteration either.
 const STUCK: f32 = 2.0;
 
-/// Still iterations counted for one long step.
+/// The number of still iterations that one long step counts as.
 const LONG_STEP: f32 = 2.0;
 
-/// The speed of a vertex that wakes its neighbours, in that of a still one. A neighbour of valence six goes at most a sixth of its way.
+/// The speed above which a vertex wakes its neighbours, in multiples of the largest speed of a still vertex. A
+/// neighbour of valence six moves by at most a sixth of the displacement.
 const WAKING: f32 = 4.0;
 
-/// The stiffness of f_c and f_e against moving a vertex of valence 6 away from its neighbours, in α_c and α_e.
+/// The stiffness of f_c and f_e against displacing a vertex of valence 6 from its neighbours, in α_c and α_e.
 const BENDING_STIFFNESS: f32 = 1.3;
 const STRETCHING_STIFFNESS: f32 = 6.0;
 
-/// A reversal of a vertex counts if it keeps more than this share of its speed; weaker oscillations decay by themselves.
+/// The share of its speed that a vertex must keep for a reversal to be counted; weaker oscillations decay by
+/// themselves.
 const UNDAMPED: f32 = 0.5;
 
-/// The decay of the count of reversals in an iteration without one; so oscillations with periods of up to eight iterations are counted.
+/// The decrease of the count of reversals in an iteration without one: oscillations with periods of up to eight
+/// iterations accumulate.
 const REVERSAL_DECAY: f32 = 0.25;
 
-/// External forces and constraints.
+/// The image, parameters and constraints that act on the mesh in one iteration.
 pub(super) struct World<'a> {
     pub(super) field: Field<'a>,
-    /// The region that vertices must stay in.
+    /// The region in which vertices must stay.
     pub(super) domain: Domain,
     pub(super) params: &'a DeformableParams,
     pub(super) delta: f32,
-    /// Whether all vertices are examined, so that only those move that are not at rest.
+    /// Whether all vertices are examined: the forces on all are evaluated, and only those that have not settled move.
     pub(super) examines: bool,
     pub(super) clock: fn() -> f64,
 }
 
-/// Moves the vertices of a mesh; buffers are kept between steps.
+/// The integrator of the law of motion; buffers are kept between iterations.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Motion {
     pub(super) awake: Awake,
     pub(super) forces: Forces,
-    /// Displacements in this iteration, by slot; zero before and after.
+    /// Displacements in this iteration, by slot; zero between iterations.
     displacements: Vec<Vec3>,
 }
 
 impl Motion {
-    /// Updates the vertices awake, or takes all vertices to examine them; their normals and L.
+    /// Selects the vertices to process, those awake or all if `examines`, and computes normals and L around them.
     pub(super) fn prepare(&mut self, mesh: &Mesh, keys: Keys, examines: bool) {
         self.awake.find(mesh, keys.still, examines);
         self.forces.update_normals(mesh.rings(), mesh.positions(), &self.awake.around);
@@ -72,8 +75,8 @@ impl Motion {
 
     /// Moves the vertices by one time step as far as `carry` allows; needs [`Self::prepare`] for the current mesh.
     ///
-    /// `carry` moves vertices by displacements, by slot, and replaces them by those applied; it returns the vertices held back, and the share
-    /// of its displacement that each moved by.
+    /// `carry` moves vertices by displacements, given by slot, and replaces these by the ones applied. It returns the
+    /// vertices held back, each with the share of its displacement that it moved by.
     pub(super) fn advance(
         &mut self,
         mesh: &mut Mesh,
@@ -101,7 +104,7 @@ impl Motion {
         movement
     }
 
-    /// Semi-implicit Euler: the new velocity moves the vertex.
+    /// Computes velocities and displacements by semi-implicit Euler: the new velocity moves the vertex.
     fn euler(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
         self.act(mesh, mesh.positions(), mesh.vector(keys.velocity), world);
         let &DeformableParams { time_step, mass, damping, .. } = world.params;
@@ -113,11 +116,13 @@ impl Motion {
         }
     }
 
-    /// Linearly implicit Euler with a long time step, v ← (m v + Δt f) / (m + Δt γ + Δt² k), for each vertex by itself; k is the stiffness of the
-    /// forces against a move along the normal.
+    /// Computes velocities and displacements by linearly implicit Euler with a long time step, v ← (m v + Δt f) / (m +
+    /// Δt γ + Δt² k), for each vertex separately; k is the stiffness of the forces against a displacement along the
+    /// normal.
     ///
-    /// Near steps of the image, or where edits displace them repeatedly, vertices would oscillate for ever. After n recent reversals a vertex
-    /// moves by 1/(n + 1) of its displacement, so it settles at the mean (Kesten, *Accelerated stochastic approximation*, 1958).
+    /// Near steps of the image, or where edits displace them repeatedly, vertices would oscillate for ever. After n
+    /// recent reversals a vertex moves by 1/(n + 1) of its displacement, so it settles at the mean (Kesten,
+    /// *Accelerated stochastic approximation*, 1958).
     fn implicit(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
         self.act(mesh, mesh.positions(), mesh.vector(keys.velocity), world);
         let &DeformableParams { mass, damping, rigidity, stiffness, .. } = world.params;
@@ -137,7 +142,7 @@ impl Motion {
         }
     }
 
-    /// The classical fourth-order method on positions and velocities.
+    /// Computes velocities and displacements by the classical fourth-order Runge–Kutta method.
     fn runge_kutta(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
         let &DeformableParams { time_step, mass, damping, .. } = world.params;
         let (step, mass, damping) = (time_step as f32, mass as f32, damping as f32);
@@ -165,14 +170,14 @@ impl Motion {
         self.awake.moving.iter().map(|v| v.index()).for_each(|i| velocities[i] += gain[i]);
     }
 
-    /// The forces on the vertices awake, at given positions and with the normals there.
+    /// Evaluates the forces on the moving vertices at given positions, with the current normals.
     fn act(&mut self, mesh: &Mesh, positions: &[Vec3], velocities: &[Vec3], world: &World) {
         let begin = (world.clock)();
         self.forces.evaluate(mesh.rings(), positions, velocities, &world.field, &self.awake.moving);
         self.forces.spent += (world.clock)() - begin;
     }
 
-    /// Shortens displacements that are too long or leave the domain, and the velocities with them.
+    /// Shortens displacements that are too long or leave the domain, and scales the velocities accordingly.
     fn bound(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
         let &World { domain, params, delta, .. } = world;
         let limit = params.max_move as f32 * delta;
@@ -191,7 +196,8 @@ impl Motion {
         }
     }
 
-    /// Of all vertices, wakes those that are about to move; the others do not.
+    /// Keeps as moving, and wakes, the examined vertices whose displacement exceeds that of a still vertex; stops the
+    /// others.
     fn wake_those_not_at_rest(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
         let stillness = stillness(world.params.mass, world.params.energy_tolerance);
         let least = stillness * world.params.step_length() as f32 * world.delta;
@@ -209,7 +215,7 @@ impl Motion {
         awake.moving.iter().for_each(|v| still[v.index()] = 0.0);
     }
 
-    /// Measures the motion, puts vertices to sleep and wakes others.
+    /// Measures energy and largest speed, counts still iterations, and wakes fast vertices with their neighbours.
     fn measure(&self, mesh: &mut Mesh, keys: Keys, world: &World) -> Movement {
         let per_time = 1.0 / (world.params.step_length() as f32 * world.delta);
         let stillness = stillness(world.params.mass, world.params.energy_tolerance);
@@ -237,7 +243,8 @@ impl Motion {
     }
 }
 
-/// Updates the count of recent reversals of a vertex by its speeds along the normal before and after a step.
+/// Returns the updated count of recent reversals of a vertex, given its speeds along the normal before and after a
+/// step.
 fn count_reversals(reversals: f32, before: f32, after: f32) -> f32 {
     if before * after >= 0.0 {
         return higher(reversals - REVERSAL_DECAY, 0.0);
@@ -246,14 +253,14 @@ fn count_reversals(reversals: f32, before: f32, after: f32) -> f32 {
     if is_undamped { reversals + 1.0 } else { reversals }
 }
 
-/// Wakes a moving vertex and its neighbours.
+/// Wakes a vertex and its neighbours.
 fn wake(mesh: &mut Mesh, keys: Keys, v: VertexId) {
     let (rings, still) = mesh.rings_and_scalar_mut(keys.still);
     still[v.index()] = 0.0;
     rings[v.index()].as_slice().iter().for_each(|w| still[w.index()] = 0.0);
 }
 
-/// Counts still iterations of a vertex; after enough of them it sleeps.
+/// Adds to the still iterations of a vertex; once there are enough it sleeps, and its velocity is set to zero.
 fn count_still(mesh: &mut Mesh, keys: Keys, v: VertexId, iterations: f32) {
     let still = &mut mesh.scalar_mut(keys.still)[v.index()];
     *still += iterations;

@@ -1,84 +1,88 @@
-//! Parameters of the deformable model, their ranges and their words.
+//! Parameters of the deformable model, with their ranges, labels and help texts.
 
 use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, ParamSpec};
 use crate::volume::Volume;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Parameters of the deformable model. All can be changed while it runs.
+/// The parameters of the deformable model. All can be changed while it runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub struct DeformableParams {
-    /// π_I: the intensity the surface looks for, in the volume's units.
+    /// π_I: the intensity that the surface settles at, in the volume's units.
     pub iso: f64,
-    /// α_I: attraction to the iso surface; negative where the object is brighter than `iso`.
+    /// α_I: strength of the image force towards the iso-surface at π_I; negative if the object is brighter than `iso`.
     pub iso_force: f64,
     /// α_g: attraction to bright ridges along the normal.
     pub gradient_normal: f64,
     /// β_g: attraction to bright ridges along the tangent plane.
     pub gradient_tangent: f64,
-    /// Longest gradient that counts, in ranges of intensity a voxel.
+    /// The length to which image gradients are clamped, in ranges of intensity per voxel.
     pub gradient_bound: f64,
-    /// α_c: rigidity, resistance to changes of curvature.
+    /// α_c: rigidity, the resistance to changes of curvature.
     pub rigidity: f64,
     /// α_e: stiffness of the edges as springs.
     pub stiffness: f64,
-    /// d: the length at which a spring is at rest.
+    /// d: the rest length of the springs.
     pub rest_length: RestLength,
-    /// m: mass of a vertex.
+    /// m: the mass of a vertex.
     pub mass: f64,
-    /// γ: damping.
+    /// γ: the damping.
     pub damping: f64,
-    /// How the law of motion is integrated.
+    /// The integrator of the law of motion.
     pub integrator: Integrator,
-    /// Δt: time step.
+    /// Δt: the time step.
     pub time_step: f64,
-    /// Largest move of a vertex in one iteration, as a fraction of δ.
+    /// The largest displacement of a vertex in one iteration, as a fraction of δ.
     pub max_move: f64,
-    /// ε: kinetic energy along the normals below which a level has come to rest.
+    /// ε: the mean kinetic energy along the normals below which a level has converged.
     pub energy_tolerance: f64,
     /// Whether the mesh adapts its sampling and topology.
     pub topology: Topology,
-    /// How far sampling, topology and rigidity adapt to the image locally; 0 is the paper: one δ, contact by distance alone.
+    /// The degree of local adaptation to the image. At 0, as in the paper, δ is uniform, and contact is decided by
+    /// distance alone; with any larger value the image decides on topology changes and limits rigidity, and edge
+    /// lengths vary with the curvature in proportion to it.
     pub adaptivity: f64,
-    /// Whether parts that a level shows and the mesh leaves out are added to it.
+    /// Whether parts of a level's contour that the mesh lacks are added to it.
     pub seeding: Seeding,
-    /// Closed parts and hollows that enclose less, in voxels of the volume, are left out of the contour and of seeds.
+    /// The least volume, in voxels of the volume, that a closed part or cavity must enclose to be in a contour or be
+    /// seeded.
     pub smallest_part: f64,
 }
 
-/// The step of the implicit integrator, in time steps. With 4 it takes twice as many iterations; with 64, fronts that meet pass by
-/// openings before they settle.
+/// The step of the implicit integrator, in time steps. With 4 it takes twice as many iterations; with 64, fronts that
+/// meet pass by openings before they settle.
 const LONG_STEP: f64 = 16.0;
 
-/// The length at which a spring is at rest.
+/// The rest length of the edges as springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RestLength {
-    /// No length: the surface tends to least area.
+    /// Zero: the surface tends to minimal area.
     Zero,
-    /// The mean edge of the mesh: edges tend to the same length.
+    /// The mean edge length of the mesh: edges tend to equal length.
     Mean,
-    /// A given length in world units.
+    /// A length in world units.
     Given(f64),
 }
 
-/// How the law of motion is integrated.
+/// The integrator of the law of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integrator {
-    /// Semi-implicit Euler: one evaluation of the forces; holds for α_c ≤ 0.4 and γ ≤ 1.
+    /// Semi-implicit Euler: one force evaluation per iteration; stable for α_c ≤ 0.4 and γ ≤ 1.
     Euler,
-    /// Runge–Kutta of order 4: four evaluations; holds for α_c up to 3.
+    /// Runge–Kutta of order 4: four force evaluations per iteration; stable for α_c up to 3.
     RungeKutta,
-    /// Linearly implicit Euler with a long time step: one evaluation; holds for all parameters, and is there in tens of
-    /// iterations where the others take hundreds. Not of the paper; same forces, so the same surface.
+    /// Linearly implicit Euler with a long time step: one force evaluation per iteration; stable for all parameters,
+    /// and converges in tens of iterations where the others take hundreds. Not in the paper; the forces, and so the
+    /// surface, are the same.
     Implicit,
 }
 
-/// Whether a level is searched for parts that the mesh leaves out.
+/// Whether levels are searched for parts of their contour that the mesh lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Seeding {
-    /// In runs that start from the contour.
+    /// Only in runs that start from the contour.
     Auto,
     /// In all runs.
     On,
@@ -86,29 +90,30 @@ pub enum Seeding {
     Off,
 }
 
-/// Whether the mesh may change while it moves.
+/// Whether the connectivity of the mesh may change while it moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Topology {
-    /// Sampling and topology follow the three bounds of δ.
+    /// Sampling and topology follow the three bounds derived from δ.
     Adaptive,
-    /// Vertices move; edges stay.
+    /// Vertices move, but the mesh keeps its edges.
     Fixed,
 }
 
 impl DeformableParams {
-    /// The defaults, with `iso` halfway between the volume's least and largest intensity.
+    /// Returns the default parameters, with `iso` halfway between the least and the largest intensity of the volume.
     pub fn for_volume(volume: &Volume) -> Self {
         let [low, high] = volume.range();
         Self { iso: 0.5 * (low + high), ..Self::default() }
     }
 
-    /// The paper's: one δ and one rigidity everywhere, contact by distance alone, its law of motion; else the defaults.
+    /// Returns the parameters of the paper: uniform δ and rigidity, contact by distance alone, its law of motion; the
+    /// others have their defaults.
     pub fn of_paper(volume: &Volume) -> Self {
         Self { adaptivity: 0.0, integrator: Integrator::Euler, ..Self::for_volume(volume) }
     }
 
-    /// The time that passes in one iteration: Δt, or what the implicit integrator takes as one step.
+    /// Returns the time that passes in one iteration: Δt, or the long step of the implicit integrator.
     pub(super) fn step_length(&self) -> f64 {
         match self.integrator {
             Integrator::Implicit => LONG_STEP * self.time_step,
@@ -121,16 +126,16 @@ impl DeformableParams {
         self.iso_force != 0.0 && self.adaptivity > 0.0
     }
 
-    /// Tests every value against its range.
+    /// Checks every value against its range.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] with the name of the first parameter out of range and what it accepts.
+    /// [`MethodError::InvalidArgument`] with the name of the first parameter out of range and the accepted range.
     pub fn validate(&self) -> Result<(), MethodError> {
         let given = SPECS.iter().zip(self.numbers());
         given.filter_map(|(spec, value)| Some((spec, value?))).try_for_each(|(spec, value)| spec.check(value))
     }
 
-    /// The values that have a range, in the order of [`SPECS`].
+    /// Returns the numerical values in the order of [`SPECS`], `None` for parameters that are no numbers.
     fn numbers(&self) -> [Option<f64>; 18] {
         let rest = if let RestLength::Given(length) = self.rest_length { Some(length) } else { None };
         [
@@ -181,7 +186,7 @@ impl Default for DeformableParams {
     }
 }
 
-/// The parameters of the deformable model, in the order a page should show them.
+/// Returns the descriptions of all parameters, in the order in which a user interface should list them.
 pub fn param_specs() -> Vec<ParamSpec> {
     SPECS.to_vec()
 }
@@ -381,7 +386,7 @@ const SPECS: [ParamSpec; 18] = [
     },
 ];
 
-/// Words or a number for people; for saved states, which are not read by people, one number.
+/// The human-readable form of a [`RestLength`]: a word or a length. Binary states store a single number instead.
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
 enum RestLengthWords {

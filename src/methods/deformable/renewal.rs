@@ -1,8 +1,9 @@
-//! Renewal: on the way down, components that leave something out are taken anew from the contour of the finer level.
+//! Renewal: on a level change, components that lack part of the finer contour are replaced by it.
 //!
-//! A coarse level shows no thin walls, and its surface has to be opened, split and filled in hundreds of places before it fits the
-//! finer image. Where a component of the contour has points that no component of the mesh is near, it and all that it touches are
-//! replaced by the contour, brought into edge bounds like a start; components that leave nothing out are refined and go on.
+//! A coarse level shows no thin walls, and its surface would have to be opened, split and filled in hundreds of places
+//! before it fits the finer image. If a component of the contour has points far from the mesh, it replaces all
+//! components of the mesh that it touches, and is brought within edge bounds like a start; other components are refined
+//! and kept.
 
 use super::contour::{ObjectIs, contour, simplified};
 use super::{DeformableModel, Topology};
@@ -10,23 +11,23 @@ use crate::mesh::{Groups, Mesh, TriangleMesh, VertexId};
 use crate::methods::MethodError;
 use crate::spatial::TriangleTree;
 
-/// A point of the contour is left out where the mesh is further away than this, in voxels of the finer level.
+/// The distance from the mesh, in voxels of the finer level, above which the mesh lacks a point of the contour.
 const REACH: f32 = 1.0;
 
-/// What changes on the way to a level.
+/// The components to replace on a level change.
 #[derive(Default)]
 pub(super) struct Renewal {
-    /// A vertex of each component that goes.
+    /// A vertex of each component to remove from the mesh.
     pub(super) stale: Vec<VertexId>,
-    /// What comes instead: parts of the contour.
+    /// The parts of the finer contour to add instead.
     pub(super) fresh: Mesh,
 }
 
 impl DeformableModel {
-    /// What has to be renewed to fit the next finer level.
+    /// Returns the components to replace for the next finer level, empty if the mesh lacks nothing.
     ///
     /// # Errors
-    /// Where the contour does not fit memory.
+    /// If the contour does not fit into memory.
     pub(super) fn renewal(&self) -> Result<Renewal, MethodError> {
         if self.params.iso_force == 0.0 || self.params.topology == Topology::Fixed {
             return Ok(Renewal::default());
@@ -43,8 +44,10 @@ impl DeformableModel {
         Ok(Renewal { stale, fresh: Mesh::from_triangles(&fresh)? })
     }
 
-    /// A vertex of each component of the mesh that goes, and the components of the contour that replace them: all that are joined,
-    /// one near the other, to a component of the contour with a point further than `reach` from the mesh.
+    /// Returns a vertex of each component of the mesh to remove, and the components of the contour that replace them.
+    ///
+    /// Components of mesh and contour within `reach` of each other form groups. Groups with a point of the contour
+    /// further than `reach` from the mesh are replaced; components of the mesh near no contour are removed, too.
     fn incomplete(
         &self,
         contour: &TriangleMesh,
@@ -72,7 +75,7 @@ impl DeformableModel {
             is_renewed[group] |= is_left_out[part as usize];
         }
         let fresh = contour.parts_where(|v| is_renewed[groups.find(part_of_contour[v as usize] as usize)]);
-        // What is near no contour would be inside of what comes, or around it.
+        // A component near no contour would be inside of a new component, or around it.
         let mut is_stale = |v: usize| {
             let group = groups.find(first + v);
             part_of_surface[v] as usize == v && (is_renewed[group] || !has_contour[group])

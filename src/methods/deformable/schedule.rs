@@ -7,40 +7,42 @@ use crate::methods::{MethodError, Times};
 use crate::remesh::{Changes, Sampling};
 use serde::{Deserialize, Serialize};
 
-/// Quiet iterations in a row for convergence: a single one may be a turning point of an oscillation.
+/// The number of quiet iterations in a row for convergence: a single one may be a turning point of an oscillation.
 const QUIET_ITERATIONS: f64 = 3.0;
 
-/// The same for long steps, which are damped and do not oscillate, where no vertex is fast either.
+/// The same with the implicit integrator if the speed of the fastest vertex is bounded, too; its long steps are damped
+/// and do not oscillate.
 const QUIET_LONG_STEPS: f64 = 2.0;
 
-/// The largest number of quiet iterations, for small time steps and damping.
+/// The largest number of quiet iterations required, whatever the time step and the damping.
 const MOST_QUIET_ITERATIONS: f64 = 500.0;
 
-/// The largest speed in a converged surface, in δ per unit of time. The mean energy hides a few moving vertices, such as a front in a hole;
-/// without this bound the model would stop before it has passed.
+/// The largest speed in a converged surface, in δ per unit of time. The mean energy hides a few moving vertices, such
+/// as a front in a hole; without this bound the model would stop before the front has passed.
 const REST_SPEED: f32 = 0.03;
 
-/// The number of searches of the finest level for missing parts.
+/// The largest number of searches of the finest level for missing parts.
 const MOST_SEARCHES: u32 = 3;
 
 /// The largest displacement in one iteration of a converged surface, in δ.
 const REST_MOVE: f32 = 0.1;
 
-/// The state of convergence.
+/// The state of convergence on the current level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Rest {
     quiet: u32,
-    /// Whether all vertices have been examined since the surface first came to rest, or something was seeded.
+    /// Whether all vertices have been examined since the surface was first quiet on this level, or since parts were
+    /// seeded.
     examined: bool,
-    /// Whether the next iteration examines all vertices.
+    /// Whether the next iteration evaluates the forces on all vertices, asleep or not.
     pub(super) examines: bool,
     done: bool,
-    /// Searches of the finest level made; the largest number once one found nothing.
+    /// The number of searches of the finest level for missing parts; [`MOST_SEARCHES`] once a search found none.
     searches: u32,
-    /// Whether edges have been sized.
+    /// Whether vertices have been given sizes by the curvature of this level.
     pub(super) sized: bool,
-    /// Whether the surface was on the contour of this level at its beginning, and parameters have not changed since; then there are no
-    /// fronts to wait for.
+    /// Whether the surface was on the contour of this level at its beginning, and neither parameters nor attractors
+    /// have changed since; there are no moving fronts then, and the fastest vertex does not delay convergence.
     pub(super) began_on_contour: bool,
     /// The iteration after which this level began.
     pub(super) began: u32,
@@ -51,8 +53,8 @@ impl DeformableModel {
         self.rest.done
     }
 
-    /// The share of levels done, and of this one by the logarithm of the energy, from full speed to convergence. It may decrease when the
-    /// surface starts moving again.
+    /// Returns the progress of the run from 0 to 1: the share of levels completed, and of the current one by the
+    /// logarithm of the energy, from full speed to convergence. It may decrease when the surface starts moving again.
     pub(super) fn progress(&self) -> f64 {
         if self.rest.done {
             return 1.0;
@@ -67,14 +69,15 @@ impl DeformableModel {
         ((levels - 1 - self.level) as f64 + way.clamp(0.0, 1.0)) / levels as f64
     }
 
-    /// Wakes all vertices after a change that may move them.
+    /// Wakes all vertices and restarts convergence, after a change that may move any of them.
     pub(super) fn wake_all(&mut self) {
         self.mesh.scalar_mut(self.keys.still).fill(0.0);
         self.mesh.scalar_mut(self.keys.reversals).fill(0.0);
         self.rest = Rest { began: self.rest.began, ..Rest::default() };
     }
 
-    /// Counts quiet iterations; after enough of them checks the whole mesh, and descends one level or ends.
+    /// Counts quiet iterations. After enough of them it examines all vertices, checks the whole mesh, and descends one
+    /// level or ends the run.
     pub(super) fn come_to_rest(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let is_slow = self.rest.began_on_contour || self.movement.fastest < self.rest_speed();
         let quiet = is_slow && self.movement.energy < self.params.energy_tolerance;
@@ -104,8 +107,8 @@ impl DeformableModel {
         Ok(changes)
     }
 
-    /// Sizes edges on the finest level and seeds missing parts; if that changed the mesh it is no longer quiet. Edits wake only the vertices
-    /// around them.
+    /// Sets sizes on the finest level, or else seeds missing parts; if either changed the mesh, it is no longer quiet.
+    /// Edits wake only the vertices around them.
     fn complete(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         if self.set_sizes() {
             self.rest.quiet = 0;
@@ -125,13 +128,15 @@ impl DeformableModel {
         Ok(found)
     }
 
-    /// The speed below which the fastest vertex counts as settled; no vertex may move far in a long step either.
+    /// Returns the speed, in δ per unit of time, below which the fastest vertex has settled; it also bounds the
+    /// displacement in one step.
     fn rest_speed(&self) -> f32 {
         let longest = REST_MOVE / self.params.step_length() as f32;
         if longest < REST_SPEED { longest } else { REST_SPEED }
     }
 
-    /// The response time m/γ in iterations: a surface that has just begun to move is slow, too, without being converged.
+    /// Returns the number of quiet iterations for convergence, at least the response time m/γ: a surface that has just
+    /// begun to move is slow, too, without having converged.
     fn quiet_iterations(&self) -> u32 {
         let DeformableParams { mass, damping, integrator, .. } = self.params;
         let is_settled = integrator == Integrator::Implicit && !self.rest.began_on_contour;
@@ -139,7 +144,7 @@ impl DeformableModel {
         libm::ceil(mass / (damping * self.params.step_length())).clamp(least, MOST_QUIET_ITERATIONS) as u32
     }
 
-    /// Checks the bounds at every vertex, and removes specks.
+    /// Restores the bounds around all vertices, and removes specks.
     pub(super) fn check_everything(&mut self, times: &mut Times) -> Changes {
         if self.params.topology == Topology::Fixed {
             return Changes::default();
@@ -154,8 +159,8 @@ impl DeformableModel {
         changes
     }
 
-    /// Refines the mesh and descends to the next finer image (figure 13); renews components that leave out part of it, if what replaces
-    /// them fits.
+    /// Refines the mesh and descends to the next finer image (figure 13). Components that lack part of the finer
+    /// contour are renewed; if the result would intersect itself, missing parts are seeded instead.
     fn descend(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let begin = (self.clock)();
         let renewal = if self.seeds_levels() { self.renewal()? } else { Renewal::default() };
@@ -175,7 +180,8 @@ impl DeformableModel {
         Ok(changes)
     }
 
-    /// As [`Self::descend_renewed`]; if that fails, the model is as it was on this level.
+    /// Tries [`Self::descend_renewed`] and returns whether it succeeded; if not, mesh, level and pending vertices are
+    /// restored.
     fn try_to_renew(&mut self, renewal: &Renewal) -> bool {
         let (level, coarse, waiting) = (self.level, self.mesh.clone(), self.resolver.waiting());
         let is_renewed = self.descend_renewed(renewal).is_ok();
@@ -188,10 +194,10 @@ impl DeformableModel {
         is_renewed
     }
 
-    /// Descends with some components replaced by parts of the finer contour, all of it resolved like a start.
+    /// Descends with some components replaced by parts of the finer contour, and resolves the whole mesh like a start.
     ///
     /// # Errors
-    /// Where the new parts do not fit beside the others, or not in memory.
+    /// If the new parts do not fit beside the others, or into memory.
     fn descend_renewed(&mut self, renewal: &Renewal) -> Result<(), MethodError> {
         renewal.stale.iter().for_each(|&v| _ = self.mesh.remove_component(v));
         self.descend_refined()?;
@@ -217,7 +223,7 @@ impl DeformableModel {
             if self.mesh.vertex_count() + self.mesh.triangle_count() > most {
                 return Err(MethodError::TooManyVertices { most });
             }
-            // If it cannot be refined, edges that are too long now are split.
+            // If the mesh cannot be refined, edges that are too long on the finer level are split.
             let sampling = Sampling::new(self.model_delta());
             self.resolver.refine(&mut self.mesh, sampling)?;
         }
@@ -248,7 +254,7 @@ mod tests {
         .unwrap()
     }
 
-    /// A ball in noise, of which single vertices move long after the rest has settled.
+    /// A noisy ball on which single vertices keep moving long after the others have settled.
     fn model() -> DeformableModel {
         let mut random = Random::new(1);
         let volume = volume(32, |p| {
@@ -260,7 +266,7 @@ mod tests {
         DeformableModel::new(&volume, options).unwrap()
     }
 
-    /// Without a contour the run starts from a surface around the image, which has far to go.
+    /// Without a contour a run starts from the enclosing surface, whose fronts have a long way to go.
     #[test]
     fn only_a_start_on_the_contour_begins_on_it() {
         let speck = volume(32, |p| if (p - 15.5).length() < 2.0 { 1.0 } else { 0.0 });

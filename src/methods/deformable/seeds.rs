@@ -1,9 +1,9 @@
-//! Seeding: parts of a level's iso-surface that are far from the mesh become new components of it.
+//! Seeding: adds parts of a level's contour that are far from the mesh as new components.
 //!
-//! What vanished on a coarse level, or was never shown by one, is not reached by a surface that only moves. So the voxels of a level
-//! are compared with the mesh: object outside of it is missing matter, background inside is a missing hollow. Where that is
-//! further from the mesh than [`CLEARANCE`] its contour is added, closed and clear of the mesh by construction; forces and contact
-//! do the rest.
+//! A surface that only moves does not reach parts that vanished on a coarse level, or that no coarse level shows. So
+//! the voxels of a level are compared with the mesh: object outside of it is missing matter, background inside is a
+//! missing cavity. The contours of those further from the mesh than [`CLEARANCE`] are added; they are closed and clear
+//! of the mesh by construction. Forces and contact join them with the rest.
 
 use super::contour::{ObjectIs, contour, placed};
 use super::coverage::Missing;
@@ -17,19 +17,22 @@ use crate::spatial::{CellSet, TriangleTree};
 use crate::volume::{Grid, marching_cubes, voxels_inside};
 use fixedbitset::FixedBitSet;
 
-/// Voxels nearer to the mesh than this, in voxels of the level, are left to it. With less, seeds would touch it; with more, thin
-/// parts beside it are not found.
+/// The least distance of missing voxels from the mesh, in voxels of the level. With less, seeds would touch the mesh;
+/// with more, thin parts beside it are not found.
 const CLEARANCE: f64 = 0.9;
 
-/// The least volume of a seed, in that of the smallest part of its own: pieces of parts that the mesh has may be smaller.
+/// The least volume of a seed, as a share of [`super::DeformableParams::smallest_part`]: pieces of parts that are
+/// already in the mesh may be smaller than separate parts.
 const SMALLEST_SEED: f64 = 1.0 / 32.0;
 
-/// The volume of the octahedron of the six neighbours of a voxel, in voxels: a contour around it alone encloses no more.
+/// The volume of the octahedron of the six neighbours of a voxel, in voxels; the contour of a single voxel encloses no
+/// more.
 const MOST_OF_ONE_VOXEL: f64 = 4.0 / 3.0;
 
 impl DeformableModel {
-    /// Searches the level for parts that the mesh leaves out and adds them, whatever `seeding` says. The run goes on where it had
-    /// ended; the report counts the parts as `seeds`.
+    /// Searches the current level for parts of the contour that the mesh lacks and adds them, whatever the parameter
+    /// `seeding`. A finished run continues if there are any; the report counts them as `seeds`. Nothing is added if the
+    /// topology is fixed or the image force is zero.
     ///
     /// # Errors
     /// [`MethodError::TooManyVertices`]; out of memory.
@@ -43,7 +46,8 @@ impl DeformableModel {
         Ok(self.report(changes, times))
     }
 
-    /// Adds to the mesh the closed contours of what this level shows and the mesh leaves out, and returns how many there were.
+    /// Adds closed contours of the matter and the cavities on this level that the mesh lacks, and restores the bounds
+    /// around them. Returns the edits, with the number of contours as `seeds`.
     pub(super) fn seed_missing(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         if self.params.iso_force == 0.0 || self.params.topology == Topology::Fixed {
             return Ok(Changes::default());
@@ -67,7 +71,8 @@ impl DeformableModel {
         Ok(changes)
     }
 
-    /// Adds components to the mesh, all but those that would cross something, and returns how many as `seeds`, and their vertices.
+    /// Adds components to the mesh, except for those that would intersect it or each other. Returns the number of those
+    /// added, as `seeds`, and their vertices.
     ///
     /// # Errors
     /// [`MethodError::TooManyVertices`]; nothing is added then.
@@ -90,7 +95,7 @@ impl DeformableModel {
         Ok((Changes { seeds: count as u32, ..Changes::default() }, added))
     }
 
-    /// Whether components can be added without exceeding the largest number of vertices.
+    /// Checks that components can be added without exceeding the largest number of vertices.
     ///
     /// # Errors
     /// [`MethodError::TooManyVertices`].
@@ -100,7 +105,7 @@ impl DeformableModel {
         if fits { Ok(()) } else { Err(MethodError::TooManyVertices { most }) }
     }
 
-    /// Makes new vertices known to the model.
+    /// Initialises the attributes of vertices added to the mesh: at rest, awake and checked, with size 1.
     pub(super) fn welcome(&mut self, added: &[VertexId]) {
         let keys = self.keys;
         for v in added.iter().map(|v| v.index()) {
@@ -114,13 +119,13 @@ impl DeformableModel {
         }
     }
 
-    /// The contours of what is missing, closed surfaces in the space of the model: of matter, and of hollows.
+    /// Returns the contours of matter and of cavities that the mesh lacks, closed surfaces in model space.
     fn missing_parts(&self) -> Result<[TriangleMesh; 2], MethodError> {
         let image = &self.pyramid.levels[self.level];
         let object = ObjectIs::by(&self.params);
         let dims = image.grid().0.dims;
         let indexed = |mesh| placed(mesh, |p| image.index(p));
-        // The contour of a large image is the larger of the two, and is gone before the other is made.
+        // The contour, in a large image the larger of the two meshes, is freed before the other is made.
         let contour = contour(image, self.level_iso, object, self.params.smallest_part)?;
         let in_contour = voxels_inside(&indexed(contour), dims);
         let surface = indexed(self.mesh.to_triangles());
@@ -131,21 +136,22 @@ impl DeformableModel {
     }
 }
 
-/// The contour of a level and the mesh, voxel by voxel.
+/// The voxels of a level compared between its contour and the mesh.
 struct Comparison<'a> {
     image: &'a LevelImage,
     iso: f32,
     object: ObjectIs,
-    /// Whether each voxel is inside the contour; closed parts that are too small are no part of that.
+    /// Whether each voxel is inside the contour, which has no closed parts that are too small.
     in_contour: FixedBitSet,
     /// Whether each voxel is inside the mesh.
     in_mesh: FixedBitSet,
-    /// The mesh in voxels of the level.
+    /// The mesh in voxel indices of the level.
     surface: TriangleMesh,
 }
 
 impl Comparison<'_> {
-    /// Closed surfaces around what is missing of one kind, each of at least a volume.
+    /// Returns closed surfaces, in model space, around the missing voxels of one kind; each encloses at least
+    /// `smallest`.
     fn parts(&self, kind: Missing, smallest: f64) -> Result<TriangleMesh, MethodError> {
         let (grid, position) = self.image.grid();
         let missing = self.missing_voxels(kind)?;
@@ -165,12 +171,12 @@ impl Comparison<'_> {
         Ok(parts.without_parts_below(smallest))
     }
 
-    /// Whether the contour has a voxel on the side where something of this kind is.
+    /// Whether the contour assigns a voxel to the object if matter is missing, or to the background if cavities are.
     fn is_of(&self, kind: Missing, voxel: usize) -> bool {
         self.in_contour.contains(voxel) == (kind == Missing::Matter)
     }
 
-    /// Voxels on the wrong side of the mesh and clear of it, in order.
+    /// Returns the misplaced voxels that are further from the mesh than [`CLEARANCE`], in order.
     fn missing_voxels(&self, kind: Missing) -> Result<Vec<usize>, MethodError> {
         let mut missing = self.misplaced_voxels(kind);
         if missing.is_empty() {
@@ -184,7 +190,7 @@ impl Comparison<'_> {
         Ok(missing)
     }
 
-    /// Voxels on the wrong side of the mesh, whose neighbours are on that side, too; in order.
+    /// Returns the voxels on the wrong side of the mesh whose six neighbours are on that side of it, too, in order.
     fn misplaced_voxels(&self, kind: Missing) -> Vec<usize> {
         let is_inside = kind == Missing::Hollow;
         let dims = self.image.grid().0.dims;
@@ -197,7 +203,7 @@ impl Comparison<'_> {
         differing.ones().filter(is_misplaced).collect()
     }
 
-    /// The triangles that may be within [`CLEARANCE`] of some places.
+    /// Returns the part of the mesh with the triangles that may be within [`CLEARANCE`] of some positions.
     fn surface_near(&self, places: &CellSet) -> TriangleMesh {
         let is_near: Vec<bool> = self.surface.positions.iter().map(|&p| places.contains(p)).collect();
         let near =
@@ -209,14 +215,16 @@ impl Comparison<'_> {
         }
     }
 
-    /// How far the intensity of a voxel is on the side where something of this kind is.
+    /// Returns the difference between the intensity of a voxel and the iso value, positive in the object if matter is
+    /// missing, in the background if cavities are.
     fn depth(&self, kind: Missing, voxel: usize) -> f32 {
         let depth = self.object.depth(self.image.grid().0.values[voxel], self.iso);
         if kind == Missing::Matter { depth } else { -depth }
     }
 
-    /// How steep the image is at the contour of some voxels: the root mean square of the differences between those that are on that side
-    /// and their neighbours that are not; without any, of their depths. Above 0.
+    /// Returns the steepness of the image at the contour of some voxels: the root mean square of the differences
+    /// between voxels on that side of the iso value and their neighbours on the other; if there are none, of their
+    /// depths. Above 0.
     fn steepness(&self, kind: Missing, voxels: &[usize]) -> f32 {
         let dims = self.image.grid().0.dims;
         let (mut differences, mut depths) = (Mean::default(), Mean::default());
@@ -235,7 +243,8 @@ impl Comparison<'_> {
         differences.value().or(depths.value()).map_or(1.0, |square| square.sqrt() as f32)
     }
 
-    /// A field around a cluster of missing voxels, 0 on their contour: the iso-surface where they end at it, else halfway to the next voxel.
+    /// Returns a field on a box around a cluster of missing voxels that is 0 on their contour: on the iso-surface where
+    /// it bounds them, else halfway to the next voxel.
     fn field(&self, kind: Missing, missing: &[usize], [low, high]: [[usize; 3]; 2]) -> Grid {
         let grid = self.image.grid().0;
         let steep = self.steepness(kind, missing);
@@ -249,7 +258,7 @@ impl Comparison<'_> {
         let mut value = |voxel: usize| {
             let depth = self.depth(kind, voxel);
             match is_missing(voxel) {
-                // What belongs to a part that is too small has the other sign.
+                // Voxels of a part that is too small for the contour have the other sign.
                 true if depth < 0.0 => 0.5 * steep,
                 true => depth.min(steep),
                 false if self.is_of(kind, voxel) || depth >= 0.0 => -steep,
@@ -266,7 +275,7 @@ impl Comparison<'_> {
     }
 }
 
-/// A mean of numbers.
+/// An accumulator for the mean of numbers.
 #[derive(Default)]
 struct Mean {
     sum: f64,
@@ -284,7 +293,7 @@ impl Mean {
     }
 }
 
-/// The longest edge of a surface.
+/// Returns the length of the longest edge.
 fn longest_edge(surface: &TriangleMesh) -> f32 {
     let longest = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|v| surface.positions[v as usize]);
@@ -293,7 +302,7 @@ fn longest_edge(surface: &TriangleMesh) -> f32 {
     surface.triangles.iter().map(longest).fold(0.0, f32::max).sqrt()
 }
 
-/// The indices of a voxel along the axes.
+/// Returns the indices of a voxel along the axes.
 fn indices(dims: [usize; 3], voxel: usize) -> [usize; 3] {
     [voxel % dims[0], voxel / dims[0] % dims[1], voxel / dims[0] / dims[1]]
 }
@@ -302,7 +311,7 @@ fn coordinates(dims: [usize; 3], voxel: usize) -> Vec3 {
     Vec3::from(indices(dims, voxel).map(|k| k as f32))
 }
 
-/// The six voxels that share a face with one; `None` beyond the image.
+/// Returns the six voxels that share a face with a voxel; `None` for those outside the image.
 fn faces(dims: [usize; 3], voxel: usize) -> impl Iterator<Item = Option<usize>> {
     let at = indices(dims, voxel);
     let step = [1, dims[0], dims[0] * dims[1]];
@@ -311,7 +320,8 @@ fn faces(dims: [usize; 3], voxel: usize) -> impl Iterator<Item = Option<usize>> 
     })
 }
 
-/// The lowest voxel of a box around some and the one beyond its highest, with a voxel to spare where there is one.
+/// Returns the bounding box of some voxels, enlarged by one voxel within the image: its first voxel, and the one past
+/// its last, along each axis.
 fn bounding_box(voxels: &[usize], dims: [usize; 3]) -> ([usize; 3], [usize; 3]) {
     let (mut low, mut high) = (dims, [0; 3]);
     for &voxel in voxels {
@@ -324,7 +334,7 @@ fn bounding_box(voxels: &[usize], dims: [usize; 3]) -> ([usize; 3], [usize; 3]) 
     (low.map(|k| k.saturating_sub(1)), [0, 1, 2].map(|axis| (high[axis] + 2).min(dims[axis])))
 }
 
-/// The voxels in groups of those connected over faces, edges or corners; all in order.
+/// Groups voxels, given in order, into clusters connected over faces, edges or corners; each is in order.
 fn clusters(voxels: &[usize], dims: [usize; 3]) -> Vec<Vec<usize>> {
     let mut groups = Groups::new(voxels.len());
     for (i, &voxel) in voxels.iter().enumerate() {

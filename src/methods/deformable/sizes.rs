@@ -1,9 +1,10 @@
-//! Non-uniform sampling: how long edges are where, by the curvature that the image shows.
+//! Non-uniform sampling: edge lengths by the curvature of the image's contour.
 //!
-//! The middle of an edge of length l with its ends on a contour of curvature κ is κ l²/8 away from it, its sagitta. The image shows it
-//! where the ends have not settled, too: their own offsets are taken off. So it tells how long each edge may be to stay near. Where a
-//! wall or a gap is thin, edges are no longer than with one δ everywhere: sheets with longer ones than their distance are cut. They
-//! need not be shorter, since [`super::contact`] keeps them. The paper has one δ everywhere and names this as future work.
+//! The midpoint of an edge of length l with its ends on a contour of curvature κ is κ l²/8 away from it; this is the
+//! sagitta. It is measured in the image, also where the ends have not settled: their own offsets are subtracted. It
+//! bounds the length of an edge that stays near the contour. Where a wall or a gap is thin, edges are no longer than
+//! with uniform δ, since sheets whose edges are longer than their distance are cut. They need not be shorter, since
+//! [`super::contact`] keeps the sheets apart. The paper has uniform δ and names this as future work.
 
 use super::DeformableModel;
 use super::contour::ObjectIs;
@@ -12,35 +13,36 @@ use crate::mesh::VertexId;
 use crate::remesh::Sampling;
 use crate::volume::KnownCell;
 
-/// The sagitta, in voxels, above which edges are made shorter. With 0.1 the surface of a rough image has as many vertices as marching
-/// cubes; with 0.5, small features are sampled no better than without sizes.
+/// The sagitta, in voxels, above which edges are made shorter. With 0.1 the surface of a rough image has as many
+/// vertices as marching cubes; with 0.5, small features are sampled no better than without sizes.
 const COARSE: f32 = 0.25;
 
-/// The sagitta below which edges are made longer. The surface is inside its contour by two thirds of it: with 0.25, a ball of 7 voxels
-/// has 7 % less volume.
+/// The sagitta, in voxels, below which edges are made longer. The surface is inside its contour by two thirds of it:
+/// with 0.25, a ball of 7 voxels has 7 % less volume.
 const FINE: f32 = 0.05;
 
-/// The smallest and the largest size, in δ, with full adaptivity.
+/// The smallest and the largest size of a vertex, a factor on δ, with full adaptivity.
 const SMALLEST: f32 = 0.7;
 const LARGEST: f32 = 1.6;
 
-/// By how much the size may grow along an edge, as a share of its length: sampling then stays isotropic.
+/// The largest change of size along an edge, per length in edges of size 1; with this, sampling remains isotropic.
 const GRADATION: f32 = 0.3;
 
-/// Step of the search for the opposite side of a wall or a gap, in voxels.
+/// The step of the search for the opposite side of a wall or a gap, in voxels.
 const STRIDE: f32 = 0.5;
 
-/// Passes over the mesh that bound the gradation; each reaches one edge further.
+/// The number of passes over the mesh that bound the gradation; each reaches one edge further.
 const PASSES: usize = 3;
 
 /// The length of an edge of size 1, in δ.
 const ORDINARY: f32 = super::MEAN_EDGE as f32;
 
-/// The contour is not looked for further away than this, in voxels.
+/// The largest offset from the contour that is measured, in voxels; larger ones are clamped.
 const FURTHEST: f32 = 0.5;
 
 impl DeformableModel {
-    /// Sets the size of every vertex, unless that was done on this level; returns whether it was set. Seeds are sized when they are added.
+    /// Sets the size of every vertex, and returns whether it did: not if sizes were set on this level before, or if the
+    /// model does not adapt to the image. Seeds added later are given sizes separately.
     pub(super) fn set_sizes(&mut self) -> bool {
         if self.rest.sized || self.params.adaptivity == 0.0 || self.params.iso_force == 0.0 {
             return false;
@@ -62,7 +64,7 @@ impl DeformableModel {
         members.iter().map(|v| v.index()).for_each(|v| of[v] = share * (sizes[v] - 1.0));
     }
 
-    /// For each vertex, the smallest size that one of its edges asks for.
+    /// Returns the smallest size of the edges at each vertex, bounded by the thickness of thin walls and gaps.
     fn sizes_by_curvature(&self, members: &[VertexId]) -> Vec<f32> {
         let mut sizes = vec![LARGEST; self.mesh.slots()];
         let offsets = self.offsets_from_contour(members);
@@ -82,7 +84,8 @@ impl DeformableModel {
         sizes
     }
 
-    /// The size at which sheets are further apart than contact reaches.
+    /// Returns the size at which the contact distance equals the thickness of the wall or gap at a vertex; infinite if
+    /// none is found.
     fn size_by_thickness(&self, v: VertexId) -> f32 {
         let normal = self.mesh.area_normal(v).normalize_or_zero();
         let contact = Sampling::new(self.model_delta()).contact();
@@ -96,7 +99,7 @@ impl DeformableModel {
         thickness / contact
     }
 
-    /// How far the intensity at a point is on the object's side of the iso value.
+    /// Returns the difference between the intensity at a point and the iso value, positive in the object.
     fn depth(&self, p: Vec3) -> f32 {
         let (image, object) = (&self.pyramid.levels[self.level], ObjectIs::by(&self.params));
         object.depth(image.intensity(p, object.background(), &mut KnownCell::default()), self.level_iso)
@@ -114,7 +117,7 @@ impl DeformableModel {
         }
     }
 
-    /// The offset of each vertex from the contour.
+    /// Returns the offset of each vertex from the contour along its normal.
     fn offsets_from_contour(&self, members: &[VertexId]) -> Vec<f32> {
         let mut offsets = vec![0.0; self.mesh.slots()];
         for &v in members {
@@ -124,7 +127,7 @@ impl DeformableModel {
         offsets
     }
 
-    /// The size of an edge by its sagitta; `offsets` are those of its ends from the contour.
+    /// Returns the size of an edge by its sagitta; `offsets` are those of its ends from the contour.
     fn size_of_edge(&self, ends: [VertexId; 2], offsets: [f32; 2]) -> f32 {
         let [p, q] = ends.map(|w| self.mesh.position(w));
         let [m, n] = ends.map(|w| self.mesh.area_normal(w).normalize_or_zero());
@@ -132,7 +135,7 @@ impl DeformableModel {
         let sagitta = (middle - (offsets[0] + offsets[1]) * 0.5).abs();
         let length = p.distance(q) / (ORDINARY * self.model_delta());
         let [shortened, lengthened] = [COARSE, FINE].map(|within| length * (within / sagitta).sqrt());
-        // A straight edge gives infinity, which is the largest size.
+        // The sagitta of a straight edge is 0, and its size infinite; the caller clamps it to the largest size.
         if shortened < 1.0 {
             shortened
         } else if lengthened > 1.0 {
@@ -142,7 +145,7 @@ impl DeformableModel {
         }
     }
 
-    /// About the depth of a point inside the contour along a direction, in voxels; negative outside.
+    /// Returns the approximate depth of a point inside the contour along a direction, in voxels; negative outside.
     fn offset_from_contour(&self, p: Vec3, direction: Vec3) -> f32 {
         let [here, ahead, behind] = [p, p + direction * 0.5, p - direction * 0.5].map(|p| self.depth(p));
         let slope = (ahead - behind).abs();
@@ -159,7 +162,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Half of a sphere and half of a flatter one.
+    /// The intersection of two balls of different radius.
     fn model() -> DeformableModel {
         let n = 24;
         let at = |k: usize| Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32) - 11.5;
@@ -180,7 +183,8 @@ mod tests {
         DeformableModel::new(&volume, options).unwrap()
     }
 
-    /// Regression: sized by the offset of the middle alone, edges of a surface 0.3 voxels off its contour were a quarter shorter.
+    /// Regression: with sizes by the offset of the midpoint alone, edges of a surface 0.3 voxels off its contour were a
+    /// quarter shorter.
     #[test]
     fn sizes_are_those_of_the_contour_where_the_surface_is_beside_it() {
         let mut model = model();

@@ -1,4 +1,4 @@
-//! The surface a run starts from (section 3.6), made in the space of the model and resolved before the first step.
+//! Start surfaces (section 3.6): made in model space, and resolved before the first step.
 
 use super::contour::{ObjectIs, contour, placed, simplified};
 use super::domain::{Domain, rounded_axes};
@@ -12,49 +12,49 @@ use crate::remesh::{Resolver, Sampling, TopologyGuide, Unguided, Waiting};
 use crate::spatial::CellSet;
 use crate::volume::marching_cubes;
 
-/// What a run starts from; lengths and points in world units.
+/// The start surface of a run; lengths and points in world units.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Start {
-    /// The iso-surface at π_I of the coarsest level, outer and inner boundaries, less the parts that enclose less than
-    /// [`super::DeformableParams::smallest_part`]. Where there is none: nothing, if finer levels are searched for parts, else the
-    /// enclosing surface.
+    /// The iso-surface at π_I on the coarsest level, outer and inner boundaries, without parts that enclose less than
+    /// [`super::DeformableParams::smallest_part`]. If it is empty, the mesh is empty, too, if finer levels are searched
+    /// for parts; otherwise the enclosing surface is used.
     Contour,
-    /// A refined icosahedron around all of the image that is brighter than π_I; around the whole image where nothing is, or
-    /// where the surface does not look for what is brighter.
+    /// A refined icosahedron around all of the coarsest level that is brighter than its π_I; around the whole image if
+    /// nothing is, or if the object is not the brighter side.
     Enclosing,
     /// A grid of n³ small spheres that fills the image.
     Bubbles(u32),
-    /// Spheres of one radius around points.
+    /// Spheres of equal radius around given points.
     Seeds {
         /// The centres.
         points: Vec<DVec3>,
-        /// Their radius.
+        /// The common radius.
         radius: f64,
     },
-    /// The iso-surface at an intensity.
+    /// The iso-surface of the coarsest level at this intensity.
     MarchingCubes(f64),
-    /// A closed mesh that does not cross itself.
+    /// A closed mesh without self-intersections.
     Mesh(TriangleMesh),
 }
 
-/// What a start shape is made for.
+/// The image and the sampling that a start surface is made for.
 pub(super) struct Frame<'a> {
     pub(super) image: &'a LevelImage,
-    /// The intensity, normalised, of what an enclosing surface looks for.
+    /// The normalised intensity above which voxels are enclosed; `None` if the object is not the brighter side.
     pub(super) brighter_than: Option<f32>,
-    /// π_I, normalised, and on which side of it the object is.
+    /// π_I, normalised, and the side of it on which the object is.
     pub(super) iso: f32,
     pub(super) object: ObjectIs,
     /// The least volume of a closed part of the contour, in voxels of the finest level.
     pub(super) smallest_part: f64,
-    /// Voxels of the finest level.
+    /// The dimensions of the finest level in voxels.
     pub(super) dims: [usize; 3],
     pub(super) domain: Domain,
     pub(super) from_world: DAffine3,
-    /// World lengths of the voxel edges.
+    /// The voxel spacing in world units.
     pub(super) spacing: [f64; 3],
     pub(super) sampling: Sampling,
-    /// Whether a contour without parts is the start: parts come with finer levels.
+    /// Whether an empty contour gives an empty start mesh, since parts are seeded on finer levels.
     pub(super) may_be_empty: bool,
 }
 
@@ -64,38 +64,44 @@ impl Frame<'_> {
     }
 }
 
-/// The smallest sphere in δ that has its edges within bounds as an icosahedron, with room for one that is hit.
+/// The smallest radius of a start sphere, in δ: an icosahedron of this radius has its edges within bounds, with a
+/// margin.
 const SMALLEST_RADIUS: f32 = 1.2;
 
-/// Room between an object and the surface that encloses it, in δ.
+/// The distance between an object and the surface that encloses it, in δ.
 const OBJECT_ROOM: f32 = 1.5;
 
-/// Radius of a bubble as a share of its cell: neighbours stay further apart than contact reaches.
+/// The radius of a bubble as a share of its cell; neighbours are further apart than the contact distance.
 const BUBBLE_SHARE: f32 = 0.3;
 
-/// Upper bound of a sphere's edges in δ: below 2.5 with a margin, and above √3 with one, so that one refinement
-/// more does not fall below the lower bound.
+/// The upper bound of a sphere's edges in δ: well below 2.5, and well above √3, so that one more refinement does not
+/// make edges shorter than the lower bound.
 const SPHERE_EDGE: f32 = 2.2;
 
-/// The most bubbles along an axis and the most seeds: beyond them memory, not the method, is the limit.
+/// The largest number of bubbles along an axis, and of seeds: with more, memory, not the method, is the limit.
 const MOST_BUBBLES: u32 = 100;
 const MOST_SEEDS: usize = 10_000;
 
-/// Side of the cells around self-intersections of a resolved contour in which edits are tested in full, in longest edges.
+/// The side of the cells around self-intersections of a resolved contour in which edits are tested in full, as a
+/// multiple of the longest edge.
 const TESTED_CELL: f32 = 2.5;
 
-/// Times that a contour is resolved with edits that are not all tested in full, before all are.
+/// The number of times that a contour is resolved with some edits not tested in full, before all are.
 const MOST_RUNS: usize = 2;
 
-/// Calls until the edges of a start mesh are within bounds; each refines a coarse mesh several times.
+/// The largest number of resolver calls to bring the edges of a start mesh within bounds; each refines a coarse mesh
+/// several times.
 const MOST_CALLS: usize = 20;
 
 impl Start {
-    /// The start mesh with its edges within bounds, and no two parts in contact; for a contour, what replaces an empty one.
+    /// Makes the start mesh on the coarsest level, with its edges within bounds and no two parts in contact. For
+    /// [`Start::Contour`] that is the enclosing surface, the replacement for an empty contour.
+    ///
+    /// `iso` normalises intensities.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] where a sphere is too small for the sampling or two overlap, or the iso-surface
-    /// is empty; [`MethodError::Mesh`] where the caller's mesh is open, not manifold or crosses itself.
+    /// [`MethodError::InvalidArgument`] if a sphere is too small for the sampling, two overlap, or the iso-surface is
+    /// empty; [`MethodError::Mesh`] if the caller's mesh is open, not manifold or intersects itself.
     pub(super) fn make(
         &self,
         frame: &Frame,
@@ -118,9 +124,12 @@ impl Start {
 }
 
 impl DeformableModel {
-    /// Brings the edges of the contour that the mesh is within bounds, on the finest level by the sizes that they should have. Edits hardly
-    /// ever make it intersect itself, so most are not tested for that. All of it is at the end; what intersects is separated, or else
-    /// the contour is resolved again with edits that are tested there.
+    /// Brings the edges of the mesh, a contour, within bounds, on the finest level with sizes by curvature; used for
+    /// the start and for renewed components.
+    ///
+    /// Edits hardly ever cause self-intersections, so most are tested in one-rings only, and the whole mesh is tested
+    /// at the end. Intersecting parts are separated; if that fails, the contour is resolved again with edits near them
+    /// tested in full.
     ///
     /// # Errors
     /// [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] if it intersects itself after all edits were tested.
@@ -131,7 +140,7 @@ impl DeformableModel {
         loop {
             self.resolver.test_in((runs < MOST_RUNS).then(|| tested.clone()));
             let resolved = self.resolve_sized();
-            // Without a contour to go back to, all edits are tested, also after an error.
+            // Later calls have no contour to return to, so all their edits are tested, also after an error.
             self.resolver.test_in(None);
             resolved?;
             let sampling = self.sampling();
@@ -171,7 +180,7 @@ impl DeformableModel {
     }
 }
 
-/// Brings the edges of a mesh within bounds, and what is in contact together.
+/// Brings the edges of a mesh within bounds and resolves its contacts, with a new resolver, which is returned.
 fn resolve_all(
     mesh: &mut Mesh,
     most_vertices: usize,
@@ -203,10 +212,10 @@ fn resolve_with(
     Ok(())
 }
 
-/// A rounded box around the object, |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1, or around the whole image.
+/// Makes a rounded box, |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1, around the object or the whole image.
 ///
-/// It is refined from an icosahedron, each level pulled onto the shape and resolved: a fine icosahedron squashed onto
-/// a flat box would have triangles that no edit can mend.
+/// An icosahedron is refined, and after each refinement projected onto the box and resolved: a fine icosahedron
+/// squashed onto a flat box would have triangles that no edit can repair.
 fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
     let delta = frame.sampling.shortest();
     let most = frame.most_vertices();
@@ -235,8 +244,8 @@ fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
     Ok(mesh)
 }
 
-/// Centre and half axes of a rounded box around all of the object, in the proportions of the box around it. `None` where
-/// there is no object.
+/// Returns the centre and the half axes of a rounded box around all of the object, with the proportions of its bounding
+/// box; `None` if there is no object.
 fn around_object(frame: &Frame) -> Option<(Vec3, Vec3)> {
     let ends = frame.image.ends_of_rows(frame.brighter_than?);
     let Bounds { min, max } = Bounds::of(&ends);
@@ -253,7 +262,7 @@ fn around_object(frame: &Frame) -> Option<(Vec3, Vec3)> {
     Some((centre, axes * furthest))
 }
 
-/// The fourth root of x⁴ + y⁴ + z⁴.
+/// Returns the fourth root of x⁴ + y⁴ + z⁴: 1 on the unit rounded box.
 fn rounded_distance(p: Vec3) -> f32 {
     let square = p * p;
     (square * square).element_sum().sqrt().sqrt()
@@ -313,8 +322,8 @@ fn seeds(frame: &Frame, points: &[DVec3], radius: f64) -> Result<Mesh, MethodErr
     Ok(mesh)
 }
 
-/// A sphere around the origin of the world, in the space of the model without its translation: an ellipsoid where
-/// voxels are not cubes.
+/// Makes a sphere of a radius in world units around the origin and maps it to model space without translation; it is an
+/// ellipsoid there if voxels are not cubes.
 fn world_ball(frame: &Frame, radius: f64) -> Result<Mesh, MethodError> {
     let least = f64::from(SMALLEST_RADIUS * frame.sampling.shortest()) * largest(frame.spacing);
     let most =
@@ -340,7 +349,8 @@ fn largest(spacing: [f64; 3]) -> f64 {
     spacing.into_iter().fold(0.0, f64::max)
 }
 
-/// The contour that the model looks for, of the level it starts on; `None` where there is none, and finer levels are not searched.
+/// Makes the simplified contour at π_I of the start level, for [`DeformableModel::resolve_contour`]. If it is empty: an
+/// empty mesh if finer levels are searched for parts, else `None`.
 pub(super) fn on_contour(frame: &Frame) -> Result<Option<Mesh>, MethodError> {
     let surface = contour(frame.image, frame.iso, frame.object, frame.smallest_part)?;
     if surface.triangles.is_empty() {

@@ -1,4 +1,4 @@
-//! Saving a run and going on with it, bit for bit.
+//! Saving and restoring a run; a restored run continues bit for bit.
 
 use super::domain::Domain;
 use super::motion::Movement;
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 const MARK: Mark = *b"VSCLDEF\x05";
 
-/// Everything a run has beside its volume.
+/// The saved part of a run: everything but the volume and what is computed from it.
 #[derive(Serialize, Deserialize)]
 struct State {
     fingerprint: u64,
@@ -31,7 +31,7 @@ struct State {
 }
 
 impl DeformableModel {
-    /// The run as bytes, without the volume.
+    /// Returns the state of the run as bytes, without the volume.
     pub fn save(&self) -> Vec<u8> {
         let state = State {
             fingerprint: self.fingerprint,
@@ -50,10 +50,12 @@ impl DeformableModel {
         sealed(&MARK, &state)
     }
 
-    /// Goes on from bytes that [`Self::save`] gave, for a model of the same volume, frame and levels.
+    /// Restores a run from bytes made by [`Self::save`]; this model must have the same volume, frame and levels.
     ///
     /// # Errors
-    /// [`MethodError::BadState`] where the bytes are none of those; the model is then as it was.
+    /// [`MethodError::BadState`] if the bytes are not such a state, [`MethodError::InvalidArgument`] if a parameter or
+    /// attractor in it is invalid, [`MethodError::Volume`] if the gradient image does not fit into memory; the model is
+    /// unchanged then.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
         let state: State = opened(&MARK, bytes)?;
         if state.fingerprint != self.fingerprint {
@@ -119,7 +121,7 @@ impl DeformableModel {
     }
 }
 
-/// A number that tells volumes, frames and pyramids apart.
+/// Returns a hash of a volume's frame and the number of pyramid levels, by which a saved state is matched to its model.
 pub(super) fn fingerprint(volume: &Volume, frame: usize, levels: usize) -> u64 {
     let mut hash = Hash::new();
     volume.dims().into_iter().chain([frame, levels]).for_each(|n| hash.mix(n as u64));

@@ -1,55 +1,58 @@
-//! The cameras that points were made from: where each stands, and what it saw (paper, sections VI-A and VII-C).
+//! Calibrated cameras from which the points were made, with their images (paper, sections VI-A and VII-C).
 
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::methods::MethodError;
 use crate::methods::saved::Hash;
 
-/// Pixels a side that are accepted: more than any photograph has, and its bytes still fit memory.
+/// Largest accepted side of an image, in pixels: more than any photograph has, and its bytes still fit in memory.
 const MOST_PIXELS: u32 = 16384;
 
-/// How far from flat the left block of a projection has to be: the volume its rows span, once each has length 1.
+/// Threshold below which the left 3×3 block of a projection counts as singular: the volume that its rows span, each
+/// scaled to length 1.
 ///
-/// Rows of a parallel projection span 1e-16 or so by rounding; with a focal length of one pixel in a picture of 16384 it
+/// Rows of a parallel projection span 1e-16 or so by rounding; with a focal length of one pixel in an image of 16384 it
 /// is still 1e-8.
 const LEAST_SPAN: f64 = 1e-12;
 
-/// A perspective camera, with its picture where there is one.
+/// A calibrated perspective camera, with its image if there is one. Cameras tell where the outside is, and colour the
+/// surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
-    /// From world space to (x·depth, y·depth, depth).
+    /// Maps world space to (x·depth, y·depth, depth).
     to_view: DAffine3,
-    /// Its inverse: moves the origin to the centre.
+    /// Inverse of `to_view`; maps the origin to the camera's centre.
     from_view: DAffine3,
     width: u32,
     height: u32,
     image: Option<Vec<u8>>,
 }
 
-/// Where a camera sees a point.
+/// A world point projected into the image of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projected {
-    /// In pixels to the right of the centre of the first pixel.
+    /// Pixels to the right of the centre of the first pixel.
     pub x: f64,
-    /// In pixels down from there.
+    /// Pixels down from the centre of the first pixel.
     pub y: f64,
-    /// Distance from the camera along its axis, in units of the world; positive.
+    /// Distance from the camera along its axis, in world units; positive.
     pub depth: f64,
 }
 
 impl Camera {
-    /// A camera that projects a world point p to the pixel (x, y) with (x·s, y·s, s) = P (p, 1), where `projection` is
-    /// the 3×4 matrix P row by row.
+    /// Creates a camera that projects a world point p to the pixel (x, y) with (x·s, y·s, s) = P (p, 1), where
+    /// `projection` is the 3×4 matrix P row by row.
     ///
     /// The convention is that of OpenCV: x to the right, y down, the centre of the first pixel at (0, 0), that of the
-    /// last at (width − 1, height − 1). A factor does not change P, a negative one neither: in front is where s has the
-    /// sign of the determinant of the left 3×3 block, as it is where the axes right, down and ahead are right-handed.
+    /// last at (width − 1, height − 1). P may be scaled by any factor, also a negative one: points in front of the
+    /// camera are those whose s has the sign of the determinant of the left 3×3 block, as if the axes right, down and
+    /// ahead are right-handed.
     ///
-    /// `image` holds red, green, blue and alpha of each pixel, row by row from the top. Where alpha is 0 nothing is
-    /// seen: so an object is cut out of its background.
+    /// `image` holds red, green, blue and alpha of each pixel, row by row from the top. Pixels with an alpha of 0 are
+    /// ignored, which masks the background of an object.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] for entries that are not finite, a projection that has no centre, a side of 0 or
-    /// more than 16384 pixels, or an image of another length than 4·width·height.
+    /// [`MethodError::InvalidArgument`] for entries that are not finite, a projection that has no centre, a side of 0
+    /// or more than 16384 pixels, or an image of another length than 4·width·height.
     pub fn new(
         projection: [f64; 12],
         width: u32,
@@ -68,7 +71,7 @@ impl Camera {
         Ok(Self { to_view, from_view: to_view.inverse(), width, height, image })
     }
 
-    /// Tells it apart from others.
+    /// Adds the camera and its image to `hash`, by which a saved state is checked against its input.
     pub fn mix_into(&self, hash: &mut Hash) {
         self.to_view.to_cols_array().into_iter().for_each(|x| hash.mix(x.to_bits()));
         [self.width, self.height].into_iter().for_each(|n| hash.mix(u64::from(n)));
@@ -77,46 +80,47 @@ impl Camera {
         words.iter().for_each(|&pixel| hash.mix(u32::from_le_bytes(pixel).into()));
     }
 
-    /// The same camera for a world moved by `map`, which must have an inverse: it sees `map`(p) where it saw p.
+    /// Returns the same camera for a world transformed by `map`, which must be invertible: it sees `map`(p) where it
+    /// saw p.
     #[must_use]
     pub fn moved(self, map: &DAffine3) -> Self {
         let to_view = scaled_to_depth(self.to_view * map.inverse());
         Self { to_view, from_view: to_view.inverse(), ..self }
     }
 
-    /// Where the camera stands, in world space.
+    /// Returns the centre of the camera, in world space.
     pub fn centre(&self) -> DVec3 {
         self.from_view.translation
     }
 
-    /// Pixels of a row and number of rows.
+    /// Returns the width and the height of the image, in pixels.
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]
     }
 
-    /// Whether there is a picture.
+    /// Returns whether the camera has an image.
     pub fn has_image(&self) -> bool {
         self.image.is_some()
     }
 
-    /// Where the camera sees `p`, also beside the picture; `None` behind it, and in the plane through its centre.
+    /// Projects `p` into the image plane, also beyond the image; `None` if `p` is behind the camera or in the plane
+    /// through its centre.
     pub fn project(&self, p: DVec3) -> Option<Projected> {
         let view = self.view(p);
         let (x, y, depth) = (view.x / view.z, view.y / view.z, view.z);
         (depth > 0.0 && x.is_finite() && y.is_finite()).then_some(Projected { x, y, depth })
     }
 
-    /// Whether the picture covers (x, y): its pixels are squares about their centres.
+    /// Returns whether the image covers (x, y): its pixels are squares around their centres.
     pub fn covers(&self, x: f64, y: f64) -> bool {
         let within = |at: f64, side: u32| at >= -0.5 && at <= f64::from(side) - 0.5;
         within(x, self.width) && within(y, self.height)
     }
 
-    /// Red, green and blue in 0..1 of the picture at (x, y), and alpha in 0..1, which is never 0. `None` where alpha is 0,
-    /// outside the picture, and where there is none.
+    /// Returns red, green and blue of the image at (x, y), in 0..1, and alpha, above 0 and at most 1. `None` if alpha
+    /// is 0, outside the image, and without an image.
     ///
-    /// Bilinear between the centres of pixels; the colour counts each by its alpha, so that what a mask leaves out is not
-    /// mixed in.
+    /// Bilinear between the centres of pixels; colours are weighted by alpha, so that masked pixels do not bleed in.
     pub fn color_at(&self, x: f64, y: f64) -> Option<(Vec3, f32)> {
         let mut mix = Mix::default();
         for (pixel, share) in self.around(x, y)? {
@@ -125,32 +129,32 @@ impl Camera {
         mix.color()
     }
 
-    /// Column and row of the four pixels between whose centres (x, y) is, and the share of each in a bilinear mean;
-    /// `None` outside the picture.
+    /// Returns column and row of the four pixels whose centres surround (x, y), with their bilinear weights; `None`
+    /// outside the image.
     pub(super) fn around(&self, x: f64, y: f64) -> Option<[([usize; 2], f32); 4]> {
         let [columns, rows] = [between(x, self.width), between(y, self.height)];
         let pixel = |i: usize, j: usize| ([columns[i].0, rows[j].0], columns[i].1 * rows[j].1);
         self.covers(x, y).then(|| [pixel(0, 0), pixel(1, 0), pixel(0, 1), pixel(1, 1)])
     }
 
-    /// Red, green, blue and alpha of a pixel, 0..=255; `None` where there is none.
+    /// Returns red, green, blue and alpha of a pixel, 0..=255; `None` if there is none.
     pub(super) fn pixel(&self, [column, row]: [usize; 2]) -> Option<[u8; 4]> {
         let image = self.image.as_ref()?;
         image.as_chunks().0.get(row * self.width as usize + column).copied()
     }
 
-    /// (x·depth, y·depth, depth) of a world point; see [`Projected`].
+    /// Returns (x·depth, y·depth, depth) of a world point; see [`Projected`].
     pub(super) fn view(&self, p: DVec3) -> DVec3 {
         self.to_view.transform_point3(p)
     }
 
-    /// How far a world point at depth 1 goes for one pixel to the right, and for one down.
+    /// Returns the displacements of a world point at depth 1 that move it by one pixel to the right, and by one down.
     pub(super) fn pixel_axes(&self) -> [DVec3; 2] {
         [self.from_view.matrix3.x_axis, self.from_view.matrix3.y_axis]
     }
 }
 
-/// The mean colour of pixels, each by its share and its alpha.
+/// Accumulates a mean colour of pixels, weighted by their shares and alpha.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Mix {
     sum: Vec3,
@@ -164,13 +168,14 @@ impl Mix {
         self.alpha += share * a;
     }
 
-    /// The colour, and alpha, which is never 0: then there is no colour.
+    /// Returns the mean colour and the summed alpha, above 0; `None` if alpha is 0, as there is no colour then.
     pub(super) fn color(self) -> Option<(Vec3, f32)> {
         (self.alpha > 0.0).then(|| (self.sum / self.alpha, self.alpha))
     }
 }
 
-/// What is wrong with the numbers of a camera, and what is accepted. `length` is that of the image in bytes.
+/// Returns an error message if the arguments of [`Camera::new`] are invalid, saying what is accepted. `length` is that
+/// of the image in bytes.
 fn problem(projection: &[f64; 12], width: u32, height: u32, length: Option<usize>) -> Option<String> {
     if let Some(i) = projection.iter().position(|entry| !entry.is_finite()) {
         let (row, column, entry) = (i / 4 + 1, i % 4 + 1, projection[i]);
@@ -188,9 +193,9 @@ fn problem(projection: &[f64; 12], width: u32, height: u32, length: Option<usize
     ))
 }
 
-/// The projection with the factor that makes its last coordinate the depth; `None` where it has no centre.
+/// Returns the projection with the scale that makes its last coordinate the depth; `None` if it has no centre.
 fn view(projection: [f64; 12]) -> Option<DAffine3> {
-    // Its own size first, or products of extreme entries leave the range of numbers.
+    // Normalised first, as products of extreme entries overflow or underflow.
     let size = projection.iter().fold(0.0, |size: f64, entry| size.max(entry.abs()));
     let p = projection.map(|entry| entry / size);
     let rows = [0, 4, 8].map(|i| DVec3::new(p[i], p[i + 1], p[i + 2]));
@@ -205,14 +210,14 @@ fn view(projection: [f64; 12]) -> Option<DAffine3> {
     to_view.inverse().is_finite().then_some(to_view)
 }
 
-/// The projection with a positive factor that makes its last row a unit vector (Hartley & Zisserman, *Multiple view
-/// geometry*, section 6.2.3).
+/// Scales the projection by the positive factor that makes its last row a unit vector (Hartley & Zisserman, *Multiple
+/// view geometry*, section 6.2.3).
 fn scaled_to_depth(to_view: DAffine3) -> DAffine3 {
     let factor = to_view.matrix3.row(2).length().recip();
     DAffine3 { matrix3: to_view.matrix3 * factor, translation: to_view.translation * factor }
 }
 
-/// The two pixels of `side` between whose centres `at` lies, the nearest at a border, and how much each counts.
+/// Returns the two of `side` pixels whose centres surround `at`, clamped at the borders, with their linear weights.
 fn between(at: f64, side: u32) -> [(usize, f32); 2] {
     let at = at.clamp(0.0, f64::from(side - 1));
     let low = at as usize;
@@ -226,8 +231,8 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Stands at (1, 2, −5) and looks along z, right along x, down along y: focal length 100, centre of the picture
-    /// (40, 30).
+    /// Projection of a camera at (1, 2, −5) that looks along z, with right along x and down along y: focal length 100,
+    /// principal point (40, 30).
     const AHEAD: [f64; 12] = [100.0, 0.0, 40.0, 100.0, 0.0, 100.0, 30.0, -50.0, 0.0, 0.0, 1.0, 5.0];
 
     fn camera(projection: [f64; 12]) -> Camera {
@@ -321,7 +326,7 @@ mod tests {
         assert!(problem(missing, 9, 9, None).starts_with("row 2, column 3 of the projection is NaN"));
         let parallel = [100.0, 0.0, 0.0, 40.0, 0.0, 100.0, 0.0, 30.0, 0.0, 0.0, 0.0, 1.0];
         let mut shifted = parallel;
-        // One third of each: rounding leaves a little of a determinant.
+        // A third of each of the other rows: rounding leaves a small determinant.
         (0..4).for_each(|i| shifted[8 + i] += (parallel[i] + parallel[4 + i]) / 3.0);
         for flat in [parallel, shifted, [0.0; 12], [1.0; 12]] {
             assert!(problem(flat, 9, 9, None).contains("perspective camera"));

@@ -1,29 +1,30 @@
-//! The points in the box: scaled, without duplicates, without outliers (paper, section VI-D).
+//! Input points: validation, scaling into the normalised box, removal of duplicates, and clustering against outliers
+//! (paper, section VI-D).
 
 use crate::math::order::sort_by_rank;
 use crate::math::{Bounds, DAffine3, DMat3, DVec3, Vec3, symmetric};
 use crate::methods::MethodError;
 
-/// Points near a surface, with what is known of each.
+/// A point cloud near a surface, with optional normals, confidences and colours; the input of an implicit surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cloud {
-    /// Where they are.
+    /// Positions.
     pub points: Vec<Vec3>,
-    /// Unit normals that point outwards.
+    /// Unit normals, pointing outwards.
     pub normals: Option<Vec<Vec3>>,
-    /// How sure each is, in (0, 1].
+    /// Confidence of each point, in (0, 1]; its λ is divided by it.
     pub confidence: Option<Vec<f32>>,
-    /// rgb, 0..1.
+    /// Red, green and blue of each point, in 0..1.
     pub colors: Option<Vec<Vec3>>,
 }
 
-/// Fewer different points span no volume.
+/// Minimum number of distinct points: fewer span no volume.
 pub const LEAST_POINTS: usize = 4;
-/// A cloud is flat where its thickness is at most this share of its length.
+/// Ratio of thickness to length up to which a cloud counts as flat.
 const FLAT: f64 = 1e-6;
 
 impl Cloud {
-    /// Tests the lengths and the values.
+    /// Checks the lengths of the arrays and their values.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the array and the first bad entry, or what is wrong with the whole.
@@ -52,17 +53,17 @@ impl Cloud {
         }
     }
 
-    /// The number of points.
+    /// Returns the number of points.
     pub fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
-    /// The points of the given indices, in that order.
+    /// Returns the points with the given indices, in that order, with their attributes.
     pub fn gathered(&self, indices: &[u32]) -> Self {
         fn gather<T: Copy>(all: &[T], indices: &[u32]) -> Vec<T> {
             indices.iter().map(|&i| all[i as usize]).collect()
@@ -75,7 +76,7 @@ impl Cloud {
         }
     }
 
-    /// The first of each set of equal points, in order.
+    /// Returns the cloud without duplicates: the first of each set of equal points, in order.
     pub fn distinct(&self) -> Self {
         let bits = |i: u32| self.points[i as usize].to_array().map(|x| (x + 0.0).to_bits());
         let mut order: Vec<([u32; 3], u32)> = (0..self.len() as u32).map(|i| (bits(i), i)).collect();
@@ -85,7 +86,7 @@ impl Cloud {
         if first.len() == self.len() { self.clone() } else { self.gathered(&first) }
     }
 
-    /// Nothing, where there are points enough.
+    /// Checks that there are enough points.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for fewer than four.
@@ -97,7 +98,7 @@ impl Cloud {
         Err(MethodError::invalid("points", problem))
     }
 
-    /// Nothing, where the points, in the box, span a volume.
+    /// Checks that the points, which are in the box, span a volume.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for points in one plane.
@@ -113,16 +114,16 @@ impl Cloud {
         Ok(())
     }
 
-    /// Everything moved and scaled by `map`, which does not turn or mirror.
+    /// Returns the cloud with its points in the box. Normals are unchanged, as `map` neither rotates nor mirrors.
     pub fn mapped(&self, map: &BoxMap) -> Self {
         Self { points: self.points.iter().map(|&p| map.in_box(p)).collect(), ..self.clone() }
     }
 }
 
-/// The most points that take part: their matrix takes about 2 GB.
+/// Maximum number of points in a system: their matrix takes about 2 GB.
 pub const MOST_POINTS: usize = 100_000;
 
-/// Tests that there are no more points than can take part.
+/// Checks that `count` points are not too many for a system.
 ///
 /// # Errors
 /// [`MethodError::InvalidArgument`] with both numbers.
@@ -133,7 +134,7 @@ pub fn check_number(name: &'static str, count: usize) -> Result<(), MethodError>
     Err(MethodError::invalid(name, format!("{count} points; at most {MOST_POINTS} are accepted")))
 }
 
-/// Tests that all values are finite.
+/// Checks that all values are finite.
 ///
 /// # Errors
 /// [`MethodError::InvalidArgument`] naming the first that is not.
@@ -147,35 +148,36 @@ pub fn check_finite(name: &'static str, values: &[Vec3]) -> Result<(), MethodErr
     }
 }
 
-/// Longest side of points that single precision has room around for.
+/// Smallest accepted size of a cloud, the longest side of its bounding box in world units; limited by single precision.
 const LEAST_SIZE: f64 = 1e-27;
+/// Largest accepted size of a cloud, the longest side of its bounding box in world units; limited by single precision.
 const MOST_SIZE: f64 = 1e38;
-/// Distance from the origin, in longest sides, at which a cell of 1/30 of a side is still as exact as it has to be.
+/// Maximum distance of the points from the origin, in longest sides of their bounding box: a cell of 1/30 of a side is
+/// still as exact as needed there.
 const MOST_AWAY: f64 = 240.0;
 
-/// From the points' own units into the box, whose longest side is 2, and back.
+/// Uniform map from world units (those of the input points) into the normalised box, whose longest side is 2, and back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxMap {
     centre: DVec3,
-    /// Box units a unit of the points.
+    /// Box units per world unit.
     scale: f64,
 }
 
 impl BoxMap {
-    /// The map that puts the bounds of `points`, not all equal, into the box.
+    /// Returns the map that puts the bounding box of `points`, which must not all be equal, into the normalised box.
     pub fn of(points: &[Vec3]) -> Self {
         let bounds = Bounds::of(points);
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
-        // Halves first: the sum of two large coordinates can overflow.
         Self { centre: min * 0.5 + max * 0.5, scale: 1.0 / (max * 0.5 - min * 0.5).max_element() }
     }
 
-    /// How far from the origin of the points' units anything in the box is, at most; in those units.
+    /// Returns an upper bound of the distance of the box from the world's origin, along each axis, in world units.
     pub fn reach(&self) -> f64 {
         self.centre.abs().max_element() + 1.0 / self.scale
     }
 
-    /// Tests that vertices on a surface of such points can be told apart in single precision.
+    /// Checks that single precision resolves the vertices of a surface near the points.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for points too small or too large, or too far from the origin for their size.
@@ -201,33 +203,33 @@ impl BoxMap {
         ))
     }
 
-    /// Box units a unit of the points.
+    /// Returns the number of box units per world unit.
     pub fn scale(&self) -> f64 {
         self.scale
     }
 
-    /// A point in the box.
+    /// Maps a world point into the box, in single precision.
     pub fn in_box(&self, p: Vec3) -> Vec3 {
         self.in_box_exactly(p.as_dvec3()).as_vec3()
     }
 
-    /// A point in the box, not rounded.
+    /// Maps a world point into the box, in double precision.
     pub fn in_box_exactly(&self, p: DVec3) -> DVec3 {
         (p - self.centre) * self.scale
     }
 
-    /// A point of the box in the points' units.
+    /// Maps a point of the box to world units.
     pub fn in_world(&self, p: DVec3) -> DVec3 {
         p / self.scale + self.centre
     }
 
-    /// The map into the box.
+    /// Returns the map into the box as an affine transformation.
     pub fn affine(&self) -> DAffine3 {
         DAffine3::from_scale(DVec3::splat(self.scale)) * DAffine3::from_translation(-self.centre)
     }
 }
 
-/// The mean distance from a point to the one nearest to it, over at most 4000 of them.
+/// Returns the mean distance from a point to its nearest neighbour, estimated from at most 4000 points.
 pub fn mean_spacing(points: &[Vec3]) -> f64 {
     let tree =
         crate::math::BoxTree::new(&points.iter().map(|&p| Bounds { min: p, max: p }).collect::<Vec<_>>());
@@ -246,10 +248,11 @@ pub fn mean_spacing(points: &[Vec3]) -> f64 {
     sampled.map(distance).sum::<f64>() / count as f64
 }
 
-/// Points that the mean spacing is taken from: enough for a hundredth of it.
+/// Number of points, at most, from which the mean spacing is estimated: enough for a hundredth of it.
 const SPACING_SAMPLE: usize = 4000;
 
-/// The points of the `keep` largest clusters, in order; `cell` is the edge of the cells whose 26 neighbours join them.
+/// Returns the indices of the points in the `keep` largest clusters, in ascending order. Points belong to one cluster
+/// if their grid cells, with edges of length `cell`, are connected by 26-neighbourhood.
 pub fn largest_clusters(points: &[Vec3], cell: f32, keep: usize) -> Vec<u32> {
     let clusters = clusters(points, cell);
     let mut largest: Vec<&[u32]> = clusters.iter().map(Vec::as_slice).collect();
@@ -259,7 +262,8 @@ pub fn largest_clusters(points: &[Vec3], cell: f32, keep: usize) -> Vec<u32> {
     kept
 }
 
-/// Points whose cells touch, even at a corner, by the lowest index of each cluster.
+/// Returns the points grouped by connected grid cells, which touch even at a corner; clusters are ordered by their
+/// lowest index.
 fn clusters(points: &[Vec3], cell: f32) -> Vec<Vec<u32>> {
     let cell_of = |p: &Vec3| (*p / cell).floor().to_array().map(|x| x as i32 as u32);
     let mut by_cell: Vec<([u32; 3], u32)> = points.iter().map(cell_of).zip(0..).collect();
@@ -284,7 +288,7 @@ fn clusters(points: &[Vec3], cell: f32) -> Vec<Vec<u32>> {
     found
 }
 
-/// Cells by the bits of their places.
+/// Returns a cell and its 26 neighbours, as the bits of signed coordinates.
 fn neighbours(cell: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
     let [x, y, z] = cell.map(|k| k as i32);
     let steps = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
@@ -304,7 +308,7 @@ pub mod tests {
         random.bits() as f32 / 2_147_483_648.0 - 1.0
     }
 
-    /// Points spread over the unit ball.
+    /// Returns random points on the unit sphere.
     pub fn on_ball(count: usize) -> Vec<Vec3> {
         let mut random = Random::new(7);
         let mut place =

@@ -1,12 +1,12 @@
-//! Colours of the surface from the pictures of the cameras (paper, section VII-C).
+//! Vertex colours from the images of the cameras (paper, section VII-C).
 //!
-//! Each camera that sees a place gives it the colour of its picture there, which counts by the cosine of the angle between
-//! normal and direction to the camera. The paper subdivides triangles until their footprint in the pictures is smaller
-//! than a pixel, and gives each one colour. Here each vertex has one and triangles blend those of their corners: as sharp
-//! as the pictures where edges are as short as a pixel is wide, and else as sharp as the mesh.
+//! Each camera that sees a vertex contributes the colour of its image there, weighted by the cosine between the normal
+//! and the direction to the camera. The paper subdivides triangles until their footprint in the images is smaller than
+//! a pixel, and gives each one colour. Here each vertex has a colour, and triangles interpolate those of their corners:
+//! as sharp as the images where edges are no longer than a pixel is wide, and otherwise as sharp as the mesh.
 //!
-//! A depth buffer for each camera tells what hides what. What a camera sees on the rim of a part, where the picture may
-//! show what is behind it, hardly counts. Vertices that no camera sees take the colours around them.
+//! A depth buffer for each camera decides visibility. At silhouettes, where the image may show the background, a camera
+//! has hardly any weight. Vertices that no camera sees are filled in from their neighbours.
 
 use super::camera::{Camera, Mix, Projected};
 use crate::math::{DVec3, Vec3};
@@ -14,44 +14,44 @@ use crate::mesh::TriangleMesh;
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Pixels a side of the largest depth buffer: 16 MB. Finer than that no surface is drawn.
+/// Largest side of a depth buffer, in pixels: 16 MB. Larger images get a buffer of lower resolution.
 const LARGEST_BUFFER: u32 = 2048;
 
-/// The cosine between normal and direction to the camera from where on the depth over a pixel is no longer taken to grow.
-/// With less, vertices on the far rim are seen through the surface; with more, vertices of a steep side hide each
-/// other. A camera that sees a place so flat counts next to nothing.
+/// Cosine between normal and direction to the camera below which the depth tolerance no longer grows. With a smaller
+/// value, vertices just behind a silhouette are seen through the surface; with a larger one, vertices of a steep side
+/// hide each other. A camera with such an oblique view has next to no weight.
 const GRAZING: f64 = 0.1;
 
-/// How wide the rim of a part is, in pixels of the picture. The surface is never quite right, and where it is a little too
-/// large the picture shows what is behind it: on a painted ball too large by half a pixel, colours are off by 0.14 with 0
-/// and by 0.01 with 3. With 4, small parts in small pictures are nothing but rim, and it is 0.07.
+/// Width of a silhouette, in pixels of the image. The surface is never exact, and where it is slightly too large the
+/// image shows the background: on a painted ball too large by half a pixel, colours are off by 0.14 with a width of 0
+/// and by 0.01 with 3. With 4, small parts in small images are nothing but silhouette, and it is 0.07.
 const RIM_WIDTH: f64 = 3.0;
 
-/// What a place on a rim counts against others: only where no camera sees better it has to do.
+/// Factor of the weight of a view at a silhouette: it matters only where no camera has a better view.
 const RIM: f32 = 0.01;
 
-/// The share of a pixel by which a triangle's reach is widened, against rounding: else single pixels on edges are missed.
+/// Margin of a triangle's pixel bounds against rounding, in pixels; without it, single pixels on edges are missed.
 const BORDER: f64 = 1e-6;
 
-/// The colour of each vertex, red, green and blue in 0..1, from all cameras that have a picture; `None` where they see
-/// nothing of the surface. See [`Coloring`] for what the surface needs.
+/// Returns the colour of each vertex, red, green and blue in 0..1, from all cameras that have an image; `None` if they
+/// see nothing of the surface. See [`Coloring`] for the requirements on the surface.
 pub fn colors(surface: &TriangleMesh, cameras: &[Camera]) -> Option<Vec<Vec3>> {
     let mut coloring = Coloring::new(surface.positions.len());
     cameras.iter().for_each(|camera| coloring.add(surface, camera));
     coloring.finish(surface)
 }
 
-/// The colours of a surface while they are gathered, camera by camera.
+/// Accumulates vertex colours of a surface, camera by camera.
 ///
-/// All calls are given the same closed surface, counter-clockwise seen from outside, whose indices exist. Where it has no
-/// normals, those of [`TriangleMesh::vertex_normals`] are worked out for each camera.
+/// All calls must be given the same closed surface, counter-clockwise seen from outside, with valid indices. If it has
+/// no normals, those of [`TriangleMesh::vertex_normals`] are computed for each camera.
 #[derive(Clone, Debug)]
 pub struct Coloring {
     gathered: Vec<Gathered>,
     depths: DepthBuffer,
 }
 
-/// What a vertex has of the cameras so far.
+/// The accumulated colour of a vertex.
 #[derive(Clone, Copy, Debug, Default)]
 struct Gathered {
     /// Sum of the colours, each times its weight.
@@ -60,12 +60,12 @@ struct Gathered {
 }
 
 impl Coloring {
-    /// Nothing gathered yet, for so many vertices.
+    /// Creates an accumulator without colours, for a surface of `vertices` vertices.
     pub fn new(vertices: usize) -> Self {
         Self { gathered: vec![Gathered::default(); vertices], depths: DepthBuffer::default() }
     }
 
-    /// Gathers what `camera` sees of the surface; nothing where it has no picture.
+    /// Adds the colours that `camera` sees of the surface; none if it has no image.
     pub fn add(&mut self, surface: &TriangleMesh, camera: &Camera) {
         if !camera.has_image() {
             return;
@@ -83,20 +83,20 @@ impl Coloring {
         }
     }
 
-    /// Adds a colour to a vertex.
+    /// Adds one weighted colour to a vertex, for example that of a nearby point.
     pub fn gather(&mut self, vertex: usize, color: Vec3, weight: f32) {
         self.gathered[vertex].color += color * weight;
         self.gathered[vertex].weight += weight;
     }
 
-    /// Whether nothing was gathered.
+    /// Returns whether no vertex has a colour.
     pub fn is_empty(&self) -> bool {
         self.gathered.iter().all(|gathered| gathered.weight == 0.0)
     }
 
-    /// The colour of each vertex: the mean of those gathered. Unseen vertices take the mean of their neighbours, ring by
-    /// ring outwards from the seen ones; parts of which nothing is seen the mean of all seen vertices. `None` where no
-    /// vertex is seen.
+    /// Returns the colour of each vertex: the weighted mean of those added. Unseen vertices take the mean of their
+    /// neighbours, ring by ring outwards from the seen ones; connected components of which nothing is seen take the
+    /// mean of all seen vertices. `None` if no vertex is seen.
     pub fn finish(self, surface: &TriangleMesh) -> Option<Vec<Vec3>> {
         let mean = |g: &Gathered| (g.weight > 0.0).then(|| g.color / g.weight);
         let mut colors: Vec<Option<Vec3>> = self.gathered.iter().map(mean).collect();
@@ -106,13 +106,14 @@ impl Coloring {
     }
 }
 
-/// `None` of nothing.
+/// Returns the mean of `colors`, or `None` if there are none.
 fn mean_of(colors: impl Iterator<Item = Vec3>) -> Option<Vec3> {
     let (sum, count) = colors.fold((DVec3::ZERO, 0.0), |(sum, count), c| (sum + c.as_dvec3(), count + 1.0));
     (count > 0.0).then(|| (sum / count).as_vec3())
 }
 
-/// Colours the vertices without colour that are joined to one with, ring by ring.
+/// Fills in vertices without a colour that are connected to coloured ones, ring by ring, with the mean of their
+/// neighbours.
 fn spread(colors: &mut [Option<Vec3>], neighbours: &Neighbours) {
     let mut front: Vec<usize> = (0..colors.len()).filter(|&v| colors[v].is_some()).collect();
     while !front.is_empty() {
@@ -127,7 +128,7 @@ fn spread(colors: &mut [Option<Vec3>], neighbours: &Neighbours) {
     }
 }
 
-/// The neighbours of every vertex, each once for every triangle they share: as often as any other on a closed surface.
+/// Neighbours of all vertices, each listed once for every shared triangle: on a closed surface, all equally often.
 struct Neighbours {
     starts: Vec<usize>,
     all: Vec<usize>,
@@ -159,22 +160,22 @@ impl Neighbours {
     }
 }
 
-/// How near the surface is in each pixel of a camera.
+/// Depth buffer of one camera, to decide which vertices it sees.
 #[derive(Clone, Debug, Default)]
 struct DepthBuffer {
     width: usize,
     height: usize,
-    /// Pixels of the buffer for one of the picture.
+    /// Buffer pixels per image pixel, at most 1.
     scale: f64,
-    /// 1/depth at the centres of the pixels, row by row: unlike depth, it is linear over a triangle in the picture. 0
-    /// where there is nothing.
+    /// 1/depth at the centres of the pixels, row by row: unlike depth, it is linear over a triangle in the image. 0
+    /// where there is no surface.
     nearness: Vec<f32>,
-    /// The vertices in (x·depth, y·depth, depth), with x and y in pixels of the buffer.
+    /// The vertices as (x·depth, y·depth, depth), with x and y in buffer pixels.
     view: Vec<DVec3>,
 }
 
 impl DepthBuffer {
-    /// Draws the surface as `camera` sees it.
+    /// Renders `surface` as `camera` sees it, in place of the previous contents.
     fn draw(&mut self, surface: &TriangleMesh, camera: &Camera) {
         let [width, height] = camera.size();
         self.scale = (f64::from(LARGEST_BUFFER) / f64::from(width.max(height))).min(1.0);
@@ -192,14 +193,16 @@ impl DepthBuffer {
         self.view = view;
     }
 
-    /// Where the centre of the picture's first pixel is in the buffer: both begin at the same border.
+    /// Returns the buffer coordinate, along either axis, of the centre of the image's first pixel: both start at the
+    /// same border.
     fn shift(&self) -> f64 {
         0.5 * self.scale - 0.5
     }
 
-    /// Draws a triangle, from either side. A pixel's centre is in it where the ray through it is a sum of the corners with
-    /// no factor below 0, also where corners are behind the camera (Olano & Greer, *Triangle scan conversion using 2D
-    /// homogeneous coordinates*, 1997). The three factors are linear over the picture and sum to 1/depth.
+    /// Rasterises a triangle, whichever side faces the camera. It covers a pixel if the ray through the pixel's centre
+    /// is a combination of the corners with non-negative factors, which also holds for corners behind the camera (Olano
+    /// & Greer, *Triangle scan conversion using 2D homogeneous coordinates*, 1997). The three factors are linear over
+    /// the image and sum to 1/depth.
     fn draw_triangle(&mut self, corners: [DVec3; 3]) {
         let [a, b, c] = corners;
         let volume = a.dot(b.cross(c));
@@ -213,7 +216,7 @@ impl DepthBuffer {
         for row in rows {
             for column in columns.clone() {
                 let pixel = DVec3::new(column as f64, row as f64, 1.0);
-                // Of two triangles at an edge one has the centre, or both: their factors are exact opposites.
+                // Triangles that share an edge leave no gap: on it, their factors are exact opposites.
                 if factors.iter().all(|factor| factor.dot(pixel) >= 0.0) {
                     let nearness = sum.dot(pixel).max(limits.start).min(limits.end) as f32;
                     let there = &mut self.nearness[row * self.width + column];
@@ -223,9 +226,9 @@ impl DepthBuffer {
         }
     }
 
-    /// The columns and rows that the part of the triangle in front of the camera may reach.
+    /// Returns the columns and rows that the part of a triangle in front of the camera can cover.
     fn reach(&self, corners: [DVec3; 3]) -> (Range<usize>, Range<usize>) {
-        // Nearer than this share of the depth nothing is drawn: the picture of an edge through the camera's plane has no end.
+        // Near plane, relative to the deepest corner: the image of an edge through the camera's plane is unbounded.
         let near = 1e-6 * corners.iter().fold(0.0, |deepest: f64, p| deepest.max(p.z));
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let mut take = |p: DVec3| {
@@ -240,18 +243,19 @@ impl DepthBuffer {
                 take(p.lerp(q, (near - p.z) / (q.z - p.z)));
             }
         }
-        // A cast from float saturates: below 0 is 0.
+        // Casts from float saturate: negative values become 0.
         let pixels = |low: f64, high: f64, count: usize| {
             (low - BORDER).ceil() as usize..((high + BORDER).floor() + 1.0).min(count as f64) as usize
         };
         (pixels(low.x, high.x, self.width), pixels(low.y, high.y, self.height))
     }
 
-    /// The colour of a place on the surface in the camera's picture and what it counts: the cosine between normal and
-    /// direction to the camera, times alpha, on a rim times [`RIM`]. `None` where the camera does not see it.
+    /// Returns the colour of a surface point in the camera's image, and its weight: the cosine between normal and
+    /// direction to the camera, times alpha, at a silhouette times [`RIM`]. `None` if the camera does not see the
+    /// point.
     ///
-    /// Only those of the four pixels around it are mixed that show the surface near the place. Where one shows something
-    /// nearer, the place counts as hidden.
+    /// Only those of the four surrounding pixels that show the surface near the point are blended. If one shows
+    /// something nearer, the point counts as hidden.
     fn look(&self, camera: &Camera, p: DVec3, normal: DVec3) -> Option<(Vec3, f32)> {
         let to_camera = camera.centre() - p;
         let distance = to_camera.length();
@@ -277,7 +281,8 @@ impl DepthBuffer {
         Some((color, cosine as f32 * alpha * worth))
     }
 
-    /// Whether a place has something farther, or nothing, beside it in the picture.
+    /// Returns whether a surface point is at a silhouette: something farther away, or nothing, is [`RIM_WIDTH`] pixels
+    /// beside it in the image.
     fn on_rim(&self, camera: &Camera, at: Projected, margin: f64) -> bool {
         let [width, height] = camera.size().map(|side| side as usize);
         let beyond = at.depth + (RIM_WIDTH + 1.0) * margin;
@@ -290,18 +295,19 @@ impl DepthBuffer {
         )
     }
 
-    /// How much the depth of a surface differs at most between a place at `depth` and what the buffer holds for the pixels
-    /// around it: what its plane changes, and the width of the way for what is not plane. `slope` is the normal over its
-    /// product with the way to the camera.
+    /// Returns the depth tolerance of the visibility test: a bound on the difference between a surface point at `depth`
+    /// and the buffer in the pixels around it. It is the change of depth in the tangent plane, plus the distance
+    /// spanned by these pixels for deviations from that plane. `slope` is the normal divided by its dot product with
+    /// the vector to the camera.
     fn margin(&self, camera: &Camera, depth: f64, slope: DVec3) -> f64 {
-        // One to the side and one down, and where those of the buffer are larger, one of them on top of it.
+        // One image pixel along each axis, and one buffer pixel more if those are larger.
         let pixels = if self.scale < 1.0 { 1.0 + 1.0 / self.scale } else { 1.0 };
         let change = |axis: DVec3| depth * slope.dot(axis).abs() + 0.5 * axis.length();
         pixels * depth * camera.pixel_axes().map(change).iter().sum::<f64>()
     }
 
-    /// The least and the greatest depth in the pixels of the buffer around the centre of one of the picture: a single one
-    /// where they are of the same size. Infinite where there is nothing.
+    /// Returns the least and the greatest depth in the buffer pixels around the centre of an image pixel; only one is
+    /// read if both have the same size. Infinite where there is no surface.
     fn depths_at(&self, pixel: [usize; 2]) -> [f64; 2] {
         let [column, row] = pixel.map(|at| at as f64 * self.scale + self.shift());
         let (mut nearest, mut farthest) = (0.0, f32::INFINITY);
@@ -316,7 +322,8 @@ impl DepthBuffer {
     }
 }
 
-/// 1/depth of the farthest corner and of the nearest, which no point of the triangle may leave by rounding.
+/// Returns 1/depth of the farthest and of the nearest corner, the limits that interpolation over the triangle must not
+/// exceed by rounding.
 fn nearness_limits(corners: [DVec3; 3]) -> Range<f64> {
     let depths = corners.map(|p| p.z);
     let [low, high] =
@@ -331,7 +338,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// What a picture shows: the balls of the scene as its rays meet them, each painted by the direction from its centre.
+    /// A painted ball of a test scene. Rays that hit it take a colour that depends on the direction from its centre.
     struct Ball {
         centre: DVec3,
         radius: f64,
@@ -344,7 +351,7 @@ mod tests {
             mesh.to_triangles()
         }
 
-        /// How far away a ray of length 1 meets it, and the colour there.
+        /// Returns the distance at which a ray of unit length hits the ball, and the colour there.
         fn hit(&self, from: DVec3, ray: DVec3) -> Option<(f64, [u8; 4])> {
             let (along, off) = ((self.centre - from).dot(ray), from - self.centre);
             let root = along * along - off.length_squared() + self.radius * self.radius;
@@ -365,7 +372,7 @@ mod tests {
         [r, g, b, 255]
     }
 
-    /// A camera that looks from `from` at `to`, with a picture of the balls before `background`.
+    /// Returns a camera at `from` that looks at `to`, with an image of the balls in front of `background`.
     fn camera(balls: &[&Ball], from: DVec3, to: DVec3, size: [u32; 2], background: [u8; 4]) -> Camera {
         let ahead = (to - from).normalize();
         let right = ahead.any_orthonormal_vector();
@@ -406,7 +413,7 @@ mod tests {
         coloring.gathered.iter().map(|gathered| gathered.weight).collect()
     }
 
-    /// How far the colours are from those the unit ball is painted with.
+    /// Returns the largest difference of the colours from those that the unit ball is painted with.
     fn worst(surface: &TriangleMesh, colors: &[Vec3]) -> f32 {
         let off = |(p, color): (&Vec3, &Vec3)| (*p * 0.4 + 0.5 - *color).abs().max_element();
         surface.positions.iter().zip(colors).map(off).fold(0.0, f32::max)

@@ -1,4 +1,4 @@
-//! Points added and taken away by hand.
+//! Manual edits of the input: points added, removed, and marked as outside.
 
 use super::cloud::{BoxMap, Cloud, check_finite, check_number};
 use super::exterior::Exterior;
@@ -8,23 +8,24 @@ use crate::math::Vec3;
 use crate::methods::MethodError;
 use serde::{Deserialize, Serialize};
 
-/// What differs from the points as they were given.
+/// Manual edits of an implicit surface, as differences from its input points.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Edits {
-    /// More points near the surface, in the units of the others.
+    /// Additional points near the surface, in world units.
     pub added: Vec<Vec3>,
-    /// Points that are left out, by their index in those given; others in the same place are, too. Where not all points
-    /// take part, none takes the place of one that is left out.
+    /// Indices of input points to leave out; points at the same position are left out, too. If only a sample of the
+    /// points is used, removed samples are not replaced by others.
     pub removed: Vec<u32>,
-    /// More points known to be outside.
+    /// Additional points known to be outside, in world units.
     pub outside: Vec<Vec3>,
 }
 
-/// How far from the middle of the points as given others may be added, in half sides of their box.
+/// Maximum distance, along each axis, of added points from the centre of the input points' bounding box, in half its
+/// longest side.
 pub const REACH: f32 = 3.0;
 
 impl Edits {
-    /// Tests everything against the points as given.
+    /// Checks the edits against the input points: numbers of points, finite coordinates, distances and indices.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the list, the entry and what is accepted.
@@ -47,10 +48,10 @@ impl Edits {
         }
     }
 
-    /// Tests that none of those outside is a point of the surface, too.
+    /// Checks that no point marked as outside coincides with a point of `surface`, which is in the box.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] naming the first that is.
+    /// [`MethodError::InvalidArgument`] naming the first point that does.
     pub fn check_outside(&self, surface: &Cloud, map: &BoxMap) -> Result<(), MethodError> {
         let known = ByPlace::new(&surface.points);
         match self.outside.iter().position(|&p| known.find(map.in_box(p)).is_some()) {
@@ -62,14 +63,14 @@ impl Edits {
         }
     }
 
-    /// Where the removed points are, in the box.
+    /// Returns a lookup of the removed points by their positions in the box.
     pub fn removed_places(&self, original: &[Vec3], map: &BoxMap) -> ByPlace {
         let places: Vec<Vec3> = self.removed.iter().map(|&i| map.in_box(original[i as usize])).collect();
         ByPlace::new(&places)
     }
 
-    /// The points of `cloud`, all in the box, that are left of it, and those added. The latter have no normals, colours or
-    /// confidence of their own: `cloud` comes back without the first two.
+    /// Returns `cloud`, which is in the box, without the removed points and with the added ones. As added points have
+    /// no normals or colours, the result has neither; their confidence is 1.
     pub fn applied(&self, cloud: &Cloud, original: &[Vec3], map: &BoxMap) -> Cloud {
         let left = self.left(cloud, original, map);
         let added = self.added.iter().map(|&p| map.in_box(p));
@@ -81,7 +82,7 @@ impl Edits {
         Cloud { points, confidence, ..Cloud::default() }.distinct()
     }
 
-    /// The points of `cloud` that are not removed.
+    /// Returns `cloud`, which is in the box, without the removed points.
     pub fn left(&self, cloud: &Cloud, original: &[Vec3], map: &BoxMap) -> Cloud {
         if self.removed.is_empty() {
             return cloud.clone();
@@ -91,10 +92,10 @@ impl Edits {
         cloud.gathered(&(0..cloud.len() as u32).filter(stays).collect::<Vec<u32>>())
     }
 
-    /// The constraints that the points which take part, and those outside, become.
+    /// Builds the constraints from the sampled points, the exterior points and these edits.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] where too few points are left, or one is on the surface and outside.
+    /// [`MethodError::InvalidArgument`] if too few points remain, or a point is both on the surface and outside.
     pub fn constraints(
         &self,
         samples: &Samples,

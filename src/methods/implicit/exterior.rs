@@ -1,4 +1,4 @@
-//! Where the function has to be negative (paper, section VI-A).
+//! Points for exterior constraints, at which f has to be −1 (paper, section VI-A).
 
 use super::camera::Camera;
 use super::cloud::Cloud;
@@ -7,39 +7,40 @@ use super::sampling::subsampled;
 use crate::math::{Bounds, DVec3, Vec3};
 use crate::spatial::PointGrid;
 
-/// Exterior constraints on the sphere around everything, always.
+/// Number of exterior points on the bounding sphere, which are always added.
 const ON_SPHERE: usize = 16;
-/// Radius of that sphere, in half diagonals of the points' bounds: near enough to hold the surface in, and outside of it
-/// where it bulges between points.
+/// Radius of the bounding sphere, in half diagonals of the points' bounding box: near enough to confine the surface,
+/// and outside of it where it bulges between points.
 const SPHERE: f64 = 1.2;
-/// Surface points for one of the others.
+/// Number of surface points per exterior point near the surface.
 const SURFACE_POINTS: usize = 10;
-/// The least number of the others, where points are few.
+/// Minimum number of exterior points near the surface, for small clouds.
 const LEAST: usize = 30;
-/// Distance of the others from the surface, in mean spacings of the points. At 1 they bind less than noise, at 6 they fall
-/// into hollows.
+/// Distance of exterior points from the surface, in mean spacings of the points. At 1 they constrain less than noise
+/// does, at 6 they fall into cavities.
 const OFFSET: f32 = 3.0;
-/// The same, in standard deviations of the noise.
+/// Minimum distance of exterior points from the surface, in standard deviations of the noise.
 const NOISE: f32 = 4.0;
-/// The least such distance, in units of the box: dense clouds are not less noisy.
+/// Minimum distance of exterior points from the surface, in box units: dense clouds are not less noisy.
 const LEAST_OFFSET: f32 = 0.04;
-/// One that is nearer to another point of the surface than this share of its own distance may be inside.
+/// Minimum distance of an exterior point from all surface points, as a share of the distance at which it was made: a
+/// nearer one may be inside.
 const CLEAR: f32 = 0.8;
 
-/// The points outside; all in units of the box.
+/// The points that become exterior constraints, in box units.
 #[derive(Clone, Debug)]
 pub struct Exterior {
-    /// Given, or made from the points.
+    /// Points near the surface, given by the caller or made from the surface points.
     pub near: Vec<Vec3>,
-    /// How far from the surface they were made; 0 for given ones.
+    /// Distance from the surface at which `near` was made; 0 if it was given.
     pub offset: f32,
-    /// On the sphere around everything.
+    /// Points on the bounding sphere.
     pub around: Vec<Vec3>,
 }
 
 impl Exterior {
-    /// Those of [`Self::near`] that go with points added to and removed from the `surface` that they were made for: not too
-    /// near to one added, and with a point left that they may have been made from. Given ones all do.
+    /// Returns those of [`Self::near`] that remain valid after edits: not too near to a point of `added`, and with a
+    /// point left in `surface`, the edited points, from which they may have been made. Given ones are all kept.
     pub fn beside<'a>(&'a self, surface: &'a [Vec3], added: &'a [Vec3]) -> impl Iterator<Item = Vec3> + 'a {
         let cell = if self.offset > 0.0 { self.offset } else { 1.0 };
         let [surface, added] = [surface, added].map(|points| PointGrid::of(points, cell));
@@ -50,21 +51,22 @@ impl Exterior {
     }
 }
 
-/// One that is farther than so many offsets from all points of the surface has lost those that it was made from.
+/// Exterior points farther than this many offsets from all surface points are dropped: those they were made from were
+/// removed.
 const LOST: f32 = 1.25;
 
-/// Points given as outside, with those on the sphere.
+/// Returns `given` exterior points, in box units, with those on the bounding sphere.
 pub fn given_exterior(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
     Exterior { near: given, offset: 0.0, around: sphere_around(&cloud.points) }
 }
 
-/// The points outside, for surface points of mean distance `spacing`.
+/// Makes exterior points for the surface points `cloud`, of mean distance `spacing`.
 ///
-/// Towards each camera that sees the point; where no cameras are given, along the normals, given or estimated.
-/// Thinned by Poisson-disc sampling to one for ten surface points. Then those on the sphere.
+/// They lie towards each camera that sees the surface point; without cameras, along the normals, given or estimated.
+/// Poisson-disc sampling reduces them to one for ten surface points. Those on the bounding sphere are added.
 pub fn made_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: u64) -> Exterior {
     let wanted = (cloud.len() / SURFACE_POINTS).max(LEAST);
-    // A few more places than points wanted, as some will be refused.
+    // A few more than wanted, as some will be rejected.
     let places = wanted + wanted / 4;
     let ways = ways_out(cloud, cameras, places, spacing, seed);
     let offset = [OFFSET * spacing, NOISE * ways.noise, LEAST_OFFSET].into_iter().fold(0.0, f32::max);
@@ -75,14 +77,14 @@ pub fn made_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: u64)
     Exterior { near: kept.collect(), offset, around: sphere_around(&cloud.points) }
 }
 
-/// Directions that lead outwards.
+/// Directions that lead outwards from surface points.
 struct Ways {
-    /// Points with a direction each; a point may have several, or none.
+    /// Indices of points, each with a direction; a point may have several, or none.
     directions: Vec<(u32, Vec3)>,
     noise: f32,
 }
 
-/// From at most so many places.
+/// Returns outward directions at no more than `places` surface points.
 fn ways_out(cloud: &Cloud, cameras: &[Camera], places: usize, spacing: f32, seed: u64) -> Ways {
     let (oriented, normals) = match &cloud.normals {
         Some(given) => {
@@ -107,12 +109,13 @@ fn ways_out(cloud: &Cloud, cameras: &[Camera], places: usize, spacing: f32, seed
     Ways { directions, noise: normals.noise }
 }
 
-/// Places whose normals are estimated, at least: with fewer, neighbours on thin things are on different sides.
+/// Minimum number of points whose normals are estimated: with fewer, neighbours on thin parts lie on different sides.
 const ORIENTED: usize = 3000;
 
-/// The way from each place to each camera on the outer side of its normal from which nothing hides it.
+/// Returns the directions from each surface point to the cameras that are on the outer side of its normal and not
+/// occluded.
 ///
-/// The normal has a say, too, since rays slip through gaps in the far side of a thing.
+/// Occlusion alone does not suffice, since rays slip through gaps in the far side of an object.
 fn towards_cameras(
     points: &[Vec3],
     cameras: &[Camera],
@@ -131,10 +134,10 @@ fn towards_cameras(
     ways
 }
 
-/// Cosine between normal and way to a camera below which the camera sees the point too flat to tell.
+/// Cosine between normal and direction to a camera below which the view is too oblique to tell the outer side.
 const GRAZING: f32 = 0.2;
 
-/// Points spread evenly on a sphere around the bounds of `points`, on a spiral.
+/// Returns points spread evenly on a sphere around the bounding box of `points`, along a spiral.
 fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
     let bounds = Bounds::of(points);
     let [min, max] = [bounds.min, bounds.max].map(|corner| corner.as_dvec3());
@@ -149,14 +152,15 @@ fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
     (0..ON_SPHERE).map(place).collect()
 }
 
-/// Edge of a voxel in mean spacings: with 1.5 rays pass through the gaps of stereo data, with 6 legs grow together.
+/// Edge length of an occlusion voxel, in mean spacings: with 1.5 rays pass through the gaps of stereo data, with 6 legs
+/// merge.
 const VOXEL: f32 = 3.5;
-/// Voxels of a ray that belong to the neighbourhood of its own point.
+/// Length, in voxels, of the start of a ray that is not tested for occlusion: the neighbourhood of its own point.
 const OWN: f32 = 1.5;
-/// Voxels along a side at most.
+/// Maximum number of occlusion voxels along an axis.
 const MOST_VOXELS: f32 = 256.0;
 
-/// Which cells hold points.
+/// Voxels that contain points, to decide whether a camera sees a point.
 struct Voxels {
     origin: Vec3,
     edge: f32,
@@ -189,7 +193,7 @@ impl Voxels {
             .then(|| (z * self.dims[1] + y) * self.dims[0] + x)
     }
 
-    /// Whether no voxel with points is on the way from `p` to `camera`, beyond the neighbourhood of `p`.
+    /// Returns whether the segment from `p` to `camera` crosses no voxel with points, beyond the neighbourhood of `p`.
     fn is_free(&self, p: Vec3, camera: Vec3) -> bool {
         let length = p.distance(camera);
         let step = (camera - p) / length * (0.5 * self.edge);
@@ -234,7 +238,7 @@ mod tests {
         (ring * ring + p.z * p.z).sqrt() - 0.3
     }
 
-    /// Looks at the origin from `from`, which is not on the y axis.
+    /// Returns a camera at `from`, which is not on the y axis, that looks at the origin.
     fn camera(from: DVec3) -> Camera {
         let ahead = -from.normalize();
         let right = ahead.cross(DVec3::Y).normalize();
@@ -271,7 +275,7 @@ mod tests {
             assert!(around.len() == ON_SPHERE && around.iter().all(|p| p.length() > 1.05));
             let again = made_exterior(cloud, cameras, spacing, 1);
             assert_eq!((&near, &around, offset), (&again.near, &again.around, again.offset));
-            // Each goes with its own points, and not with a point of the surface in its place.
+            // Each is kept with the points it was made from, and dropped if a surface point is added in its position.
             assert_eq!(again.beside(&cloud.points, &[]).count(), near.len());
             assert_eq!(again.beside(&cloud.points, &near[..1]).count(), near.len() - 1);
             assert_eq!(again.beside(&[], &[]).count(), 0);
@@ -299,7 +303,7 @@ mod tests {
         let right = Vec3::X;
         assert!(voxels.is_free(right, Vec3::X * 9.0));
         assert!(!voxels.is_free(right, Vec3::X * -9.0));
-        // Through the hole.
+        // Through the hole of the torus.
         assert!(voxels.is_free(Vec3::new(0.0, 0.0, -2.0), Vec3::Z * 9.0));
         assert!(voxels.is_free(right, right));
     }

@@ -1,5 +1,5 @@
-//! The surface where the function passes the level, followed from the points (paper, section VII; Lorensen & Cline,
-//! *Marching cubes*, 1987).
+//! Extraction of the iso-surface by marching cubes, only in cells that it crosses, starting from those at the points
+//! (paper, section VII; Lorensen & Cline, *Marching cubes*, 1987).
 
 use super::cloud::BoxMap;
 use super::edits::REACH;
@@ -10,20 +10,22 @@ use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::volume::{Follower, Lattice};
 
-/// Cells along the longest side of the points where none is asked for: not fewer, nor more.
+/// Minimum and maximum default number of cells along the longest side of the points' bounding box.
 const CELLS: [f64; 2] = [64.0, 160.0];
-/// A cell in mean spacings of the points: detail between them is the kernel's.
+/// Default edge length of a cell, in mean spacings of the points: finer detail comes from the kernel alone.
 const CELL: f64 = 0.5;
-/// Room around the points for the surface to bulge into, of their longest side.
+/// Margin of the lattice around the points, as a share of the longest side of their bounding box: the surface may bulge
+/// beyond them.
 const MARGIN: f64 = 0.3;
-/// Cells between the lines on which pieces are looked for that no point is near.
+/// Number of cells between the lines of the coarse scan, which finds connected components that no point is near.
 const SCAN: usize = 6;
-/// Evaluations a vertex is placed with: one parabola leaves less than the fast sums do.
+/// Evaluations of f per vertex to refine its position: after one parabolic step, the error is less than that of the
+/// fast sums.
 const STEPS: usize = 1;
-/// Values of the function in a slice: some ten milliseconds.
+/// Evaluations of f in a slice of work: about ten milliseconds.
 const SLICE: usize = 3000;
 
-/// A surface on its way.
+/// Extraction of an iso-surface, slice by slice.
 pub struct Extraction {
     field: FastField,
     map: BoxMap,
@@ -34,12 +36,12 @@ pub struct Extraction {
 
 enum Stage {
     Follow,
-    /// Normals of the vertices so far.
+    /// The finished mesh, and the normals computed so far.
     Normals(TriangleMesh, Vec<Vec3>),
 }
 
-/// The edge of a cell in the points' units that suits points of mean distance `spacing`, in units of the box. Far from the
-/// origin it is coarser, as single precision is.
+/// Returns the default edge length of a cell, in world units, for points of mean distance `spacing` in box units. Far
+/// from the origin it is larger, as single precision is coarser there.
 pub fn default_cell(map: &BoxMap, spacing: f64) -> f64 {
     let cell = (CELL * spacing).clamp(2.0 / CELLS[1], 2.0 / CELLS[0]) / map.scale();
     let around = (f64::from(REACH) + 2.0 * MARGIN) / map.scale();
@@ -47,14 +49,15 @@ pub fn default_cell(map: &BoxMap, spacing: f64) -> f64 {
     if cell > least { cell } else { least }
 }
 
-/// Edges that a lattice may reach from the origin, with room for one more than needed.
+/// Maximum distance of a default lattice from the world's origin, in cell edges: a little less than [`Lattice`] allows.
 const MOST_EDGES_AWAY: f64 = 8100.0;
 
 impl Extraction {
-    /// The surface where `field` is `level`, around `points`, with cells of edge `cell`; points and cell in their own units.
+    /// Starts extracting the surface on which `field` equals `level`, from the cells around `points`; points and edge
+    /// length of a cell, `cell`, are in world units.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] where the cell is too small or too large for the points.
+    /// [`MethodError::InvalidArgument`] if the cell is too small or too large for the points.
     pub fn new(
         field: &Field,
         map: BoxMap,
@@ -78,10 +81,10 @@ impl Extraction {
         Ok(Self { field, map, level, follower, stage: Stage::Follow })
     }
 
-    /// A slice of work. Returns the surface with its normals, once it is there.
+    /// Does a slice of work. Returns the surface with its normals, once it is finished.
     ///
     /// # Errors
-    /// [`MethodError::Volume`] where memory ends.
+    /// [`MethodError::Volume`] if memory cannot be allocated.
     pub fn advance(&mut self) -> Result<Option<TriangleMesh>, MethodError> {
         match &mut self.stage {
             Stage::Follow => {
@@ -112,7 +115,7 @@ impl Extraction {
         }
     }
 
-    /// About how much is done.
+    /// Returns the approximate share of the work that is done, 0 to 1, for progress bars.
     pub fn progress(&self) -> f64 {
         match &self.stage {
             Stage::Follow => 0.8 * self.follower.progress(),
@@ -122,10 +125,10 @@ impl Extraction {
         }
     }
 
-    /// The surface as far as it was followed: open where it goes on.
+    /// Returns the surface extracted so far, with boundaries where it continues.
     ///
     /// # Errors
-    /// [`MethodError::Volume`] where memory ends.
+    /// [`MethodError::Volume`] if memory cannot be allocated.
     pub fn preview(&self) -> Result<TriangleMesh, MethodError> {
         match &self.stage {
             Stage::Follow => Ok(self.follower.mesh()?),
@@ -133,7 +136,7 @@ impl Extraction {
         }
     }
 
-    /// Pieces of the surface that no point is near.
+    /// Returns the number of connected components that no point is near; the coarse scan found them.
     pub fn strays(&self) -> usize {
         self.follower.found_by_scan()
     }

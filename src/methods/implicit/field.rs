@@ -1,10 +1,11 @@
-//! The function and its gradient, summed term by term.
+//! The implicit function f and its gradient, summed directly over all terms.
 
 use super::kernel::KernelTable;
 use super::solve::Solution;
 use crate::math::{DVec3, Vec3};
 
-/// f(x) = Σ wᵢ φ(|x − cᵢ|) + p(x), in units of the box.
+/// The implicit function f(x) = Σ wᵢ φ(|x − cᵢ|) + p(x) (paper, equation 2), in units of the normalised box. Every
+/// evaluation sums all terms; see `fast` for many points.
 #[derive(Clone, Debug)]
 pub struct Field {
     table: KernelTable,
@@ -13,18 +14,18 @@ pub struct Field {
 }
 
 impl Field {
-    /// The function of a solution over its centres.
+    /// Creates the implicit function from its kernel φ, centres cᵢ, and the weights and polynomial of `solution`.
     pub fn new(table: KernelTable, centres: &[Vec3], solution: &Solution) -> Self {
         let terms = centres.iter().zip(&solution.weights).map(|(c, &w)| (c.as_dvec3(), w)).collect();
         Self { table, terms, coefficients: solution.coefficients.clone() }
     }
 
-    /// f at `p`.
+    /// Returns f at `p`.
     pub fn value(&self, p: DVec3) -> f64 {
         self.terms.iter().map(|term| self.term(term, p)).sum::<f64>() + self.polynomial(p)
     }
 
-    /// f and ∇f at `p`.
+    /// Returns f and ∇f at `p`.
     pub fn value_and_gradient(&self, p: DVec3) -> (f64, DVec3) {
         let (mut sum, mut gradient) = (self.polynomial(p), self.slopes());
         for term in &self.terms {
@@ -35,23 +36,23 @@ impl Field {
         (sum, gradient)
     }
 
-    /// The centres and their weights.
+    /// Returns the terms of the sum, as pairs of centre cᵢ and weight wᵢ.
     pub fn terms(&self) -> &[(DVec3, f64)] {
         &self.terms
     }
 
-    /// The kernel.
+    /// Returns the tabulated kernel φ.
     pub fn table(&self) -> &KernelTable {
         &self.table
     }
 
-    /// One term at `p`.
+    /// Returns the value of one term, wᵢ φ(|p − cᵢ|).
     #[inline]
     pub fn term(&self, (centre, weight): &(DVec3, f64), p: DVec3) -> f64 {
         weight * self.table.value(p.distance_squared(*centre))
     }
 
-    /// One term and its gradient at `p`.
+    /// Returns the value and the gradient of one term at `p`.
     #[inline]
     pub fn term_and_gradient(&self, (centre, weight): &(DVec3, f64), p: DVec3) -> (f64, DVec3) {
         let away = p - *centre;
@@ -59,12 +60,12 @@ impl Field {
         (weight * value, away * (2.0 * weight * slope))
     }
 
-    /// The polynomial at `p`.
+    /// Returns the polynomial part of f at `p`.
     pub fn polynomial(&self, p: DVec3) -> f64 {
         self.coefficients[0] + self.slopes().dot(p)
     }
 
-    /// The gradient of the polynomial.
+    /// Returns the gradient of the polynomial part of f, a constant: 0, or with a thin plate its linear coefficients.
     pub fn slopes(&self) -> DVec3 {
         if let [_, x, y, z] = self.coefficients[..] { DVec3::new(x, y, z) } else { DVec3::ZERO }
     }

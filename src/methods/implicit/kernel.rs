@@ -1,30 +1,31 @@
-//! The radial functions (paper, section V and equation 6).
+//! The radial basis functions (paper, section V and equation 6).
 //!
-//! The multi-order function minimises first, second and third order energy at once: it is the fundamental solution of
+//! The multi-order kernel minimises first, second and third order energy at once: it is the fundamental solution of
 //! −δ²Δf + Δ²f − τ²Δ³f = 0. (The paper prints δ and τ without the squares; its own equation 6 has them.)
 
 use super::params::{ImplicitParams, KernelKind};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// A radial function and its parameters, in units of the box.
+/// A radial basis function φ with its parameters, in units of the normalised box.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Kernel {
-    /// Equation 6. 1/(4πδ²r) far away, which is not small: it falls to a thousandth only a hundred units off.
+    /// Equation 6. It decays only as 1/(4πδ²r), to a thousandth at a distance of a hundred units, so it must not be
+    /// truncated.
     MultiOrder {
-        /// δ, an inverse length: more of it, a tighter surface.
+        /// δ, an inverse length: a larger value makes the surface tighter.
         delta: f64,
-        /// τ, a length: more of it, a smoother surface.
+        /// τ, a length: a larger value makes the surface smoother.
         tau: f64,
     },
     /// |r|³, for comparison: the paper's thin plate (triharmonic in three dimensions).
     ThinPlate {
-        /// Radius of a ball that holds all centres.
+        /// Radius of a ball that contains all centres.
         radius: f64,
     },
-    /// −|r|, for comparison: what a thin plate is in three dimensions.
+    /// −|r|, for comparison: the true thin plate of three dimensions (biharmonic).
     Biharmonic {
-        /// Radius of a ball that holds all centres.
+        /// Radius of a ball that contains all centres.
         radius: f64,
     },
     /// exp(−r²/2σ²), for comparison.
@@ -35,7 +36,7 @@ pub enum Kernel {
 }
 
 impl Kernel {
-    /// The function that `params` ask for, over centres in a ball of `radius`.
+    /// Creates the kernel that `params` select, for centres in a ball of `radius`.
     pub fn new(params: &ImplicitParams, radius: f64) -> Self {
         match params.kernel {
             KernelKind::MultiOrder => Self::MultiOrder { delta: params.delta, tau: params.tau },
@@ -45,23 +46,23 @@ impl Kernel {
         }
     }
 
-    /// How many polynomials it needs beside it: 1 for the constant, 4 with x, y and z.
+    /// Returns the number of polynomials that accompany the kernel: 1 for the constant, 4 with x, y and z.
     pub fn polynomials(&self) -> usize {
         if matches!(self, Self::ThinPlate { .. }) { 4 } else { 1 }
     }
 
-    /// Whether it is positive definite only between weights that are orthogonal to the polynomials; it then grows with the
-    /// distance.
+    /// Returns whether the kernel is only conditionally positive definite, that is, for weights orthogonal to the
+    /// polynomials. Such a kernel grows with the distance.
     pub fn is_conditional(&self) -> bool {
         matches!(self, Self::ThinPlate { .. } | Self::Biharmonic { .. })
     }
 
-    /// φ(r), and dφ/d(r²) = φ′(r)/2r, which has a limit at 0.
+    /// Returns φ(r) and dφ/d(r²) = φ′(r)/2r, which has a limit at 0.
     ///
-    /// r³ and −r are only conditionally positive definite. To both is added what makes them positive definite between
-    /// points of the ball and vanishes in every sum whose weights are orthogonal to the polynomials: a constant, and for r³
-    /// a multiple of r². So one solver does for all kernels. The amounts are those at which spherical harmonics of degree 0
-    /// and 1 get positive eigenvalues on the sphere, with some room.
+    /// r³ and −r are only conditionally positive definite. Both are shifted by terms that make them positive definite
+    /// between points of the ball, and that vanish in every sum whose weights are orthogonal to the polynomials: a
+    /// constant, and for r³ a multiple of r². Thus one solver serves all kernels. The shifts are those at which
+    /// spherical harmonics of degree 0 and 1 get positive eigenvalues on the sphere, with some margin.
     pub fn value_and_slope(&self, r: f64) -> [f64; 2] {
         match *self {
             Self::MultiOrder { delta, tau } => multi_order(delta, tau, r),
@@ -69,7 +70,7 @@ impl Kernel {
                 let (constant, square) = (8.0 * radius * radius * radius, 3.0 * radius);
                 [r * r * r - square * r * r + constant, 1.5 * r - square]
             }
-            // The slope of a cone has no limit at its tip.
+            // A cone has no slope at its tip; 0 is returned there.
             Self::Biharmonic { radius } => [2.0 * radius - r, if r > 0.0 { -0.5 / r } else { 0.0 }],
             Self::Gaussian { sigma } => {
                 let half = 0.5 / (sigma * sigma);
@@ -82,21 +83,23 @@ impl Kernel {
 
 #[cfg(test)]
 impl Kernel {
-    /// φ(r).
+    /// Returns φ(r).
     pub fn value(&self, r: f64) -> f64 {
         self.value_and_slope(r)[0]
     }
 }
 
-/// Below this many decay lengths the closed form cancels, and the series has converged in [`TERMS`].
+/// Number of decay lengths, 1/a, below which the closed form suffers from cancellation, and the power series is used;
+/// there it has converged in [`TERMS`].
 const SERIES_BELOW: f64 = 0.5;
-/// Terms of the series: 0.5²⁰/20! is below rounding in every regime, as |b| is below 2a.
+/// Number of terms of the power series: 0.5²⁰/20! is below rounding for all parameters, as |b| is below 2a.
 const TERMS: usize = 20;
 
-/// Equation 6 in real numbers: φ(r) = (1 − g(r)) / (4πδ²r), g(r) = e^(−ar) (C(br) + κ r S(br)), where
-/// a = √(1+2δτ)/2τ, b² = (1−2δτ)/4τ², κ = 1/4aτ², and C, S are cosh and sinh x/x, or cos and sin x/x where b² < 0.
+/// Returns φ(r) and dφ/d(r²) of the multi-order kernel, by equation 6 in real numbers: φ(r) = (1 − g(r)) / (4πδ²r),
+/// g(r) = e^(−ar) (C(br) + κ r S(br)), where a = √(1+2δτ)/2τ, b² = (1−2δτ)/4τ², κ = 1/4aτ², and C, S are cosh and sinh
+/// x/x, or cos and sin x/x where b² < 0.
 ///
-/// g solves g″ + 2a g′ + (δ/τ) g = 0, which gives its series.
+/// g solves g″ + 2a g′ + (δ/τ) g = 0, from which its power series follows.
 fn multi_order(delta: f64, tau: f64, r: f64) -> [f64; 2] {
     let product = 2.0 * delta * tau;
     let a = (1.0 + product).sqrt() / (2.0 * tau);
@@ -113,7 +116,8 @@ fn multi_order(delta: f64, tau: f64, r: f64) -> [f64; 2] {
     [value, -(scale * g_slope + value) / (2.0 * r * r)]
 }
 
-/// e^(−ar) C(br) and e^(−ar) r S(br), without overflow and through b = 0. `product` is a² − b².
+/// Returns e^(−ar) C(br) and e^(−ar) r S(br) of [`multi_order`], without overflow and for b² of either sign or 0;
+/// `product` is a² − b².
 fn damped(a: f64, b_squared: f64, product: f64, r: f64) -> [f64; 2] {
     let b = b_squared.abs().sqrt();
     let x = b * r;
@@ -128,12 +132,13 @@ fn damped(a: f64, b_squared: f64, product: f64, r: f64) -> [f64; 2] {
         let envelope = libm::exp(-a * r);
         return [envelope * libm::cos(x), envelope * libm::sin(x) / b];
     }
-    // a − b as a quotient: the difference cancels where τ is small.
+    // a − b as (a² − b²)/(a + b): the difference cancels for small τ.
     let (slow, fast) = (libm::exp(-product / (a + b) * r), libm::exp(-(a + b) * r));
     [0.5 * (slow + fast), 0.5 * (slow - fast) / b]
 }
 
-/// φ = −scale Σ gₖ rᵏ⁻¹, k from 1; φ(0) = 1/(4πδ√(1+2δτ)).
+/// Returns φ(r) and dφ/d(r²) of the multi-order kernel near its centre, from the power series φ = −scale Σ gₖ rᵏ⁻¹, k
+/// from 1; φ(0) = 1/(4πδ√(1+2δτ)).
 fn near_centre(a: f64, product: f64, kappa: f64, scale: f64, r: f64) -> [f64; 2] {
     let mut g = [0.0; TERMS + 2];
     (g[0], g[1]) = (1.0, kappa - a);
@@ -146,31 +151,33 @@ fn near_centre(a: f64, product: f64, kappa: f64, scale: f64, r: f64) -> [f64; 2]
         value = (value + g[k]) * r;
         slope = slope * r + g[k] * (k - 1) as f64;
     }
-    // g₂ = 0: the function is flat at its centre.
+    // g₂ = 0: φ has no linear term.
     [-scale * (value * r + g[1]), -0.5 * scale * slope]
 }
 
-/// A kernel as a table over r², for sums with millions of terms: a cubic on each of 32 equal parts of every octave, so
-/// that resolution follows the distance. Off by less than 1e-7 of φ(0).
+/// A kernel tabulated over s = r², for sums with millions of terms: a cubic on each of 32 equal intervals of every
+/// octave, so that the resolution follows the distance. The error is less than 1e-7 of φ(0).
 #[derive(Clone, Debug)]
 pub struct KernelTable {
     kernel: Kernel,
-    /// Value and slope at the centre.
+    /// φ and dφ/ds at the centre.
     centre: [f64; 2],
     pieces: Vec<[f64; 4]>,
 }
 
-/// Parts of an octave of r², as bits. Four less and the error passes 1e-6.
+/// Base-2 logarithm of the number of intervals in an octave of r². With a quarter of the intervals, the error exceeds
+/// 1e-6.
 const PART_BITS: u32 = 5;
-/// The bits of a number below those that choose its piece.
+/// Number of low bits of an `f64` that do not affect the choice of its interval.
 const SHIFT: u32 = 52 - PART_BITS;
-/// r² from which on the table holds; nearer, value and slope at the centre do. √LEAST is 1e-6.
+/// Lower end of the table, in r²; below it, value and slope at the centre are used. √LEAST is about 1e-6.
 const LEAST: f64 = 1.0 / (1_u64 << 40) as f64;
-/// r² up to which the table holds; the box and all that is placed around it are within it.
+/// Upper end of the table, in r²: beyond the distances between any points in the box and around it. Farther away, the
+/// kernel itself is evaluated.
 const MOST: f64 = 256.0;
 
 impl KernelTable {
-    /// The table of `kernel`.
+    /// Tabulates `kernel`.
     pub fn new(kernel: Kernel) -> Self {
         let pieces = (piece(LEAST)..=piece(MOST)).map(|index| {
             let [from, to] = [index, index + 1].map(|bits| f64::from_bits(bits << SHIFT));
@@ -179,12 +186,12 @@ impl KernelTable {
         Self { kernel, centre: kernel.value_and_slope(0.0), pieces: pieces.collect() }
     }
 
-    /// The function that is tabled.
+    /// Returns the tabulated kernel.
     pub fn kernel(&self) -> Kernel {
         self.kernel
     }
 
-    /// φ at the squared distance `s`.
+    /// Returns φ at the squared distance `s`.
     #[inline]
     pub fn value(&self, s: f64) -> f64 {
         match self.pieces.get(piece(s).wrapping_sub(piece(LEAST)) as usize) {
@@ -196,7 +203,7 @@ impl KernelTable {
         }
     }
 
-    /// φ and dφ/ds at the squared distance `s`.
+    /// Returns φ and dφ/ds at the squared distance `s`.
     #[inline]
     pub fn value_and_slope(&self, s: f64) -> [f64; 2] {
         match self.pieces.get(piece(s).wrapping_sub(piece(LEAST)) as usize) {
@@ -218,19 +225,21 @@ impl KernelTable {
     }
 }
 
-/// The piece of the table that a number falls in, counted from that of 0.
+/// Returns the number of the interval that contains `s`, counted from that of 0; it consists of the leading bits of
+/// `s`.
 #[inline]
 fn piece(s: f64) -> u64 {
     s.to_bits() >> SHIFT
 }
 
-/// Where the piece of `s` begins.
+/// Returns the lower end of the interval that contains `s`.
 #[inline]
 fn knot(s: f64) -> f64 {
     f64::from_bits(s.to_bits() >> SHIFT << SHIFT)
 }
 
-/// Coefficients of the cubic with these values and slopes at both ends of a stretch.
+/// Returns the coefficients of the cubic with the given values and slopes at both ends of an interval (Hermite
+/// interpolation).
 fn cubic([a, slope_a]: [f64; 2], [b, slope_b]: [f64; 2], width: f64) -> [f64; 4] {
     let rise = (b - a) / width;
     [
@@ -248,8 +257,8 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Equation 6 in complex arithmetic of 60 digits, by mpmath, with v, w = (1 ± √(1 − 4δ²τ²)) / 2τ² and at 2δτ = 1 the limit:
-    /// (1 + (w e^(−r√v) − v e^(−r√w)) / (v − w)) / 4πδ²r.
+    /// Rows of δ, τ, r and φ(r): equation 6 in complex arithmetic of 60 digits, by mpmath, with v, w = (1 ± √(1 −
+    /// 4δ²τ²)) / 2τ² and at 2δτ = 1 the limit: (1 + (w e^(−r√v) − v e^(−r√w)) / (v − w)) / 4πδ²r.
     const REFERENCE: &[(f64, f64, f64, f64)] = &[
         (5.0, 0.025, 1e-06, 0.014235250867869038),
         (5.0, 0.025, 0.001, 0.014234781622721626),
@@ -333,7 +342,7 @@ mod tests {
         1.0 / (4.0 * PI * delta * (1.0 + 2.0 * delta * tau).sqrt())
     }
 
-    /// Of the ball of radius 1, some of them close together.
+    /// Returns random points in the unit ball, each with another close to it.
     fn points(count: usize, seed: u64) -> Vec<DVec3> {
         let mut random = Random::new(seed);
         let mut found = Vec::new();
@@ -404,7 +413,7 @@ mod tests {
         for _ in 0..20_000 {
             let (delta, tau) = (5.0 + 35.0 * random.unit(), 0.005 + 0.02 * random.unit());
             let r = 0.02 + 3.98 * random.unit();
-            // Near b = 0 equation 6 itself cancels; the sixty digits are for that.
+            // Near b = 0 equation 6 itself suffers from cancellation; `sixty_digits_agree` covers that.
             if (2.0 * delta * tau - 1.0).abs() > 1e-3 {
                 let (found, expected) = (multi(delta, tau).value(r), equation_six(delta, tau, r));
                 let off = (found / expected - 1.0).abs();
@@ -419,11 +428,11 @@ mod tests {
             let kernel = multi(delta, tau);
             let top = kernel.value(0.0);
             assert!((top / at_centre(delta, tau) - 1.0).abs() < 1e-14);
-            // φ(0) − φ(r) = q r² − r³/96πτ² + …; q is minus the slope at 0.
+            // φ(0) − φ(r) = q r² − r³/96πτ² + …, where q is minus the slope at 0.
             let q = -kernel.value_and_slope(0.0)[1];
             assert!(q > 0.0);
             let cubic = |r: f64| (q * r * r - (top - kernel.value(r))) / (r * r * r);
-            // Twice the radius has twice the error: the next term is r⁴.
+            // The next term is r⁴, so the error doubles with the radius, and extrapolation removes it.
             let r = 0.02 * tau;
             let (near, far) = (cubic(r), cubic(2.0 * r));
             let found = 2.0 * near - far;
@@ -450,7 +459,7 @@ mod tests {
                 assert!((value / tail - 1.0).abs() < 1e-2, "δ {delta}, r {r}: {value} for {tail}");
             }
         }
-        // The feasibility study's figure.
+        // The tail is within 0.7 % of the kernel from r = 0.5 on.
         let (value, tail) = (multi(10.0, 0.01).value(0.5), 1.0 / (200.0 * PI));
         assert!((value / tail - 1.0).abs() < 0.007);
     }
@@ -501,9 +510,9 @@ mod tests {
             let top = kernel.value(0.0);
             let (mut worst, mut steepest, mut off_slope): (f64, f64, f64) = (0.0, 0.0, 0.0);
             for k in 0..200_000 {
-                // All sizes, from below the table's beginning to beyond its end.
+                // Distances from below the start of the table to beyond its end.
                 let s = match kernel {
-                    // Within the ball; a cone has no slope at its tip, and nearer than 1e-6 the table is flat.
+                    // Within the ball, and not nearer than 1e-6, where the table is flat but a cone is not.
                     Kernel::ThinPlate { .. } | Kernel::Biharmonic { .. } => {
                         libm::exp2(-39.9 + 43.9 * random.unit())
                     }
@@ -514,7 +523,7 @@ mod tests {
                 assert_eq!(found[0].to_bits(), table.value(s).to_bits(), "{kernel:?} at {s}");
                 let off = (found[0] - expected[0]).abs() / top;
                 worst = if off > worst { off } else { worst };
-                // As gradients have it, dφ/dr = 2 r dφ/ds.
+                // As used for gradients: dφ/dr = 2 r dφ/ds.
                 let [slope, other] = [expected[1], found[1]].map(|slope| 2.0 * s.sqrt() * slope);
                 steepest = if slope.abs() > steepest { slope.abs() } else { steepest };
                 off_slope = if (slope - other).abs() > off_slope { (slope - other).abs() } else { off_slope };
@@ -525,10 +534,11 @@ mod tests {
         }
     }
 
-    /// The multi-order kernel is off by 2.6e-9 at its defaults and 4e-9 at most.
+    /// Bound for the error of every table, relative to φ(0). The multi-order kernel is off by 2.6e-9 at its defaults
+    /// and 4e-9 at most.
     const TABLE_ERROR: f64 = 1e-7;
 
-    /// Whether a symmetric matrix is positive definite.
+    /// Returns whether a symmetric matrix is positive definite, by trying a Cholesky factorisation.
     fn is_positive(n: usize, entry: impl Fn(usize, usize) -> f64) -> bool {
         let mut factor = vec![0.0; n * n];
         for i in 0..n {
@@ -553,7 +563,7 @@ mod tests {
                 multi(20.0, 0.025),
                 multi(40.0, 0.025),
                 multi(0.1, 0.001),
-                // The ball about the bounds of what lies in a ball, as the constraints have it.
+                // The circumscribed ball of the bounding box of a unit ball, as for constraints.
                 Kernel::ThinPlate { radius: 3.0_f64.sqrt() },
                 Kernel::Biharmonic { radius: 1.0 },
                 Kernel::Gaussian { sigma: 0.07 },
@@ -565,12 +575,12 @@ mod tests {
                 assert!(is_positive(points.len(), entry), "{kernel:?}");
             }
         }
-        // On the whole sphere, where the shifts are needed.
+        // On the whole sphere, where the shifts are necessary.
         let sphere: Vec<DVec3> = points(300, 9).into_iter().map(|p| p.normalize()).collect();
         for kernel in [Kernel::ThinPlate { radius: 1.0 }, Kernel::Biharmonic { radius: 1.0 }] {
             let entry = |i: usize, j: usize| kernel.value(sphere[i].distance(sphere[j]));
             assert!(is_positive(sphere.len(), entry), "{kernel:?}");
-            // Without its shift neither is.
+            // Without nine tenths of its shift, neither kernel is.
             let shift = kernel.value(0.0);
             assert!(!is_positive(sphere.len(), |i, j| entry(i, j) - 0.9 * shift), "{kernel:?}");
         }

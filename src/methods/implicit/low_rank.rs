@@ -1,22 +1,22 @@
-//! Blocks of the matrix between far clusters as products of thin ones: adaptive cross approximation with partial
+//! Low-rank approximation of kernel blocks between separated clusters, by adaptive cross approximation with partial
 //! pivoting (Bebendorf, *Approximation of boundary element matrices*, 2000).
 
 use super::vectors::{Number, dot};
 
-/// A block as Σ uₖ vₖᵀ.
+/// A matrix block as a sum of outer products, Σ uₖ vₖᵀ.
 #[derive(Clone, Debug)]
 pub struct LowRank<T> {
-    /// uₖ one after the other, each as long as the block is high.
+    /// The vectors uₖ one after the other, each with one entry per row of the block.
     pub columns: Vec<T>,
-    /// vₖ one after the other, each as long as the block is wide.
+    /// The vectors vₖ one after the other, each with one entry per column of the block.
     pub rows: Vec<T>,
 }
 
-/// Rank at which a block is taken as it is, whatever its error: none between separated clusters comes near it.
+/// Maximum rank of an approximation, whatever its error; blocks between separated clusters stay far below it.
 const MOST_RANK: usize = 64;
 
-/// The block of `height` by `width` whose rows and columns `row` and `column` write, to a relative error of about
-/// `tolerance`.
+/// Approximates a block of `height` by `width` entries as a low-rank product, to a relative error of about `tolerance`.
+/// `row` and `column` write the entries of a row or column, given its index.
 pub fn cross_approximation<T: Number>(
     [height, width]: [usize; 2],
     tolerance: f64,
@@ -35,7 +35,8 @@ pub fn cross_approximation<T: Number>(
         let pivot_column = largest(&v, |_| true);
         let pivot = v[pivot_column];
         if pivot == 0.0 {
-            // Nothing is left of this row, as where a Gaussian underflowed; others of a wide cluster may be nearer.
+            // The row is already exact, for instance because a Gaussian underflowed; rows of centres nearer to the
+            // other cluster may not be.
             match row_used.iter().position(|used| !used) {
                 Some(next) => pivot_row = next,
                 None => break,
@@ -59,7 +60,7 @@ pub fn cross_approximation<T: Number>(
     LowRank { columns: narrowed(&us), rows: narrowed(&vs) }
 }
 
-/// Takes the part of the approximation so far from a row or column of the block.
+/// Subtracts the approximation so far from a row or column of the block.
 fn subtract(values: &mut [f64], parts: &[Vec<f64>], weight: impl Fn(usize) -> f64) {
     for (k, part) in parts.iter().enumerate() {
         let weight = weight(k);
@@ -102,7 +103,8 @@ mod tests {
 
     #[test]
     fn as_near_as_asked_for() {
-        // Two stretches of a line, apart; a product; nothing; a single row.
+        // A kernel between two separate segments of a line, a block of rank 1, a zero block, and a block with a single
+        // row.
         let far = |i: usize, j: usize| 1.0 / (3.0 + i as f64 * 0.02 + j as f64 * 0.03);
         let product = |i: usize, j: usize| (1.0 + i as f64) * (j as f64 - 4.5);
         type Block<'a> = ([usize; 2], &'a dyn Fn(usize, usize) -> f64);

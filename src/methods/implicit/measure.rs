@@ -1,4 +1,4 @@
-//! How well a surface fits its points (paper, section VI-C).
+//! Fitness of a surface: distances of the points from it, and its curvature (paper, section VI-C).
 
 use crate::math::Vec3;
 use crate::mesh::{TriangleMesh, curvature};
@@ -6,25 +6,25 @@ use crate::methods::MethodError;
 use crate::spatial::TriangleTree;
 use serde::Serialize;
 
-/// Distances of points from a surface, in their units, and how curved it is.
+/// Distances of points from a surface, in the units of the points, and the mean curvature of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Fitness {
-    /// The mean distance.
+    /// Mean distance.
     pub mean: f64,
-    /// The root of the mean squared distance.
+    /// Root mean square distance.
     pub rms: f64,
-    /// The largest distance.
+    /// Largest distance.
     pub max: f64,
-    /// The mean of |H| over the vertices, per unit.
+    /// Mean of the absolute mean curvature |H| over the vertices, per unit of length.
     pub mean_curvature: f64,
 }
 
 impl Fitness {
-    /// Of `points` to `surface`.
+    /// Measures the distances of `points` from `surface`, and the curvature of `surface`.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] where the surface is empty.
+    /// [`MethodError::InvalidArgument`] if the surface is empty.
     pub fn of(points: &[Vec3], surface: &TriangleMesh) -> Result<Self, MethodError> {
         let tree = TriangleTree::new(surface)?;
         let distances: Vec<f64> =

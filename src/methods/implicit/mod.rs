@@ -1,19 +1,20 @@
-//! Implicit surface from sparse noisy points.
+//! Implicit surface reconstruction from sparse, noisy points.
 //!
-//! Dinh, Turk & Slabaugh, *Reconstructing surfaces by volumetric regularization using radial basis functions*. Points near
-//! an unknown closed surface are scaled into a box and thinned (`cloud`; section VI-B, VI-D); points outside say which side
-//! is out (`exterior`, `camera`, `normals`; section VI-A). A smooth function that is 0 on the surface and negative outside is
-//! solved for (`kernel`, `solve`; sections IV and V), the surface where it passes 0 is followed (`extract`, with `field` and
-//! `fast` for its values), and coloured from photographs (`color`; section VII-C).
+//! Dinh, Turk & Slabaugh, *Reconstructing surfaces by volumetric regularization using radial basis functions*. Points
+//! near an unknown closed surface are scaled into a box, cleaned of outliers and subsampled (`cloud`, `sampling`;
+//! sections VI-B, VI-D); points outside fix the orientation (`exterior`, `camera`, `normals`; section VI-A). A smooth
+//! function that is 0 on the surface and negative outside is solved for (`kernel`, `solve`; sections IV and V). Its
+//! zero set is extracted (`extract`, with `field` and `fast` for its values), and coloured from photographs (`color`;
+//! section VII-C).
 //!
-//! # What it guarantees
-//! The mesh is closed, oriented and 2-manifold, no two of its triangles cross, whatever the points; every piece of it is
-//! kept, and those that no point is near are counted. The residual of the system is computed from the kernel itself. The
-//! same input gives the same bits, natively and in wasm.
+//! # Guarantees
+//! The mesh is closed, oriented, 2-manifold and free of self-intersections, whatever the points; all its connected
+//! components are kept, and those that no point is near are counted. The residual of the system is computed from the
+//! kernel itself. The same input gives the same bits, natively and in wasm.
 //!
-//! # What it does not
-//! Where points say nothing, the surface closes smoothly, which need not be what was there. Detail finer than the points'
-//! spacing, and pieces smaller than the lines of the scan are apart, may be missing.
+//! # Limitations
+//! In gaps between the points, the surface closes smoothly, which need not match the true one. Detail finer than the
+//! spacing of the points, and components smaller than the distance between scan lines, may be missing.
 //!
 //! # Example
 //! ```
@@ -72,18 +73,19 @@ use point_colors::PointColors;
 use sampling::{Samples, Sampling};
 use solve::{ByPlace, Constraints, Solution, Solver};
 
-/// How an [`ImplicitSurface`] is set up, beside its points.
+/// Options of an [`ImplicitSurface`], beside its points.
 #[derive(Clone, Debug)]
 pub struct ImplicitOptions {
-    /// Points known to be outside, in the units of the others; else they are made from cameras, normals or the points alone.
+    /// Points known to be outside, in world units (those of the input points); if `None`, exterior points are made
+    /// from cameras, normals or the points alone.
     pub exterior: Option<Vec<Vec3>>,
-    /// The cameras that the points were made from.
+    /// Cameras from which the points were made; their images colour the surface.
     pub cameras: Vec<Camera>,
-    /// Points that take part at most; more are thinned.
+    /// Maximum number of points that become surface constraints; more are subsampled.
     pub max_points: usize,
-    /// The number of clusters kept, largest first; else all.
+    /// Number of clusters to keep, largest first, which discards outliers; `None` keeps all.
     pub keep_components: Option<usize>,
-    /// Parameters.
+    /// Parameters of kernel, regularisation, solver and extraction.
     pub params: ImplicitParams,
 }
 
@@ -99,18 +101,18 @@ impl Default for ImplicitOptions {
     }
 }
 
-/// Points that take part where no number is asked for.
+/// Default of [`ImplicitOptions::max_points`].
 const DEFAULT_POINTS: usize = 20_000;
-/// A solver is kept for edits while its matrix takes no more; without, it is made again when it is needed.
+/// Largest matrix, in bytes, that is kept after a solve for later edits; a larger one is rebuilt when needed.
 const KEPT_BYTES: usize = 256 << 20;
-/// Of all random choices.
+/// Seed of all random choices.
 const SEED: u64 = 1;
 
-/// An implicit surface on its way from points to a mesh.
+/// Reconstruction of an implicit surface from points, step by step, up to a coloured mesh.
 pub struct ImplicitSurface {
-    /// As they came.
+    /// The input points, in world units.
     original: Vec<Vec3>,
-    /// Without duplicates, in the box.
+    /// The input points without duplicates, in the box.
     cloud: Cloud,
     map: BoxMap,
     options: ImplicitOptions,
@@ -118,18 +120,18 @@ pub struct ImplicitSurface {
     edits: Edits,
     samples: Option<Samples>,
     exterior: Option<Exterior>,
-    /// In force, of samples, exterior and edits.
+    /// The current constraints, from samples, exterior points and edits.
     constraints: Constraints,
     stage: Stage,
-    /// Slices of work that the stage has had, where it does not know by itself.
+    /// Slices of work done in the stage, if it does not count them itself.
     slices: u32,
     solved: Option<Solved>,
-    /// The edits at the last solve from the start: later ones revise its system.
+    /// The edits at the last full solve, whose system later edits revise.
     base: Option<Edits>,
-    /// That system, where it is kept.
+    /// The solver of that system, if it is kept.
     solver: Option<Box<Solver>>,
     mesh: TriangleMesh,
-    /// Counts the surfaces so far.
+    /// Counter of changes of the surface or its colours.
     version: u32,
     components: u32,
     euler: i64,
@@ -139,13 +141,13 @@ pub struct ImplicitSurface {
     clock: fn() -> f64,
 }
 
-/// The function, with what it was solved for.
+/// The solved implicit function, with its centres and kernel.
 #[derive(Clone, Debug)]
 struct Solved {
     centres: Vec<Vec3>,
     solution: Solution,
     kernel: Kernel,
-    /// The mean of f over the surface constraints.
+    /// Mean of f over the surface constraints.
     mean: f64,
     field: Field,
 }
@@ -156,7 +158,7 @@ impl Solved {
         Self { centres, solution, kernel, mean, field }
     }
 
-    /// The weights at the centres of `constraints`, 0 at those that it did not have.
+    /// Returns the weights at the centres of `constraints`, 0 at new ones: the start of a revised solve.
     fn weights_at(&self, constraints: &Constraints) -> Vec<f64> {
         let known = ByPlace::new(&self.centres);
         let weight = |&centre: &Vec3| known.find(centre).map_or(0.0, |i| self.solution.weights[i]);
@@ -164,7 +166,7 @@ impl Solved {
     }
 }
 
-/// What is to be done next.
+/// The stage of the pipeline that is to be done next.
 enum Stage {
     Subsample(Box<Sampling>),
     Constrain,
@@ -174,18 +176,18 @@ enum Stage {
     Done,
 }
 
-/// The extracted mesh while it is coloured.
+/// The extracted mesh while it is being coloured.
 struct Painting {
     mesh: TriangleMesh,
     coloring: Coloring,
-    /// The next camera.
+    /// Index of the next camera.
     camera: usize,
-    /// The coloured points, where no camera saw anything.
+    /// Interpolation of the points' colours, if no camera saw anything.
     points: Option<PointColors>,
 }
 
 impl ImplicitSurface {
-    /// The surface of `points`, before its first step.
+    /// Creates the reconstruction from `points`, before its first step.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the option or parameter that cannot be used, and what is accepted.
@@ -198,7 +200,7 @@ impl ImplicitSurface {
         cloud.check_count()?;
         let map = BoxMap::of(&cloud.points);
         map.check_place()?;
-        // Rounding in the box may make equal what was not.
+        // Rounding in the box can make distinct points equal.
         let cloud = cloud.mapped(&map).distinct();
         cloud.check_count()?;
         cloud.check_span()?;
@@ -232,17 +234,18 @@ impl ImplicitSurface {
         }
     }
 
-    /// Gives the model a clock for [`StepReport::times`], in milliseconds. The core has none of its own.
+    /// Sets the clock for [`StepReport::times`], in milliseconds. The core has none of its own.
     pub fn set_clock(&mut self, clock: fn() -> f64) {
         self.clock = clock;
     }
 
-    /// One slice of the next stage: some ten milliseconds of work with some ten thousand points. At the end it does nothing.
+    /// Does one slice of the current stage: some ten milliseconds of work with some ten thousand points. Does nothing
+    /// at the end.
     ///
     /// # Errors
-    /// [`MethodError::Singular`] where the system cannot be solved, [`MethodError::InvalidArgument`] where the cell does not
-    /// suit the points, [`MethodError::Volume`] where memory ends. The surface is then as it was, and other parameters may be
-    /// set.
+    /// [`MethodError::Singular`] if the system cannot be solved, [`MethodError::InvalidArgument`] if the cell does not
+    /// suit the points, [`MethodError::Volume`] if memory cannot be allocated. The surface is then unchanged, and other
+    /// parameters may be set.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let (phase, begun) = (self.stage.phase(), (self.clock)());
         if !matches!(self.stage, Stage::Done) {
@@ -254,7 +257,8 @@ impl ImplicitSurface {
         Ok(self.report(phase, times))
     }
 
-    /// A slice of the stage. One that fails leaves what stood before.
+    /// Does one slice of the current stage. On an error the last surface is kept, and [`Self::fallback`] is the next
+    /// stage.
     fn advance(&mut self) -> Result<(), MethodError> {
         let fallback = self.fallback();
         let stage = std::mem::replace(&mut self.stage, fallback);
@@ -267,7 +271,7 @@ impl ImplicitSurface {
             Stage::Color(painting) => self.color(*painting),
             Stage::Done => Stage::Done,
         };
-        // The solver knows how far it is, and at the end nothing goes on.
+        // The solver counts its own slices, and there are none at the end.
         let counts = self.stage.phase() == before && !matches!(self.stage, Stage::Solve(_) | Stage::Done);
         self.slices = if counts { slices + 1 } else { 0 };
         Ok(())
@@ -300,7 +304,7 @@ impl ImplicitSurface {
         Ok(if self.exterior.is_some() { self.begin_solve() } else { first_stage(&self.options) })
     }
 
-    /// From the points that take part, where they are chosen.
+    /// Builds the constraints from the samples, if these are selected.
     fn make_constraints(&mut self) -> Result<(), MethodError> {
         let Some(samples) = &self.samples else { return Ok(()) };
         let exterior = match &self.options.exterior {
@@ -325,7 +329,7 @@ impl ImplicitSurface {
         constraints
     }
 
-    /// From the start.
+    /// Starts a full solve.
     fn begin_solve(&mut self) -> Stage {
         self.base = Some(self.edits.clone());
         self.solver = None;
@@ -337,7 +341,7 @@ impl ImplicitSurface {
         Box::new(Solver::new(constraints, kernel, self.params.tolerance, SEED))
     }
 
-    /// From the system of the last solve from the start, where that serves.
+    /// Starts a solve that revises the system of the last full solve, or a full one if that is impossible.
     fn begin_revision(&mut self) -> Stage {
         self.revised_solver().map_or_else(|| self.begin_solve(), Stage::Solve)
     }
@@ -354,7 +358,7 @@ impl ImplicitSurface {
         serves.then_some(solver)
     }
 
-    /// What the last solve from the start was for.
+    /// Returns the constraints of the last full solve.
     fn base_constraints(&self) -> Option<Constraints> {
         let (base, samples, exterior) =
             (self.base.as_ref()?, self.samples.as_ref()?, self.exterior.as_ref()?);
@@ -374,7 +378,7 @@ impl ImplicitSurface {
         self.begin_extraction()
     }
 
-    /// What is left of the solver is of no use any more.
+    /// Returns the error of a failed solve, and discards its system, which cannot be revised.
     fn singular(&mut self) -> MethodError {
         (self.base, self.solver) = (None, None);
         let cause = if self.params.lambda_surface == 0.0 {
@@ -397,7 +401,7 @@ impl ImplicitSurface {
         points.iter().map(|p| self.map.in_world(p.as_dvec3()).as_vec3()).collect()
     }
 
-    /// The value of the function that counts as 0.
+    /// Returns the iso-value of f at which the surface is extracted.
     fn level_of(&self, solved: &Solved) -> f64 {
         match self.params.level {
             Level::Zero => 0.0,
@@ -440,12 +444,13 @@ impl ImplicitSurface {
         self.version = self.version.wrapping_add(1);
     }
 
-    /// The stage to go on from when the present one fails.
+    /// Returns the stage to continue with if the current one fails.
     fn fallback(&self) -> Stage {
         if self.mesh.triangles.is_empty() { first_stage(&self.options) } else { Stage::Done }
     }
 
-    /// The edge of a cell, in the points' units: as asked for, or from the spacing of the points, once that is known.
+    /// Returns the edge length of an extraction cell, in world units: as set, or derived from the spacing of the
+    /// samples once they are selected.
     pub fn cell(&self) -> f64 {
         match &self.samples {
             Some(samples) if self.params.cell == 0.0 => default_cell(&self.map, samples.spacing),
@@ -453,13 +458,13 @@ impl ImplicitSurface {
         }
     }
 
-    /// The parameters.
+    /// Returns the current parameters.
     pub fn params(&self) -> &ImplicitParams {
         &self.params
     }
 
-    /// Takes other parameters. The surface stays until the new one is there; stages whose result does not change are not
-    /// done again.
+    /// Sets the parameters. The surface stays until the new one is complete; stages whose result does not change are
+    /// not repeated.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the parameter; nothing has changed then.
@@ -486,17 +491,17 @@ impl ImplicitSurface {
         Ok(())
     }
 
-    /// What differs from the points as they were given.
+    /// Returns the current edits of the input points.
     pub fn edits(&self) -> &Edits {
         &self.edits
     }
 
-    /// Takes other points in and leaves some out, in place of all edits before. The surface stays until the new one is
-    /// there. A few edits change the system that was solved last: its matrix and its solution serve again.
+    /// Replaces all edits: points added, removed and marked as outside. The surface stays until the new one is
+    /// complete. After a few edits, the last system is revised: its matrix and its solution are reused.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] naming the list and the entry, or where too few points are left; nothing has changed
-    /// then.
+    /// [`MethodError::InvalidArgument`] naming the list and the entry, or if too few points are left; nothing has
+    /// changed then.
     pub fn set_edits(&mut self, edits: Edits) -> Result<(), MethodError> {
         edits.validate(&self.original, &self.map)?;
         let left = edits.applied(&self.cloud, &self.original, &self.map);
@@ -520,21 +525,22 @@ impl ImplicitSurface {
         Ok(())
     }
 
-    /// The surface: empty before the first one is there, then the last that was finished. In the points' units, with normals
-    /// from the gradient, and colours where there are photographs or coloured points.
+    /// Returns the last finished surface; empty before the first. It is in world units, with normals from the gradient,
+    /// and colours if there are photographs or coloured points.
     pub fn surface(&self) -> &TriangleMesh {
         &self.mesh
     }
 
-    /// Counts up when the surface becomes another, or gets other colours.
+    /// Returns a counter that increases when the surface or its colours change.
     pub fn version(&self) -> u32 {
         self.version
     }
 
-    /// The surface that is being extracted, as far as it was followed, open where it goes on; empty in other stages.
+    /// Returns the surface that is being extracted, as far as it is complete, with boundaries where it continues; while
+    /// it is being coloured, all of it. Empty in other stages.
     ///
     /// # Errors
-    /// [`MethodError::Volume`] where memory ends.
+    /// [`MethodError::Volume`] if memory cannot be allocated.
     pub fn preview(&self) -> Result<TriangleMesh, MethodError> {
         match &self.stage {
             Stage::Extract(extraction) => extraction.preview(),
@@ -543,17 +549,18 @@ impl ImplicitSurface {
         }
     }
 
-    /// Pieces of the last surface that no point is near.
+    /// Returns the number of connected components of the last surface that no point is near.
     pub fn strays(&self) -> usize {
         self.strays
     }
 
-    /// Points that were equal to others, and left out.
+    /// Returns the number of input points that were left out as duplicates of others.
     pub fn duplicates(&self) -> usize {
         self.original.len() - self.cloud.len()
     }
 
-    /// The mean distance from a point that takes part to the nearest other, in units of the box; 0 before they are chosen.
+    /// Returns the mean distance from a sample to its nearest neighbour, in box units; 0 before the samples are
+    /// selected.
     pub fn spacing(&self) -> f64 {
         self.samples.as_ref().map_or(0.0, |samples| samples.spacing)
     }

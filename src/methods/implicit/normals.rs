@@ -1,5 +1,6 @@
-//! Normals where none are given: planes through neighbours, turned the same way by walking from place to place (Hoppe,
-//! DeRose, Duchamp, McDonald & Stuetzle, *Surface reconstruction from unorganized points*, 1992).
+//! Normals for points that have none: planes fitted to neighbourhoods, oriented consistently by propagation along a
+//! minimum spanning tree (Hoppe, DeRose, Duchamp, McDonald & Stuetzle, *Surface reconstruction from unorganized
+//! points*, 1992).
 
 use crate::math::order::{rank_f64, sort_by_rank};
 use crate::math::{DMat3, DVec3, Vec3, symmetric};
@@ -7,27 +8,27 @@ use crate::spatial::PointGrid;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Radii of the neighbourhoods that are tried, in mean spacings.
+/// Neighbourhood radii that are tried, in mean spacings of the points.
 const RADII: [f32; 7] = [3.0, 4.2, 6.0, 8.5, 12.0, 17.0, 24.0];
-/// A neighbourhood is a plane when it is at most so thick, in its width; its noise is then a tenth of its radius.
+/// Largest ratio of thickness to width at which a neighbourhood counts as planar; noise is then a tenth of its radius.
 const FLAT: f64 = 0.2;
-/// Places that the radius is chosen from.
+/// Number of points, at most, from which the radius is chosen.
 const TRIALS: usize = 200;
-/// Neighbours that a normal is passed on to.
+/// Nearest neighbours of a point to which its orientation is propagated.
 const LINKS: usize = 10;
 
-/// Unit normals at some places, and how noisy the points are there.
+/// Unit normals at some points of a cloud, and the noise of the cloud.
 pub struct Normals {
-    /// One a place, outwards as far as can be told.
+    /// One normal per point, outwards as far as can be determined.
     pub directions: Vec<Vec3>,
-    /// Standard deviation of the points from their planes.
+    /// Standard deviation of the points from their fitted planes; 0 if normals were given.
     pub noise: f32,
 }
 
-/// Normals of the surface near `points`, of mean distance `spacing`, at the points `at`.
+/// Estimates normals of the surface near `points`, of mean distance `spacing`, at the points with indices `at`.
 ///
-/// Within each part of the graph that joins neighbouring places, normals are turned like those before them, the pair that
-/// differs least first; then all of a part are turned so that it encloses a positive volume.
+/// Within each connected component of the neighbour graph, normals are oriented like an already oriented neighbour, the
+/// pair with the smallest angle first; then each component is oriented such that it encloses a positive volume.
 pub fn estimated_normals(points: &[Vec3], at: &[u32], spacing: f32) -> Normals {
     let grid = PointGrid::of(points, RADII[0] * spacing);
     let places: Vec<Vec3> = at.iter().map(|&i| points[i as usize]).collect();
@@ -44,12 +45,12 @@ pub fn estimated_normals(points: &[Vec3], at: &[u32], spacing: f32) -> Normals {
     Normals { directions, noise: noise as f32 }
 }
 
-/// The plane that points lie nearest to.
+/// The least-squares plane of a neighbourhood.
 struct Plane {
     normal: Vec3,
-    /// Standard deviation across it.
+    /// Standard deviation of the points across the plane.
     thickness: f64,
-    /// Standard deviation within it, where it is least.
+    /// Least standard deviation of the points within the plane.
     width: f64,
 }
 
@@ -75,7 +76,8 @@ impl Plane {
     }
 }
 
-/// The least radius whose neighbourhoods are flat in the median, or the one where they are flattest; and how thick they are.
+/// Returns the smallest radius whose median neighbourhood is planar, or else the one whose median neighbourhood is
+/// flattest, and the thickness of that neighbourhood.
 fn flattest_radius(grid: &PointGrid, places: &[Vec3], spacing: f32) -> (f32, f64) {
     let step = places.len().div_ceil(TRIALS);
     let mut best = (f64::INFINITY, RADII[0] * spacing, 0.0);
@@ -94,7 +96,7 @@ fn flattest_radius(grid: &PointGrid, places: &[Vec3], spacing: f32) -> (f32, f64
     (best.1, best.2)
 }
 
-/// The neighbour graph without direction: places along the surface from each other, not across a gap or a thin wall.
+/// Returns the undirected neighbour graph of `places`: neighbours along the surface, not across a gap or a thin wall.
 fn links(places: &[Vec3], normals: &[Vec3], radius: f32) -> Vec<Vec<u32>> {
     let grid = PointGrid::of(places, radius);
     let near = |&p: &Vec3| grid.nearest(p, LINKS + 1, radius).into_iter().map(|(_, i)| i as usize);
@@ -115,7 +117,7 @@ fn links(places: &[Vec3], normals: &[Vec3], radius: f32) -> Vec<Vec<u32>> {
     links
 }
 
-/// Cosine between a normal and the way to a neighbour from which on the neighbour is on another sheet.
+/// Cosine between a normal and the direction to a neighbour from which the neighbour counts as part of another sheet.
 const STEEP: f32 = 0.7;
 
 fn parts(links: &[Vec<u32>]) -> Vec<Vec<u32>> {
@@ -136,15 +138,17 @@ fn parts(links: &[Vec<u32>]) -> Vec<Vec<u32>> {
     found
 }
 
-/// Σ (p − middle)·n: where the places are spread evenly over a closed surface and all normals point outwards, its volume is
-/// in proportion to it (Gauss's theorem).
+/// Returns Σ (p − middle)·n over a connected component. If the points are spread evenly over a closed surface with
+/// outward normals, it is proportional to the enclosed volume (Gauss's theorem); a negative value shows that all
+/// normals point inwards.
 fn outflow(places: &[Vec3], normals: &[Vec3], part: &[u32]) -> f64 {
     let place = |i: u32| places[i as usize].as_dvec3();
     let middle = part.iter().map(|&i| place(i)).sum::<DVec3>() / part.len() as f64;
     part.iter().map(|&i| (place(i) - middle).dot(normals[i as usize].as_dvec3())).sum()
 }
 
-/// Prim's minimum spanning tree over the angle between normals, each turned like the one it is reached from.
+/// Orients the normals of the connected component of `start` along a minimum spanning tree over the angle between
+/// normals (Prim's algorithm): each is flipped to agree with the one it is reached from.
 fn propagate(start: u32, links: &[Vec<u32>], normals: &mut [Vec3], turned: &mut [bool]) {
     let mut waiting = BinaryHeap::from([Reverse((0_u32, start, start))]);
     while let Some(Reverse((_, i, from))) = waiting.pop() {
@@ -156,7 +160,7 @@ fn propagate(start: u32, links: &[Vec<u32>], normals: &mut [Vec3], turned: &mut 
         }
         let normal = normals[i as usize];
         for &j in links[i as usize].iter().filter(|&&j| !turned[j as usize]) {
-            // Numbers of at least 0 have the order of their bits.
+            // Floats of at least 0 have the order of their bits.
             let turn = 1.0 - normal.dot(normals[j as usize]).abs();
             waiting.push(Reverse(((if turn > 0.0 { turn } else { 0.0 }).to_bits(), j, i)));
         }
@@ -171,7 +175,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// About normally distributed, of deviation 1.
+    /// Returns a roughly normally distributed number with standard deviation 1.
     fn noise(random: &mut Random) -> f64 {
         2.0 * ((0..3).map(|_| random.unit()).sum::<f64>() - 1.5)
     }
@@ -187,7 +191,7 @@ mod tests {
         loop {
             let [a, b] = [0; 2].map(|_| std::f64::consts::TAU * random.unit());
             let out = DVec3::new(libm::cos(a), libm::sin(a), 0.0);
-            // As many to an area everywhere.
+            // Rejection makes the density uniform over the surface.
             if 0.3 * libm::cos(b) + 0.7 > random.unit() {
                 let n = out * libm::cos(b) + DVec3::Z * libm::sin(b);
                 return (out * 0.7 + n * 0.3, n);
@@ -237,7 +241,7 @@ mod tests {
         }
     }
 
-    /// A wrong start, and all of a part with it, is turned by the sign of its volume.
+    /// If the starting normal is wrong, so are all of its component, and the sign of the volume shows it.
     #[test]
     fn turned_from_any_start() {
         let mut random = Random::new(5);
@@ -246,7 +250,7 @@ mod tests {
         let all = parts(&links);
         assert_eq!(all.len(), 1);
         for start in [0, 7, 399] {
-            // Half of them wrong, the start too.
+            // Half of them are wrong, and so is the start.
             let mut normals: Vec<Vec3> =
                 places.iter().zip(0..).map(|(p, i)| *p * [1.0, -1.0][i % 2]).collect();
             normals[start as usize] = -places[start as usize];

@@ -1,48 +1,48 @@
-//! Parameters of the implicit surface, their ranges and their words.
+//! Parameters of the implicit surface, with their ranges, labels and help texts.
 
 use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, ParamSpec};
 use serde::{Deserialize, Serialize};
 
-/// Parameters of the implicit surface. Lengths but `cell` are in units of the box, in which the longest side of the points'
-/// bounds is 2.
+/// Parameters of the implicit surface. Lengths other than `cell` are in units of the normalised box, in which the
+/// longest side of the points' bounding box is 2.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub struct ImplicitParams {
-    /// φ: the radial function.
+    /// φ: the radial basis function.
     pub kernel: KernelKind,
-    /// δ: first-order smoothness of the multi-order kernel.
+    /// δ: first-order smoothness of the multi-order kernel, per box unit.
     pub delta: f64,
-    /// τ: third-order smoothness of the multi-order kernel.
+    /// τ: third-order smoothness of the multi-order kernel, in box units.
     pub tau: f64,
-    /// σ: width of the Gaussian.
+    /// σ: width of the Gaussian kernel, in box units.
     pub sigma: f64,
-    /// λ of surface constraints.
+    /// λ of surface constraints: how much each may be missed; 0 interpolates the points.
     pub lambda_surface: f64,
-    /// λ of exterior constraints.
+    /// λ of exterior constraints: how much each may be missed.
     pub lambda_exterior: f64,
-    /// Relative residual at which the solve ends.
+    /// Relative residual at which the linear solver stops.
     pub tolerance: f64,
-    /// Edge of an extraction cell in the points' units; 0 takes it from the spacing of the points.
+    /// Edge length of an extraction cell, in world units; 0 derives it from the spacing of the sampled points.
     pub cell: f64,
-    /// The value of f that the surface is taken at.
+    /// The iso-value of f at which the surface is extracted.
     pub level: Level,
 }
 
-/// The radial functions.
+/// Choice of the radial basis function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum KernelKind {
-    /// First, second and third order smoothness at once.
+    /// The paper's kernel (equation 6): first, second and third order smoothness at once.
     MultiOrder,
-    /// |r|³.
+    /// |r|³, the paper's thin plate, for comparison.
     ThinPlate,
-    /// −|r|.
+    /// −|r|, which is biharmonic in three dimensions, for comparison.
     Biharmonic,
-    /// exp(−r²/2σ²).
+    /// exp(−r²/2σ²), for comparison.
     Gaussian,
 }
 
-/// The value of f that the surface is taken at.
+/// Choice of the iso-value of f at which the surface is extracted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Level {
@@ -69,7 +69,7 @@ impl Default for ImplicitParams {
 }
 
 impl ImplicitParams {
-    /// Tests every value against its range.
+    /// Checks every number against its range.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] with the name of the first parameter out of range and what it accepts.
@@ -87,12 +87,13 @@ impl ImplicitParams {
         specs.zip(numbers).try_for_each(|(spec, value)| spec.check(value))
     }
 
-    /// These parameters with those of the extraction alone taken from `other`.
+    /// Returns these parameters with those that affect only the extraction taken from `other`; used to find out whether
+    /// a change needs a new solve.
     pub fn with_extraction_of(&self, other: &Self) -> Self {
         Self { cell: other.cell, level: other.level, ..self.clone() }
     }
 
-    /// What may go wrong with these values, in words, though they are accepted.
+    /// Returns a warning, to be shown to the user, if the values are accepted but may fail.
     pub fn warning(&self) -> Option<&'static str> {
         (self.kernel == KernelKind::MultiOrder && self.delta >= TIGHT).then_some(
             "delta is 25 or more: where the points have large gaps the function falls to 0 inside, and the surface breaks up",
@@ -100,10 +101,10 @@ impl ImplicitParams {
     }
 }
 
-/// δ from which on surfaces with large gaps break up.
+/// δ from which surfaces of points with large gaps break up.
 const TIGHT: f64 = 25.0;
 
-/// The parameters of the implicit surface, in the order a page should show them.
+/// Returns the specifications of all parameters, in the order in which a page should show them.
 pub fn param_specs() -> Vec<ParamSpec> {
     SPECS.to_vec()
 }

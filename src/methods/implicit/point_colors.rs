@@ -1,4 +1,4 @@
-//! Colours of points on the surface that they lie near.
+//! Vertex colours interpolated from coloured points near the surface.
 
 use super::cloud::{BoxMap, Cloud};
 use super::color::Coloring;
@@ -6,16 +6,16 @@ use crate::math::Vec3;
 use crate::mesh::TriangleMesh;
 use crate::spatial::PointGrid;
 
-/// Points whose colours a vertex takes.
+/// Number of nearest points whose colours a vertex blends.
 const BLENDED: usize = 4;
-/// How far away they are looked for, in mean spacings of those that take part.
+/// Search radius for coloured points around a vertex, in mean spacings of the sampled points.
 const REACH: f32 = 2.0;
-/// Keeps weights finite where points are all but equal.
+/// Lower bound of the squared distance that is added in the weights: keeps them finite where points nearly coincide.
 const LEAST_SQUARE: f32 = 1e-20;
-/// Vertices in a slice: some ten milliseconds.
+/// Vertices coloured in a slice of work: about ten milliseconds.
 const SLICE: usize = 10_000;
 
-/// Coloured points, and how many vertices have theirs.
+/// Interpolation of point colours at the vertices of a surface, slice by slice. Used when no camera sees the surface.
 pub struct PointColors {
     grid: PointGrid,
     colors: Vec<Vec3>,
@@ -24,17 +24,18 @@ pub struct PointColors {
 }
 
 impl PointColors {
-    /// Of points in the box; `None` where they have no colours.
+    /// Prepares the interpolation from `cloud`, in the box, within a radius relative to `spacing`; `None` if it has no
+    /// colours.
     pub fn new(cloud: Cloud, spacing: f64) -> Option<Self> {
         let spacing = spacing as f32;
         let grid = PointGrid::of(&cloud.points, REACH * spacing);
         Some(Self { grid, colors: cloud.colors?, spacing, next: 0 })
     }
 
-    /// Adds the colours of the nearest points, which count by the inverse of their squared distance, to some more
-    /// vertices; nothing to those with no point near. Returns whether all had their turn.
+    /// Colours the next slice of vertices by the nearest points, weighted by their inverse squared distance; vertices
+    /// with no point near get no colour. Returns whether all vertices are done.
     pub fn advance(&mut self, mesh: &TriangleMesh, map: &BoxMap, coloring: &mut Coloring) -> bool {
-        // Half a spacing beside the distance: else each point makes a spot.
+        // Half a spacing in quadrature with the distance; without it, each point leaves a spot.
         let least = (0.25 * self.spacing * self.spacing).clamp(LEAST_SQUARE, 1.0);
         let vertices = mesh.positions.iter().enumerate().skip(self.next).take(SLICE);
         for (vertex, &p) in vertices {

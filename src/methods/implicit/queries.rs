@@ -1,4 +1,5 @@
-//! What can be asked of a surface, and of the function behind it.
+//! Queries on a solved implicit surface: values and gradient of f, fitness to the points, sampling to a volume, and
+//! colouring.
 
 use super::camera::Camera;
 use super::fast::FastField;
@@ -9,17 +10,18 @@ use crate::methods::MethodError;
 use crate::volume::{Space, Volume, VolumeError, VolumeInit, Voxels};
 
 impl ImplicitSurface {
-    /// f at points in their own units, less the level: above 0 inside, 0 on the surface, below outside.
+    /// Returns f minus the iso-value at `points`, in world units (those of the input points): positive inside, 0 on the
+    /// surface, negative outside.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] before the system was solved.
+    /// [`MethodError::InvalidArgument`] before the system is solved.
     pub fn evaluate(&self, points: &[Vec3]) -> Result<Vec<f64>, MethodError> {
         let solved = self.solved("evaluate")?;
         let level = self.level_of(solved);
         Ok(points.iter().map(|p| solved.field.value(self.map.in_box_exactly(p.as_dvec3())) - level).collect())
     }
 
-    /// ∇f at points in their own units, per unit; it points inwards.
+    /// Returns ∇f at `points`, per world unit (the unit of the input points). On the surface it points inwards.
     ///
     /// # Errors
     /// As [`Self::evaluate`].
@@ -34,13 +36,14 @@ impl ImplicitSurface {
         self.solved.as_ref().ok_or_else(|| MethodError::invalid(what, problem))
     }
 
-    /// The points that take part, and those outside, in the points' units; empty before they are chosen.
+    /// Returns the centres of the surface constraints and of the exterior constraints, in world units; both are empty
+    /// until they are chosen.
     pub fn constraints(&self) -> [Vec<Vec3>; 2] {
         let (surface, outside) = self.constraints.centres.split_at(self.constraints.surface);
         [self.in_world(surface), self.in_world(outside)]
     }
 
-    /// All points as given, without those removed and with those added.
+    /// Returns the input points with the edits applied: without those removed, with those added.
     fn points(&self) -> Vec<Vec3> {
         let removed = self.edits.removed_places(&self.original, &self.map);
         let stays = |p: &Vec3| removed.find(self.map.in_box(*p)).is_none();
@@ -48,19 +51,21 @@ impl ImplicitSurface {
         left.chain(self.edits.added.iter().copied()).collect()
     }
 
-    /// Distances of all points, also of those that take no part, from the surface, and its mean curvature.
+    /// Measures how well the surface fits all points, including those not sampled as constraints: their distances from
+    /// it, and its mean curvature.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] before there is a surface.
+    /// [`MethodError::InvalidArgument`] if there is no surface yet.
     pub fn fitness(&self) -> Result<Fitness, MethodError> {
         Fitness::of(&self.points(), &self.mesh)
     }
 
-    /// f, less the level, on a grid of `dims` voxels around the points, so that other methods can take over: above 0 inside.
+    /// Samples f minus the iso-value on a grid of `dims` voxels that covers points and surface, as input for methods
+    /// that work on volumes: positive inside.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] before the system was solved, and for fewer than 2 voxels along an axis;
-    /// [`MethodError::Volume`] where memory ends.
+    /// [`MethodError::InvalidArgument`] before the system is solved, and for fewer than 2 voxels along an axis;
+    /// [`MethodError::Volume`] if memory cannot be allocated.
     pub fn to_volume(&self, dims: [usize; 3]) -> Result<Volume, MethodError> {
         let solved = self.solved("toVolume")?;
         if dims.iter().any(|&n| n < 2) {
@@ -91,7 +96,8 @@ impl ImplicitSurface {
         })?)
     }
 
-    /// First voxel and voxel size of a grid around the points and the surface.
+    /// Returns the centre of the first voxel and the voxel size, in world units, of a grid of `dims` voxels around
+    /// points and surface.
     fn grid(&self, dims: [usize; 3]) -> (DVec3, DVec3) {
         let bounds = Bounds::of(&self.points()).joined(&Bounds::of(&self.mesh.positions));
         let margin = DVec3::splat(GRID_MARGIN * 2.0 / self.map.scale());
@@ -99,10 +105,10 @@ impl ImplicitSurface {
         (low, (high - low) / DVec3::from_array(dims.map(|n| (n - 1) as f64)))
     }
 
-    /// Colours the surface from photographs.
+    /// Colours the surface from the images of `cameras`. The colours stay unchanged if no camera sees any of it.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] before there is a surface, and where no camera has a picture.
+    /// [`MethodError::InvalidArgument`] if there is no surface yet, or no camera has an image.
     pub fn colorize(&mut self, cameras: &[Camera]) -> Result<(), MethodError> {
         if self.mesh.triangles.is_empty() {
             return Err(MethodError::invalid("colorize", "there is no surface yet: step to the end first"));
@@ -118,10 +124,12 @@ impl ImplicitSurface {
     }
 }
 
-/// Room around the points in a volume made of them, of their longest side: enough for the surface to close in.
+/// Margin around points and surface in [`ImplicitSurface::to_volume`], as a share of the longest side of the points'
+/// bounding box: enough for the surface to close.
 const GRID_MARGIN: f64 = 0.1;
 
-/// Numbers at all nodes of a grid, x fastest, a row at a time.
+/// Returns values at all nodes of a grid, x fastest. `row` writes the values of a row of nodes, given their positions
+/// in voxels.
 fn sampled(dims: [usize; 3], mut row: impl FnMut(&[DVec3], &mut [f64])) -> Result<Vec<f32>, VolumeError> {
     let count = dims.iter().try_fold(1_usize, |product, &n| product.checked_mul(n)).unwrap_or(usize::MAX);
     let mut values: Vec<f32> = Vec::new();

@@ -1,32 +1,33 @@
-//! The points that take part (paper, section VI-B): Poisson-disc sampling, slice by slice.
+//! Selection of the points that become surface constraints (paper, section VI-B): Poisson-disc sampling, slice by
+//! slice.
 
 use super::cloud::{Cloud, largest_clusters, mean_spacing};
 use crate::math::{Random, Vec3};
 use crate::methods::MethodError;
 use crate::spatial::PointGrid;
 
-/// Edge of the cells that join points to clusters, in mean spacings.
+/// Edge length of the grid cells that join points to clusters, in mean spacings.
 const CLUSTER_CELL: f64 = 2.0;
-/// Points looked at in a slice: some ten milliseconds.
+/// Points visited in a slice of work: about ten milliseconds.
 const SLICE: usize = 50_000;
-/// Trials for the radius.
+/// Maximum number of sampling radii that are tried.
 const ROUNDS: u32 = 16;
-/// The share of the points wanted that is near enough.
+/// Share of the wanted number of samples from which a radius is accepted.
 const NEARLY: f64 = 0.97;
 
-/// The points that take part.
+/// The sampled points, which become surface constraints.
 #[derive(Clone, Debug)]
 pub struct Samples {
-    /// In random order.
+    /// The samples, in random order.
     pub cloud: Cloud,
-    /// Their mean distance.
+    /// Mean distance of a sample from its nearest neighbour, in box units.
     pub spacing: f64,
 }
 
-/// The choice of the points that take part, on its way.
+/// Selection of samples from a cloud, slice by slice.
 #[derive(Clone, Debug)]
 pub struct Sampling {
-    /// Number of clusters to keep of the cloud that is given, until that is done.
+    /// Number of largest clusters to keep, or all.
     keep: Option<usize>,
     most: usize,
     seed: u64,
@@ -34,15 +35,16 @@ pub struct Sampling {
 }
 
 impl Sampling {
-    /// At most `most` points of the `keep` largest clusters, or of all.
+    /// Starts the selection of at most `most` points from the `keep` largest clusters, or from all.
     pub fn new(keep: Option<usize>, most: usize, seed: u64) -> Self {
         Self { keep, most, seed, thinning: None }
     }
 
-    /// A slice of the work on `cloud`, always the same one. Returns the points once they are chosen.
+    /// Does a slice of work on `cloud`, which must be the same in all calls. Returns the samples once they are
+    /// selected.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] where too few points are left, or only such in a plane.
+    /// [`MethodError::InvalidArgument`] if too few points are left, or all of them lie in one plane.
     pub fn advance(&mut self, cloud: &Cloud) -> Result<Option<Samples>, MethodError> {
         let Some((kept, thinning)) = &mut self.thinning else {
             let kept = match self.keep {
@@ -67,26 +69,28 @@ impl Sampling {
         Ok(kept)
     }
 
-    /// About how much is done.
+    /// Returns the approximate share of the work that is done, 0 to 1, for progress bars.
     pub fn progress(&self) -> f64 {
         self.thinning.as_ref().map_or(0.0, |(_, thinning)| thinning.progress())
     }
 }
 
-/// At most `most` of the points by Poisson-disc sampling: the points in a random order without those nearer than a radius to
-/// one before, with the largest radius that gives nearly so many. All, where there are no more.
+/// Poisson-disc sampling of at most `most` points: visits the points in random order, and keeps each that is farther
+/// than a radius from all kept before, with the largest radius that leaves nearly `most`. Keeps all points if there are
+/// no more.
 #[derive(Clone, Debug)]
 struct Thinning {
     order: Vec<u32>,
     most: usize,
     round: u32,
     radius: f32,
-    /// The largest radius known to leave too many, and the smallest known to do; 0 where none is.
+    /// Bounds of the search for the radius: the largest known to leave too many points, and the smallest known to leave
+    /// few enough; 0 if there is none.
     small: f32,
     large: f32,
-    /// What the latter left.
+    /// The points kept with the smallest radius known to leave few enough.
     best: Vec<u32>,
-    /// This round: points looked at, and those kept, with their places.
+    /// Progress with the current radius: number of points visited, points kept, and the positions of the latter.
     looked_at: usize,
     kept: Vec<u32>,
     grid: PointGrid,
@@ -98,7 +102,7 @@ impl Thinning {
             order: Random::new(seed).order(points.len()),
             most,
             round: 0,
-            // A surface of side 2 has a hundred points a tenth apart or so.
+            // First guess: n points at a distance r cover an area of about nr², here a square of side 2.
             radius: 2.0 / (most as f32).sqrt(),
             small: 0.0,
             large: 0.0,
@@ -117,7 +121,7 @@ impl Thinning {
         self.kept.clear();
     }
 
-    /// Looks at up to `count` points. Returns the indices of those chosen, in random order, once they are.
+    /// Visits up to `count` points. Returns the indices of the samples, in random order, once the search ends.
     fn advance(&mut self, points: &[Vec3], count: usize) -> Option<Vec<u32>> {
         if self.order.len() <= self.most {
             return Some(self.order.clone());
@@ -156,7 +160,8 @@ impl Thinning {
         None
     }
 
-    /// On a surface the number falls with the square of the radius; between bounds, else, their middle.
+    /// Returns the next radius to try. On a surface the number of samples falls with the square of the radius; if the
+    /// radius predicted by that is outside the bounds, their midpoint is used, or twice the lower one if there is no upper.
     fn next_radius(&self, count: usize) -> f32 {
         let wanted = 0.5 * (1.0 + NEARLY as f32) * self.most as f32;
         let guess = self.radius * (count as f32 / wanted).sqrt();
@@ -169,14 +174,14 @@ impl Thinning {
         }
     }
 
-    /// Most often a handful of rounds do.
+    /// Returns the approximate share of the work that is done, as if a handful of rounds were needed.
     fn progress(&self) -> f64 {
         let rounds = f64::from(self.round) + self.looked_at as f64 / self.order.len() as f64;
         rounds / (rounds + 2.0)
     }
 }
 
-/// At most `most` of the points, as [`Sampling`] chooses them, at once.
+/// Returns the indices of at most `most` points by Poisson-disc sampling, as [`Sampling`] selects them, in one call.
 pub fn subsampled(points: &[Vec3], most: usize, seed: u64) -> Vec<u32> {
     let mut thinning = Thinning::new(points, most, seed);
     loop {
@@ -218,7 +223,7 @@ mod tests {
     #[test]
     fn nearly_as_many_as_asked_for() {
         let mut uneven = on_ball(3000);
-        // Most of them on a fifth of the ball.
+        // Most of them are on a fifth of the sphere.
         uneven.extend(on_ball(30_000).into_iter().filter(|p| p.z > 0.6));
         for points in [on_ball(5000), uneven] {
             for most in [4, 30, 300, 2000, 4999] {

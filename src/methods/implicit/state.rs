@@ -1,7 +1,8 @@
-//! Saving a run and going on with it, bit for bit.
+//! Saving and restoring a run, bit for bit.
 //!
-//! A state holds what took long, the solution, and what cannot be made again, the last surface. The rest is done again from the
-//! same points, as many slices of it as had been done. The system that edits revise is made again when the first of them comes.
+//! A state stores what is expensive to compute, the solution, and what cannot be recomputed, the last surface. The rest
+//! is recomputed from the same points, up to the same slice of work. The linear system that edits revise is rebuilt at
+//! the first edit.
 
 use super::kernel::Kernel;
 use super::solve::{Position, Solution};
@@ -14,19 +15,19 @@ use serde::{Deserialize, Serialize};
 
 const MARK: Mark = *b"VSCLIMP\x02";
 
-/// How far a run is.
+/// The stage a saved run had reached, without the data of [`Stage`].
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
 enum Reached {
     Subsample,
     Constrain,
-    /// How far the solver is, and whether it revises the system of the last solve from the start.
+    /// Position of the solver, and whether it revises the system of the last full solve.
     Solve(Position, bool),
     Extract,
     Color,
     Done,
 }
 
-/// Everything a run has beside its points.
+/// The saved form of an [`ImplicitSurface`], without its points and options.
 #[derive(Serialize, Deserialize)]
 struct State {
     fingerprint: u64,
@@ -42,7 +43,7 @@ struct State {
     surface: Surface,
 }
 
-/// The function of the last solve.
+/// The saved form of the last solution: the implicit function f.
 #[derive(Serialize, Deserialize)]
 struct Function {
     kernel: Kernel,
@@ -51,7 +52,7 @@ struct Function {
     mean: f64,
 }
 
-/// A closed surface as a mesh has it.
+/// The saved form of the last extracted mesh.
 #[derive(Serialize, Deserialize)]
 struct Surface {
     positions: Vec<Vec3>,
@@ -61,7 +62,7 @@ struct Surface {
 }
 
 impl ImplicitSurface {
-    /// The run as bytes, without its points.
+    /// Returns the run as bytes for [`Self::restore`], without points and options.
     pub fn save(&self) -> Vec<u8> {
         let mesh = &self.mesh;
         sealed(
@@ -92,11 +93,12 @@ impl ImplicitSurface {
         )
     }
 
-    /// Goes on from bytes that [`Self::save`] gave, for a surface of the same points and options. Takes as long as
-    /// the choice of the points and the present stage took so far; in colouring, as the extraction, too.
+    /// Continues a run from the bytes of [`Self::save`]; `self` must be made from the same points and options. Takes as
+    /// long as the run had spent on choosing constraints and on its current stage; if it was colouring, on the
+    /// extraction, too.
     ///
     /// # Errors
-    /// [`MethodError::BadState`] where the bytes are none of those; the run is then as it was.
+    /// [`MethodError::BadState`] if the bytes are not such a state; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
         let state: State = opened(&MARK, bytes)?;
         self.restore_state(state).map_err(|error| match error {
@@ -139,7 +141,7 @@ impl ImplicitSurface {
         Ok(())
     }
 
-    /// A number that tells points and options apart.
+    /// Returns a hash of points and options, by which [`Self::restore`] rejects a state of other input.
     fn fingerprint(&self) -> u64 {
         let mut hash = Hash::new();
         let mut mix = |points: &[Vec3]| {
@@ -163,7 +165,7 @@ impl ImplicitSurface {
         Self { clock: self.clock, ..Self::begun(original, cloud, self.map, self.options.clone()) }
     }
 
-    /// Does again what leads to a stage, and the slices of it that had been done.
+    /// Recomputes everything up to the stage `reached`, and its first `slices` slices of work.
     fn repeat(&mut self, reached: Reached, slices: u32) -> Result<(), MethodError> {
         while reached != Reached::Subsample && matches!(self.stage, Stage::Subsample(_)) {
             self.advance()?;

@@ -1,8 +1,8 @@
-//! Sums over vectors, in one order everywhere, so that the bits are the same.
+//! Vector operations with a fixed order of summation, so that results are bit-identical natively and in wasm.
 
-/// A number as a matrix stores it.
+/// A floating-point type for matrix entries, `f32` or `f64`; sums over them are taken in `f64`.
 pub trait Number: Copy + Into<f64> {
-    /// The nearest to `x`.
+    /// Rounds `x` to this type.
     fn of(x: f64) -> Self;
 }
 
@@ -18,7 +18,7 @@ impl Number for f64 {
     }
 }
 
-/// Σ aᵢbᵢ, as four sums side by side that a processor can do at once.
+/// Returns the dot product Σ aᵢbᵢ, accumulated in four independent partial sums that the compiler can vectorise.
 pub fn dot<T: Number>(a: &[T], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (fours, rest) = a.as_chunks::<4>();
@@ -32,12 +32,12 @@ pub fn dot<T: Number>(a: &[T], b: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + tail
 }
 
-/// `to` plus `weight` times `from`.
+/// Adds `weight` times `from` to `to`.
 pub fn add<T: Number>(weight: f64, from: &[T], to: &mut [f64]) {
     to.iter_mut().zip(from).for_each(|(x, &y)| *x += weight * y.into());
 }
 
-/// The length of a vector.
+/// Returns the Euclidean norm of `a`.
 pub fn norm(a: &[f64]) -> f64 {
     dot(a, a).sqrt()
 }

@@ -1,5 +1,5 @@
-//! A base where none is given: the detailed surface drawn onto the ellipsoids as far as it stays a graph over what comes of it
-//! (the end of section 2), or a skin around the ellipsoids alone.
+//! Makes a base where none is given: the detailed surface is smoothed towards the ellipsoids as long as it remains a
+//! graph over the result (end of section 2); without detail, a membrane is built around the ellipsoids.
 
 use super::REST;
 use super::detail::{Band, MOST_BANDS, reach};
@@ -15,14 +15,18 @@ use crate::spatial::SurfacePoint;
 use crate::volume::{Follower, Lattice};
 use std::rc::Rc;
 
-/// Drawing goes on at most so long; a bust settles in twelve.
+/// Maximum number of smoothing rounds of a decomposition; a bust settles in twelve.
 const ROUNDS: usize = 40;
 
-/// The share of normals that may miss the finer surface or meet it folded: undercuts of ears and nostrils are some.
+/// Largest share of normals of a coarser surface that may miss the finer one or hit it from its back: undercuts of ears
+/// and nostrils account for some.
 const MOST_STRAY: f64 = 0.02;
 
-/// The surfaces from coarse to fine between a base and `detail`, both among them: each a graph over the one before as far
-/// as could be had.
+/// Decomposes `detail` into surfaces from coarse to fine, the base first and `detail` last. Each is a graph over the
+/// one before, except for up to [`MOST_STRAY`] of its normals.
+///
+/// # Errors
+/// [`MethodError::InvalidArgument`] if no smoother surface has `detail` as a graph over it; [`MethodError::Mesh`].
 pub(super) fn decomposition(
     detail: TriangleMesh,
     ellipsoids: &[Ellipsoid],
@@ -45,7 +49,7 @@ pub(super) fn decomposition(
             }
             continue;
         }
-        // What was a graph last becomes a band of its own, and drawing goes on from there.
+        // The last surface with a graph over it becomes a band of its own, and smoothing continues from it.
         match last_good.take() {
             Some((band, before)) if bands.len() < MOST_BANDS => {
                 bands.push(band);
@@ -76,7 +80,8 @@ fn is_embedded(mesh: &Mesh) -> bool {
     guard.is_embedded(mesh)
 }
 
-/// The share of the vertices of `coarse` whose normal does not lead to the last of `bands`, or to its wrong side.
+/// Returns the share of triangles of `coarse` whose normal at the centroid misses the last of `bands` or hits it from
+/// its back.
 fn strays(coarse: &Rc<Band>, bands: &[Rc<Band>]) -> f64 {
     let Some(fine) = bands.last() else { return 0.0 };
     let reach = reach(coarse, fine);
@@ -95,7 +100,8 @@ fn strays(coarse: &Rc<Band>, bands: &[Rc<Band>]) -> f64 {
     stray.count() as f64 / (2 * count).max(1) as f64
 }
 
-/// A skin around the ellipsoids: settled, where that crosses nothing, else as they are.
+/// Builds a membrane around the ellipsoids, for a model without detail: solved if the result has no self-intersections,
+/// otherwise the union of the ellipsoids.
 pub(super) fn skin(ellipsoids: &[Ellipsoid], params: &MultiresParams) -> Result<TriangleMesh, MethodError> {
     let tight = union_of(ellipsoids, params.target())?;
     let mut mesh = Mesh::from_triangles(&tight)?;
@@ -103,7 +109,7 @@ pub(super) fn skin(ellipsoids: &[Ellipsoid], params: &MultiresParams) -> Result<
     Ok(if is_embedded(&mesh) { mesh.to_triangles() } else { tight })
 }
 
-/// The surface of all ellipsoids together.
+/// Returns the surface of the union of the ellipsoids, with edges of about `edge`, shorter for thin ellipsoids.
 fn union_of(ellipsoids: &[Ellipsoid], edge: f64) -> Result<TriangleMesh, MethodError> {
     let middle = ellipsoids.iter().map(|e| e.center).sum::<DVec3>() / ellipsoids.len() as f64;
     let thinnest = ellipsoids.iter().map(Ellipsoid::thinnest).fold(f64::MAX, f64::min);
@@ -140,18 +146,22 @@ fn union_of(ellipsoids: &[Ellipsoid], edge: f64) -> Result<TriangleMesh, MethodE
     Ok(mesh)
 }
 
-/// Edge of a cell of the lattice in the thinnest ellipsoid, at most.
+/// Longest edge of a lattice cell, as a share of the shortest semi-axis of all ellipsoids.
 const CELL: f64 = 0.4;
 
-/// Nodes of the lattice along an axis, at most: a surface across all of it then has some ten million triangles.
+/// Maximum number of lattice nodes along an axis: a surface across the whole lattice then has some ten million
+/// triangles.
 const MOST_NODES: f64 = 1024.0;
 
-/// The mean edge of equal triangles with the area of the mesh, for so many of them.
+/// Returns the edge length of equilateral triangles of which `triangles` have the total area `area`.
 pub(super) fn edge_for(area: f64, triangles: f64) -> f64 {
     (area / triangles * 4.0 / 3.0_f64.sqrt()).sqrt()
 }
 
-/// Tests that a mesh does not cross itself.
+/// Checks that a mesh has no self-intersections.
+///
+/// # Errors
+/// [`MeshError::SelfIntersecting`] with the number of crossing pairs of triangles.
 pub(super) fn check_embedded(mesh: &TriangleMesh) -> Result<(), MeshError> {
     match crate::mesh::count_crossings(mesh) {
         0 => Ok(()),

@@ -1,4 +1,5 @@
-//! Detail: how far the next finer surface is along the normals of the coarser one (sections 2 and 3).
+//! Detail: the signed distance λ from each surface of the decomposition to the next finer one along its normals, and
+//! its reconstruction on the deformed base (sections 2 and 3).
 
 use super::link::{Link, Linked, NOWHERE, normal_at};
 use super::prisms::Prisms;
@@ -8,16 +9,16 @@ use crate::remesh::Embedding;
 use crate::spatial::SurfaceWalker;
 use std::rc::Rc;
 
-/// One surface of the decomposition.
+/// One surface of the decomposition, with its vertex normals.
 #[derive(Clone, Debug)]
 pub(super) struct Band {
     pub walker: SurfaceWalker,
-    /// Of its vertices, of length 1.
+    /// Unit vertex normals.
     pub normals: Vec<Vec3>,
 }
 
 impl Band {
-    /// Of a closed mesh.
+    /// Builds a band from a closed mesh.
     pub fn of(mesh: TriangleMesh) -> Result<Rc<Self>, MeshError> {
         let walker = SurfaceWalker::new(mesh)?;
         let normals = walker.mesh().vertex_normals();
@@ -25,23 +26,23 @@ impl Band {
     }
 }
 
-/// The surfaces of a decomposition from coarse to fine, and how to get from each to the next.
+/// The surfaces of a decomposition from coarse to fine, with lookups from each to the next.
 #[derive(Clone, Debug)]
 pub(super) struct Bands {
     pub all: Vec<Rc<Band>>,
     leaps: Vec<Leap>,
 }
 
-/// From one surface of a decomposition to the next.
+/// The lookup of normals from one surface of a decomposition to the next finer one.
 #[derive(Clone, Debug)]
 struct Leap {
-    /// A hit further away belongs to another part of the surface.
+    /// The largest distance of a hit; farther ones belong to another part of the surface.
     reach: f64,
     prisms: Prisms,
 }
 
 impl Bands {
-    /// From coarse to fine; the first is the base.
+    /// Prepares the surfaces of a decomposition, from coarse to fine; the first is the base.
     pub fn new(all: Vec<Rc<Band>>) -> Self {
         let leap = |pair: &[Rc<Band>]| {
             let reach = reach(&pair[0], &pair[1]);
@@ -58,8 +59,8 @@ impl Bands {
         &self.all[self.all.len() - 1]
     }
 
-    /// For each band but the first, how far it is from the one before along the normal at a place of the base: its share of
-    /// the detail there.
+    /// Returns the detail at a point of the base: for each band but the first, its signed distance from the band before
+    /// along the normal.
     pub fn offsets(&self, at: &Linked) -> Offsets {
         let mut offsets = Offsets { last: *at, ..NOTHING };
         for (k, Leap { reach, prisms }) in self.leaps.iter().enumerate() {
@@ -76,29 +77,30 @@ impl Bands {
     }
 }
 
-/// How far along a normal the next surface may be, in the largest distance between both.
+/// The search distance along a normal, as a multiple of the largest distance between the two surfaces.
 const REACH: f64 = 2.0;
 
-/// How far along a normal of one surface the other may be.
+/// Returns the search distance for hits along the normals of `from` on `to`.
 pub(super) fn reach(from: &Band, to: &Band) -> f64 {
     REACH * farthest(from, to)
 }
 
-/// Bands above the base that a decomposition can have.
+/// Maximum number of bands above the base.
 pub(super) const MOST_BANDS: usize = 8;
 
-/// The detail at a place of the base.
+/// The detail at a point of the base: the signed distances of all bands.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Offsets {
     lambdas: [f32; MOST_BANDS],
-    /// Whether a normal did not meet its surface; the nearest point stands in.
+    /// Whether a normal did not hit its surface and the closest point was used instead.
     pub missed: bool,
-    /// The place on the finest surface.
+    /// The corresponding point on the finest surface.
     pub last: Linked,
 }
 
 impl Band {
-    /// The nearest point, and how far it is along the normal.
+    /// Returns the closest point to `origin`, and its signed distance along `normal`: the fallback where the normal
+    /// hits nothing.
     fn beside(&self, origin: Vec3, normal: Vec3) -> (f32, Linked) {
         match self.walker.closest(origin) {
             Some(found) => ((found.point - origin).dot(normal), found.into()),
@@ -107,7 +109,7 @@ impl Band {
     }
 }
 
-/// The largest distance from a vertex of either to the other.
+/// Returns the largest distance from a vertex of one surface to the other surface.
 fn farthest(a: &Band, b: &Band) -> f64 {
     let one_way = |from: &Band, to: &Band| {
         let distances = from.walker.mesh().positions.iter().filter_map(|&p| to.walker.closest(p));
@@ -116,18 +118,18 @@ fn farthest(a: &Band, b: &Band) -> f64 {
     one_way(a, b).max(one_way(b, a))
 }
 
-/// What the detail put back makes of a surface.
+/// The deformed base with its detail.
 pub(super) struct Detailed {
     pub mesh: Mesh,
-    /// Where each vertex lies on the finest surface, by slot.
+    /// The corresponding point on the finest surface for each vertex, by slot; for texture coordinates.
     pub places: Link,
-    /// Vertices whose normal met no surface.
+    /// Number of vertices whose normal hit no surface.
     pub missed: usize,
-    /// Vertices that went less than their way, so that nothing crosses.
+    /// Number of vertices that moved by less than their displacement, to avoid self-intersections.
     pub held: usize,
 }
 
-/// How finely the detail is put back.
+/// How finely the deformed base is sampled for the detail.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fineness {
     /// Longer edges of the detailed surface are split.
@@ -136,8 +138,8 @@ pub(super) struct Fineness {
     pub rounds: u32,
 }
 
-/// Puts the detail on the deformed base, band by band, along the normals of what there is so far; only so far that
-/// nothing crosses.
+/// Reconstructs the detail on the deformed base `surface`, band by band, along the normals of the result so far.
+/// Vertices move only as far as no triangles intersect.
 pub(super) fn detailed(
     surface: &Mesh,
     link: &Link,
@@ -151,13 +153,13 @@ pub(super) fn detailed(
     }
     let shown = carried(fine, bands, guard);
     if fineness.rounds > 0 && guard.left_crossing(&shown.mesh) {
-        // A part of the skin is as small as rounding: there, the middles of edges cross what is beside them.
+        // A part of the membrane is so small that rounding dominates: edge midpoints then cause intersections.
         return carried(Samples::new(surface, link, bands), bands, guard);
     }
     shown
 }
 
-/// The samples with their detail.
+/// Displaces the samples by their detail, band by band, guarded against self-intersections.
 fn carried(samples: Samples, bands: &Bands, guard: &mut Embedding) -> Detailed {
     let Samples { mut mesh, normals, offsets, .. } = samples;
     let mut held = 0;
@@ -180,11 +182,13 @@ fn carried(samples: Samples, bands: &Bands, guard: &mut Embedding) -> Detailed {
     Detailed { mesh, places: offsets.into_iter().map(|offsets| offsets.last).collect(), missed, held }
 }
 
-/// How many rings around what was held back are drawn back a little, too: else it ends in a crack.
+/// Number of one-rings around a held-back vertex that are moved back partly as well; without them, the surface has a
+/// crease around it.
 const SOFT_RINGS: usize = 4;
 
-/// The ways back, by slot, that spread what some vertices were held back by among those around them; `ways` are what all were
-/// to go, and the shares in `held` what these went of it.
+/// Returns corrections, by slot, that move the neighbours of held-back vertices back as well, less with every ring.
+/// `ways` are the intended displacements of all vertices, and `held` the share of it that each held-back vertex moved
+/// by.
 fn softened(mesh: &Mesh, ways: &[Vec3], held: &[(VertexId, f32)]) -> Vec<Vec3> {
     let mut missing = vec![0.0_f32; mesh.slots()];
     held.iter().for_each(|&(v, share)| missing[v.index()] = 1.0 - share);
@@ -205,7 +209,7 @@ fn softened(mesh: &Mesh, ways: &[Vec3], held: &[(VertexId, f32)]) -> Vec<Vec3> {
     ways.iter().zip(went.iter().zip(&missing)).map(back).collect()
 }
 
-/// The deformed base, perhaps with more vertices in its edges, and the detail at each; by slot.
+/// The vertices of the deformed base, with those added by edge splits, and the detail at each; by slot.
 struct Samples {
     mesh: Mesh,
     link: Link,
@@ -213,8 +217,8 @@ struct Samples {
     offsets: Vec<Offsets>,
 }
 
-/// An edge is halved where the detail in its middle is off the straight line by this share of the longest edge. With more,
-/// noses and lids stay blunt; with less, all is split.
+/// An edge is halved if the detail at its midpoint is off the straight line by more than this share of the longest
+/// edge. With a larger value, noses and eyelids stay blunt; with a smaller one, every edge is split.
 const BEND: f32 = 0.04;
 
 impl Samples {
@@ -228,7 +232,7 @@ impl Samples {
         Self { offsets: offsets.collect(), mesh: surface.clone(), link: link.clone(), normals }
     }
 
-    /// Where a vertex comes to lie, about: along the normal of the base for all bands.
+    /// Returns the approximate position of a vertex with its detail: all bands along the normal of the deformed base.
     fn place(&self, v: VertexId) -> Vec3 {
         self.placed(self.mesh.position(v), self.normals[v.index()], &self.offsets[v.index()])
     }
@@ -237,7 +241,7 @@ impl Samples {
         p + normal * offsets.lambdas.iter().sum::<f32>()
     }
 
-    /// Halves edges that are too long with their detail, or do not follow it, longest first.
+    /// Halves edges that are too long with their detail, or off it at their midpoint, longest first.
     fn refine(&mut self, bands: &Bands, longest: f32) {
         let mut wanted: Vec<(f32, VertexId, VertexId, Sample)> = Vec::new();
         for (u, v) in self.mesh.edges() {
@@ -260,7 +264,7 @@ impl Samples {
         }
     }
 
-    /// The middle of an edge, with its detail.
+    /// Returns the midpoint of an edge, with its detail.
     fn middle(&self, bands: &Bands, u: VertexId, v: VertexId) -> Sample {
         let (from, to) = (&self.link[u.index()], &self.link[v.index()]);
         let on_base = bands.base().walker.march(from.triangle, (from.point + to.point) * 0.5);
@@ -274,7 +278,7 @@ impl Samples {
     }
 }
 
-/// One place of the deformed base, with its detail.
+/// A point of the deformed base, with its detail.
 struct Sample {
     position: Vec3,
     normal: Vec3,
@@ -282,7 +286,7 @@ struct Sample {
     offsets: Offsets,
 }
 
-/// At a free slot.
+/// The entry of a free slot.
 const NOTHING: Offsets = Offsets { lambdas: [0.0; MOST_BANDS], missed: false, last: NOWHERE };
 
 #[cfg(test)]

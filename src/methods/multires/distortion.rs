@@ -1,15 +1,17 @@
-//! How much the map T distorts: what the operator D is to keep low (section 3).
+//! Distortion of the map T, which the operator D keeps low (section 3).
 
 use super::link::Link;
 use crate::math::{DVec3, triangle};
 use crate::mesh::{Mesh, VertexId};
 
-/// Distortion by vertex of the deformed base, in the order of its live slots.
+/// Distortion of the map T from the deformed base to the base M₀, by live vertex of the deformed base.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Distortion {
-    /// Area on the undeformed base over area on the deformed one, of the triangles around: 1 where it is kept.
+    /// Area of the adjacent triangles on the base M₀, divided by their area on the deformed base; 1 where area is
+    /// preserved.
     pub area: Vec<f64>,
-    /// Longest over shortest stretch of directions, mean of the triangles around by their area: 1 where angles are kept.
+    /// Ratio of the largest to the smallest stretch, as an area-weighted mean over the adjacent triangles; 1 where
+    /// angles are preserved.
     pub angle: Vec<f64>,
 }
 
@@ -35,9 +37,11 @@ pub(super) fn distortion(mesh: &Mesh, link: &Link) -> Distortion {
     Distortion { area: per_vertex(&before), angle: per_vertex(&stretch) }
 }
 
-/// The largest over the smallest singular value of the affine map from one triangle to another; at most [`MOST`].
+/// Returns the ratio of the singular values of the affine map from one triangle to another, at most [`MOST`]; 1 for a
+/// similarity.
 fn anisotropy(from: [DVec3; 3], to: [DVec3; 3]) -> f64 {
-    // In the plane of the first: one edge along x, so that the map of directions is a 3 × 2 matrix of columns p, q.
+    // In the plane of the first triangle, with one edge along x, the linear part is a 3 × 2 matrix with columns p and
+    // q.
     let (edge, other) = (from[1] - from[0], from[2] - from[0]);
     let length = edge.length();
     let along = other.dot(edge) / length;
@@ -47,7 +51,7 @@ fn anisotropy(from: [DVec3; 3], to: [DVec3; 3]) -> f64 {
     let (mean, half) = (0.5 * (p.dot(p) + q.dot(q)), 0.5 * (p.dot(p) - q.dot(q)));
     let root = (half * half + p.dot(q) * p.dot(q)).sqrt();
     let ratio = ((mean + root) / (mean - root)).sqrt();
-    // Of a triangle without area it is infinite, or no number.
+    // For a triangle without area the ratio is infinite or NaN.
     if ratio < MOST { ratio } else { MOST }
 }
 

@@ -1,34 +1,34 @@
-//! Control ellipsoids: what is inside, the nearest point of the surface, and how what they touch moves with them
+//! Control ellipsoids: containment, closest points, pushing vertices out, and moving points along with the ellipsoids
 //! (section 5).
 
 use crate::math::{DMat3, DVec3, Vec3};
 use crate::methods::MethodError;
 use serde::{Deserialize, Serialize};
 
-/// A solid ellipsoid as it is given.
+/// A solid control ellipsoid as passed by the caller.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ControlEllipsoid {
-    /// Its middle, in the mesh's units.
+    /// The centre, in units of the mesh.
     pub center: [f64; 3],
     /// Three orthogonal semi-axes as vectors.
     pub axes: [[f64; 3]; 3],
 }
 
-/// Cosine of the angle by which axes may be off the right one: rounding in `f32` stays far below.
+/// Largest cosine between two axes that counts as a right angle: rounding to `f32` stays far below.
 const ORTHOGONAL: f64 = 1e-3;
 
-/// Axes of one ellipsoid may differ by this factor: beyond, needles and plates are thinner than any triangle could follow.
+/// Largest ratio of two semi-axes: more slender ellipsoids are thinner than any triangle could follow.
 const MOST_SLENDER: f64 = 1e3;
 
-/// The lengths that are accepted, so that squares and cubes stay within `f32`.
+/// Accepted range of semi-axes, in units of the mesh: squares and cubes stay within the range of `f32`.
 const SHORTEST: f64 = 1e-9;
 const LONGEST: f64 = 1e9;
 
 impl ControlEllipsoid {
-    /// Tests that the axes span an ellipsoid.
+    /// Checks that the axes span an ellipsoid.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] naming `ellipsoids` and the one that is wrong.
+    /// [`MethodError::InvalidArgument`] naming `ellipsoids`, and the one at fault by its `index`.
     pub(super) fn validate(&self, index: usize) -> Result<(), MethodError> {
         let refuse =
             |problem: String| Err(MethodError::invalid("ellipsoids", format!("number {index}: {problem}")));
@@ -59,10 +59,10 @@ impl ControlEllipsoid {
     }
 }
 
-/// Tests that there are some, and that each is one.
+/// Checks that there is at least one ellipsoid, and that each is valid.
 ///
 /// # Errors
-/// As [`ControlEllipsoid::validate`], and where there is none.
+/// As [`ControlEllipsoid::validate`], and for an empty list.
 pub(super) fn check_ellipsoids(given: &[ControlEllipsoid]) -> Result<(), MethodError> {
     if given.is_empty() {
         return Err(MethodError::invalid("ellipsoids", "none given; at least one is needed"));
@@ -70,25 +70,25 @@ pub(super) fn check_ellipsoids(given: &[ControlEllipsoid]) -> Result<(), MethodE
     given.iter().enumerate().try_for_each(|(k, e)| e.validate(k))
 }
 
-/// An ellipsoid ready for use: a rotation, lengths along its columns, and a middle.
+/// An ellipsoid with precomputed values for fast containment tests.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Shape", into = "Shape")]
 pub(super) struct Ellipsoid {
     shape: Shape,
-    /// Takes what is seen from the middle to the frame in which the ellipsoid is the unit ball: divisions by
-    /// lengths were a large part of a frame.
+    /// Maps offsets from the centre to the frame in which the ellipsoid is the unit ball. Precomputed, because
+    /// divisions by the semi-axes took a large part of a frame.
     to_unit: DMat3,
-    /// The longest semi-axis, squared: nothing inside is further from the middle.
+    /// The square of the longest semi-axis: points farther from the centre are outside.
     square: f64,
 }
 
-/// What an ellipsoid is.
+/// The geometry of an ellipsoid: centre, orientation and semi-axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Shape {
     pub center: DVec3,
-    /// The directions of the axes as columns; right-handed.
+    /// Unit directions of the axes as columns; right-handed.
     pub rotation: DMat3,
-    /// Half the lengths of the axes.
+    /// The lengths of the semi-axes.
     pub lengths: DVec3,
 }
 
@@ -114,36 +114,38 @@ impl std::ops::Deref for Ellipsoid {
     }
 }
 
-/// Newton's steps for the nearest point: from a point near the surface two or three are enough, from anywhere 60.
+/// Maximum number of Newton steps for the closest point: from a point near the surface two or three are enough, from
+/// anywhere 60.
 const STEPS: usize = 100;
 
-/// Newton's steps end with one as small as this, in what it is a step of: the digits double with each, so twice as many
-/// are right.
+/// Newton's method stops at a relative step as small as this: convergence is quadratic, so twice as many digits are
+/// right then.
 const LAST_STEP: f64 = 1e-5;
 
 impl Ellipsoid {
-    /// From axes that were found to span one. A left-handed set is one of the same ellipsoid with an axis turned round.
+    /// Creates an ellipsoid from validated axes. A left-handed set gets its third axis reversed, which is the same
+    /// ellipsoid.
     pub fn new(given: &ControlEllipsoid) -> Self {
         let axes = given.axes.map(DVec3::from);
         let x = axes[0].normalize();
-        // Exactly orthogonal, whatever rounding the given ones went through.
+        // Orthogonal up to rounding, however the given axes were rounded.
         let y = (axes[1] - x * axes[1].dot(x)).normalize();
         let lengths = DVec3::new(axes[0].length(), axes[1].length(), axes[2].length());
         Shape { center: given.center.into(), rotation: DMat3::from_cols(x, y, x.cross(y)), lengths }.into()
     }
 
-    /// The same with all lengths `factor` times as long.
+    /// Returns the ellipsoid with all semi-axes multiplied by `factor`.
     pub fn scaled(&self, factor: f64) -> Self {
         Shape { lengths: self.lengths * factor, ..self.shape }.into()
     }
 
-    /// As it would be given.
+    /// Converts the ellipsoid back to the caller's form.
     pub fn given(&self) -> ControlEllipsoid {
         let axis = |k: usize| (self.rotation.col(k) * self.lengths[k]).to_array();
         ControlEllipsoid { center: self.center.to_array(), axes: [axis(0), axis(1), axis(2)] }
     }
 
-    /// In the frame in which the axes are those of space.
+    /// Returns `p` relative to the centre, in coordinates along the axes.
     #[inline]
     fn local(&self, p: DVec3) -> DVec3 {
         self.rotation.transpose() * (p - self.center)
@@ -154,45 +156,48 @@ impl Ellipsoid {
         self.center + self.rotation * local
     }
 
-    /// In the frame in which the ellipsoid is the unit ball; the distance from the middle is 1 on the surface.
+    /// Maps a point in coordinates along the axes back to the world.
     #[inline]
     pub fn unit(&self, p: DVec3) -> DVec3 {
         self.to_unit * (p - self.center)
     }
 
-    /// Whether `p` is inside, and not but for a rounding on the surface.
+    /// Maps `p` to the frame in which the ellipsoid is the unit ball: the length of the result is 1 on the surface,
+    /// less inside.
     #[inline]
     pub fn contains(&self, p: DVec3) -> bool {
         let seen = p - self.center;
-        // Most are far from most.
+        // Most ellipsoids are far from most points.
         seen.length_squared() < self.square && (self.to_unit * seen).length_squared() < OUTSIDE * OUTSIDE
     }
 
-    /// The point of the world at a place of that frame.
+    /// Maps a point from the unit-ball frame of [`Self::unit`] to the world.
     pub fn at_unit(&self, unit: DVec3) -> DVec3 {
         self.world(unit * self.lengths)
     }
 
-    /// The shortest semi-axis.
+    /// Returns the length of the shortest semi-axis.
     pub fn thinnest(&self) -> f64 {
         self.lengths.min_element()
     }
 
-    /// The least radius of curvature, that of the sharpest tip.
+    /// Returns the smallest radius of curvature, that of the sharpest tip.
     pub fn sharpest(&self) -> f64 {
         self.thinnest() * self.thinnest() / self.lengths.max_element()
     }
 
-    /// How far it is, about, from `p` to the surface along the ray from the middle; 0 inside.
+    /// Returns the distance from `p` to the surface along the ray to the centre, an upper bound of the distance; 0
+    /// inside.
     pub fn clearance(&self, p: DVec3) -> f64 {
         let size = self.unit(p).length();
         if size > 1.0 { p.distance(self.center) * (1.0 - 1.0 / size) } else { 0.0 }
     }
 
-    /// The point of the surface nearest to `p`, from inside or outside. From the middle, one end of the shortest axis.
+    /// Returns the point of the surface closest to `p`, from inside or outside. For the centre, it is an end of the
+    /// shortest axis.
     ///
-    /// It is where a normal of the surface leads through p: with local coordinates y of p and semi-axes a, it is at
-    /// a²y/(a² + t) for the largest root t of Σ (a y/(a² + t))² = 1.
+    /// The surface normal at this point passes through p. With local coordinates y of p and semi-axes a, it is a²y/(a²
+    /// + t) for the largest root t of Σ (a y/(a² + t))² = 1.
     pub fn nearest(&self, p: DVec3) -> DVec3 {
         if self.lengths.min_element() == self.lengths.max_element() {
             return self.center + self.thinnest() * (p - self.center).normalize_or(self.rotation.x_axis);
@@ -200,7 +205,7 @@ impl Ellipsoid {
         let squares = self.lengths * self.lengths;
         let least = squares.min_element();
         let mut local = self.local(p);
-        // On the plane across the shortest axis the root may vanish; a little beside it, it does not.
+        // In the plane perpendicular to the shortest axis the root may vanish; slightly off it, it does not.
         for k in 0..3 {
             if squares[k] == least && local[k].abs() < 1e-9 * self.lengths[k] {
                 local[k] = 1e-9 * self.lengths[k];
@@ -209,15 +214,16 @@ impl Ellipsoid {
         }
         let t = largest_root(local * self.lengths, squares, least);
         let on = squares * local / (squares + DVec3::splat(t));
-        // Rounding leaves it a little off the surface.
+        // Rounding leaves the point slightly off the surface.
         let scaled = on / self.lengths;
         self.world(on / scaled.length())
     }
 }
 
-/// The largest t with Σ (w / (s + t))² = 1; the sum falls with t and is convex, from −`least` on.
+/// Returns the largest t with Σ (w / (s + t))² = 1, by Newton's method; the sum is decreasing and convex from −`least`
+/// on.
 fn largest_root(weights: DVec3, squares: DVec3, least: f64) -> f64 {
-    // There the term of the shortest axis alone is 1 or less than the sum is.
+    // A lower bound of the root: no single term may exceed 1.
     let floor = (0..3).map(|k| weights[k].abs() - squares[k]).fold(-least, f64::max);
     let mut t = if floor > 0.0 { floor } else { 0.0 };
     for _ in 0..STEPS {
@@ -235,10 +241,10 @@ fn largest_root(weights: DVec3, squares: DVec3, least: f64) -> f64 {
     t
 }
 
-/// Tests that edges up to `longest` can hold each of the ellipsoids.
+/// Checks that a membrane with edges up to `longest` can hold on to each of the ellipsoids.
 ///
 /// # Errors
-/// [`MethodError::InvalidArgument`] naming the first that the skin would slip off.
+/// [`MethodError::InvalidArgument`] naming the first ellipsoid that the membrane would slip off.
 pub(super) fn check_sizes(ellipsoids: &[Ellipsoid], longest: f64) -> Result<(), MethodError> {
     let slips = |(k, e): (usize, &Ellipsoid)| (longest > BLUNT * e.sharpest()).then_some((k, e.sharpest()));
     let Some((k, radius)) = ellipsoids.iter().enumerate().find_map(slips) else { return Ok(()) };
@@ -250,15 +256,16 @@ pub(super) fn check_sizes(ellipsoids: &[Ellipsoid], longest: f64) -> Result<(), 
     Err(MethodError::invalid("ellipsoids", problem))
 }
 
-/// The longest edge that holds on to a tip, in its radius. Vertices are held, triangles between them are not: with much
-/// longer ones the tip goes through a triangle, and the skin draws back from it.
+/// Longest edge that holds on to a tip, as a multiple of its radius of curvature. Only vertices are pushed out, not
+/// triangles: with much longer edges the tip pierces a triangle, and the membrane retracts from it.
 const BLUNT: f64 = 1.6;
 
-/// Where a point inside some of the ellipsoids is pushed to: out of the one it is deepest in, again until it is outside
-/// all. `p` itself where it is outside all from the beginning.
+/// Returns `p` moved out of all ellipsoids, by repeated pushes out of the one that it is deepest in; `p` itself if it
+/// is outside of all.
 ///
-/// Out of one at a time: the first that contains it may be left through another's inside. In the crease between two, pushes
-/// out of one lead into the other by less and less; what is left then is left along a straight line.
+/// Leaving the first ellipsoid that contains it would not be enough, as that may lead into another. In the crease
+/// between two, pushes alternate by ever shorter distances; what remains after [`PUSHES`] is left along a straight
+/// line.
 pub(super) fn pushed_out(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
     let mut at = p;
     for _ in 0..PUSHES {
@@ -270,33 +277,35 @@ pub(super) fn pushed_out(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
     straight_out(ellipsoids, at)
 }
 
-/// Pushes out of one ellipsoid after the other; a crease of 90° takes some three for each digit.
+/// Maximum number of pushes out of one ellipsoid after the other; a crease of 90° takes some three for each digit.
 const PUSHES: usize = 12;
 
-/// A point with this distance from the middle in the unit frame is outside: rounding puts it a little beside 1.
+/// A point at this distance from the centre in the unit-ball frame counts as outside: rounding puts surface points
+/// slightly off 1.
 const OUTSIDE: f64 = 1.0 - 1e-7;
 
-/// The ellipsoid that `p` is deepest inside of, and its nearest point.
+/// Returns the index of the ellipsoid that `p` is deepest in, and the point of its surface closest to `p`; `None`
+/// outside of all.
 fn deepest(ellipsoids: &[Ellipsoid], p: DVec3) -> Option<(usize, DVec3)> {
     let inside = ellipsoids.iter().enumerate().filter(|(_, e)| e.contains(p));
     let nearest = inside.map(|(k, e)| (k, e.nearest(p)));
     nearest.max_by(|a, b| a.1.distance_squared(p).total_cmp(&b.1.distance_squared(p)))
 }
 
-/// Along the sum of the normals of all that contain `p`, as far as it takes to be outside of every one.
+/// Moves `p` along the sum of the normals of all ellipsoids that contain it until it is outside of every one.
 fn straight_out(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
     let containing = ellipsoids.iter().filter(|e| e.contains(p));
     let away = |e: &Ellipsoid| (e.rotation * (e.unit(p) / e.lengths)).normalize_or_zero();
     let direction = containing.map(away).sum::<DVec3>().normalize_or(DVec3::Z);
     let mut way = 0.0;
-    // Each is left for good, as it is convex, so there is an end.
+    // An ellipsoid is convex, so each is left once: the loop ends.
     while let Some(exit) = ellipsoids.iter().find_map(|e| exit_beyond(e, p, direction, way)) {
         way = exit;
     }
     p + direction * way
 }
 
-/// Where the ray leaves the ellipsoid, if it is inside at `way`.
+/// Returns the distance at which a ray leaves the ellipsoid, if it is inside at the distance `way`; `None` otherwise.
 fn exit_beyond(e: &Ellipsoid, p: DVec3, direction: DVec3, way: f64) -> Option<f64> {
     if e.unit(p + direction * way).length_squared() >= OUTSIDE * OUTSIDE {
         return None;
@@ -307,10 +316,11 @@ fn exit_beyond(e: &Ellipsoid, p: DVec3, direction: DVec3, way: f64) -> Option<f6
     (exit > way).then_some(exit)
 }
 
-/// Where `p` goes as the ellipsoids go from `before` to `after`: with each by its own map, near ones counting more.
+/// Returns `p` moved along with the ellipsoids from `before` to `after`: by the mean of their affine maps, with larger
+/// weights for nearer ones. Used to predict the membrane of the next frame.
 ///
-/// Where all move alike, so does everything. Else what is nearer to one than its size goes with it for the most part, and
-/// what is between two is stretched evenly.
+/// If all ellipsoids move alike, so does every point. Otherwise, points nearer to an ellipsoid than its size mostly
+/// move with it, and the space between two is stretched evenly.
 pub(super) fn carried(before: &[Ellipsoid], after: &[Ellipsoid], p: Vec3) -> Vec3 {
     let p = p.as_dvec3();
     let (mut sum, mut total) = (DVec3::ZERO, 0.0);
@@ -322,8 +332,9 @@ pub(super) fn carried(before: &[Ellipsoid], after: &[Ellipsoid], p: Vec3) -> Vec
     }
     if total > 0.0 { (p + sum / total).as_vec3() } else { p.as_vec3() }
 }
-/// How much an ellipsoid that a point lies on counts: ten times as much as one that is its own size away. With more, all
-/// stretching falls on the crease between two that part, and the map folds there; with less, detail slides on them.
+/// Regularises the weight of an ellipsoid that a point lies on: it is ten times that of one at a distance of its own
+/// size. With a larger weight, all stretching falls on the crease between two ellipsoids that separate, and the map
+/// folds there; with a smaller one, detail slides on them.
 const SOFTNESS: f64 = 0.1;
 
 #[cfg(test)]
@@ -344,7 +355,7 @@ mod tests {
         Shape { center: vector(random), rotation: DMat3::from_cols(x, y, x.cross(y)), lengths }.into()
     }
 
-    /// Points all over the surface.
+    /// Points spread evenly over the surface.
     fn spread(e: &Ellipsoid, count: usize) -> Vec<DVec3> {
         let on = |i: usize| {
             let (z, angle) = (1.0 - (2 * i + 1) as f64 / count as f64, 2.4 * i as f64);
@@ -364,7 +375,7 @@ mod tests {
             assert!((e.unit(nearest).length() - 1.0).abs() < 1e-12);
             let least = spread(&e, 2000).iter().map(|q| q.distance(p)).fold(f64::MAX, f64::min);
             assert!(nearest.distance(p) <= least + 1e-9, "{} {least}", nearest.distance(p));
-            // And the normal there leads through p.
+            // The normal there passes through p.
             let normal = (e.rotation * (e.unit(nearest) / e.lengths)).normalize();
             let way = p - nearest;
             assert!((way - normal * way.dot(normal)).length() < 1e-7, "{:?} {p}", e);
@@ -376,7 +387,7 @@ mod tests {
         let lengths = DVec3::new(3.0, 2.0, 1.0);
         let e = Ellipsoid::from(Shape { center: DVec3::ONE, rotation: DMat3::IDENTITY, lengths });
         assert!((e.nearest(DVec3::ONE).distance(DVec3::ONE) - 1.0).abs() < 1e-6);
-        // Far out along the longest axis the nearest point is its end, near the middle it is beside.
+        // Far out along the longest axis the closest point is its end, near the centre it is to the side.
         assert!(e.nearest(DVec3::new(3.9, 1.0, 1.0)).distance(DVec3::new(4.0, 1.0, 1.0)) < 1e-6);
         let beside = e.nearest(DVec3::new(1.5, 1.0, 1.0));
         assert!(beside.z > 1.9 && beside.distance(DVec3::new(1.5, 1.0, 1.0)) < 1.0);

@@ -1,4 +1,4 @@
-//! One frame: the ellipsoids go on, the skin follows, its map is taken along, and the detail is put back.
+//! One frame of the model: moves the ellipsoids, updates the membrane and its map T, and reconstructs the detail.
 
 use super::ellipsoid::{Ellipsoid, carried};
 use super::holding::held;
@@ -12,22 +12,23 @@ use crate::methods::{MethodError, Times};
 use crate::remesh::{Changes, EdgeBounds, Resolver};
 use crate::spatial::SurfaceWalker;
 
-/// By how much the resolution changes in one frame at most: far finer or coarser than its bounds, a mesh can neither be
-/// guarded nor solved in bounded time.
+/// Largest factor by which the mean edge changes in one frame: a mesh much finer or coarser than its bounds can neither
+/// be guarded nor solved in bounded time.
 const MOST_CHANGE: f64 = 2.0;
 
-/// What is as near to rest as this is freshened up on one level while the ellipsoids go on: three times as fast as solving
-/// for it.
+/// While ellipsoids move, a membrane with at most this residual is only refreshed on one level: three times as fast as
+/// a solve on all levels.
 const NEARLY_AT_REST: f64 = 3.0 * REST;
 
-/// How deep rounding may take vertices into an ellipsoid, in the target edge: what moves as a whole goes no deeper.
+/// Depth by which rounding may put vertices inside an ellipsoid, as a share of the target edge; a rigid motion stays
+/// below.
 const ROUNDING: f64 = 1e-3;
 
-/// So many frames in a row: what wide saddles lag behind stays small.
+/// Maximum number of frames in a row that only refresh the membrane, so that wide saddles do not lag far behind.
 const MOST_PASSING: u32 = 3;
 
 impl MultiresolutionModel {
-    /// The parameters with bounds of edges that a frame can bring about: within a factor of the mean edge as it is.
+    /// Returns the parameters with edge bounds that one frame can reach: within a factor of 2 of the current mean edge.
     pub(super) fn params_now(&self) -> MultiresParams {
         let ratio = self.params.target() / mean_edge(&self.surface);
         let factor = if ratio > MOST_CHANGE {
@@ -41,7 +42,7 @@ impl MultiresolutionModel {
         MultiresParams { edge_min, edge_max, ..self.params.clone() }
     }
 
-    /// One frame; where it fails, nothing has changed.
+    /// Advances the model by one frame. If it fails, nothing has changed.
     pub(super) fn frame(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let mut lap = Lap::new(self.clock, times);
         let mut movers = self.movers.clone();
@@ -69,7 +70,7 @@ impl MultiresolutionModel {
         unrest(mesh, ellipsoids, self.params.energy) / self.params.target()
     }
 
-    /// What lies ahead with the ellipsoids at their next places.
+    /// Predicts the membrane for the next positions `are` of the ellipsoids.
     fn ahead(&self, are: Vec<Ellipsoid>) -> Result<Ahead, MethodError> {
         let were = self.movers.now();
         let mut carried_along = self.surface.clone();
@@ -82,10 +83,10 @@ impl MultiresolutionModel {
         Ok(Ahead { were, are, carried: carried_along, unrest, params })
     }
 
-    /// The surface carried along, where that is all there is to do: it is at rest there, and its edges fit. Then what moves
-    /// as a whole does so exactly.
+    /// Returns the membrane moved along with the ellipsoids, if nothing else has to be done: it is at rest and its
+    /// edges are within bounds. This makes rigid motions exact. `None` if the membrane has to be solved.
     fn followed(&mut self, ahead: &Ahead) -> Option<Mesh> {
-        // What is still passing when everything stands is solved for, even if it looks at rest.
+        // A membrane that was only refreshed is solved when the ellipsoids stop, even if its residual is small.
         let is_due = !ahead.moves() && self.passing > 0;
         if is_due || ahead.unrest > REST || !fits(&ahead.carried, ahead.params.bounds()) {
             return None;
@@ -109,7 +110,7 @@ impl MultiresolutionModel {
         Some(next)
     }
 
-    /// A new skin over the ellipsoids, and its link.
+    /// Computes a new membrane over the ellipsoids, and its map T.
     fn solve(&mut self, ahead: &Ahead, lap: &mut Lap) -> Result<Changes, MethodError> {
         let walker = SurfaceWalker::new(ahead.carried.to_triangles())?;
         let (next, changes) = self.solved(ahead);
@@ -128,8 +129,8 @@ impl MultiresolutionModel {
         Ok(changes)
     }
 
-    /// The skin over the ellipsoids at their next places: freshened up where that is enough, else solved for, else followed
-    /// with care.
+    /// Returns the membrane for the next positions of the ellipsoids: refreshed if that is sufficient, else solved on
+    /// all levels, else moved under the collision guard.
     fn solved(&mut self, ahead: &Ahead) -> (Mesh, Changes) {
         let (next, changes) = self
             .freshened(ahead)
@@ -141,7 +142,8 @@ impl MultiresolutionModel {
         (next, changes)
     }
 
-    /// The skin that was carried along, tidied up, where the ellipsoids go on and it is nearly at rest.
+    /// Returns the predicted membrane refreshed on one level; `None` unless the ellipsoids move and its residual is
+    /// small.
     fn freshened(&mut self, ahead: &Ahead) -> Option<(Mesh, Changes)> {
         let may_pass = ahead.moves() && ahead.params.levels > 0 && ahead.unrest <= NEARLY_AT_REST;
         if !may_pass || self.passing >= MOST_PASSING {
@@ -168,8 +170,8 @@ impl MultiresolutionModel {
         (next, changes)
     }
 
-    /// A skin that was made without a look at what it crosses, with what has become a thread in it cut; nothing where it
-    /// crosses itself, or an ellipsoid is no longer inside.
+    /// Cuts thin necks of a membrane that was made without collision tests. `None` if it intersects itself, or if an
+    /// ellipsoid is no longer inside.
     fn with_threads_cut(
         &mut self,
         mut mesh: Mesh,
@@ -189,17 +191,17 @@ impl MultiresolutionModel {
     }
 }
 
-/// What lies ahead of a frame.
+/// The prediction that a frame starts from.
 struct Ahead {
-    /// The ellipsoids before it.
+    /// The ellipsoids before the frame.
     were: Vec<Ellipsoid>,
-    /// The ellipsoids after it.
+    /// The ellipsoids after the frame.
     are: Vec<Ellipsoid>,
-    /// The surface where they carry it along to.
+    /// The membrane moved along with the ellipsoids.
     carried: Mesh,
-    /// How far from rest that is.
+    /// Its residual, as a share of the target edge.
     unrest: f64,
-    /// The parameters as far as one frame can bring them about.
+    /// The parameters, with edge bounds that one frame can reach.
     params: MultiresParams,
 }
 
@@ -209,7 +211,7 @@ impl Ahead {
     }
 }
 
-/// Times the parts of a frame.
+/// Measures the time of each part of a frame, for [`StepReport::times`](crate::methods::StepReport::times).
 struct Lap<'a> {
     clock: fn() -> f64,
     begun: f64,
@@ -221,7 +223,7 @@ impl<'a> Lap<'a> {
         Self { clock, begun: clock(), times }
     }
 
-    /// What was done since the last part ended is `part`.
+    /// Adds the time since the last call to `part`.
     fn ends(&mut self, part: &'static str) {
         let now = (self.clock)();
         self.times.add(part, now - self.begun);
@@ -229,7 +231,7 @@ impl<'a> Lap<'a> {
     }
 }
 
-/// Whether nearly all edges are in bounds.
+/// Whether at most [`MISFITS`] of the edges are out of bounds.
 fn fits(mesh: &Mesh, bounds: EdgeBounds) -> bool {
     let (shortest, longest) = (bounds.min * bounds.min, bounds.max * bounds.max);
     let outside = mesh.edges().filter(|&(u, v)| {
@@ -239,5 +241,5 @@ fn fits(mesh: &Mesh, bounds: EdgeBounds) -> bool {
     outside.count() as f64 <= MISFITS * mesh.edge_count() as f64
 }
 
-/// The share of edges out of bounds that a mesh is left with. Restructuring leaves some thousandths.
+/// Share of edges that may be out of bounds without remeshing. Restructuring leaves some thousandths.
 const MISFITS: f64 = 0.02;

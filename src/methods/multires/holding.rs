@@ -1,11 +1,12 @@
-//! Which ellipsoids a closed surface has inside.
+//! Tests which ellipsoids are inside a closed surface.
 
 use super::ellipsoid::Ellipsoid;
 use crate::math::triangle::Line;
 use crate::math::{DVec3, Vec3};
 use crate::mesh::Mesh;
 
-/// For each ellipsoid, whether its middle is inside the mesh: a ray from it leaves more often than it enters.
+/// Returns for each ellipsoid whether its centre is inside the closed mesh, by the parity of the hits of a ray from it.
+/// Used to detect a membrane that has slipped off an ellipsoid.
 pub(super) fn held(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<bool> {
     let middles: Vec<[f32; 2]> = ellipsoids.iter().map(|e| seen_along_ray(e.center.as_vec3())).collect();
     let places: Vec<[f32; 2]> = mesh.positions().iter().map(|&p| seen_along_ray(p)).collect();
@@ -22,18 +23,19 @@ pub(super) fn held(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<bool> {
     inside
 }
 
-/// Any direction will do; along this one a ray seldom meets an edge of a regular mesh, which would count twice.
+/// The direction of the rays, of any length: along this one, a ray seldom hits an edge of a regular mesh, which would
+/// count twice.
 const RAY: DVec3 = DVec3::new(0.5772, 0.6929, 0.4318);
 
-/// Two directions across the ray.
+/// Two directions perpendicular to the ray.
 const ACROSS: [Vec3; 2] = [Vec3::new(-0.6929, 0.5772, 0.0), Vec3::new(-0.2492, -0.2992, 0.8132)];
 
-/// Where a point is, to somebody who looks along the ray.
+/// Projects a point along the ray, to two coordinates.
 fn seen_along_ray(p: Vec3) -> [f32; 2] {
     ACROSS.map(|axis| axis.dot(p))
 }
 
-/// Whether the box around a triangle, as it is seen, is at most a rounding off the point.
+/// Whether the projected bounding box of a triangle contains a projected point, up to rounding.
 fn may_cover(corners: &[[f32; 2]; 3], point: &[f32; 2]) -> bool {
     (0..2).all(|k| {
         let [a, b, c] = corners.map(|corner| corner[k]);

@@ -1,18 +1,18 @@
-//! The map T from the deformed surface to the base: projected from step to step, and spread out evenly (sections 3 and 6,
-//! operators P and D).
+//! The map T from the deformed surface S to the base M₀: projected from frame to frame by the operator P, and evened
+//! out by the operator D (sections 3 and 6).
 
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use crate::spatial::{SurfacePoint, SurfaceWalker};
 
-/// Where a vertex lies on the base; nowhere, for free slots.
+/// A point on the base M₀, as a triangle and barycentric coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Linked {
     /// The triangle of the base.
     pub triangle: u32,
-    /// Weights of its corners.
+    /// Barycentric coordinates in it.
     pub weights: Vec3,
-    /// The point itself.
+    /// The position.
     pub point: Vec3,
 }
 
@@ -23,34 +23,35 @@ impl From<SurfacePoint> for Linked {
 }
 
 impl Linked {
-    /// The place on `base` of a triangle and weights, with the same bits whenever it is worked out.
+    /// Creates the point of `base` with these barycentric coordinates. Its position has the same bits whenever it is
+    /// computed.
     pub fn at(base: &SurfaceWalker, triangle: u32, weights: Vec3) -> Self {
         let [a, b, c] = base.corners(triangle);
         Self { triangle, weights, point: a * weights.x + b * weights.y + c * weights.z }
     }
 }
 
-/// A place on the base as it is kept.
+/// Converts a closest point on the base to its stored form.
 fn linked(base: &SurfaceWalker, found: &SurfacePoint) -> Linked {
     Linked::at(base, found.triangle, found.barycentric)
 }
 
-/// The link of every vertex, by slot.
+/// The map T: the point on the base for every vertex of S, by slot.
 pub(super) type Link = Vec<Linked>;
 
 pub(super) const NOWHERE: Linked = Linked { triangle: 0, weights: Vec3::ZERO, point: Vec3::ZERO };
 
-/// The surface before a step, and the link of its vertices.
+/// The surface that the next one is projected onto, with its map T: S_current, moved along with the ellipsoids.
 pub(super) struct Before<'a> {
     pub walker: &'a SurfaceWalker,
-    /// In the order of the vertices of the surface.
+    /// The image of each vertex under T, in the order of the vertices of the surface.
     pub link: &'a [Linked],
 }
 
-/// Operator P: each vertex of `mesh` goes to the nearest point of the surface before, and by the same weights of the same
-/// triangle to a place near the base; then onto the base.
+/// Operator P: maps each vertex of `mesh` to the closest point of S_current, then by the same barycentric coordinates
+/// to a point near the base, then to the closest point on the base. Returns the map T of `mesh`.
 ///
-/// `farthest` is how far it can be: a place beyond was found wrongly, and is looked for in a tree.
+/// A closest point farther away than `farthest` is wrong, and is searched again in a tree.
 pub(super) fn project(mesh: &Mesh, before: &Before, base: &SurfaceWalker, farthest: f64) -> Link {
     let mut link = vec![NOWHERE; mesh.slots()];
     traverse(mesh, |v, start| {
@@ -61,7 +62,8 @@ pub(super) fn project(mesh: &Mesh, before: &Before, base: &SurfaceWalker, farthe
     link
 }
 
-/// The nearest point of the surface before, on the same side of it.
+/// Returns the closest point on S_current to a vertex of the next surface, by a walk from the triangle `start`. If the
+/// result is farther away than `farthest` or faces the other way, it is searched again in a tree.
 fn nearest(
     mesh: &Mesh,
     walker: &SurfaceWalker,
@@ -78,7 +80,7 @@ fn nearest(
     let marched = start.map(|start| walker.march(start, p));
     match marched.filter(|found| found.distance <= farthest && faces_alike(found)) {
         Some(found) => found,
-        // Positions are finite, so there is one.
+        // Positions are finite, so a closest point exists.
         None => {
             let found = if start.is_some() { walker.closest(p) } else { walker.closest_of_all(p) };
             found.unwrap_or_else(|| walker.march(0, p))
@@ -86,7 +88,7 @@ fn nearest(
     }
 }
 
-/// The place on the base that belongs to a point of the surface before.
+/// Maps a point of S_current to the base, by the images of its triangle's corners under T.
 fn onto_base(before: &Before, base: &SurfaceWalker, at: &SurfacePoint) -> Linked {
     let corners = before.walker.mesh().triangles[at.triangle as usize].map(|v| before.link[v as usize]);
     let weights = at.barycentric;
@@ -95,8 +97,8 @@ fn onto_base(before: &Before, base: &SurfaceWalker, at: &SurfacePoint) -> Linked
     linked(base, &base.march(corners[heaviest].triangle, point))
 }
 
-/// Visits every vertex after a neighbour of it, and gives `visit` what it gave back for that one: none for the first of a
-/// component.
+/// Visits every vertex, starting each component at any vertex and continuing with neighbours. `visit` is passed its
+/// result for a neighbour, from which to start the search, or `None` for the first vertex of a component.
 fn traverse(mesh: &Mesh, mut visit: impl FnMut(VertexId, Option<u32>) -> u32) {
     let mut seen = vec![false; mesh.slots()];
     let mut queue: Vec<(VertexId, u32)> = Vec::new();
@@ -118,7 +120,8 @@ fn traverse(mesh: &Mesh, mut visit: impl FnMut(VertexId, Option<u32>) -> u32) {
     }
 }
 
-/// Operator D, equation 1: q ← Σ dⱼ qⱼ / Σ dⱼ, where dⱼ is the mean length of the edges at qⱼ; then onto the base again.
+/// Operator D, equation 1: q ← Σ dⱼ qⱼ / Σ dⱼ with the mean length dⱼ of the edges at qⱼ, then back onto the base.
+/// Evens out the map T.
 pub(super) fn distribute(mesh: &Mesh, base: &SurfaceWalker, link: &mut Link) {
     let densities: Vec<f32> =
         (0..mesh.slots()).map(|i| density(mesh, link, VertexId::from_index(i))).collect();
@@ -127,14 +130,14 @@ pub(super) fn distribute(mesh: &Mesh, base: &SurfaceWalker, link: &mut Link) {
     }
 }
 
-/// dⱼ: the mean length of the edges at a vertex.
+/// Returns dⱼ: the mean length of the edges at a vertex, on the base.
 fn density(mesh: &Mesh, link: &Link, v: VertexId) -> f32 {
     let (ring, here) = (mesh.ring(v).as_slice(), link[v.index()].point);
     let sum: f32 = ring.iter().map(|w| here.distance(link[w.index()].point)).sum();
     if ring.is_empty() { 0.0 } else { sum / ring.len() as f32 }
 }
 
-/// Where D takes one vertex.
+/// Returns the point to which D moves one vertex.
 fn spread(
     mesh: &Mesh,
     base: &SurfaceWalker,
@@ -151,19 +154,20 @@ fn spread(
     if total > 0.0 { linked(base, &base.march(here.triangle, sum * (1.0 / total))) } else { here }
 }
 
-/// Whether the image of a triangle on the base is turned over, or has no area.
+/// Whether the image of a triangle on the base is flipped or has no area.
 fn is_folded(corners: [VertexId; 3], base: &SurfaceWalker, normals: &[Vec3], link: &Link) -> bool {
     let [a, b, c] = corners.map(|v| link[v.index()]);
     let outward = [a, b, c].map(|at| normal_at(base, normals, &at)).into_iter().sum::<Vec3>();
     (b.point - a.point).cross(c.point - a.point).dot(outward) <= 0.0
 }
 
-/// Triangles of the surface whose image on the base is turned over, or has no area.
+/// Counts the triangles of the surface whose image on the base is flipped or has no area.
 pub(super) fn folded(mesh: &Mesh, base: &SurfaceWalker, normals: &[Vec3], link: &Link) -> usize {
     mesh.triangles().filter(|&corners| is_folded(corners, base, normals, link)).count()
 }
 
-/// Applies D to the corners of folded triangles alone, and to those around them, until none is left or it does not help.
+/// Applies D to the corners of folded triangles and their neighbours only, until no triangle is folded, at most
+/// [`UNFOLDINGS`] times.
 pub(super) fn unfold(mesh: &Mesh, base: &SurfaceWalker, normals: &[Vec3], link: &mut Link) {
     for _ in 0..UNFOLDINGS {
         let folded = mesh.triangles().filter(|&corners| is_folded(corners, base, normals, link));
@@ -182,10 +186,10 @@ pub(super) fn unfold(mesh: &Mesh, base: &SurfaceWalker, normals: &[Vec3], link: 
     }
 }
 
-/// Rounds of that: a fold that is still there after so many is one of topology, as where a neck was cut.
+/// Maximum number of passes that remove folds of T: a fold that remains has a topological cause, such as a cut neck.
 const UNFOLDINGS: usize = 12;
 
-/// The normal of the base at a place, of length 1: the vertices' normals, interpolated.
+/// Returns the unit normal of the base at a point, interpolated from the vertex normals.
 pub(super) fn normal_at(base: &SurfaceWalker, normals: &[Vec3], at: &Linked) -> Vec3 {
     let [a, b, c] = base.mesh().triangles[at.triangle as usize].map(|v| normals[v as usize]);
     (a * at.weights.x + b * at.weights.y + c * at.weights.z).normalize_or_zero()

@@ -1,4 +1,5 @@
-//! A skin over the ellipsoids: umbrella iterations and pushes, from coarse to fine (section 5).
+//! The membrane over the ellipsoids: umbrella iterations and pushes out of the ellipsoids, from coarse to fine (section
+//! 5).
 
 use super::ellipsoid::{Ellipsoid, pushed_out};
 use super::params::{Energy, MultiresParams};
@@ -6,19 +7,21 @@ use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use crate::remesh::{Changes, EdgeBounds, Unchecked, restructure};
 
-/// The longest edges of a level in the thinnest of the ellipsoids: a mesh much coarser would slip off it.
+/// Longest edge of a coarse level, as a share of the shortest semi-axis of all ellipsoids: a much coarser mesh would
+/// slip off the thinnest.
 const COARSEST: f64 = 0.8;
 
-/// Iterations of a finer level end where one moves vertices by no more than this share of its edges in the mean square:
-/// from there on they slide along the surface, with a tenth of it across.
+/// The iterations of a finer level end when one moves vertices by no more than this share of the level's target edge,
+/// as a root mean square: from there on they slide along the surface, and a tenth of that motion is normal to it.
 const STILL: f64 = 0.025;
 
-/// The least number of vertices that a coarse level is to have: fewer say nothing about the shape.
+/// Minimum number of vertices of a coarse level: fewer do not represent the shape.
 const LEAST_VERTICES: f64 = 60.0;
 
-/// Solves for the skin on meshes from coarse to fine, `levels` of them above the target; the last one is left in `mesh`.
+/// Solves the membrane on meshes from coarse to fine, with up to `levels` coarse levels before the target resolution;
+/// the last one is left in `mesh`.
 ///
-/// Edits are made whatever they cross; the caller looks at the outcome.
+/// Edits are made without collision tests; the caller checks the result for self-intersections.
 pub(super) fn settle(
     mesh: &mut Mesh,
     ellipsoids: &[Ellipsoid],
@@ -28,7 +31,7 @@ pub(super) fn settle(
     settle_seen(mesh, ellipsoids, params, levels, |_| {})
 }
 
-/// As [`settle`]; each level is shown when it is solved.
+/// As [`settle`], and calls `see` with the mesh of each level when it is solved.
 pub(super) fn settle_seen(
     mesh: &mut Mesh,
     ellipsoids: &[Ellipsoid],
@@ -41,7 +44,7 @@ pub(super) fn settle_seen(
     let coarsest = coarsest(mesh, ellipsoids, params, levels);
     for level in (0..=coarsest).rev() {
         let coarser = libm::pow(params.refine_factor, -f64::from(level));
-        // The shape is found on the coarsest; the others only have to follow.
+        // The coarsest level finds the shape; the finer ones only refine it.
         let still = if level == coarsest { 0.0 } else { STILL * coarser * params.target() };
         changes += solve_level(mesh, ellipsoids, params, bounds.scaled(coarser as f32), still);
         see(mesh);
@@ -50,7 +53,8 @@ pub(super) fn settle_seen(
     changes
 }
 
-/// Takes a skin that is nearly at rest along: only its edges, and what little it is off, on one level.
+/// Refreshes a membrane that is nearly at rest, on the target resolution only: restructures its edges and removes the
+/// small residual.
 pub(super) fn freshen(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], params: &MultiresParams) -> Changes {
     let bounds = params.bounds();
     let mut changes = solve_level(mesh, ellipsoids, params, bounds, STILL * params.target());
@@ -58,7 +62,7 @@ pub(super) fn freshen(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], params: &Multir
     changes
 }
 
-/// The iterations with edges within `bounds`; `still` as in [`relaxed`].
+/// Restructures the edges to `bounds` and iterates; `still` as in [`relaxed`].
 fn solve_level(
     mesh: &mut Mesh,
     ellipsoids: &[Ellipsoid],
@@ -72,7 +76,8 @@ fn solve_level(
     changes
 }
 
-/// The last level left edges that are too short or too long, and what is made in the middle of an edge lies inside.
+/// Restructures the edges once more, as the last level leaves some too short or too long, and pushes the new midpoints
+/// out of the ellipsoids.
 fn finish(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], bounds: EdgeBounds) -> Changes {
     let changes = restructure(mesh, bounds, &mut Unchecked);
     let places = hold(mesh, ellipsoids);
@@ -80,7 +85,8 @@ fn finish(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], bounds: EdgeBounds) -> Chan
     changes
 }
 
-/// The coarsest level that is of use.
+/// Returns the coarsest usable level, at most `levels`: fine enough for the thinnest ellipsoid, and with enough
+/// vertices. 0 is the target resolution.
 fn coarsest(mesh: &Mesh, ellipsoids: &[Ellipsoid], params: &MultiresParams, levels: u32) -> u32 {
     let thinnest = ellipsoids.iter().map(Ellipsoid::thinnest).fold(f64::MAX, f64::min);
     let fits = |level: u32| {
@@ -91,8 +97,8 @@ fn coarsest(mesh: &Mesh, ellipsoids: &[Ellipsoid], params: &MultiresParams, leve
     (0..=levels).rev().find(|&level| level == 0 || fits(level)).unwrap_or(0)
 }
 
-/// Every vertex in turn goes to where the energy is least while all others stay, and out of the ellipsoids. How far they
-/// went, in the root of the mean square.
+/// One Gauss–Seidel iteration: moves every vertex to its energy minimum with all others fixed, then out of the
+/// ellipsoids. Returns the root mean square of the displacements.
 fn sweep(mesh: &Mesh, places: &mut [Vec3], ellipsoids: &[Ellipsoid], energy: Energy) -> f64 {
     let mut sum = 0.0;
     for v in mesh.vertices() {
@@ -103,7 +109,7 @@ fn sweep(mesh: &Mesh, places: &mut [Vec3], ellipsoids: &[Ellipsoid], energy: Ene
     (sum / mesh.vertex_count().max(1) as f64).sqrt()
 }
 
-/// Where the energy is least for one vertex.
+/// Returns the position of a vertex with the least energy, with all others fixed.
 fn best(mesh: &Mesh, places: &[Vec3], energy: Energy, v: VertexId) -> Vec3 {
     match energy {
         Energy::Membrane => middle(mesh, places, v),
@@ -111,15 +117,15 @@ fn best(mesh: &Mesh, places: &[Vec3], energy: Energy, v: VertexId) -> Vec3 {
     }
 }
 
-/// Equation 2: p ← Σ pᵢ / n.
+/// Returns the mean of the neighbours, the umbrella operator: p ← Σ pᵢ / n (equation 2).
 #[inline]
 fn middle(mesh: &Mesh, places: &[Vec3], v: VertexId) -> Vec3 {
     let ring = mesh.ring(v).as_slice();
     ring.iter().fold(Vec3::ZERO, |sum, w| sum + places[w.index()]) * (1.0 / ring.len() as f32)
 }
 
-/// p ← p − U²(p) / ν, with U(p) = Σ pᵢ / n − p, U² of U, and ν = 1 + Σ 1/nᵢ / n (Kobbelt et al., *Interactive
-/// multi-resolution modeling on arbitrary meshes*, 1998).
+/// Returns the position with the least bending energy: p ← p − U²(p) / ν, with U(p) = Σ pᵢ / n − p, U² of U, and ν = 1
+/// + Σ 1/nᵢ / n (Kobbelt et al., *Interactive multi-resolution modeling on arbitrary meshes*, 1998).
 fn flattest(mesh: &Mesh, places: &[Vec3], v: VertexId) -> Vec3 {
     let umbrella = |w: VertexId| middle(mesh, places, w) - places[w.index()];
     let ring = mesh.ring(v).as_slice();
@@ -138,7 +144,8 @@ fn pushed(ellipsoids: &[Ellipsoid], p: Vec3) -> Vec3 {
     pushed_out(ellipsoids, p.as_dvec3()).as_vec3()
 }
 
-/// How far one more iteration would move the surface along its normals: the root of the mean square.
+/// Returns the residual: the root mean square of the displacements along the normals that one more iteration would
+/// make.
 pub(super) fn unrest(mesh: &Mesh, ellipsoids: &[Ellipsoid], energy: Energy) -> f64 {
     let places = mesh.positions();
     let mut sum = 0.0;
@@ -150,8 +157,8 @@ pub(super) fn unrest(mesh: &Mesh, ellipsoids: &[Ellipsoid], energy: Energy) -> f
     (sum / mesh.vertex_count().max(1) as f64).sqrt()
 }
 
-/// Where the iterations of one level would take each vertex, by slot, without a change of connectivity. They end early where
-/// one goes no further than `still`.
+/// Returns the positions after the iterations of one level, by slot, without changes of connectivity. They end early
+/// when one moves the vertices by no more than `still`, as a root mean square.
 pub(super) fn relaxed(
     mesh: &Mesh,
     ellipsoids: &[Ellipsoid],
@@ -167,7 +174,7 @@ pub(super) fn relaxed(
     places
 }
 
-/// The place of each vertex, by slot, out of the ellipsoids.
+/// Returns the position of each vertex pushed out of the ellipsoids, by slot.
 pub(super) fn hold(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<Vec3> {
     mesh.positions().iter().map(|&p| pushed(ellipsoids, p)).collect()
 }

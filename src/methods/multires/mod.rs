@@ -1,17 +1,18 @@
 //! Multiresolution deformation with dynamic connectivity.
 //!
-//! Kobbelt, Bareuther & Seidel, *Multiresolution shape deformations for meshes with dynamic vertex connectivity*. A detailed
-//! surface is split into a smooth base and the distance to it along the base's normals (`base`, `detail`; section 2). The base
-//! is a skin over control ellipsoids (`ellipsoid`, `motion`) that is solved for from coarse to fine and remeshes itself
-//! (`membrane`; sections 4 and 5). A map leads from the deformed base back to the undeformed one (`link`; section 3), where
-//! the detail is looked up and put back (section 6). Without detail it is a lava lamp.
+//! Kobbelt, Bareuther & Seidel, *Multiresolution shape deformations for meshes with dynamic vertex connectivity*. A
+//! detailed surface M₁ is split into a smooth base M₀ and the signed distance λ to M₁ along the normals of M₀ (`base`,
+//! `detail`; section 2). The deformed base S is a membrane over control ellipsoids (`ellipsoid`, `motion`), solved from
+//! coarse to fine and remeshed on the way (`membrane`; sections 4 and 5). A map T leads from S back to M₀ (`link`;
+//! section 3), where λ is sampled to reconstruct the detail on S (section 6). Without detail the model is a lava lamp.
 //!
-//! # What it guarantees
-//! After every step the base and the detailed surface are closed, oriented and 2-manifold, and no two triangles of either
-//! cross. The same input gives the same bits, natively and in wasm.
+//! # Guarantees
+//! After every step the deformed base and the detailed surface are closed, oriented 2-manifolds without
+//! self-intersections. The same input gives the same bits, natively and in wasm.
 //!
-//! # What it does not
-//! Detail is put back along normals: where it is longer than the base is round it is held back before it crosses itself.
+//! # Limits
+//! Detail is a displacement along normals: where it is longer than the radius of curvature of the base, it is shortened
+//! so that the surface does not intersect itself.
 
 mod base;
 mod detail;
@@ -46,51 +47,54 @@ use motion::Movers;
 use parting::ways_to;
 use setup::{check_size, on_itself, set_up};
 
-/// How a [`MultiresolutionModel`] is set up.
+/// Options to create a [`MultiresolutionModel`].
 #[derive(Clone, Debug, Default)]
 pub struct MultiresOptions {
-    /// The detailed surface; without, a bare skin.
+    /// The detailed surface M₁. Without it the model is a membrane without detail.
     pub detail: Option<TriangleMesh>,
-    /// Its low-frequency approximation; else made from it, or around the ellipsoids.
+    /// The base M₀, a low-frequency approximation of the detailed surface. By default it is made from that surface, or
+    /// around the ellipsoids.
     pub base: Option<TriangleMesh>,
-    /// What the skin is spanned over.
+    /// The control ellipsoids that the membrane is spanned over.
     pub ellipsoids: Vec<ControlEllipsoid>,
-    /// Parameters; bounds of edges that are 0 are taken from the base.
+    /// The parameters. Edge bounds of 0 are derived from the area of the given surface, or else of the ellipsoids.
     pub params: MultiresParams,
 }
 
-/// One more iteration may move the surface by this share of the target edge in the mean square when it is at rest.
+/// Convergence threshold: the model is at rest when one more iteration moves the surface along its normals by at most
+/// this share of the target edge, as a root mean square.
 const REST: f64 = 0.01;
 
-/// Vertices that a model may have.
+/// The largest number of vertices of the deformed base.
 const MOST_VERTICES: usize = 200_000;
 
-/// A surface deformed by ellipsoids, with its detail.
+/// A surface that is deformed by control ellipsoids and keeps its detail.
 pub struct MultiresolutionModel {
     bands: Bands,
     movers: Movers,
     params: MultiresParams,
-    /// The deformed base.
+    /// The deformed base S.
     surface: Mesh,
-    /// Where its vertices lie on the base, by slot.
+    /// The map T: the point of the base M₀ that belongs to each vertex of `surface`, by slot.
     link: Link,
     shown: Detailed,
-    /// Keeps surfaces from crossing themselves; nothing in it is kept from one frame to the next but memory.
+    /// The collision guard. Only its memory is reused between frames, not its state.
     guard: Embedding,
     components: u32,
     iteration: u32,
-    /// Frames since the skin was last solved for on all levels.
+    /// Frames in a row that refreshed the membrane on the finest level only; 0 after a solve on all levels.
     passing: u32,
     residual: f64,
     clock: fn() -> f64,
 }
 
 impl MultiresolutionModel {
-    /// A model before its first step: its surface is the base with the detail.
+    /// Creates a model before its first step: its surface is the base with the detail.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the option or parameter that cannot be used, and what is accepted;
-    /// [`MethodError::Mesh`] for a detail or a base that is open, not manifold, or (the base) crosses itself.
+    /// [`MethodError::Mesh`] for a detail or a base that is open or not manifold, or for a base that intersects itself;
+    /// [`MethodError::TooManyVertices`] if the edges are too short.
     pub fn new(options: MultiresOptions) -> Result<Self, MethodError> {
         let MultiresOptions { detail, base, ellipsoids: given, params } = options;
         check_ellipsoids(&given)?;
@@ -139,17 +143,19 @@ impl MultiresolutionModel {
         Ok(model)
     }
 
-    /// Gives the model a clock for [`StepReport::times`], in milliseconds. The core has none of its own.
+    /// Sets the clock, in milliseconds, for [`StepReport::times`]. By default all times are 0: the core has no clock of
+    /// its own.
     pub fn set_clock(&mut self, clock: fn() -> f64) {
         self.clock = clock;
     }
 
-    /// The surface with its detail.
+    /// Returns the deformed surface with its detail.
     pub fn mesh(&self) -> &Mesh {
         &self.shown.mesh
     }
 
-    /// The surface with its detail as triangles, with texture coordinates where the finest surface has them.
+    /// Returns the deformed surface with its detail as triangles, with texture coordinates if the finest input surface
+    /// has them.
     pub fn surface(&self) -> TriangleMesh {
         let mut mesh = self.shown.mesh.to_triangles();
         let finest = &self.bands.finest().walker;
@@ -158,7 +164,8 @@ impl MultiresolutionModel {
         mesh
     }
 
-    /// The meshes that the skin is solved on for the ellipsoids as they are, from coarse to fine (figure 8).
+    /// Solves the membrane for the current ellipsoids on every level, and returns the mesh of each, from coarse to fine
+    /// (figure 8).
     pub fn levels(&self) -> Vec<TriangleMesh> {
         let mut levels = Vec::new();
         let ellipsoids = self.movers.now();
@@ -169,17 +176,18 @@ impl MultiresolutionModel {
         levels
     }
 
-    /// How much the map from the deformed base to the base distorts.
+    /// Returns how much the map T from the deformed base to the base M₀ distorts area and angles.
     pub fn distortion(&self) -> Distortion {
         distortion::distortion(&self.surface, &self.link)
     }
 
-    /// The deformed base.
+    /// Returns the deformed base S, without detail.
     pub fn base_mesh(&self) -> &Mesh {
         &self.surface
     }
 
-    /// The vertices of [`Self::base_mesh`] where they lie on the undeformed base.
+    /// Returns the mesh T: the triangles of [`Self::base_mesh`] with each vertex at its position on the undeformed base
+    /// M₀.
     pub fn link_mesh(&self) -> TriangleMesh {
         let mut mesh = self.surface.to_triangles();
         mesh.positions = self.surface.vertices().map(|v| self.link[v.index()].point).collect();
@@ -187,15 +195,16 @@ impl MultiresolutionModel {
         mesh
     }
 
-    /// Parameters as they are now.
+    /// Returns the current parameters.
     pub fn params(&self) -> &MultiresParams {
         &self.params
     }
 
-    /// Takes other parameters.
+    /// Sets the parameters, also during a run.
     ///
     /// # Errors
-    /// As [`MultiresParams::validate`]; nothing has changed then.
+    /// As [`MultiresParams::validate`]; [`MethodError::InvalidArgument`] if the edges are too long for an ellipsoid,
+    /// and [`MethodError::TooManyVertices`] if they are too short. Nothing has changed then.
     pub fn set_params(&mut self, params: MultiresParams) -> Result<(), MethodError> {
         params.validate()?;
         check_sizes(&self.movers.goals(), params.edge_max)?;
@@ -207,7 +216,8 @@ impl MultiresolutionModel {
         Ok(())
     }
 
-    /// How finely the detail is put back shows at once; all else wakes the skin.
+    /// Applies changed parameters: a change of `supersample` alone only reconstructs the detail, any other makes the
+    /// model solve again.
     fn take_effect(&mut self, before: &MultiresParams) {
         let supersample = self.params.supersample;
         if self.params == (MultiresParams { supersample, ..before.clone() }) {
@@ -217,11 +227,13 @@ impl MultiresolutionModel {
         }
     }
 
-    /// Sends the ellipsoids to new places, each by its index. Further ones grow where they are to be, or come out of the
-    /// nearest one if that is outside of the skin; those left out shrink and vanish.
+    /// Sets new target ellipsoids, matched by index; the model moves towards them step by step. An additional ellipsoid
+    /// grows at its target, or emerges from the nearest ellipsoid if the target is outside the membrane; one that is
+    /// left out shrinks and is removed.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] for none, and for one that is not an ellipsoid; nothing has changed then.
+    /// [`MethodError::InvalidArgument`] for an empty list, for axes that span no ellipsoid, and for tips too sharp for
+    /// the edges; nothing has changed then.
     pub fn set_ellipsoids(&mut self, given: &[ControlEllipsoid]) -> Result<(), MethodError> {
         check_ellipsoids(given)?;
         check_sizes(&given.iter().map(Ellipsoid::new).collect::<Vec<_>>(), self.params.edge_max)?;
@@ -231,33 +243,35 @@ impl MultiresolutionModel {
         Ok(())
     }
 
-    /// The ellipsoids where they are now.
+    /// Returns the ellipsoids at their current positions, including those that are being removed.
     pub fn ellipsoids(&self) -> Vec<ControlEllipsoid> {
         self.movers.now().iter().map(Ellipsoid::given).collect()
     }
 
-    /// Where they are to be.
+    /// Returns the target ellipsoids.
     pub fn goals(&self) -> Vec<ControlEllipsoid> {
         self.movers.goals().iter().map(Ellipsoid::given).collect()
     }
 
-    /// Triangles of the surface whose image on the base is turned over.
+    /// Counts the triangles of the deformed base whose image on the base M₀ under T is flipped or has no area.
     pub fn folded(&self) -> usize {
         let base = self.bands.base();
         folded(&self.surface, &base.walker, &base.normals, &self.link)
     }
 
-    /// Surfaces of the decomposition, the base among them.
+    /// Returns the number of surfaces in the decomposition, including the base.
     pub fn bands(&self) -> usize {
         self.bands.all.len()
     }
 
-    /// Vertices whose normal met no detail, and those held back so that nothing crosses.
+    /// Returns two counts of vertices from the last reconstruction of the detail: those whose normal did not hit the
+    /// finer surface, and those held back to avoid self-intersections.
     pub fn misses(&self) -> [usize; 2] {
         [self.shown.missed, self.shown.held]
     }
 
-    /// One frame: the ellipsoids go on by as much as the skin can follow, and the skin with its detail follows.
+    /// Advances by one frame: moves the ellipsoids as far as the membrane can follow, and updates the membrane and its
+    /// detail.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
         let mut changes = Changes::default();
@@ -270,11 +284,11 @@ impl MultiresolutionModel {
 
     fn is_done(&self) -> bool {
         let at_rest = self.residual <= REST && self.passing == 0 && self.params == self.params_now();
-        // A skin that holds nothing shrinks until nothing is left of it.
+        // A membrane that encloses no ellipsoid shrinks until it has no vertices.
         self.surface.vertex_count() == 0 || self.movers.have_arrived() && at_rest
     }
 
-    /// Puts the detail back.
+    /// Reconstructs the detail on the deformed base.
     fn show(&mut self) {
         let shown = detailed(&self.surface, &self.link, &self.bands, &mut self.guard, fineness(&self.params));
         let replaced = std::mem::replace(&mut self.shown, shown);
@@ -309,7 +323,7 @@ fn mean_edge(mesh: &Mesh) -> f64 {
     mesh.edges().map(length).sum::<f64>() / mesh.edge_count().max(1) as f64
 }
 
-/// An edge that is longer than most, for the guard.
+/// Returns an edge length that most edges are shorter than, for the grid of the collision guard.
 fn usual_edge(mesh: &Mesh) -> f32 {
     (1.5 * mean_edge(mesh)) as f32
 }

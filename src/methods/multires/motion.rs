@@ -1,37 +1,40 @@
-//! Ellipsoids on their way: a step takes each only so far that the skin can follow.
+//! Moves the ellipsoids towards their targets, in each step only as far as the membrane can follow.
 
 use super::ellipsoid::{ControlEllipsoid, Ellipsoid, Shape};
 use crate::math::{DMat3, DVec3};
 use glam::DQuat;
 use serde::{Deserialize, Serialize};
 
-/// How far any point of an ellipsoid goes in one step at most, in its shortest semi-axis. With more, the surface before and
-/// after are too far apart for their nearest points to be the same places; with less, drags take more steps.
+/// Largest displacement of an ellipsoid's centre in one step, as a share of the larger of its shortest semi-axes before
+/// and after. With more, the surfaces before and after are too far apart for closest points to correspond; with less,
+/// drags take more steps.
 const REACH: f64 = 0.5;
 
-/// How far it turns in one step at most: the same for a ball, whose points on the axis of rotation do not move at all.
+/// Largest rotation of an ellipsoid in one step, in radians. It also applies to a sphere, whose points on the axis of
+/// rotation do not move at all.
 const TURN: f64 = 0.35;
 
-/// The share of its size that an ellipsoid begins with, or ends at.
+/// Size at which a new ellipsoid starts, as a share of its own, and at which a removed one disappears, as a share of
+/// the thickest target's shortest semi-axis.
 const SEED: f64 = 0.05;
 
-/// By how much an ellipsoid grows at most in one step, or shrinks.
+/// Largest factor by which a semi-axis grows or shrinks in one step.
 const GROWTH: f64 = 1.5;
 
-/// One ellipsoid, where it is and where it is to be.
+/// One ellipsoid with its current state and its target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Mover {
     now: Ellipsoid,
-    /// Where it is to be, or that it is to vanish.
+    /// The target; `None` for an ellipsoid that is being removed.
     goal: Option<Ellipsoid>,
 }
 
-/// All ellipsoids.
+/// All ellipsoids of a model, with their targets.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Movers(Vec<Mover>);
 
 impl Movers {
-    /// Ellipsoids that are where they are to be.
+    /// Creates ellipsoids that are at their targets.
     pub fn new(given: &[ControlEllipsoid]) -> Self {
         let still = |given| {
             let now = Ellipsoid::new(given);
@@ -40,8 +43,8 @@ impl Movers {
         Self(given.iter().map(still).collect())
     }
 
-    /// Sends each to its new place, by its index. New ones grow from a twentieth of their size where the skin `holds` their
-    /// place, else they come out of the nearest one; those left out shrink to a twentieth and vanish.
+    /// Sets new targets, matched by index. A new ellipsoid starts at a twentieth of its size if the membrane `holds`
+    /// the centre of its target, else inside the nearest ellipsoid; one that is left out shrinks until it is removed.
     pub fn send(&mut self, given: &[ControlEllipsoid], holds: impl Fn(&Ellipsoid) -> bool) {
         let leaving = self.0.len().min(given.len());
         let mut movers: Vec<Mover> = Vec::with_capacity(given.len().max(self.0.len()));
@@ -51,7 +54,7 @@ impl Movers {
             let now = known.map_or_else(|| self.seed(&goal, &holds), |mover| mover.now);
             movers.push(Mover { now, goal: Some(goal) });
         }
-        // Those that were vanishing already go on.
+        // Includes those that were being removed before.
         let vanishing =
             |(k, mover): (usize, &Mover)| (k >= leaving || mover.goal.is_none()).then_some(mover.now);
         let vanishing: Vec<Ellipsoid> = self.0.iter().enumerate().filter_map(vanishing).collect();
@@ -59,7 +62,8 @@ impl Movers {
         self.0 = movers;
     }
 
-    /// Where a new one begins. What grew outside would push the skin away instead of being covered by it.
+    /// Returns the state in which a new ellipsoid starts. Growing outside of the membrane, it would push the membrane
+    /// away instead of being covered by it.
     fn seed(&self, goal: &Ellipsoid, holds: impl Fn(&Ellipsoid) -> bool) -> Ellipsoid {
         let away = |mover: &Mover| mover.now.clearance(goal.center);
         let nearest = self.0.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
@@ -72,33 +76,34 @@ impl Movers {
         }
     }
 
-    /// Whether all are ellipsoids, as those of a state may not be.
+    /// Whether all are valid ellipsoids; those of a saved state may not be.
     pub fn are_sound(&self) -> bool {
         let all = self.0.iter().flat_map(|mover| std::iter::once(mover.now).chain(mover.goal));
         !self.0.is_empty() && all.into_iter().all(|e| e.given().validate(0).is_ok())
     }
 
-    /// All as they are now.
+    /// Returns all ellipsoids in their current state.
     pub fn now(&self) -> Vec<Ellipsoid> {
         self.0.iter().map(|mover| mover.now).collect()
     }
 
-    /// Where those are to be that do not vanish.
+    /// Returns the targets, without the ellipsoids that are being removed.
     pub fn goals(&self) -> Vec<Ellipsoid> {
         self.0.iter().filter_map(|mover| mover.goal).collect()
     }
 
-    /// Whether all are where they are to be.
+    /// Whether all ellipsoids are at their targets, and none is being removed.
     pub fn have_arrived(&self) -> bool {
         self.0.iter().all(|mover| mover.goal == Some(mover.now))
     }
 
-    /// How much of the way is left for the one that is furthest, in steps.
+    /// Returns the number of steps, possibly fractional, that the slowest ellipsoid needs to reach its target.
     pub fn steps_left(&self) -> f64 {
         self.0.iter().map(|mover| mover.goal.map_or(1.0, |goal| way(&mover.now, &goal))).fold(0.0, f64::max)
     }
 
-    /// Takes each one step on its way: all by the same share, so that what moves together stays together.
+    /// Moves all ellipsoids by one step, by the same share of their remaining motion, so that those that move together
+    /// stay together.
     pub fn advance(&mut self) {
         let share = 1.0 / self.steps_left().max(1.0);
         for mover in &mut self.0 {
@@ -110,7 +115,7 @@ impl Movers {
         }
     }
 
-    /// Forgets those that were to vanish and have become small.
+    /// Removes ellipsoids that were being removed and have become small.
     pub fn drop_vanished(&mut self) {
         let smallest = |mover: &Mover, all: f64| mover.goal.is_some() || mover.now.thinnest() > SEED * all;
         let usual = self.0.iter().filter_map(|m| m.goal).map(|goal| goal.thinnest()).fold(0.0, f64::max);
@@ -118,7 +123,8 @@ impl Movers {
     }
 }
 
-/// The way from one to another in steps: the largest of what each bound asks for.
+/// Returns the number of steps, possibly fractional, from one ellipsoid to another: the maximum over translation,
+/// rotation and growth.
 fn way(from: &Ellipsoid, to: &Ellipsoid) -> f64 {
     let reach = REACH * from.thinnest().max(to.thinnest());
     let shift = from.center.distance(to.center) / reach;
@@ -128,7 +134,7 @@ fn way(from: &Ellipsoid, to: &Ellipsoid) -> f64 {
     shift.max(turn).max(libm::log(growth) / libm::log(GROWTH))
 }
 
-/// A share of the way: straight, turned about one axis, lengths in proportion.
+/// Interpolates between two ellipsoids: centres linearly, orientations about one axis, lengths geometrically.
 fn between(from: &Ellipsoid, to: &Ellipsoid, share: f64) -> Ellipsoid {
     let turn = slerp(quaternion(from), quaternion(to), share);
     let lengths = [0, 1, 2].map(|k| from.lengths[k] * libm::pow(to.lengths[k] / from.lengths[k], share));
@@ -143,7 +149,7 @@ fn quaternion(e: &Ellipsoid) -> DQuat {
     DQuat::from_mat3(&e.rotation)
 }
 
-/// The shorter way round; written out, as the platform's sine is not the same everywhere.
+/// Interpolates rotations along the shorter arc. Written out because the platform's sine differs between machines.
 fn slerp(a: DQuat, b: DQuat, share: f64) -> DQuat {
     let b = if a.dot(b) < 0.0 { -b } else { b };
     let angle = libm::acos(a.dot(b).min(1.0));

@@ -1,56 +1,56 @@
-//! Parameters of the multiresolution model, their ranges and their words.
+//! Parameters of the multiresolution model, their ranges and their labels.
 
 use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, ParamSpec};
 use crate::remesh::EdgeBounds;
 use serde::{Deserialize, Serialize};
 
-/// Parameters of the multiresolution model. All can be changed while it runs.
+/// Parameters of the multiresolution model. All can be changed during a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub struct MultiresParams {
-    /// ε_min: shorter edges are drawn together, in the mesh's units.
+    /// ε_min: shorter edges are collapsed, in units of the mesh.
     pub edge_min: f64,
-    /// ε_max: longer edges are split; more than twice `edge_min`.
+    /// ε_max: longer edges are split, in units of the mesh; more than twice `edge_min`.
     pub edge_max: f64,
-    /// Levels of the solver above the target resolution; 0 solves at that alone.
+    /// Number of coarser levels that the membrane is solved on first; 0 solves on the target resolution only.
     pub levels: u32,
-    /// q: from level to level, bounds of edges shrink by this factor.
+    /// q: the factor by which the edge bounds shrink from one level to the next finer one.
     pub refine_factor: f64,
-    /// Umbrella iterations a level.
+    /// Umbrella iterations per level.
     pub smoothing: u32,
-    /// Applications of the operator D a step.
+    /// Applications of the operator D, which evens out the map T, per solve.
     pub distribute: u32,
-    /// How often edges of the base are halved for the detail, at the most.
+    /// How often an edge of the deformed base may be halved where the detail needs more vertices.
     pub supersample: u32,
-    /// What the surface makes least.
+    /// The energy that the surface minimises between the ellipsoids.
     pub energy: Energy,
-    /// What becomes of necks and contacts.
+    /// Which topology changes are made at necks and contacts.
     pub topology: Topology,
 }
 
-/// What the surface between the ellipsoids makes least.
+/// The energy that the surface minimises between the ellipsoids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Energy {
-    /// Its area, as a skin does.
+    /// Area, like a soap film.
     Membrane,
-    /// Its bending, as a plate does: smooth where it leaves an ellipsoid.
+    /// Bending, like a thin plate: the surface leaves an ellipsoid smoothly.
     ThinPlate,
 }
 
-/// What becomes of necks and contacts.
+/// Which topology changes are made at necks and contacts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Topology {
-    /// Threads stay, parts never meet: one surface, as in the paper.
+    /// None, as in the paper: thin necks stay and parts never join.
     Never,
-    /// A neck that has become a thread is cut.
+    /// A neck too thin for the shortest edge is cut.
     Split,
-    /// And parts in contact are joined.
+    /// Necks are cut, and parts in contact are joined.
     SplitAndJoin,
 }
 
-/// The share of the target edge that the bounds are by default: their ratio, 2.23, leaves no short edges behind.
+/// Default edge bounds as shares of the target edge. Their ratio, 2.23, leaves no short edges behind.
 const MIN_SHARE: f64 = 0.65;
 const MAX_SHARE: f64 = 1.45;
 
@@ -71,10 +71,10 @@ impl Default for MultiresParams {
 }
 
 impl MultiresParams {
-    /// Tests every value against its range, and the bounds of edges against each other.
+    /// Checks every value against its range, and that ε_max > 2 ε_min.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] with the name of the first parameter that is wrong and what it accepts.
+    /// [`MethodError::InvalidArgument`] naming the first parameter that is not accepted, and its range.
     pub fn validate(&self) -> Result<(), MethodError> {
         let numbers = [
             self.edge_min,
@@ -97,7 +97,7 @@ impl MultiresParams {
         Err(MethodError::invalid("edgeMax", problem))
     }
 
-    /// With bounds around a mean edge where none are given: one of them gives the other.
+    /// Replaces edge bounds of 0: one is derived from the other, or both from the target edge length `edge`.
     pub fn with_target(mut self, edge: f64) -> Self {
         match (self.edge_min > 0.0, self.edge_max > 0.0) {
             (true, false) => self.edge_max = self.edge_min * (MAX_SHARE / MIN_SHARE),
@@ -108,18 +108,18 @@ impl MultiresParams {
         self
     }
 
-    /// ε_min and ε_max.
+    /// Returns ε_min and ε_max.
     pub fn bounds(&self) -> EdgeBounds {
         EdgeBounds { min: self.edge_min as f32, max: self.edge_max as f32 }
     }
 
-    /// The mean edge that the bounds stand for.
+    /// Returns the target edge length: the mean edge that the bounds correspond to.
     pub fn target(&self) -> f64 {
         0.5 * (self.edge_min + self.edge_max) / (0.5 * (MIN_SHARE + MAX_SHARE))
     }
 }
 
-/// The parameters of the multiresolution model, in the order a page should show them.
+/// Returns the descriptions of the parameters, in the order in which a page should show them.
 pub fn param_specs() -> Vec<ParamSpec> {
     SPECS.to_vec()
 }

@@ -1,7 +1,7 @@
-//! The skin followed with care: where it comes near itself, necks part and parts meet, and nothing crosses on the way.
+//! Moves the membrane under the collision guard, and cuts necks and joins contacts where it comes near itself.
 //!
-//! The fast way (`membrane`) makes a new mesh in every frame and is taken where that does not cross itself. Here the mesh of the
-//! frame before moves instead, guarded, and the kernel's annular and axial changes do what is due.
+//! `membrane` is faster: it makes a new mesh in every frame, which is used if it has no self-intersections. Otherwise
+//! the mesh of the frame before is moved here, guarded, and annular and axial changes cut and join it.
 
 use super::ellipsoid::Ellipsoid;
 use super::membrane::{hold, relaxed};
@@ -10,10 +10,11 @@ use crate::math::Vec3;
 use crate::mesh::{EditError, Mesh, VertexId};
 use crate::remesh::{Changes, Contact, EdgeBounds, Resolver, Sampling, restructure};
 
-/// Moves, each with what it brings about. With one, a frame leaves edges out of bounds behind.
+/// Rounds of moves and remeshing in a frame. With one, edges out of bounds remain.
 const ROUNDS: usize = 2;
 
-/// Takes `mesh` to the `predicted` places, one for each slot, and on to where the skin wants to be.
+/// Moves `mesh` under the guard to the `predicted` positions, one for each slot, and on towards the membrane's energy
+/// minimum.
 pub(super) fn follow(
     mesh: &mut Mesh,
     predicted: &[Vec3],
@@ -29,13 +30,13 @@ pub(super) fn follow(
         carry(mesh, &places, resolver, sampling);
         changes += mend(mesh, params, resolver);
     }
-    // What was made in the middle of edges goes out of the ellipsoids.
+    // Pushes edge midpoints that remeshing added out of the ellipsoids.
     let places = hold(mesh, ellipsoids);
     carry(mesh, &places, resolver, sampling);
     changes
 }
 
-/// Edges into bounds, and what is to become of necks and contacts.
+/// Restores the edge bounds, and makes the topology changes at necks and contacts that the parameters allow.
 fn mend(mesh: &mut Mesh, params: &MultiresParams, resolver: &mut Resolver) -> Changes {
     let bounds = params.bounds();
     let mut changes = restructure(mesh, bounds, resolver.guard(mesh, sampling(bounds)));
@@ -48,7 +49,7 @@ fn mend(mesh: &mut Mesh, params: &MultiresParams, resolver: &mut Resolver) -> Ch
     changes
 }
 
-/// Cuts what has become a thread. `mesh` does not cross itself.
+/// Cuts thin necks of a `mesh` without self-intersections, unless the parameters forbid topology changes.
 pub(super) fn cut_threads(mesh: &mut Mesh, params: &MultiresParams, most_vertices: usize) -> Changes {
     let active = pinched(mesh, params.bounds());
     if params.topology == Topology::Never || active.is_empty() {
@@ -68,12 +69,13 @@ fn resolve(
     resolver.resolve(mesh, sampling(params.bounds()), active)
 }
 
-/// The bounds of the kernel's topology changes: its shortest edge is that of the mesh, its longest a little longer.
+/// Returns the sampling for topology changes: the same shortest edge as the mesh, and a slightly larger longest one.
 fn sampling(bounds: EdgeBounds) -> Sampling {
     Sampling::new(bounds.min)
 }
 
-/// Vertices with an edge that is too short and cannot be drawn together, as a neck is in the way or nothing else is left.
+/// Returns the vertices with a short edge that cannot be collapsed, because a neck is in the way or the component is a
+/// tetrahedron.
 fn pinched(mesh: &Mesh, bounds: EdgeBounds) -> Vec<VertexId> {
     let shortest = bounds.min * bounds.min;
     let is_pinched = |u: VertexId, v: VertexId| {
@@ -88,10 +90,10 @@ fn carry(mesh: &mut Mesh, places: &[Vec3], resolver: &mut Resolver, sampling: Sa
     resolver.carry(mesh, sampling, &mut ways);
 }
 
-/// The way of each vertex to its place, by slot.
+/// Returns the displacement of each vertex to its position in `places`, by slot.
 pub(super) fn ways_to(mesh: &Mesh, places: &[Vec3]) -> Vec<Vec3> {
     let mut ways = vec![Vec3::ZERO; mesh.slots()];
-    // Free slots have no place.
+    // Free slots have no position.
     mesh.vertices().for_each(|v| ways[v.index()] = places[v.index()] - mesh.position(v));
     ways
 }

@@ -1,5 +1,5 @@
-//! Which triangles of the finer surface the normals of each triangle of the coarser one can meet near it: a line is tried
-//! against these few instead of looked up in a tree, which took half of the time of a frame with much detail.
+//! Lists, for each triangle of a coarser surface, the triangles of the finer one that its normals can hit. Testing a
+//! line against these few replaces a tree query, which took half of the time of a frame with much detail.
 
 use super::detail::Band;
 use super::link::{Linked, normal_at};
@@ -7,28 +7,29 @@ use crate::math::triangle::Line;
 use crate::math::{Bounds, DVec3, Vec3};
 use crate::spatial::{FirstHit, SurfacePoint};
 
-/// For each triangle of a surface, the triangles of another that its prism meets: its own points moved along its
-/// interpolated normals by up to its depth, to either side.
+/// For each triangle of one surface, the triangles of another that intersect its prism: the points of the triangle
+/// moved along its interpolated normals by up to a depth, to either side.
 #[derive(Clone, Debug)]
 pub(super) struct Prisms {
-    /// Where the list of each begins, and the end of the last one.
+    /// Start of each triangle's list in `met`, and the end of the last.
     first: Vec<u32>,
     met: Vec<u32>,
     depths: Vec<f32>,
 }
 
-/// The depth of a prism in the largest distance that its corners and its middle are from the other surface. With less,
-/// normals between them go on in the tree; with more, lists grow long.
+/// Depth of a prism, as a multiple of the largest distance to the other surface along the normals at its corners and
+/// centroid. With less, more normals fall back to the tree; with more, the lists grow long.
 const DEPTH: f64 = 1.5;
 
-/// By how much a prism is widened for rounding, in its size.
+/// Widening of a prism against rounding, as a share of its size.
 const ROUNDING: f64 = 1e-5;
 
-/// The least cosine between normals at two corners: between sharper ones the prism would be much too wide.
+/// Smallest cosine between the normals at two corners: with more divergent normals the prism would be much too wide,
+/// and the tree is used.
 const LEAST_COSINE: f32 = 0.1;
 
 impl Prisms {
-    /// Of the triangles of `from` among those of `to`; no deeper than `reach`.
+    /// Builds the lists for the triangles of `from` among those of `to`, with prisms no deeper than `reach`.
     pub fn new(from: &Band, to: &Band, reach: f64) -> Self {
         let count = from.walker.mesh().triangles.len();
         let mut prisms = Self { first: vec![0], met: Vec::new(), depths: Vec::with_capacity(count) };
@@ -48,7 +49,8 @@ impl Prisms {
         prisms
     }
 
-    /// Where the line from a place along its normal meets the other surface nearest, no further away than `reach`.
+    /// Returns the intersection with the other surface nearest to a point along its normal, no farther away than
+    /// `reach`. The same result as the tree's, which is queried if the lists have none.
     pub fn line_hit(&self, to: &Band, at: &Linked, normal: Vec3, reach: f64) -> Option<SurfacePoint> {
         let t = at.triangle as usize;
         let line = Line::new(at.point.as_dvec3(), normal.as_dvec3().try_normalize()?);
@@ -61,7 +63,7 @@ impl Prisms {
     }
 }
 
-/// How deep the prism of a triangle is to be; 0 for none.
+/// Returns the depth of the prism of a triangle; 0 if it gets none.
 fn depth(from: &Band, to: &Band, reach: f64, t: u32) -> f64 {
     let third = Vec3::splat(1.0 / 3.0);
     let farthest = [Vec3::X, Vec3::Y, Vec3::Z, third].into_iter().filter_map(|weights| {
@@ -78,14 +80,14 @@ fn corner_normals(from: &Band, t: u32) -> [Vec3; 3] {
     from.walker.mesh().triangles[t as usize].map(|v| from.normals[v as usize])
 }
 
-/// A convex body around all places of a triangle moved along its normals.
+/// A convex body that contains all points of a triangle moved along its interpolated normals.
 ///
-/// A normal is n = Σ wᵢ nᵢ / s with the weights of its place and s² = |Σ wᵢ nᵢ|² ≥ min nᵢ·nⱼ. Moved by d, a place is at
-/// Σ wᵢ (cᵢ + (d/s) nᵢ): between the corners, each moved along its own normal by no more than d/s.
+/// A normal is n = Σ wᵢ nᵢ / s with the barycentric weights w and s² = |Σ wᵢ nᵢ|² ≥ min nᵢ·nⱼ. Moved by d, a point is
+/// at Σ wᵢ (cᵢ + (d/s) nᵢ): between the corners, each moved along its own normal by no more than d/s.
 struct Prism {
     /// The corners moved to either side.
     points: [DVec3; 6],
-    /// Across the sides.
+    /// The normals of the lateral faces.
     axes: [DVec3; 3],
     margin: f64,
 }
@@ -114,7 +116,7 @@ impl Prism {
         Bounds { min: (min - margin).as_vec3(), max: (max + margin).as_vec3() }
     }
 
-    /// Whether a triangle, whose box meets the prism's, is on the inner side of all sides.
+    /// Whether none of the lateral faces separates a triangle from the prism. The caller has tested the bounding boxes.
     fn meets(&self, corners: [Vec3; 3]) -> bool {
         self.axes.iter().all(|axis| {
             let (least, most) = extent(axis, &self.points);
@@ -136,7 +138,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// A ball with waves, and a smooth one.
+    /// A smooth sphere, and one with waves.
     fn pair() -> (Band, Band) {
         let ball = |edge: f32| Mesh::icosphere(Vec3::new(3.0, 0.0, 0.0), 1.0, edge).unwrap().to_triangles();
         let mut wavy = ball(0.07);
@@ -167,7 +169,7 @@ mod tests {
             assert_eq!(prisms.line_hit(&to, &at, normal, 0.5), expected, "{triangle} {weights}");
             assert!(expected.is_some());
         }
-        // And few go on in the tree, or are tried in vain.
+        // The lists are short, so few triangles are tested in vain.
         let mean = prisms.met.len() as f64 / count as f64;
         assert!(mean < 20.0, "{mean}");
         assert!(prisms.depths.iter().all(|&depth| depth > 0.0));

@@ -1,4 +1,4 @@
-//! What a model is made of: its surfaces and all parameters from what is given, tested.
+//! Validates the input of a model, and prepares its decomposition and parameters.
 
 use super::base::{check_embedded, decomposition, edge_for, skin};
 use super::detail::Band;
@@ -12,10 +12,14 @@ use crate::methods::given::check_edges;
 use crate::spatial::SurfaceWalker;
 use std::rc::Rc;
 
-/// Triangles of the base where no bounds of edges are given: the paper's "moderately complex models".
+/// Number of triangles of the base if no edge bounds are given: the paper's "moderately complex models".
 const DEFAULT_TRIANGLES: f64 = 10_000.0;
 
-/// The bands from coarse to fine, and all parameters.
+/// Returns the bands from coarse to fine, and the parameters with edge bounds filled in.
+///
+/// # Errors
+/// [`MethodError::Mesh`] and [`MethodError::InvalidArgument`] for surfaces, ellipsoids or parameters that cannot be
+/// used; [`MethodError::TooManyVertices`] for edges that are too short.
 pub(super) fn set_up(
     detail: Option<TriangleMesh>,
     base: Option<TriangleMesh>,
@@ -54,7 +58,7 @@ pub(super) fn set_up(
     Ok(bands)
 }
 
-/// The mesh, with vertices of no triangle left out.
+/// Validates a closed mesh, and returns it without isolated vertices.
 fn closed(parameter: &'static str, mesh: TriangleMesh) -> Result<TriangleMesh, MethodError> {
     mesh.validate()?;
     let mesh = mesh.welded();
@@ -63,7 +67,7 @@ fn closed(parameter: &'static str, mesh: TriangleMesh) -> Result<TriangleMesh, M
     Ok(mesh)
 }
 
-/// Tests that an ellipsoid reaches the base: else nothing would hold it.
+/// Checks that at least one ellipsoid reaches the base: otherwise nothing would hold it.
 fn touches(ellipsoids: &[Ellipsoid], base: &SurfaceWalker, target: f64) -> Result<(), MethodError> {
     let near = |p: &Vec3| {
         let p: DVec3 = p.as_dvec3();
@@ -75,7 +79,7 @@ fn touches(ellipsoids: &[Ellipsoid], base: &SurfaceWalker, target: f64) -> Resul
     Err(MethodError::invalid("ellipsoids", "none touches the base; at least one has to, or nothing holds it"))
 }
 
-/// Tests that the surface will not have too many vertices.
+/// Checks that a surface of this area has at most [`MOST_VERTICES`] vertices at the target edge length.
 pub(super) fn check_size(area: f64, params: &MultiresParams) -> Result<(), MethodError> {
     let triangle = 0.25 * 3.0_f64.sqrt() * params.target() * params.target();
     if area / triangle <= 2.0 * MOST_VERTICES as f64 {
@@ -84,7 +88,7 @@ pub(super) fn check_size(area: f64, params: &MultiresParams) -> Result<(), Metho
     Err(MethodError::TooManyVertices { most: MOST_VERTICES })
 }
 
-/// The link of every vertex of the base to itself.
+/// Returns the identity map from the base to itself, as the map T of every vertex.
 pub(super) fn on_itself(walker: &SurfaceWalker) -> Vec<Linked> {
     let mut link = vec![NOWHERE; walker.mesh().positions.len()];
     for (t, corners) in walker.mesh().triangles.iter().enumerate() {

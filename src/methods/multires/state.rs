@@ -1,5 +1,5 @@
-//! Saving a run and going on with it, bit for bit. A state holds the deformed base and its link; the decomposition is made
-//! again from the same options, and the detail put back.
+//! Saves a run and restores it bit for bit. A state holds the deformed base and its map T; the decomposition is made
+//! again from the same options, and the detail reconstructed.
 
 use super::link::{Link, Linked};
 use super::motion::Movers;
@@ -12,14 +12,14 @@ use serde::{Deserialize, Serialize};
 
 const MARK: Mark = *b"VSCLMRS\x02";
 
-/// Everything a run has beside its decomposition.
+/// The saved state: everything of a run but its decomposition.
 #[derive(Serialize, Deserialize)]
 struct State {
     fingerprint: u64,
     params: MultiresParams,
     movers: Movers,
     surface: Mesh,
-    /// Triangle and weights of each slot.
+    /// Triangle and barycentric coordinates of the map T, by slot.
     link: Vec<(u32, Vec3)>,
     iteration: u32,
     passing: u32,
@@ -28,7 +28,7 @@ struct State {
 }
 
 impl MultiresolutionModel {
-    /// The run as bytes, without the surfaces it was made of.
+    /// Serialises the run, without the surfaces that it was made from.
     pub fn save(&self) -> Vec<u8> {
         sealed(
             &MARK,
@@ -46,10 +46,10 @@ impl MultiresolutionModel {
         )
     }
 
-    /// Goes on from bytes that [`Self::save`] gave, for a model of the same surfaces and first ellipsoids.
+    /// Restores a run from the bytes of [`Self::save`], for a model of the same surfaces and initial ellipsoids.
     ///
     /// # Errors
-    /// [`MethodError::BadState`] where the bytes are none of those; the run is then as it was.
+    /// [`MethodError::BadState`] for any other bytes; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
         let state: State = opened(&MARK, bytes)?;
         let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
@@ -74,7 +74,7 @@ impl MultiresolutionModel {
         Ok(())
     }
 
-    /// Places on the base; nothing where one has no such triangle.
+    /// Restores the points of the map T; `None` if one refers to a triangle that does not exist.
     fn linked(&self, places: &[(u32, Vec3)]) -> Option<Link> {
         let base = &self.bands.base().walker;
         let count = base.mesh().triangles.len();
@@ -85,7 +85,7 @@ impl MultiresolutionModel {
         places.iter().map(place).collect()
     }
 
-    /// A number that tells decompositions apart.
+    /// Returns a hash of all surfaces, which identifies the decomposition.
     fn fingerprint(&self) -> u64 {
         let mut hash = Hash::new();
         for band in &self.bands.all {

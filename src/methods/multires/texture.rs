@@ -1,17 +1,18 @@
-//! Texture coordinates of the deformed surface: those of the place on the finest one, seams respected (section 7).
+//! Texture coordinates of the deformed surface, taken from the corresponding points of the finest surface; seams are
+//! respected (section 7).
 
 use super::link::{Link, Linked};
 use crate::math::{Vec2, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, VertexId};
 use crate::spatial::SurfaceWalker;
 
-/// Coordinates at the corners of a triangle that lie further apart than this many times what its size in space calls for
-/// belong to two sides of a seam. With less, stretched texture is taken for a seam; with much more, narrow strips of the
-/// whole texture show along it.
+/// A triangle whose texture coordinates are farther apart than this multiple of what its size implies crosses a seam.
+/// With a smaller value, stretched texture is mistaken for a seam; with a much larger one, narrow strips of the whole
+/// texture appear along it.
 const JUMP: f32 = 6.0;
 
-/// Texture coordinates by corner of each triangle, in the order of [`Mesh::triangles`]; nothing where the finest surface
-/// has none.
+/// Returns texture coordinates by corner of each triangle, in the order of [`Mesh::triangles`]; `None` if the finest
+/// surface has none. `places` are the corresponding points on the finest surface, by slot.
 pub(super) fn corner_uvs(mesh: &Mesh, places: &Link, finest: &SurfaceWalker) -> Option<Vec<[Vec2; 3]>> {
     let source = finest.mesh();
     if source.uvs.is_none() && source.corner_uvs.is_none() {
@@ -30,7 +31,7 @@ fn of_triangle(corners: [VertexId; 3], places: &Link, finest: &SurfaceWalker) ->
     if spread <= JUMP * size * density(finest, at[0].triangle) {
         return own;
     }
-    // All three from one side of the seam, that of the middle.
+    // All three from one side of the seam, that of the centroid.
     let middle: Linked = finest.march(at[0].triangle, (p + q + r) * (1.0 / 3.0)).into();
     at.map(|at| continued(finest, middle.triangle, at.point))
 }
@@ -51,7 +52,7 @@ fn uv_at(mesh: &TriangleMesh, at: &Linked) -> Vec2 {
     blend(triangle_uvs(mesh, at.triangle), at.weights)
 }
 
-/// Length in the texture for a length in space, at a triangle.
+/// Returns the length in the texture per length in space, at a triangle.
 fn density(finest: &SurfaceWalker, triangle: u32) -> f32 {
     let [a, b, c] = triangle_uvs(finest.mesh(), triangle);
     let [p, q, r] = finest.corners(triangle);
@@ -59,7 +60,7 @@ fn density(finest: &SurfaceWalker, triangle: u32) -> f32 {
     in_texture / p.distance(q).max(q.distance(r)).max(r.distance(p)).max(f32::MIN_POSITIVE)
 }
 
-/// The coordinates that a triangle's own would have at a point beside it.
+/// Extrapolates the texture coordinates of a triangle to a point beside it.
 fn continued(finest: &SurfaceWalker, triangle: u32, p: Vec3) -> Vec2 {
     let [a, b, c] = finest.corners(triangle);
     let normal = (b - a).cross(c - a);

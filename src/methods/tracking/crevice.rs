@@ -1,6 +1,7 @@
-//! What has no boundary any more, or not yet. Where two walls of a crevice have met, inside and outside look alike, and the
-//! surface would stay between them as a sheet without volume, from which folds come. Where a crevice opens, what is bright goes
-//! on before the surface, too far for points of the boundary to pull it there.
+//! Handles parts of the surface that have lost their boundary in the image, or have none yet. Where two walls have met,
+//! inside and outside have the same intensity: the surface between them would remain as a sheet without volume, which
+//! causes folds, so it is collapsed. Where a gap opens, the bright region advances faster than boundary points can
+//! attract the surface, so the surface grows into it.
 
 use super::follow::{Follower, FrameFacts, Going, Ground, middle};
 use super::project::Onto;
@@ -11,27 +12,28 @@ use crate::remesh::{Changes, restructure};
 use crate::spatial::PointGrid;
 use std::collections::BTreeSet;
 
-/// How often what is left without a boundary is looked for at most, and at least where there is any.
+/// Maximum number of rounds that search for vertices without a boundary, and the minimum if there are any.
 const ROUNDS: usize = 10;
 const LEAST_ROUNDS: usize = 2;
 
-/// Rounds end where this share is left of what was left before.
+/// Rounds end when at least this share of the vertices without a boundary remains from the round before.
 const LITTLE_PROGRESS: f64 = 0.9;
 
-/// In each round, moves of what has no boundary.
+/// Number of vertex moves in each round.
 const MOVES: usize = 2;
 
-/// Walls of a sheet are no further apart, in the shortest side of a voxel.
+/// Largest distance between the two walls of a sheet, in the shortest side of a voxel.
 const THICKNESS: f64 = 1.5;
 
-/// Walls of a sheet face away from each other: the greatest cosine of their normals.
+/// Largest cosine between the normals of the two walls of a sheet, which face away from each other.
 const OPPOSITE: f32 = -0.3;
 
-/// The share of the way to the middle of its neighbours that a vertex goes besides, where it goes on into what is bright.
+/// Share of the displacement to the mean of its neighbours that is added for a vertex that grows.
 const SMOOTHING: f32 = 0.5;
 
 impl Follower {
-    /// Draws in the sheets in crevices that have closed, grows into those that open, and smooths what else has no boundary.
+    /// Collapses sheets between walls that have met, grows the surface into bright regions, and smooths the other
+    /// vertices without a boundary. Counts them in `facts`, and returns the edits.
     pub fn retract(&mut self, mesh: &mut Mesh, going: &Going, facts: &mut FrameFacts) -> Changes {
         let mut changes = Changes::default();
         let mut grown = BTreeSet::new();
@@ -55,7 +57,7 @@ impl Follower {
                 grown.extend(self.move_lost(mesh, going));
             }
         }
-        // They have come near points of the boundary.
+        // Growing has brought these vertices near points of the boundary.
         let grown: Vec<VertexId> = grown.into_iter().filter(|&v| mesh.is_live(v)).collect();
         if !grown.is_empty() {
             let still = vec![Vec3::ZERO; mesh.slots()];
@@ -64,8 +66,8 @@ impl Follower {
         changes
     }
 
-    /// Moves vertices without a boundary: into what is bright, if they are in the midst of it and on no sheet; else to the
-    /// middle of their neighbours. Returns those that grow.
+    /// Moves vertices without a boundary: outwards if they are surrounded by bright voxels and on no sheet, else to the
+    /// mean of their neighbours. Returns the vertices that moved outwards.
     fn move_lost(&mut self, mesh: &mut Mesh, going: &Going) -> Vec<VertexId> {
         let lost = lost(mesh, going);
         let sheets = sheets(mesh, &lost, going);
@@ -85,7 +87,8 @@ impl Follower {
         grown
     }
 
-    /// Draws vertices together into their neighbours, from the innermost to the rim; returns how many are gone.
+    /// Collapses the vertices of sheets into their neighbours, from the innermost to the rim; returns the number of
+    /// collapses.
     fn draw_in(&mut self, mesh: &mut Mesh, sheets: &[VertexId]) -> u32 {
         self.guard.follow_with(mesh, self.bounds.max);
         let depth = depths(mesh, sheets);
@@ -107,13 +110,14 @@ impl Follower {
     }
 }
 
-/// Vertices without a boundary, and what they are in.
+/// Returns the vertices without a boundary, and the intensity around each.
 fn lost(mesh: &Mesh, going: &Going) -> Vec<(VertexId, Ground)> {
     let ground = |v: VertexId| (v, going.ground(mesh.position(v), mesh.area_normal(v)));
     mesh.vertices().map(ground).filter(|(_, ground)| *ground != Ground::Boundary).collect()
 }
 
-/// Those among `lost` that have another one close by that faces the other way, in order.
+/// Returns the vertices among `lost` that are on a sheet: another one close by faces the opposite way. In ascending
+/// order.
 fn sheets(mesh: &Mesh, lost: &[(VertexId, Ground)], going: &Going) -> Vec<VertexId> {
     let thickness = (THICKNESS * going.region.spacing.min_element()) as f32;
     let positions: Vec<Vec3> = lost.iter().map(|&(v, _)| mesh.position(v)).collect();
@@ -130,7 +134,8 @@ fn sheets(mesh: &Mesh, lost: &[(VertexId, Ground)], going: &Going) -> Vec<Vertex
     (0..lost.len()).filter(|&i| has_opposite(i)).map(|i| lost[i].0).collect()
 }
 
-/// By slot, the edges from a vertex of the sheets to the nearest one of no sheet; 0 for those.
+/// Returns for each vertex of the sheets the number of edges to the nearest vertex off the sheets, by slot; 0 for other
+/// vertices.
 fn depths(mesh: &Mesh, sheets: &[VertexId]) -> Vec<u32> {
     let mut depth = vec![0; mesh.slots()];
     sheets.iter().for_each(|v| depth[v.index()] = u32::MAX);

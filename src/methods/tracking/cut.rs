@@ -1,5 +1,6 @@
-//! Where the box cuts through what is bright. Blood goes on from a chamber into the next, and no step in intensity says where
-//! the one ends: the box does. Its sides are boundary there, as sure as any, and the surface is closed.
+//! The sides of the box as boundary where they cut a bright region. Blood continues from one chamber into the next
+//! without a step in intensity, so the box ends the region: its sides get faces of full weight there, and the surface
+//! is closed.
 
 use super::region::Region;
 use super::sides::{Part, nearest_sides, sides};
@@ -13,7 +14,7 @@ impl Region {
         (0..3).all(|axis| (first[axis]..=last[axis]).contains(&at[axis]))
     }
 
-    /// The voxels before and after a face; the same one for faces along time.
+    /// Returns the voxels before and after a face; the same voxel twice for a face along time.
     fn beside(&self, direction: usize, voxel: u32) -> [[usize; 3]; 2] {
         let before = self.voxel(voxel);
         let mut after = before;
@@ -23,7 +24,7 @@ impl Region {
         [before, after]
     }
 
-    /// The way out through a face in a side of the box.
+    /// Returns the outward direction through a face in a side of the box; `None` for all other faces.
     pub fn cut(&self, direction: usize, voxel: u32) -> Option<DVec3> {
         match self.beside(direction, voxel).map(|at| self.is_inside(at)) {
             [true, false] => Some(DVec3::AXES[direction]),
@@ -32,7 +33,8 @@ impl Region {
         }
     }
 
-    /// How far a voxel lies beyond the box, along the axis where it is furthest; no more than 0 inside.
+    /// Returns the distance from a voxel's centre to the box along the axis where it is largest, in world units;
+    /// negative infinity inside.
     pub fn beyond(&self, at: [usize; 3]) -> f64 {
         let [first, last] = self.inner;
         let beyond = |axis: usize| {
@@ -42,7 +44,7 @@ impl Region {
         (0..3).map(beyond).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// The voxel of the box that is nearest to a place outside of it; nothing for places inside.
+    /// Returns the voxel of the box nearest to a position outside; `None` for positions inside.
     pub fn nearest_inside(&self, place: DVec3) -> Option<u32> {
         let [first, last] = self.inner.map(|at| DVec3::from(at.map(|i| i as f64)));
         let at = place / self.spacing;
@@ -52,19 +54,19 @@ impl Region {
         (!is_inside).then_some((z * ny + y) * nx + x)
     }
 
-    /// Takes away the faces beyond the box, and adds its sides where a frame is bright.
+    /// Removes the faces beyond the box, and adds faces in its sides where the frame is bright.
     pub fn close(&self, frame: usize, faces: &mut Faces) {
         for (direction, list) in faces.iter_mut().enumerate() {
             list.retain(|face| self.beside(direction, face.voxel).iter().all(|&at| self.is_inside(at)));
         }
-        // Where no wall goes through a side, the nearest one tells.
+        // Used for sides that no wall crosses: there, the nearest wall decides.
         let whole = OnceCell::new();
         let whole =
             || whole.get_or_init(|| nearest_sides(self, frame, faces, Part { ends: self.inner })).as_deref();
         let added = [X, Y, Z].map(|direction| {
             let [first, last] = self.inner.map(|at| at[direction]);
             let mut list = Vec::new();
-            // A face comes after its voxel.
+            // A face is indexed by the voxel before it.
             if let Some(before) = first.checked_sub(1) {
                 list.extend(self.cut_faces(frame, faces, direction, [first, before], whole));
             }
@@ -76,7 +78,8 @@ impl Region {
         faces.iter_mut().zip(added).for_each(|(list, added)| list.extend(added));
     }
 
-    /// Faces in a side of the box where the `layer` of voxels along it is bright; they lie after the voxels `at` there.
+    /// Returns faces in a side of the box where the adjacent `layer` of voxels is bright; `at` is the layer of the
+    /// voxels before the faces.
     fn cut_faces<'a>(
         &self,
         frame: usize,
@@ -103,7 +106,7 @@ impl Region {
         bright.map(|i| Face { voxel: voxel(i), weight: 1.0 }).collect()
     }
 
-    /// The voxels inside at the faces in the sides of the box, in order.
+    /// Returns the voxels of the box that are adjacent to faces in its sides, sorted.
     pub fn cut_voxels(&self, faces: &Faces) -> Vec<u32> {
         let [nx, ny, _] = self.dims;
         let mut voxels = Vec::new();

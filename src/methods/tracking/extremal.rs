@@ -1,28 +1,29 @@
-//! The plane that fits the points around a place best (section 3): weighted least squares, in space or in space-time.
+//! The weighted least-squares plane through the boundary points around a position (section 3), in space or in
+//! space-time.
 
 use super::samples::Sums;
 use crate::math::{DVec3, symmetric};
 
-/// A plane through the points around a place.
+/// A least-squares plane through the points around a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fit {
-    /// Of length 1 in space and, with the next, in space-time. Which of the two sides it points to means nothing.
+    /// The spatial part of the normal, of unit length together with `along_time`; its sign is arbitrary.
     pub normal: DVec3,
-    /// Along time, in c frames.
+    /// The temporal component of the normal, for time in units of c per frame; 0 for a plane in space.
     pub along_time: f64,
-    /// From the place to the plane, along the normal.
+    /// Signed distance from the position to the plane, along the normal.
     pub distance: f64,
-    /// The weight of the points, all together.
+    /// Total weight of the points.
     pub weight: f64,
 }
 
-/// Points that weigh less than this, all together, are none.
+/// Smallest total weight of points that a plane is fitted to.
 const LEAST_WEIGHT: f64 = 1e-3;
 
-/// Points spread over time by less than this share of what they do in space are of one moment.
+/// Points whose variance in time is at most this share of their variance in space are fitted in space only.
 const LEAST_DURATION: f64 = 1e-6;
 
-/// In space: n is the direction in which the points spread least.
+/// Fits a plane in space: its normal is the direction of least variance. `None` if there are too few points.
 pub(super) fn plane(sums: &Sums) -> Option<Fit> {
     let [mean, covariance] = moments(sums)?;
     let [xx, xy, xz, _, yy, yz, _, zz, ..] = covariance;
@@ -31,10 +32,10 @@ pub(super) fn plane(sums: &Sums) -> Option<Fit> {
     Some(Fit { normal, along_time: 0.0, distance, weight: sums.weight })
 }
 
-/// In space-time.
+/// Fits a hyperplane in space-time. `None` if there are too few points.
 pub(super) fn hyperplane(sums: &Sums) -> Option<Fit> {
     let [mean, c] = moments(sums)?;
-    // Of a single moment: in space-time all planes of that moment would fit, in space there is one.
+    // All points are of a single moment: in space-time every hyperplane through their plane would fit.
     if c[9] <= LEAST_DURATION * (c[0] + c[4] + c[7]) {
         return plane(sums);
     }
@@ -49,7 +50,8 @@ pub(super) fn hyperplane(sums: &Sums) -> Option<Fit> {
     Some(Fit { normal: DVec3::new(n[0], n[1], n[2]), along_time: n[3], distance, weight: sums.weight })
 }
 
-/// Mean and covariance; those of mean products in the order of the sums. Where there are points.
+/// Returns the mean and the covariance, with products in the order of [`Sums::second`]; `None` if there are too few
+/// points.
 fn moments(sums: &Sums) -> Option<[[f64; 10]; 2]> {
     if sums.weight < LEAST_WEIGHT {
         return None;

@@ -1,4 +1,5 @@
-//! The mesh of the first frame (section 4.1): a signed distance from the boundary's points, and its zero.
+//! The mesh of the first frame (section 4.1): a signed distance from the boundary points, and its zero level by
+//! marching cubes.
 
 use super::extremal::plane;
 use super::region::Region;
@@ -10,20 +11,21 @@ use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::volume::{Grid, marching_cubes};
 
-/// The distance is that from points within this share of the radius; further off only the side counts.
+/// Half-width of the band around the points in which their distance is used, as a share of the radius; elsewhere only
+/// the inside/outside labelling counts.
 const BAND: f64 = 0.8;
 
-/// Voxels to either side that the slope of intensity is taken over.
+/// Voxels to either side over which the intensity gradient is estimated.
 const SLOPE: usize = 2;
 
-/// A point of the boundary, with the direction out of what is bright.
+/// A boundary point with its normal, which points from bright to dark.
 struct Oriented {
     at: DVec3,
     normal: DVec3,
     weight: f64,
 }
 
-/// The surface of all that is bright in the first frame, in the world.
+/// Returns the surface of all bright regions in the first frame, in world coordinates; empty without a boundary.
 pub(super) fn bright_surface(
     region: &Region,
     faces: &Faces,
@@ -37,7 +39,7 @@ pub(super) fn bright_surface(
     let value = |i: usize| {
         let at = region.voxel(i as u32);
         let side = if part.index(at).is_some_and(|i| is_bright[i]) { band } else { -band };
-        // Beyond the box there is nothing.
+        // Beyond the box everything is outside.
         let most = -region.beyond(at);
         distance[i].unwrap_or(side).clamp(-band, band).min(most) as f32
     };
@@ -46,7 +48,7 @@ pub(super) fn bright_surface(
     Ok(mesh.transformed(&(region.to_world * DAffine3::from_scale(region.spacing))))
 }
 
-/// The faces' middles, each with the normal of the plane through what is around it, turned to where intensity falls.
+/// Returns the face centres with the normals of their fitted planes, oriented towards falling intensity.
 fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
     let field = Field::still(region, falloff, faces);
     let mut points = Vec::new();
@@ -63,7 +65,7 @@ fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
     points
 }
 
-/// The direction in which intensity rises around a voxel: the slope of the line that fits it over each axis.
+/// Returns the direction in which intensity rises around a voxel: the covariance of intensity and position.
 fn slope(region: &Region, voxel: [usize; 3]) -> DVec3 {
     let [nx, ny, _] = region.dims;
     let range = |k: usize| voxel[k].saturating_sub(SLOPE)..(voxel[k] + SLOPE + 1).min(region.dims[k]);
@@ -83,7 +85,8 @@ fn slope(region: &Region, voxel: [usize; 3]) -> DVec3 {
     sum - first * (mean / count)
 }
 
-/// At each voxel near points, the weighted mean of its distances from their planes, positive inside.
+/// Returns the weighted mean of the signed distances to the planes of nearby points, for each voxel in their band;
+/// positive inside.
 fn distances(region: &Region, points: &[Oriented], band: f64) -> Vec<Option<f64>> {
     let [nx, ny, nz] = region.dims;
     let mut sums = vec![(0.0f64, 0.0f64); nx * ny * nz];

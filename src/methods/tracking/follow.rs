@@ -1,4 +1,5 @@
-//! From one frame to the next (section 4): prediction, projection, what has no boundary, folds, and connectivity.
+//! Tracks the mesh from one frame to the next (section 4): prediction, projection, parts without a boundary, folds, and
+//! connectivity.
 
 use super::TrackingParams;
 use super::project::{Moment, Onto};
@@ -9,71 +10,73 @@ use crate::mesh::{Mesh, VertexId, curvature, measure};
 use crate::remesh::{Changes, EdgeBounds, Embedding, restructure};
 use serde::{Deserialize, Serialize};
 
-/// How often predictions and bends are smoothed over the mesh: raw, they are worse than none.
+/// Smoothing passes over the mesh for predictions and curvature corrections: raw, either is worse than none.
 const SMOOTHINGS: usize = 5;
 
-/// What a bend takes away is given back up to this, in the shortest side of a voxel: where it is more, it is a corner.
+/// Largest curvature correction of a vertex, in the shortest side of a voxel; larger ones occur at sharp corners.
 const MOST_UNBENT: f64 = 0.3;
 
-/// How often folds are smoothed in a frame.
+/// Maximum number of passes that smooth folds in a frame.
 const UNFOLDINGS: usize = 3;
 
-/// How often the first frame is settled: its mesh comes from a grid, not from a frame before.
+/// Number of times that the mesh is projected in the first frame: it comes from a grid, not from a tracked frame.
 const FIRST_SETTLINGS: usize = 3;
 
-/// A vertex with less of a step in intensity along its normal than this share of τ is on no boundary.
+/// A vertex is on a boundary if intensity falls along its normal by at least this share of τ.
 const LEAST_STEP: f64 = 0.3;
 
-/// By how much of the way to the middle of their neighbours vertices are spaced along the surface in a frame.
+/// Share of the tangential displacement to the mean of the neighbours by which vertices are spaced in each frame.
 const SPACING: f32 = 0.5;
 
-/// What happened in a frame, and what came out.
+/// Measurements of the surface in one frame, and counts of what tracking did there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FrameFacts {
-    /// What the surface encloses, cubed world units.
+    /// Volume enclosed by the surface, in cubed world units.
     pub volume: f64,
-    /// Its area, squared world units.
+    /// Area of the surface, in squared world units.
     pub area: f64,
-    /// Its triangles.
+    /// Number of triangles.
     pub triangles: usize,
-    /// Those that face away from their three neighbours.
+    /// Number of folded triangles, which face away from the sum of their three neighbours.
     pub folded: usize,
-    /// Projections that led nowhere, or too far.
+    /// Number of projections that found no points or moved too far.
     pub rejected: usize,
-    /// Moves that were held back, so that nothing crosses.
+    /// Number of vertex moves in projections and curvature corrections that were shortened to avoid self-intersections.
     pub held: usize,
-    /// Vertices that had no boundary: drawn together where a crevice has closed, grown where one has opened, else smoothed.
+    /// Number of vertices without a boundary: collapsed between walls that have met, grown into gaps that open, else
+    /// smoothed.
     pub retracted: usize,
-    /// Steps of a vertex's projections, onto space-time and onto the frame, in the mean.
+    /// Mean number of projection steps per vertex, over the projections onto space-time and onto the frame together.
     pub steps: f64,
-    /// How far the last projection moved the vertices, in the mean, world units.
+    /// Mean displacement of the vertices by the last projection, in world units.
     pub correction: f64,
 }
 
-/// Into which frame it goes, and by what.
+/// The frame that the mesh is tracked into, with its image and parameters.
 pub(super) struct Going<'a> {
     pub region: &'a Region,
     pub params: &'a TrackingParams,
     pub frame: usize,
-    /// What is around that frame.
+    /// The boundary points around that frame in time.
     pub into: &'a Moment,
-    /// It knows the levels of that frame.
+    /// The levels between bright and dark; those of that frame are known.
     pub voting: &'a Voting,
 }
 
-/// What a piece of the surface lies on.
+/// The image around a point of the surface: whether there is a boundary, and if not, its intensity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ground {
-    /// It is brighter inside than outside, or the box cuts what is bright.
+    /// Inside is brighter than outside, or the box cuts a bright region.
     Boundary,
-    /// On both sides of it everything is bright.
+    /// Both sides are bright.
     Bright,
-    /// Neither.
+    /// Neither of these.
     Dark,
 }
 
 impl Going<'_> {
-    /// What is one voxel inside and one outside.
+    /// Classifies a point of the surface by the intensities one voxel inside and one voxel outside, in the shortest
+    /// side of a voxel.
     pub fn ground(&self, at: Vec3, normal: Vec3) -> Ground {
         let region = self.region;
         let way = region.from_world.transform_vector3(normal.as_dvec3()).normalize_or_zero()
@@ -93,11 +96,11 @@ impl Going<'_> {
     }
 }
 
-/// Takes one mesh, in the world, through the frames.
+/// Tracks one mesh, in world coordinates, through the frames.
 #[derive(Clone, Debug)]
 pub(super) struct Follower {
     pub(super) guard: Embedding,
-    /// The mean edge of the first frame's mesh.
+    /// Mean edge length of the mesh in the first frame; the edge bounds are multiples of it.
     pub edge: f64,
     pub(super) bounds: EdgeBounds,
 }
@@ -107,7 +110,7 @@ impl Follower {
         Self { guard: Embedding::default(), edge, bounds: EdgeBounds { min: 0.0, max: 0.0 } }
     }
 
-    /// Into the next frame, from what is around the one before where there is one.
+    /// Moves the mesh into the next frame, with a prediction from the samples of the frame before, if any.
     pub fn go(&mut self, mesh: &mut Mesh, from: Option<&Moment>, going: &Going) -> (Changes, FrameFacts) {
         let mut facts = FrameFacts::default();
         let bound = |share: f64| (share * self.edge) as f32;
@@ -128,7 +131,7 @@ impl Follower {
         (changes, facts)
     }
 
-    /// Onto the surface of a frame, from so far on, with edges in bounds.
+    /// Projects the mesh, displaced by `ahead`, onto the surface of a frame, and restores its edge bounds.
     fn settle(
         &mut self,
         mesh: &mut Mesh,
@@ -144,8 +147,9 @@ impl Follower {
         changes
     }
 
-    /// The plane through the points of a bent surface lies on its inner side: by the spread of the points along it, R²/8 for
-    /// θ = exp(−4r²/R²), times the mean curvature. Vertices go back by as much.
+    /// Corrects the bias of the fitted planes on curved surfaces: a plane lies on the inner side by the variance of the
+    /// points along it, R²/8 for θ = exp(−4r²/R²), times the mean curvature. Vertices move along their normals by as
+    /// much, outwards where the surface is convex.
     fn unbend(&mut self, mesh: &mut Mesh, going: &Going, facts: &mut FrameFacts) {
         let spread = (going.params.radius * going.params.radius / 8.0) as f32;
         let most = (MOST_UNBENT * going.region.spacing.min_element()) as f32;
@@ -159,7 +163,8 @@ impl Follower {
         facts.held += self.carry(mesh, ways);
     }
 
-    /// Where the surface is folded, vertices go to the middle of their neighbours. Returns how many triangles stay folded.
+    /// Moves the vertices of folded triangles to the mean of their neighbours. Returns the number of triangles that
+    /// stay folded.
     fn unfold(&mut self, mesh: &mut Mesh) -> usize {
         let mut folds = folded(mesh);
         for _ in 0..UNFOLDINGS {
@@ -176,7 +181,7 @@ impl Follower {
         folds.len()
     }
 
-    /// All vertices onto the surface, and how far that was.
+    /// Projects all vertices, and adds the mean number of steps and the mean displacement to `facts`.
     fn project_all(
         &mut self,
         mesh: &mut Mesh,
@@ -192,8 +197,8 @@ impl Follower {
         facts.correction = way / count;
     }
 
-    /// Vertices onto the surface, from where they are when they have gone `ahead`: one move, which is looked at once. Returns
-    /// the steps and the way that it took them from there, all together.
+    /// Projects vertices onto the surface of a frame, each displaced by `ahead` first. All move at once, with one
+    /// collision test. Returns the total number of steps, and the total displacement by the projection.
     pub(super) fn project(
         &mut self,
         mesh: &mut Mesh,
@@ -223,14 +228,15 @@ impl Follower {
         (steps, sum)
     }
 
-    /// How many were held back.
+    /// Moves the vertices by `ways` under the collision guard. Returns the number held back.
     pub(super) fn carry(&mut self, mesh: &mut Mesh, mut ways: Vec<Vec3>) -> usize {
         self.guard.follow_with(mesh, self.bounds.max);
         self.guard.carry(mesh, &mut ways).len()
     }
 }
 
-/// On to where the surface is going to be in the next frame, by how it passes through `moment`.
+/// Predicts the displacement of each vertex to the next frame, by slot, from the slope of the space-time surface;
+/// smoothed over the mesh.
 fn prediction(mesh: &Mesh, region: &Region, moment: &Moment) -> Vec<Vec3> {
     let mut ways = vec![Vec3::ZERO; mesh.slots()];
     for v in mesh.vertices() {
@@ -240,7 +246,7 @@ fn prediction(mesh: &Mesh, region: &Region, moment: &Moment) -> Vec<Vec3> {
     (0..SMOOTHINGS).fold(ways, |ways, _| means(mesh, &ways))
 }
 
-/// Along the surface towards the middle of the neighbours.
+/// Returns tangential displacements towards the mean of the neighbours, by slot, which even out the vertices.
 fn spacing(mesh: &Mesh) -> Vec<Vec3> {
     let mut ways = vec![Vec3::ZERO; mesh.slots()];
     for v in mesh.vertices() {
@@ -256,7 +262,7 @@ pub(super) fn middle(mesh: &Mesh, v: VertexId) -> Vec3 {
     ring.iter().fold(Vec3::ZERO, |sum, &w| sum + mesh.position(w)) * (1.0 / ring.len() as f32)
 }
 
-/// Each the mean of those of the neighbours.
+/// Returns for each vertex the mean of its neighbours' displacements.
 fn means(mesh: &Mesh, ways: &[Vec3]) -> Vec<Vec3> {
     let mut out = vec![Vec3::ZERO; ways.len()];
     for v in mesh.vertices() {
@@ -267,7 +273,7 @@ fn means(mesh: &Mesh, ways: &[Vec3]) -> Vec<Vec3> {
     out
 }
 
-/// Those that were `rejected` with the mean of their neighbours.
+/// Fills in each `rejected` vertex with the mean displacement of its neighbours.
 fn filled(mesh: &Mesh, ways: &[Option<Vec3>], rejected: &[VertexId]) -> Vec<Vec3> {
     let mut out: Vec<Vec3> = ways.iter().map(|way| way.unwrap_or(Vec3::ZERO)).collect();
     for &v in rejected {
@@ -278,7 +284,7 @@ fn filled(mesh: &Mesh, ways: &[Option<Vec3>], rejected: &[VertexId]) -> Vec<Vec3
     out
 }
 
-/// Triangles that face away from the sum of their three neighbours.
+/// Returns the triangles that face away from the sum of their three neighbours.
 fn folded(mesh: &Mesh) -> Vec<[VertexId; 3]> {
     let normal = |[a, b, c]: [VertexId; 3]| {
         let [a, b, c] = [a, b, c].map(|v| mesh.position(v));
@@ -288,7 +294,7 @@ fn folded(mesh: &Mesh) -> Vec<[VertexId; 3]> {
         |a: VertexId, b: VertexId| mesh.ring(a).before(b).map_or(Vec3::ZERO, |tip| normal([b, a, tip]));
     let mut folded = Vec::new();
     for v in mesh.vertices() {
-        // Each triangle from its lowest corner.
+        // Each triangle once, from its lowest corner.
         for (a, b) in mesh.ring(v).pairs().filter(|&(a, b)| v < a && v < b) {
             if (across(v, a) + across(a, b) + across(b, v)).dot(normal([v, a, b])) < 0.0 {
                 folded.push([v, a, b]);

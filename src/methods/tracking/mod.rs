@@ -1,19 +1,20 @@
-//! A dynamic surface through a 4D image.
+//! A dynamic surface tracked through a 4D image.
 //!
-//! Dynamic surfaces from 4D cardiac MRI by weighted points in space-time. Windows of the image vote for the faces between
-//! bright and dark voxels (`vote`; section 2). The votes are weighted points in space-time, whose extremal surface is where a
-//! place lies on the plane that fits the points around it (`samples`, `extremal`; section 3). The first frame's surface is
-//! meshed (`first`; section 4.1), and taken from frame to frame by prediction and projection (`project`, `follow`; sections
-//! 3.3, 4.2 and 4.3).
+//! After the paper on dynamic surfaces from 4D cardiac MRI by weighted points in space-time. Windows of the image vote
+//! for the faces between bright and dark voxels (`vote`; section 2). The votes are weighted points in space-time; their
+//! extremal surface consists of the positions that lie on the plane fitted to the points around them (`samples`,
+//! `extremal`; section 3). The surface of the first frame is meshed (`first`; section 4.1), and tracked from frame to
+//! frame by prediction and projection (`project`, `follow`; sections 3.3, 4.2 and 4.3).
 //!
-//! # What it guarantees
-//! After every step the surface is closed, oriented and 2-manifold, and no two triangles cross. The same input gives the same
-//! bits, natively and in wasm.
+//! # Guarantees
+//! After every step the surface is a closed, oriented 2-manifold without self-intersections. The same input gives the
+//! same bits, natively and in wasm.
 //!
-//! # What is not the paper's
-//! The first frame's distance is that from oriented points (the plane's own, equation 6, has no sign away from them). A frame's
-//! last projection is onto its own points alone, and what planes take from bends is given back. Where two walls meet, the sheet
-//! between them has no boundary left; it is drawn together. Nothing is moved so that it crosses.
+//! # Differences from the paper
+//! The first frame uses the distance from oriented points, because the distance from the plane (equation 6) has no sign
+//! away from them. The last projection of a frame is onto that frame's points alone, and the bias of fitted planes on
+//! curved surfaces is corrected. Where two walls meet, the sheet between them has no boundary any more and is
+//! collapsed. No move makes the surface intersect itself.
 
 mod crevice;
 mod cut;
@@ -44,65 +45,66 @@ use region::Region;
 use samples::{Falloff, Field};
 use vote::{Faces, Voting, Window};
 
-/// Which surface of the first frame is followed.
+/// Selects which surface of the first frame is tracked.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Component {
-    /// The one that encloses most.
+    /// The one that encloses the largest volume.
     #[default]
     Largest,
-    /// The one around a point of the world, or nearest to it.
+    /// The one that contains a point in world coordinates, or is nearest to it.
     Nearest(DVec3),
 }
 
-/// A part of a volume.
+/// A region of a volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bounds {
-    /// Opposite corners in the world. Where voxel axes are not those of the world, the box along voxel axes around that one is
-    /// taken.
+    /// Opposite corners in world coordinates. If the voxel axes are rotated, the bounding box along the voxel axes is
+    /// used.
     World([DVec3; 2]),
-    /// The first and the last voxel.
+    /// The first and the last voxel along x, y and z, both inclusive.
     Voxels([[usize; 3]; 2]),
 }
 
-/// How a [`SurfaceTracker`] is set up.
+/// Options to create a [`SurfaceTracker`].
 #[derive(Clone, Debug)]
 pub struct TrackingOptions {
-    /// Two frames or more.
+    /// The 4D image, of two frames or more.
     pub volume: Volume,
-    /// The part that is looked at; all of it without. What is bright where it ends is closed there.
+    /// The region that is processed; by default the whole volume. The surface is closed where its sides cut a bright
+    /// region.
     pub bounds: Option<Bounds>,
-    /// What is followed.
+    /// Which surface is tracked.
     pub component: Component,
-    /// The surface in the first frame; else it is found.
+    /// The surface in the first frame; by default it is extracted from the image.
     pub start: Option<TriangleMesh>,
-    /// Those that are 0 are taken from the volume.
+    /// The parameters; those that are 0 are derived from the volume.
     pub params: TrackingParams,
 }
 
-/// A step of a projection as short as this is the last, in the shortest side of a voxel.
+/// A projection has converged after a step no longer than this, in the shortest side of a voxel.
 const STILL: f64 = 0.012;
 
-/// Projections that lead further are rejected, in the same.
+/// Projections that move a vertex by more than this are rejected, in the shortest side of a voxel.
 const LONGEST: f64 = 4.8;
 
-/// A surface that is followed through the frames of a 4D image.
+/// Tracks a closed surface through the frames of a 4D image.
 #[derive(Clone, Debug)]
 pub struct SurfaceTracker {
     region: Region,
     component: Component,
-    /// The caller's mesh; empty without.
+    /// The caller's mesh for the first frame; empty without one.
     start: Mesh,
     params: TrackingParams,
-    /// Of the volume: the shortest side of a voxel, the noise and the range of intensities.
+    /// Properties of the image that default parameters are derived from.
     image: ImageFacts,
     voting: Voting,
-    /// By frame, as far as they are found.
+    /// The boundary votes by frame, for the frames processed so far.
     faces: Vec<Faces>,
     follower: Option<Follower>,
-    /// Around the newest frame.
+    /// The boundary points around the newest frame.
     moment: Option<Moment>,
     mesh: Mesh,
-    /// By frame, in the world.
+    /// The surface of each frame so far, in world coordinates.
     meshes: Vec<TriangleMesh>,
     facts: Vec<FrameFacts>,
     closing: Option<f64>,
@@ -110,26 +112,27 @@ pub struct SurfaceTracker {
     clock: fn() -> f64,
 }
 
-/// What parameters are taken from where none are given.
+/// Properties of the image that default parameters are derived from.
 #[derive(Clone, Copy, Debug)]
 struct ImageFacts {
-    /// The shortest side of a voxel.
+    /// The shortest side of a voxel, in world units.
     pixel: f64,
-    /// The longest along which there are several.
+    /// The longest side of a voxel among axes with more than one voxel, in world units.
     thickest: f64,
     /// The standard deviation of the noise, in intensity.
     noise: f64,
-    /// The range of intensities.
+    /// The range of intensities, without outliers.
     range: f64,
 }
 
 impl SurfaceTracker {
-    /// A tracker before its first step.
+    /// Creates a tracker before its first step.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`]: parameters, a volume of one frame, or without contrast, or with axes that are not
-    /// at right angles, a box outside of it; a start that is empty, inside out, or with edges shorter than a tenth of a voxel;
-    /// [`MethodError::Mesh`] for a start that is not a closed surface, or crosses itself.
+    /// [`MethodError::InvalidArgument`] for parameters that are not accepted, for a volume with one frame, without
+    /// contrast or with axes that are not at right angles, for a box outside of it, and for a start that is empty,
+    /// inside out, outside the box, or has a mean edge below a tenth of a voxel; [`MethodError::Mesh`] for a start that
+    /// is not a closed surface, or intersects itself.
     pub fn new(options: TrackingOptions) -> Result<Self, MethodError> {
         let TrackingOptions { volume, bounds, component, start, params } = options;
         params.validate()?;
@@ -164,7 +167,7 @@ impl SurfaceTracker {
         Ok(tracker)
     }
 
-    /// Parameters, checked, with what is taken from the volume.
+    /// Validates the parameters, and derives those that are 0 from the volume.
     fn completed(&self, params: TrackingParams) -> Result<TrackingParams, MethodError> {
         params.validate()?;
         let pixel = self.image.pixel;
@@ -179,7 +182,7 @@ impl SurfaceTracker {
         Ok(params)
     }
 
-    /// Back before the first step, with the parameters as they are.
+    /// Resets the run to before its first step, with the current parameters.
     fn begin(&mut self) {
         self.region.threshold = self.params.threshold / self.region.step;
         let window = Window {
@@ -197,11 +200,11 @@ impl SurfaceTracker {
         self.mesh.count_on_from(&replaced);
     }
 
-    /// Live parameters. Those of the boundary (`threshold`, `window`, `windowFrames`, `cyclic`) begin everything again; the
-    /// others hold from the next frame on.
+    /// Sets the parameters during a run. A change of the boundary (`threshold`, `window`, `windowFrames`, `cyclic`)
+    /// restarts the run; other changes apply from the next frame on.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`], and nothing has changed.
+    /// [`MethodError::InvalidArgument`]; nothing has changed then.
     pub fn set_params(&mut self, params: TrackingParams) -> Result<(), MethodError> {
         let params = self.completed(params)?;
         let stands = params.same_boundary(&self.params);
@@ -214,58 +217,59 @@ impl SurfaceTracker {
         Ok(())
     }
 
-    /// Times are told by this clock, in milliseconds.
+    /// Sets the clock, in milliseconds, for [`StepReport::times`]. By default all times are 0.
     pub fn set_clock(&mut self, clock: fn() -> f64) {
         self.clock = clock;
     }
 
-    /// Parameters, with what was taken from the volume.
+    /// Returns the parameters, including those derived from the volume.
     pub fn params(&self) -> &TrackingParams {
         &self.params
     }
 
-    /// The standard deviation of the noise, in intensity.
+    /// Returns the estimated standard deviation of the noise, in intensity; for choosing the threshold.
     pub fn noise(&self) -> f64 {
         self.image.noise
     }
 
-    /// The surface in the newest frame, in the world.
+    /// Returns the surface in the newest frame, in world coordinates.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
 
-    /// The surfaces of the frames so far, in the world: positions and triangles.
+    /// Returns the surfaces of the frames so far, in world coordinates: positions and triangles.
     pub fn meshes(&self) -> &[TriangleMesh] {
         &self.meshes
     }
 
-    /// What happened in the frames so far.
+    /// Returns measurements and counts for each frame so far.
     pub fn facts(&self) -> &[FrameFacts] {
         &self.facts
     }
 
-    /// The frame that the mesh is of: 0 before the first, too.
+    /// Returns the index of the frame that [`Self::mesh`] belongs to; 0 before the first frame is done, too.
     pub fn frame(&self) -> usize {
         self.meshes.len().saturating_sub(1)
     }
 
-    /// The volumes that the surfaces of the frames so far enclose, in cubed world units.
+    /// Returns the volume enclosed by the surface in each frame so far, in cubed world units.
     pub fn volumes(&self) -> Vec<f64> {
         self.facts.iter().map(|facts| facts.volume).collect()
     }
 
-    /// Of a cyclic sequence: how far the surface of the last frame, taken on to the first, is from the first frame's in the
-    /// mean, world units; once it is known.
+    /// Returns the cycle closure error: the mean distance of the last frame's surface, tracked on to the first frame,
+    /// from the surface there, in world units. `None` until it is known, and for sequences that are not cyclic.
     pub fn closing(&self) -> Option<f64> {
         self.closing
     }
 
-    /// So many frames, from the first on, have their boundary.
+    /// Returns the number of frames, from the first on, whose boundary has been found.
     pub fn bounded(&self) -> usize {
         self.faces.len()
     }
 
-    /// The boundary's points in a frame, as far as they are found: x, y, z in the world, t in frames, and the weight.
+    /// Returns the boundary points of a frame: x, y, z in world coordinates, t in frames, and the weight. Empty until
+    /// the boundary of the frame has been found.
     pub fn boundary(&self, frame: usize) -> Vec<[f32; 5]> {
         let Some(faces) = self.faces.get(frame) else { return Vec::new() };
         let mut points = Vec::new();
@@ -279,17 +283,17 @@ impl SurfaceTracker {
         points
     }
 
-    /// Whether all frames are done, and a cycle is closed.
+    /// Whether all frames are done, and the closure error of a cyclic sequence is known.
     pub fn is_done(&self) -> bool {
         self.meshes.len() == self.frames() && (self.closing.is_some() || !self.params.cyclic)
     }
 
-    /// Finds the boundary in one more frame; then follows the surface into one more frame; at last, in a cyclic sequence,
-    /// from the last to the first.
+    /// Processes one more frame: first finds the boundary in every frame, then tracks the surface through them, and
+    /// finally, in a cyclic sequence, from the last frame to the first.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] where there is no boundary at all, or no surface; [`MethodError::Mesh`] and
-    /// [`MethodError::Volume`] where there is no memory for it.
+    /// [`MethodError::InvalidArgument`] if there is no boundary or no closed surface; [`MethodError::Mesh`] and
+    /// [`MethodError::Volume`] if memory does not suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         let began = (self.clock)();
         let mut times = Times::default();
@@ -313,12 +317,12 @@ impl SurfaceTracker {
         Ok(self.report(changes, times))
     }
 
-    /// Frames of the volume.
+    /// Returns the number of frames of the volume.
     pub fn frames(&self) -> usize {
         self.region.frames.len()
     }
 
-    /// The surface in the next frame; where it fails, nothing has changed.
+    /// Tracks the surface into the next frame. If it fails, nothing has changed.
     fn next_frame(&mut self) -> Result<Changes, MethodError> {
         let frame = self.meshes.len();
         let mut follower = match self.follower.take() {
@@ -328,7 +332,7 @@ impl SurfaceTracker {
                 Follower::new(measure(&self.mesh.to_triangles()).edge_mean)
             }
         };
-        // There is one around every frame that was done.
+        // Present for every frame but the first.
         let from = self.moment.take();
         let into = self.moment_of(frame);
         self.voting.know_levels(&self.region, frame);
@@ -341,7 +345,7 @@ impl SurfaceTracker {
         Ok(changes)
     }
 
-    /// From the last frame on to the first: a cycle's surface should come back to where it began.
+    /// Tracks the surface of the last frame on to the first, and measures how far it is from where it began.
     fn close(&mut self) {
         let (Some(mut follower), Some(first)) = (self.follower.clone(), self.meshes.first()) else { return };
         let mut mesh = self.mesh.clone();
@@ -354,16 +358,16 @@ impl SurfaceTracker {
         self.closing = Some(apart.map_or(f64::INFINITY, |distance| distance.mean));
     }
 
-    /// What is around the newest frame that is done.
+    /// Collects the boundary points around the newest frame; `None` before the first.
     fn newest_moment(&self) -> Option<Moment> {
         self.meshes.len().checked_sub(1).map(|frame| self.moment_of(frame))
     }
 
-    /// What is around a frame.
+    /// Collects the boundary points of a frame and of those around it in time.
     fn moment_of(&self, frame: usize) -> Moment {
         let (count, falloff) = (self.frames(), self.falloff());
         let mut field = Field::new(&self.region, falloff);
-        // No frame twice.
+        // In a cycle, no frame is added twice.
         let most = if self.params.cyclic { (count - 1) / 2 } else { count - 1 };
         for offset in falloff.offsets(most) {
             let at = frame as i64 + offset;

@@ -1,30 +1,30 @@
-//! Parameters of the tracker, and what they may be.
+//! Parameters of the tracker, their ranges, defaults and labels.
 
 use super::ImageFacts;
 use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, ParamSpec};
 use serde::{Deserialize, Serialize};
 
-/// Parameters of a [`SurfaceTracker`](super::SurfaceTracker). Those that are 0 are taken from the volume.
+/// Parameters of a [`SurfaceTracker`](super::SurfaceTracker). Those that are 0 are derived from the volume.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", default, deny_unknown_fields)]
 pub struct TrackingParams {
-    /// τ: the least difference of the means of two clusters, in intensity.
+    /// τ: the means of the two clusters of a window must differ by more than this, in intensity.
     pub threshold: f64,
     /// k: a window is (2k + 1) voxels wide along each axis.
     pub window: u32,
-    /// Frames to either side that a window holds: 0 looks at each frame by itself.
+    /// Frames to either side that a window includes; with 0 each frame is processed on its own.
     pub window_frames: u32,
-    /// Where the weight of a point ends, world units: 2h of θ(r) = exp(−r²/h²).
+    /// Radius at which the weight of a point ends, in world units: 2h of θ(r) = exp(−r²/h²).
     pub radius: f64,
-    /// c: the world units that one frame counts as.
+    /// c: the distance that one frame counts as, in world units.
     pub time_scale: f64,
-    /// β: each step of a projection goes by so much less far than the one before.
+    /// β: the scale of each step of a projection is this factor times that of the step before; at least 0.2.
     pub damping: f64,
-    /// c_min: shorter edges are drawn together, in the mean edge of the first frame.
+    /// c_min: shorter edges are collapsed, as a multiple of the mean edge in the first frame.
     pub edge_min: f64,
-    /// c_max: longer edges are split, in the same.
+    /// c_max: longer edges are split, as a multiple of the mean edge in the first frame.
     pub edge_max: f64,
-    /// Whether a frame begins where the surface is going from the one before; else where it was.
+    /// Whether a frame starts from the predicted surface; otherwise it starts from the surface of the frame before.
     pub prediction: bool,
     /// Whether the last frame is followed by the first.
     pub cyclic: bool,
@@ -47,26 +47,30 @@ impl Default for TrackingParams {
     }
 }
 
-/// Where none is given: of noise, whose windows differ by 1.6 deviations, hardly any passes.
+/// Default τ in standard deviations of the noise: noise alone splits windows by 1.6 of them, so hardly any window of
+/// noise passes.
 const THRESHOLD_IN_NOISE: f64 = 4.0;
 
-/// At least this share of the range: images without noise have one, too.
+/// Smallest default τ, as a share of the intensity range: images without noise need a threshold as well.
 const LEAST_THRESHOLD: f64 = 0.05;
 
-/// Two voxels of a slice and a half: less follows noise, more rounds off what is as thin.
+/// Default radius in the shortest side of a voxel, about two voxels and a half: a smaller one follows noise, a larger
+/// one rounds off details of that thickness.
 const RADIUS_IN_PIXELS: f64 = 2.4;
 
-/// More than from slice to slice, or the points of a single one would lie in its own plane.
+/// Smallest default radius in the longest side of a voxel: with a radius below the slice distance, all points would be
+/// of one slice and the plane fitted to them would be the slice itself.
 const RADIUS_IN_SLICES: f64 = 1.2;
 
-/// Of neighbouring frames next to nothing counts, and of the changes in between all: what moves fast is followed then.
+/// Default c as a share of the radius: neighbouring frames then have next to no weight, unlike the temporal faces half
+/// a frame away, so fast motion is followed.
 const TIME_SCALE_IN_RADIUS: f64 = 0.9;
 
 impl TrackingParams {
-    /// Tests all but what is taken from the volume.
+    /// Checks all values but those to be derived from the volume.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] naming the first that is not accepted.
+    /// [`MethodError::InvalidArgument`] naming the first parameter that is not accepted.
     pub fn validate(&self) -> Result<(), MethodError> {
         for (spec, value) in SPECS.iter().zip(self.numbers()) {
             if spec.default != ParamDefault::FromData || value != 0.0 {
@@ -88,13 +92,13 @@ impl TrackingParams {
         [threshold, window, frames, radius, time_scale, damping, edge_min, edge_max]
     }
 
-    /// Whether the boundary that was found under others still stands.
+    /// Whether these parameters give the same boundary votes as `others`, so that those already found remain valid.
     pub(super) fn same_boundary(&self, others: &Self) -> bool {
         let key = |p: &Self| (p.threshold.to_bits(), p.window, p.window_frames, p.cyclic);
         key(self) == key(others)
     }
 
-    /// With what the volume says where nothing is given.
+    /// Replaces parameters that are 0 by values derived from the volume.
     pub(super) fn with_volume(mut self, image: &ImageFacts) -> Self {
         let ImageFacts { pixel, thickest, noise, range } = *image;
         let or = |value: f64, usual: f64| if value == 0.0 { usual } else { value };
@@ -105,7 +109,7 @@ impl TrackingParams {
     }
 }
 
-/// The parameters of the tracker, in the order a page should show them.
+/// Returns the descriptions of the parameters, in the order in which a page should show them.
 pub fn param_specs() -> Vec<ParamSpec> {
     SPECS.to_vec()
 }

@@ -1,41 +1,43 @@
-//! Restricted projection onto the space-time surface in one frame (section 3.3), and prediction (section 4.2).
+//! Restricted projection onto the space-time surface within one frame (section 3.3), and prediction of the next frame
+//! (section 4.2).
 
 use super::extremal::{Fit, hyperplane, plane};
 use super::samples::Field;
 use crate::math::DVec3;
 
-/// Damping of the i-th step is β^i, and no less than this.
+/// Smallest damping factor of a projection step; that of the i-th step is β^i until then.
 const LEAST_DAMPING: f64 = 0.2;
 
-/// Steps of one projection at most.
+/// Maximum number of steps of one projection.
 const STEPS: usize = 30;
 
-/// The frame's plane is the surface itself where the normal has less than this (squared) along space: nothing can be
-/// projected onto it then.
+/// Smallest |n₃|², the squared spatial part of the normal, for a projection: below, the hyperplane is nearly parallel
+/// to the frame, and cuts it in no well-defined plane.
 const LEAST_SLOPE: f64 = 0.05;
 
-/// What is around one frame in time, and how places are projected there.
+/// The boundary points around one frame in time, and the parameters of projections there.
 #[derive(Clone, Debug)]
 pub(super) struct Moment {
-    /// The points of the frame and of those around it.
+    /// Points of the frame and of those around it.
     pub field: Field,
-    /// Those of the frame alone.
+    /// Points of the frame alone.
     pub own: Field,
-    /// Voxels of the frame at the sides of the box where they are bright, in order.
+    /// Voxels of the frame that are bright at a side of the box, sorted.
     pub cut: Vec<u32>,
-    /// World units that one frame counts as: c.
+    /// c: the distance that one frame counts as, in world units.
     pub time_scale: f64,
     pub damping: f64,
-    /// A step as short as this is the last.
+    /// A projection has converged after a step no longer than this, in world units.
     pub still: f64,
-    /// Projections that lead further are rejected.
+    /// Projections that move farther than this are rejected, in world units.
     pub longest: f64,
 }
 
-/// What a place is projected onto.
+/// The surface that a point is projected onto.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Onto {
-    /// The surface in space-time, where the frame cuts it: found from further off, and behind what moves faster and faster.
+    /// The space-time surface, restricted to the frame. It is found from farther away, but lags behind accelerating
+    /// motion.
     SpaceTime,
     /// The surface of the frame's own points.
     Frame,
@@ -51,14 +53,16 @@ impl Moment {
         }
     }
 
-    /// Where a point comes to lie on the surface, and after how many steps; nothing where it does not.
+    /// Projects a point onto the surface, and returns its position and the number of steps. If it has not converged
+    /// after [`STEPS`], its last position is returned. `None` if there are too few points around it, the hyperplane is
+    /// nearly parallel to the frame, or it moves too far.
     pub fn project(&self, p: DVec3, onto: Onto) -> Option<(DVec3, usize)> {
         let mut x = p;
         let mut damping: f64 = 1.0;
         for step in 0..STEPS {
             let fit = self.fit(x, onto)?;
             let n = fit.normal;
-            // The plane through x's surroundings, cut with this frame: where p falls onto it.
+            // Projects p onto the plane fitted around x, restricted to this frame.
             let above = n.dot(p - x) - fit.distance;
             let y = p - n * (above / n.length_squared());
             let next = x + (y - x) * damping;
@@ -75,7 +79,7 @@ impl Moment {
         Some((x, STEPS))
     }
 
-    /// How far the surface goes at a point until the next frame.
+    /// Predicts the displacement of the surface from a point to the next frame: −c·nₜ·n₃ / |n₃|².
     pub fn prediction(&self, at: DVec3) -> Option<DVec3> {
         let fit = self.fit(at, Onto::SpaceTime)?;
         let square = fit.normal.length_squared();
@@ -109,7 +113,7 @@ mod tests {
         }
     }
 
-    /// Faces near the plane n·x = distance + speed·t, weighted by how near they are.
+    /// Faces near the plane n·x = distance + speed·t, with weights that fall off with distance.
     fn plane_faces(region: &Region, normal: DVec3, distance: f64, speed: f64, frame: f64) -> Faces {
         let mut faces = Faces::default();
         let [nx, ny, nz] = region.dims;
@@ -127,7 +131,7 @@ mod tests {
 
     const FALLOFF: Falloff = Falloff { radius: 4.0, time_scale: C };
 
-    /// What a place sees of a plane that moves along its normal.
+    /// Samples of a plane that moves along its normal.
     fn moment(normal: DVec3, distance: f64, speed: f64) -> Moment {
         let region = region();
         let mut field = Field::new(&region, FALLOFF);
@@ -158,7 +162,7 @@ mod tests {
                         let (place, later) = region.face(direction, face.voxel);
                         let way = place - at;
                         let time = (f64::from(t) + f64::from(later)) * C;
-                        // Along x the cut is at the radius whatever the rest is.
+                        // Along x the cut-off is at the radius, whatever the other coordinates are.
                         let across = way.y * way.y + way.z * way.z;
                         let square = radius * radius;
                         if across >= square || way.x.abs() > radius || time.abs() >= radius {
@@ -189,7 +193,7 @@ mod tests {
             for start in
                 [DVec3::new(10.0, 10.0, 10.2), DVec3::new(9.0, 9.5, 8.3), DVec3::new(10.5, 11.0, 8.0)]
             {
-                // A moving plane's points of other frames lie on it in space-time.
+                // The points of a moving plane in other frames lie on it in space-time.
                 for onto in [Onto::SpaceTime, Onto::Frame] {
                     let (x, _) = moment.project(start, onto).unwrap();
                     assert!((normal.dot(x) - 9.0).abs() < 0.03, "{speed} {start} {}", normal.dot(x));

@@ -1,4 +1,4 @@
-//! The part of a 4D image that is looked at, and its intensities in steps.
+//! The region of a 4D image that is processed, with its intensities quantised to one byte.
 
 use super::Bounds;
 use super::vote::TIME;
@@ -6,58 +6,60 @@ use crate::math::{DAffine3, DMat3, DVec3};
 use crate::methods::MethodError;
 use crate::volume::{Volume, trilinear};
 
-/// Intensities are told apart in so many steps, 0 to 254: fewer than noise needs, and one byte a voxel.
+/// Highest quantised intensity: levels 0 to 254, one byte per voxel.
 const STEPS: f64 = 254.0;
 
-/// Voxels beyond these parts of the region, one in a thousand at either end, read as the ends.
+/// Share of the region's voxels at either end of the intensities, one in a thousand, that are clamped to the range.
 const OUTLIERS: f64 = 1e-3;
 
-/// Counts that the ends are found by.
+/// Bins of the histogram that determines the range of intensities.
 const BINS: usize = 4096;
 
-/// Voxels around the bounds that windows reach.
+/// Padding around the bounds, in voxels, for the windows of voxels at the border.
 const ROOM: usize = 2;
 
-/// A surface needs so many voxels along two axes at least; a single slice may be followed.
+/// Minimum number of voxels along at least two axes; a single slice is accepted.
 const LEAST_VOXELS: usize = 5;
 
-/// What is kept for a voxel at most, bytes: weights around two frames, and in each frame its intensity and its level.
+/// Upper bounds of the memory per voxel, in bytes: in total, for the weights around two frames, and per frame, for
+/// intensity and level.
 const BYTES: [u64; 2] = [140, 2];
 
-/// The most for a whole region: what a browser gives to one page, less the volume.
+/// Maximum memory for a region, in bytes: what a browser gives to one page, less the volume.
 const MOST_BYTES: u64 = 3_000_000_000;
 
-/// Cosine of the angle by which voxel axes may be off the right one: rounding in headers stays far below.
+/// Largest cosine between two voxel axes that counts as a right angle: rounding in headers stays far below.
 const ORTHOGONAL: f64 = 1e-3;
 
-/// Boxes of voxels of a 4D image, one a frame, in steps of intensity, with some room around: what is in the box is looked at,
-/// windows reach beyond. Where the image ends its border goes on.
+/// A box of voxels of a 4D image, in all frames, with quantised intensities. Padding around the box lets windows extend
+/// beyond it; outside of the image, the border is replicated.
 ///
-/// Places in it are in millimetres (world units) along the voxels' axes, from the centre of its first voxel.
+/// Positions in the region are in world units (millimetres) along the voxel axes, from the centre of its first voxel.
 #[derive(Clone, Debug)]
 pub(super) struct Region {
     pub dims: [usize; 3],
-    /// The first and the last voxel of the box.
+    /// The first and the last voxel of the box, without the padding.
     pub inner: [[usize; 3]; 2],
-    /// World length of one voxel.
+    /// Side lengths of a voxel, in world units.
     pub spacing: DVec3,
-    /// Places to the world.
+    /// Maps positions in the region to the world.
     pub to_world: DAffine3,
-    /// World to places.
+    /// Maps the world to positions in the region.
     pub from_world: DAffine3,
-    /// By frame, x fastest.
+    /// Quantised intensities by frame, x fastest.
     pub frames: Vec<Vec<u8>>,
-    /// One step in intensity.
+    /// The intensity of one quantisation step.
     pub step: f64,
-    /// τ in steps.
+    /// τ, in quantisation steps.
     pub threshold: f64,
 }
 
 impl Region {
-    /// The voxels of `volume` within bounds, and some around them; all of them without bounds.
+    /// Extracts the voxels of `volume` within `bounds`, by default all, with padding around them.
     ///
     /// # Errors
-    /// Voxel axes that are not at right angles; a box outside the volume; too few voxels; no contrast.
+    /// [`MethodError::InvalidArgument`] for voxel axes that are not at right angles, a box outside the volume, too few
+    /// voxels, too many, or no contrast.
     pub fn new(volume: &Volume, bounds: Option<Bounds>) -> Result<Self, MethodError> {
         let spacing = DVec3::from(volume.spacing());
         let axes = volume.affine().matrix3;
@@ -89,7 +91,7 @@ impl Region {
         Ok(region)
     }
 
-    /// Takes the intensities of all frames over, in steps between the ends.
+    /// Quantises the intensities of all frames, between the quantiles found by [`ends`].
     fn read(&mut self, volume: &Volume, low: [usize; 3]) -> Result<(), MethodError> {
         let mut counts = vec![0u64; BINS];
         for frame in 0..volume.frames() {
@@ -116,7 +118,7 @@ impl Region {
         Ok(())
     }
 
-    /// Calls `take` with each row of x of the region, in intensities from 0 to 1.
+    /// Calls `take` with each row of the region along x, in intensities from 0 to 1.
     fn each_row(
         &self,
         volume: &Volume,
@@ -125,7 +127,7 @@ impl Region {
         mut take: impl FnMut(&[f32]),
     ) -> Result<(), MethodError> {
         let grid = volume.normalised_grid(frame)?;
-        // The voxel of the volume, or the nearest one where there is none.
+        // Indices into the volume, clamped to its border.
         let along = |axis: usize| -> Vec<usize> {
             let (from, last) = (low[axis], grid.dims[axis] - 1);
             (0..self.dims[axis]).map(|i| (from + i).saturating_sub(self.inner[0][axis]).min(last)).collect()
@@ -142,30 +144,30 @@ impl Region {
         Ok(())
     }
 
-    /// The longest side of a voxel, of the axes along which there are several.
+    /// Returns the longest side of a voxel among axes with more than one voxel, in world units.
     pub fn thickest(&self) -> f64 {
         let [first, last] = self.inner;
         (0..3).filter(|&axis| last[axis] > first[axis]).map(|axis| self.spacing[axis]).fold(0.0, f64::max)
     }
 
-    /// The range of intensities, without outliers.
+    /// Returns the range of intensities, without outliers.
     pub fn span(&self) -> f64 {
         STEPS * self.step
     }
 
-    /// Where a voxel is in the grid.
+    /// Returns the grid coordinates of a voxel.
     pub fn voxel(&self, index: u32) -> [usize; 3] {
         let ([nx, ny, _], i) = (self.dims, index as usize);
         [i % nx, i / nx % ny, i / (nx * ny)]
     }
 
-    /// The voxel that is nearest to a place.
+    /// Returns the grid coordinates of the voxel nearest to a position.
     pub fn nearest(&self, place: DVec3) -> [usize; 3] {
         let last = DVec3::from(self.dims.map(|n| (n - 1) as f64));
         (place / self.spacing).clamp(DVec3::ZERO, last).round().to_array().map(|i| i as usize)
     }
 
-    /// The middle of the face after a voxel along a direction, and by how much of a frame it is later than the voxel.
+    /// Returns the centre of the face after a voxel along a direction, and its time after the voxel's frame, in frames.
     pub fn face(&self, direction: usize, voxel: u32) -> (DVec3, f32) {
         let mut at = DVec3::from(self.voxel(voxel).map(|i| i as f64));
         if direction == TIME {
@@ -175,12 +177,13 @@ impl Region {
         (at * self.spacing, 0.0)
     }
 
-    /// Trilinear, the border replicated.
+    /// Interpolates the quantised intensity trilinearly at a position, with the border replicated.
     pub fn sample(&self, frame: usize, place: DVec3) -> f64 {
         trilinear(self.dims, place / self.spacing, |i| f64::from(self.frames[frame][i]))
     }
 
-    /// Standard deviation of the noise, in steps: from differences between neighbours along x, most of which are noise.
+    /// Estimates the standard deviation of the noise, in quantisation steps, from differences between neighbours along
+    /// x: most of them are noise.
     pub fn noise(&self) -> f64 {
         let mut counts = [0u64; 256];
         for frame in &self.frames {
@@ -192,13 +195,13 @@ impl Region {
         let (mut below, mut median) = (0, 0.0);
         for (size, &count) in counts.iter().enumerate() {
             if 2 * (below + count) >= all && count > 0 {
-                // Within the step by the share of it that is needed.
+                // Interpolates linearly within the bin.
                 median = size as f64 - 0.5 + (all as f64 / 2.0 - below as f64) / count as f64;
                 break;
             }
             below += count;
         }
-        // The median of |a − b| for two of one normal distribution, in its deviation.
+        // For two normally distributed values, the median of |a − b| is 0.6745·√2 standard deviations.
         median.max(0.0) / (0.674_49 * std::f64::consts::SQRT_2)
     }
 }
@@ -222,7 +225,7 @@ fn bin_of(value: f32) -> usize {
     (value * (BINS - 1) as f32 + 0.5) as usize
 }
 
-/// The intensities, 0 to 1, that outliers lie beyond.
+/// Returns the lower and upper quantile of the intensities, from 0 to 1, beyond which voxels are outliers.
 fn ends(counts: &[u64]) -> [f64; 2] {
     let few = OUTLIERS * counts.iter().sum::<u64>() as f64;
     let beyond = |from_top: bool| {
@@ -237,7 +240,7 @@ fn ends(counts: &[u64]) -> [f64; 2] {
     [false, true].map(beyond)
 }
 
-/// The first and the last voxel within bounds.
+/// Returns the first and the last voxel within bounds, validated; by default those of the whole volume.
 fn ends_of(volume: &Volume, bounds: Option<Bounds>) -> Result<[[usize; 3]; 2], MethodError> {
     let last = volume.dims().map(|n| n - 1);
     let (parameter, [low, high]) = match bounds {
@@ -261,7 +264,8 @@ fn ends_of(volume: &Volume, bounds: Option<Bounds>) -> Result<[[usize; 3]; 2], M
     Ok([low, high])
 }
 
-/// The first and the last voxel of those around a box of the world.
+/// Returns the first and the last voxel whose centres are inside the bounding box, along the voxel axes, of a box in
+/// the world.
 fn voxels_around(volume: &Volume, [low, high]: [DVec3; 2]) -> Result<[[usize; 3]; 2], MethodError> {
     let last = volume.dims().map(|n| n - 1);
     if !low.is_finite() || !high.is_finite() || low.cmpge(high).any() {
@@ -270,7 +274,7 @@ fn voxels_around(volume: &Volume, [low, high]: [DVec3; 2]) -> Result<[[usize; 3]
         );
         return Err(MethodError::invalid("box", problem));
     }
-    // The corners of the box in voxels: its axes are those of the world.
+    // The corners of the box in voxel coordinates, because its axes are those of the world.
     let corner = |k: usize| {
         let pick = |axis: usize| if k >> axis & 1 == 0 { low[axis] } else { high[axis] };
         volume.inverse_affine().transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
@@ -285,7 +289,7 @@ fn voxels_around(volume: &Volume, [low, high]: [DVec3; 2]) -> Result<[[usize; 3]
     }
     let inside = |value: f64, axis: usize| value.clamp(0.0, last[axis] as f64) as usize;
     let first = [0, 1, 2].map(|axis| inside(from[axis].ceil(), axis));
-    // Between the middles of two voxels there is the next one at least.
+    // A box between two voxel centres contains at least the second voxel.
     let end = [0, 1, 2].map(|axis| inside(to[axis].floor(), axis).max(first[axis]));
     Ok([first, end])
 }

@@ -1,19 +1,21 @@
-//! The points of the boundary as a field: weights on the faces between voxels, ready for sums over what is near.
+//! Boundary points as arrays of weights on the faces between voxels, for fast weighted sums over the points around a
+//! position.
 //!
-//! All places of one frame see the others at the same distances in time, and θ is a product over the axes. So the frames are
-//! summed up once, and what is left are sums along rows of voxels.
+//! All positions in a frame have the same distances in time to the points of other frames, and θ is separable over the
+//! axes. So the frames are summed once, and each query sums along rows of voxels only.
 
 use super::region::Region;
 use super::vote::{Faces, TIME, X, Y, Z};
 use crate::math::DVec3;
 use wide::f32x8;
 
-/// How weights fall with distance: θ(r) = exp(−r²/h²), with r in space-time, and 0 beyond 2h in space or in time.
+/// Weights by distance: θ(r) = exp(−r²/h²), with r in space-time. It is cut off at 2h: |x| ≤ 2h, y² + z² < 4h², c|t| <
+/// 2h.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Falloff {
-    /// Where it ends: 2h.
+    /// Radius of the cut-off, in world units: 2h.
     pub radius: f64,
-    /// World units that one frame counts as: c.
+    /// c: the distance that one frame counts as, in world units.
     pub time_scale: f64,
 }
 
@@ -22,55 +24,54 @@ impl Falloff {
         libm::exp(-4.0 * distance * distance / (self.radius * self.radius))
     }
 
-    /// What θ at a distance is multiplied by a `step` further on.
+    /// Returns the ratio of θ at `distance + step` to θ at `distance`.
     fn ratio(&self, distance: f64, step: f64) -> f64 {
         libm::exp(-4.0 * step * (2.0 * distance + step) / (self.radius * self.radius))
     }
 
-    /// Frames whose faces may be near, from a frame on: no more of them than `most` to either side.
+    /// Returns the offsets of the frames whose faces may be within the radius, at most `most` to either side.
     pub fn offsets(&self, most: usize) -> std::ops::RangeInclusive<i64> {
         let reach = ((self.radius / self.time_scale + 1.0) as i64).min(most as i64);
         -reach..=reach
     }
 }
 
-/// Faces along x that are summed up at once; usually there are no more within the radius.
+/// Faces along x that one vector holds; usually no more are within the radius.
 const LANES: usize = 8;
 
-/// So many times as many at most.
+/// Maximum number of vectors along x.
 const MOST_LANES: usize = 4;
 
-/// Most faces within the radius along one axis.
+/// Maximum number of faces within the radius along one axis; limits the radius.
 pub(super) const MOST: usize = MOST_LANES * LANES;
 
-/// What is near in time to one frame.
+/// The boundary points around one frame, as weights on faces; answers queries for [`Sums`].
 #[derive(Clone, Debug)]
 pub(super) struct Field {
     dims: [usize; 3],
     spacing: DVec3,
     falloff: Falloff,
-    /// From one row to the next, and zeroes before the first voxel of a row.
+    /// Length of a row, and its padding with zeros at either end.
     row: usize,
     room: usize,
-    /// By axis, what the ratio of θ from each voxel to the next changes by with each.
+    /// By axis, the constant factor by which the ratio of θ between neighbouring voxels changes from voxel to voxel.
     changes: DVec3,
-    /// Whether there are points of several moments.
+    /// Whether the points are of several moments, so that temporal sums are kept.
     timed: bool,
-    /// By direction of the faces; those along time lie in the middle of voxels.
+    /// Points by direction of the faces; faces along time are at voxel centres.
     sites: [Sites; 4],
 }
 
-/// Weights times θ of the time, on the faces of one direction: as they are and, where there are several moments, times the
-/// time and times its square.
+/// Weights of the points of one direction, times θ of their time t: times 1 and, for several moments, times t and t².
 #[derive(Clone, Debug, Default)]
 struct Sites {
     weights: [Vec<f32>; 3],
-    /// By row, from the first to after the last voxel with a weight.
+    /// By row, from the first voxel with a weight to after the last.
     extents: Vec<[u32; 2]>,
 }
 
 impl Field {
-    /// Without points.
+    /// Creates a field without points, for several moments.
     pub fn new(region: &Region, falloff: Falloff) -> Self {
         let most = (2.0 * falloff.radius / region.spacing.x) as usize + 1;
         let room = most + 1 + if most <= LANES { LANES } else { MOST };
@@ -88,7 +89,7 @@ impl Field {
         }
     }
 
-    /// The points of a single frame, without those along time.
+    /// Creates a field with the points of a single frame, without those along time.
     pub fn still(region: &Region, falloff: Falloff, faces: &Faces) -> Self {
         let mut field = Self { timed: false, ..Self::new(region, falloff) };
         for direction in [X, Y, Z] {
@@ -100,7 +101,7 @@ impl Field {
     /// Adds the points of the frame that is `offset` frames later.
     pub fn add(&mut self, faces: &Faces, offset: i64) {
         for direction in [X, Y, Z, TIME] {
-            // Faces along time lie half a frame later than their own.
+            // Faces along time are half a frame after their frame.
             let frames = offset as f64 + if direction == TIME { 0.5 } else { 0.0 };
             let time = frames * self.falloff.time_scale;
             if time.abs() < self.falloff.radius {
@@ -129,7 +130,7 @@ impl Field {
         }
     }
 
-    /// Sums over all points around a place of the frame.
+    /// Returns weighted sums over all points around a position in the frame.
     pub fn sums(&self, at: DVec3) -> Sums {
         let mut sums = Sums::default();
         let axis =
@@ -137,7 +138,7 @@ impl Field {
         let axes = [[axis(0, 0.0), axis(0, 0.5)], [axis(1, 0.0), axis(1, 0.5)], [axis(2, 0.0), axis(2, 0.5)]];
         for direction in [X, Y, Z, TIME] {
             let [x, y, z] = [X, Y, Z].map(|k| &axes[k][usize::from(direction == k)]);
-            // Off the grid there are none.
+            // There are no points off the grid.
             let room = self.room as i64;
             let outside = x.first < -room || x.end() > self.dims[0] as i64 + room;
             if outside || self.sites[direction].extents.is_empty() {
@@ -154,7 +155,7 @@ impl Field {
         sums
     }
 
-    /// `N` times as many lanes as are no fewer than the faces along x.
+    /// Sums over the faces of one direction, with `N` vectors of lanes along x, enough for all faces within the radius.
     fn gather<const N: usize, const TIMED: bool>(
         &self,
         sites: &Sites,
@@ -194,10 +195,10 @@ impl Field {
     }
 }
 
-/// Faces within the radius along one axis, by the number of the voxel before them.
+/// The faces within the radius along one axis, indexed by the voxel before them, with their θ.
 struct Axis {
     first: i64,
-    /// From the place to the first of them, and from each to the next.
+    /// Signed distance from the position to the first face, and from each face to the next.
     start: f64,
     spacing: f64,
     weights: [f32; MOST],
@@ -220,13 +221,13 @@ impl Axis {
         Self { first, start, spacing, weights, count }
     }
 
-    /// After the last.
+    /// Returns the index after the last face.
     fn end(&self) -> i64 {
-        // Places may be as far off as numbers go.
+        // Positions may be arbitrarily far away.
         self.first.saturating_add(self.count as i64)
     }
 
-    /// Those on the grid.
+    /// Returns the indices of the faces on a grid of `n` voxels.
     fn range(&self, n: usize) -> std::ops::Range<i64> {
         self.first.max(0)..self.end().min(n as i64)
     }
@@ -240,7 +241,7 @@ impl Axis {
     }
 }
 
-/// A sum for each of the faces along x.
+/// One partial sum for each face along x.
 type Lanes<const N: usize> = [f32x8; N];
 
 fn lanes<const N: usize>(values: &[f32]) -> Lanes<N> {
@@ -255,7 +256,7 @@ fn add<const N: usize>(to: &mut Lanes<N>, lanes: &Lanes<N>, factor: f32) {
     to.iter_mut().zip(lanes).for_each(|(to, lane)| *to += *lane * factor);
 }
 
-/// Sums over y in one plane: of the weights times 1, y and y², of those with time times 1 and y, and of those with its square.
+/// Sums over y in one plane of rows: weights times 1, y and y², weights times t, times 1 and y, and weights times t².
 struct Plane<const N: usize> {
     plain: [Lanes<N>; 3],
     timed: [Lanes<N>; 2],
@@ -286,12 +287,12 @@ impl<const N: usize> Plane<N> {
     }
 }
 
-/// Sums over the planes: of theirs times 1, and of some times z and z².
+/// Sums over the planes: those of [`Plane`], and its sums with factors z and z².
 struct Columns<const N: usize> {
     plane: Plane<N>,
-    /// Times z: of weights times 1 and y, and of those with time.
+    /// Weights times z, yz and zt.
     high: [Lanes<N>; 3],
-    /// Times z².
+    /// Weights times z².
     higher: Lanes<N>,
 }
 
@@ -319,7 +320,7 @@ impl<const N: usize> Columns<N> {
         add(&mut self.high[2], &plane.timed[0], theta * dz);
     }
 
-    /// Over x, too.
+    /// Sums over x, and adds the results to `sums`.
     fn add_to(&self, sums: &mut Sums, x: &Axis) {
         let theta = lanes::<N>(&x.weights);
         let mut away = [f32x8::ZERO; N];
@@ -329,7 +330,7 @@ impl<const N: usize> Columns<N> {
         }
         let times = |a: &Lanes<N>, b: &Lanes<N>| -> Lanes<N> { std::array::from_fn(|k| a[k] * b[k]) };
         let powers = [theta, times(&theta, &away), times(&times(&theta, &away), &away)];
-        // In this order on any machine.
+        // In the same order on every machine.
         let sum = |lanes: &Lanes<N>, power: usize| -> f64 {
             let lane = lanes.iter().zip(&powers[power]).fold(f32x8::ZERO, |sum, (a, b)| sum + *a * *b);
             let [a, b, c, d, e, f, g, h] = lane.to_array();
@@ -346,11 +347,12 @@ impl<const N: usize> Columns<N> {
     }
 }
 
-/// Weighted sums of the points around a place: of 1, of x, y, z, ct from the place on, and of the products of those.
+/// Weighted sums over the points around a position: of 1, of their coordinates x, y, z, ct relative to it, and of the
+/// products of two coordinates. Planes are fitted to them.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sums {
     pub weight: f64,
     pub first: [f64; 4],
-    /// xx xy xz xt yy yz yt zz zt tt.
+    /// Products in the order xx xy xz xt yy yz yt zz zt tt.
     pub second: [f64; 10],
 }

@@ -1,26 +1,27 @@
-//! Which voxels are on the bright side of the boundary.
+//! Inside/outside labelling: which voxels are on the bright side of the boundary.
 //!
-//! No level of intensity tells: far from a coil, what is bright is as dark as what is dark near it. So the image is made
-//! again from its boundary alone. Every face says by how much intensity steps up there, by its votes; the image whose
-//! differences are nearest to these (a Poisson equation) has steps of about 1 at all walls, flat parts between, and hardly any
-//! trace of votes that make up no wall. A voxel is bright where it is above the middle of the step at the wall that is nearest.
+//! No intensity threshold can separate them: far from a coil, bright regions are as dark as dark regions near it. So an
+//! image is reconstructed from the boundary votes alone. Every face contributes a step in intensity by its votes; the
+//! image whose differences are nearest to these steps (a Poisson equation) has steps of about 1 at all walls, flat
+//! parts between, and hardly any trace of isolated votes. A voxel is bright if it is above the middle of the step at
+//! the nearest wall.
 
 use super::region::Region;
 use super::vote::{Faces, X, Y, Z};
 
-/// Faces with fewer votes make up no wall.
+/// Smallest weight, as a share of votes, with which a face is part of a wall.
 pub(super) const LEAST_WEIGHT: f32 = 0.3;
 
-/// The residual is down to this share of what it was when the image is solved for.
+/// Relative residual at which conjugate gradients stop.
 const TOLERANCE: f64 = 1e-3;
 
-/// Iterations at most: across a box of 64 voxels a hundred are needed.
+/// Maximum number of conjugate gradient iterations: a box of 64 voxels a side needs a hundred.
 const ITERATIONS: usize = 400;
 
-/// A box of voxels of a region.
+/// A box of voxels within a region.
 #[derive(Clone, Copy)]
 pub(super) struct Part {
-    /// First and last voxel.
+    /// First and last voxel, inclusive.
     pub ends: [[usize; 3]; 2],
 }
 
@@ -29,18 +30,18 @@ impl Part {
         [0, 1, 2].map(|axis| self.ends[1][axis] - self.ends[0][axis] + 1)
     }
 
-    /// How many voxels it has.
+    /// Returns the number of voxels.
     pub fn len(&self) -> usize {
         self.dims().iter().product()
     }
 
-    /// The voxel of the region that comes `index`-th in the list of those of the part.
+    /// Returns the region coordinates of the voxel with an index in the box, x fastest.
     pub fn at(&self, index: usize) -> [usize; 3] {
         let ([nx, ny, _], [x, y, z]) = (self.dims(), self.ends[0]);
         [x + index % nx, y + index / nx % ny, z + index / (nx * ny)]
     }
 
-    /// Where a voxel of the region is in the list of those of the part.
+    /// Returns the index in the box of a voxel of the region; `None` outside.
     pub fn index(&self, at: [usize; 3]) -> Option<usize> {
         let [first, last] = self.ends;
         let is_inside = (0..3).all(|axis| (first[axis]..=last[axis]).contains(&at[axis]));
@@ -49,7 +50,7 @@ impl Part {
     }
 }
 
-/// By voxel of a part of a frame, whether it is on the bright side; nothing where no wall is.
+/// Labels the voxels of a box in one frame: true on the bright side of the boundary. `None` if there are no walls.
 pub(super) fn sides(region: &Region, frame: usize, faces: &Faces, part: Part) -> Option<Vec<bool>> {
     let dims = part.dims();
     let steps = steps(region, frame, faces, part);
@@ -59,7 +60,7 @@ pub(super) fn sides(region: &Region, frame: usize, faces: &Faces, part: Part) ->
         source[j] += f64::from(step);
     }
     let remade = solved(dims, source);
-    // The middles of the steps at walls.
+    // Weighted means of the middles of the steps, at voxels adjacent to walls.
     let mut middles = vec![(0.0, 0.0); remade.len()];
     for &(i, j, step) in steps.iter().filter(|(.., step)| step.abs() >= LEAST_WEIGHT) {
         let (weight, middle) = (f64::from(step.abs()), (remade[i] + remade[j]) / 2.0);
@@ -73,7 +74,8 @@ pub(super) fn sides(region: &Region, frame: usize, faces: &Faces, part: Part) ->
     Some(remade.iter().zip(levels).map(|(value, level)| *value > level).collect())
 }
 
-/// The same, told by the level in the middle of the nearest wall: at once, and right where the signal is as strong as there.
+/// As [`sides`], by comparing each intensity with the middle of the step at the nearest wall. Needs no solve, but is
+/// only right where the signal is as strong as at that wall.
 pub(super) fn nearest_sides(region: &Region, frame: usize, faces: &Faces, part: Part) -> Option<Vec<bool>> {
     let [nx, ny, _] = region.dims;
     let level = |i: usize| {
@@ -90,7 +92,8 @@ pub(super) fn nearest_sides(region: &Region, frame: usize, faces: &Faces, part: 
     Some(levels.into_iter().enumerate().map(|(i, middle)| level(i) > middle).collect())
 }
 
-/// The steps at the faces within a part: the voxels before and after, and by how much it is brighter after, by votes.
+/// Returns the steps at the faces within a box: the indices of the voxels before and after, and the share of votes,
+/// negative if intensity falls.
 fn steps(region: &Region, frame: usize, faces: &Faces, part: Part) -> Vec<(usize, usize, f32)> {
     let image = &region.frames[frame];
     let mut steps = Vec::new();
@@ -108,7 +111,8 @@ fn steps(region: &Region, frame: usize, faces: &Faces, part: Part) -> Vec<(usize
     steps
 }
 
-/// The image whose sums of differences to its neighbours are `source`, by conjugate gradients.
+/// Solves the Poisson equation for the image whose differences to its neighbours sum to `source` at each voxel, by
+/// conjugate gradients.
 fn solved(dims: [usize; 3], source: Vec<f64>) -> Vec<f64> {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
     let mut image = vec![0.0; source.len()];
@@ -132,7 +136,7 @@ fn solved(dims: [usize; 3], source: Vec<f64>) -> Vec<f64> {
     image
 }
 
-/// At each voxel the sum of its differences to its neighbours.
+/// Writes the sum of differences to the neighbours of each voxel: the graph Laplacian.
 fn differences([nx, ny, nz]: [usize; 3], values: &[f64], out: &mut [f64]) {
     out.fill(0.0);
     let mut add = |i: usize, j: usize| {
@@ -154,7 +158,7 @@ fn differences([nx, ny, nz]: [usize; 3], values: &[f64], out: &mut [f64]) {
     }
 }
 
-/// Numbers for all voxels: those without one take that of the nearest with one, along the axes. Nothing where none has.
+/// Extends known values to all voxels, each from the nearest along the axes; `None` if no value is known.
 fn spread(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Vec<f64>> {
     let mut all = known;
     let mut front: Vec<usize> = (0..all.len()).filter(|&i| all[i].is_some()).collect();
@@ -199,7 +203,7 @@ mod tests {
         RADIUS - DVec3::new(x, y, z).distance(CENTER)
     }
 
-    /// A ball whose far end is darker than what is around its near end.
+    /// A ball that becomes darker along z: its far end is darker than the background at its near end.
     fn shaded() -> Region {
         let mut random = Random::new(3);
         let value = |i: usize| {
@@ -231,7 +235,7 @@ mod tests {
         for (i, &is_bright) in found.iter().enumerate().filter(|&(i, _)| depth(i).abs() > 1.5) {
             assert_eq!(is_bright, depth(i) > 0.0, "{:?}", whole.at(i));
         }
-        // No level does it: the far end inside is darker than the near end outside.
+        // No threshold would separate them: the far end inside is darker than the near end outside.
         let image = &region.frames[0];
         let [inside, outside] = [[14, 12, 21], [14, 12, 0]].map(|at| image[whole.index(at).unwrap()]);
         assert!(inside < outside, "{inside} {outside}");

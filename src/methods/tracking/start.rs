@@ -1,4 +1,4 @@
-//! The mesh to begin with: the caller's, or that of the first frame (section 4.1).
+//! The initial mesh: the caller's, or the surface of the first frame (section 4.1).
 
 use super::first::bright_surface;
 use super::region::Region;
@@ -9,17 +9,21 @@ use crate::methods::MethodError;
 use crate::methods::given::surface;
 use crate::remesh::{EdgeBounds, remesh};
 
-/// Edges of the first frame's mesh, in the shortest side of a voxel.
+/// Target edge length of the first frame's mesh, in the shortest side of a voxel.
 const EDGE: f64 = 1.2;
 
-/// Their bounds, in that length.
+/// Factor between the target edge and its bounds, to either side.
 const EDGE_SPREAD: f32 = 1.5;
 
-/// The mean edge of a mesh of the caller's, in that length, at least: edges stay as long as they are, and with shorter ones
-/// a surface as large as the image has more triangles than there is memory for.
+/// Smallest mean edge of a caller's mesh, in the shortest side of a voxel. Its resolution is kept: with shorter edges,
+/// a surface as large as the image would have more triangles than fit into memory.
 const FINEST: f64 = 0.1;
 
-/// A mesh of the caller's, as it is.
+/// Validates the caller's mesh, and returns it unchanged.
+///
+/// # Errors
+/// [`MethodError::InvalidArgument`] if its edges are too short, or none of its vertices is in the box; the errors of
+/// [`surface`].
 pub(super) fn checked(start: &TriangleMesh, region: &Region) -> Result<Mesh, MethodError> {
     let mesh = surface("start", start)?;
     let (edge, least) = (measure(start).edge_mean, FINEST * region.spacing.min_element());
@@ -38,7 +42,10 @@ pub(super) fn checked(start: &TriangleMesh, region: &Region) -> Result<Mesh, Met
 }
 
 impl SurfaceTracker {
-    /// The mesh to begin with, in the world, where none was given.
+    /// Extracts the initial mesh from the first frame, in world coordinates, unless one was given.
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] if no frame has a boundary, or there is no closed surface in the first one.
     pub(super) fn find_first_mesh(&mut self) -> Result<(), MethodError> {
         if self.faces.iter().flatten().all(Vec::is_empty) {
             let largest = self.voting.largest_step(&self.region) * self.region.step;
@@ -64,7 +71,7 @@ impl SurfaceTracker {
         Ok(())
     }
 
-    /// The part that is followed. Holes in others are none.
+    /// Returns the component to be tracked. Components with negative volume are cavities of others, and are skipped.
     fn chosen(&self, parts: Vec<TriangleMesh>) -> Option<TriangleMesh> {
         let with_volume = parts.into_iter().map(|part| (measure(&part).volume, part));
         let solids = with_volume.filter(|(volume, _)| *volume > 0.0);
@@ -76,7 +83,7 @@ impl SurfaceTracker {
     }
 }
 
-/// Of a point from a solid: 0 inside, else that from its nearest vertex.
+/// Returns the distance of a point from the nearest vertex of a solid; 0 inside.
 fn distance(part: &TriangleMesh, p: Vec3) -> f64 {
     let angle: f64 = part.corners().map(|corners| triangle::solid_angle(corners, p)).sum();
     if angle.abs() > std::f64::consts::TAU {

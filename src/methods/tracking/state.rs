@@ -1,5 +1,5 @@
-//! Saving a run and going on with it, bit for bit. A state holds the boundary and the surfaces; the image is the same
-//! volume's again, and what is around the newest frame is summed up again.
+//! Saves a run and restores it bit for bit. A state holds the boundary votes and the surfaces; the image comes from the
+//! same volume, and sums around the newest frame are computed again.
 
 use super::follow::{Follower, FrameFacts};
 use super::vote::{Faces, TIME};
@@ -12,14 +12,14 @@ use serde::{Deserialize, Serialize};
 
 const MARK: Mark = *b"VSCLTRK\x01";
 
-/// Everything a run has beside its image.
+/// The saved state: everything of a run but its image.
 #[derive(Serialize, Deserialize)]
 struct State {
     fingerprint: u64,
     params: TrackingParams,
     faces: Vec<Faces>,
     mesh: Mesh,
-    /// The mean edge of the first frame's mesh, once there is one.
+    /// Mean edge of the first frame's mesh, once there is one.
     edge: Option<f64>,
     /// Positions and triangles by frame.
     meshes: Vec<(Vec<Vec3>, Vec<[u32; 3]>)>,
@@ -29,7 +29,7 @@ struct State {
 }
 
 impl SurfaceTracker {
-    /// The run as bytes, without the image.
+    /// Serialises the run, without the image.
     pub fn save(&self) -> Vec<u8> {
         let plain = |mesh: &TriangleMesh| (mesh.positions.clone(), mesh.triangles.clone());
         sealed(
@@ -48,10 +48,10 @@ impl SurfaceTracker {
         )
     }
 
-    /// Goes on from bytes that [`Self::save`] gave, for a tracker of the same volume, box, component and start.
+    /// Restores a run from the bytes of [`Self::save`], for a tracker of the same volume, box, component and start.
     ///
     /// # Errors
-    /// [`MethodError::BadState`] where the bytes are none of those; the run is then as it was.
+    /// [`MethodError::BadState`] for any other bytes; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
         let state: State = opened(&MARK, bytes)?;
         let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
@@ -109,7 +109,7 @@ impl SurfaceTracker {
             .all(|(direction, list)| list.iter().all(|face| is_sound(direction, face.voxel, face.weight)))
     }
 
-    /// A number that tells images, boxes and starts apart.
+    /// Returns a hash of the image, the box, the component and the start, which identifies the input of a run.
     fn fingerprint(&self) -> u64 {
         let mut hash = Hash::new();
         let mut mix = |values: &[f64]| values.iter().for_each(|value| hash.mix(value.to_bits()));

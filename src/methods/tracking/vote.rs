@@ -1,60 +1,61 @@
-//! Where windows of the image fall into two clusters, and votes for the faces between them (section 2).
+//! Boundary votes (section 2): each window of the image is split into two clusters by intensity, and votes for the
+//! faces between them.
 
 use super::region::Region;
 use serde::{Deserialize, Serialize};
 use wide::u8x16;
 
-/// No level: this window has no boundary in it. Levels of intensity end below.
+/// Marks a window without a boundary; quantised intensities are lower.
 const NONE: u8 = u8::MAX;
 
-/// Faces that are counted at once.
+/// Faces that are counted at once in one vector.
 const LANES: usize = u8x16::LANES as usize;
 
-/// A cluster must hold more than this share of its window.
+/// Smallest share of its window that a cluster must exceed.
 const LEAST_SHARE: f64 = 0.1;
 
-/// Lloyd's iterations at most; two to five are usual.
+/// Maximum number of Lloyd iterations; two to five are usual.
 const ITERATIONS: usize = 50;
 
-/// What a window is, and when its clusters count.
+/// The extent of a window, and the criterion for its clusters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Window {
-    /// Voxels to either side of the middle.
+    /// Voxels to either side of the central one: k.
     pub reach: usize,
-    /// Frames to either side: 0 where each frame is looked at by itself.
+    /// Frames to either side of the central one; 0 processes each frame on its own.
     pub frames: usize,
-    /// The least difference of the means, in steps of intensity.
+    /// τ: the difference of the cluster means must exceed this, in quantisation steps.
     pub threshold: f64,
-    /// The last frame is followed by the first.
+    /// Whether the last frame is followed by the first.
     pub cyclic: bool,
 }
 
-/// The direction in which two voxels share a face.
+/// Directions in which two voxels share a face: indices into [`Faces`].
 pub(super) const X: usize = 0;
 pub(super) const Y: usize = 1;
 pub(super) const Z: usize = 2;
 pub(super) const TIME: usize = 3;
 
-/// A face with votes.
+/// A face between two voxels that has votes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Face {
-    /// Index of the voxel before it; the other one comes next along the direction.
+    /// Index of the voxel before the face; the other one is next along the direction.
     pub voxel: u32,
-    /// The share of the windows around it that separate its voxels, above 0.
+    /// Votes as a share of the windows that contain both voxels, above 0.
     pub weight: f32,
 }
 
-/// Faces of one frame by direction; those along time lie between it and the next.
+/// Faces of one frame by direction; those along time are between it and the next frame.
 pub(super) type Faces = [Vec<Face>; 4];
 
-/// Finds levels and votes of a sequence, frame after frame.
+/// Finds the levels and the boundary votes of a sequence, frame by frame.
 #[derive(Clone, Debug)]
 pub(super) struct Voting {
     window: Window,
-    /// By frame, the level between the clusters of the window around each voxel, as rows with room at both ends, once it
-    /// was asked for.
+    /// By frame, the level between the clusters of the window around each voxel, in padded rows (see [`Rows`]);
+    /// computed when first needed.
     levels: Vec<Option<Vec<u8>>>,
-    /// The largest difference of means so far.
+    /// The largest difference of cluster means so far, in quantisation steps.
     largest: f64,
 }
 
@@ -63,7 +64,7 @@ impl Voting {
         Self { window, levels: vec![None; frames], largest: 0.0 }
     }
 
-    /// The faces of a frame. Frames are asked for in order.
+    /// Returns the faces of a frame that have votes, within the box and in its sides. Frames are processed in order.
     pub fn faces(&mut self, region: &Region, frame: usize) -> Faces {
         let around = self.window.around(frame, region.frames.len());
         around.iter().for_each(|&t| self.know_levels(region, t));
@@ -74,7 +75,7 @@ impl Voting {
         let count = region.frames.len();
         let next = if frame + 1 < count { Some(frame + 1) } else { self.window.cyclic.then_some(0) };
         if let (Some(next), true) = (next, self.window.frames > 0) {
-            // Windows that hold both frames.
+            // Windows that contain both frames.
             let both: Vec<usize> =
                 self.window.around(next, count).into_iter().filter(|t| around.contains(t)).collect();
             faces[TIME] = self.votes(region, frame, next, TIME, &both);
@@ -83,28 +84,29 @@ impl Voting {
         faces
     }
 
-    /// The largest difference of means in all frames, however small.
+    /// Returns the largest difference of cluster means in any frame, whatever the threshold, in quantisation steps; for
+    /// the error message when no boundary is found.
     pub fn largest_step(&self, region: &Region) -> f64 {
         let mut all = Self::new(Window { threshold: 0.0, ..self.window }, region.frames.len());
         (0..region.frames.len()).for_each(|frame| drop(all.levels_of(region, frame)));
         all.largest
     }
 
-    /// Finds the levels of a frame, if they are not known yet.
+    /// Computes the levels of a frame, unless they are known.
     pub fn know_levels(&mut self, region: &Region, frame: usize) {
         if self.levels[frame].is_none() {
             self.levels[frame] = Some(self.levels_of(region, frame));
         }
     }
 
-    /// The level between the clusters of the window around a voxel, in a frame whose levels are known: nothing where it
-    /// holds no boundary.
+    /// Returns the level between the clusters of the window around a voxel, in a frame whose levels are known; `None`
+    /// if the window has no boundary.
     pub fn level_at(&self, region: &Region, frame: usize, [x, y, z]: [usize; 3]) -> Option<u8> {
         let level = self.levels[frame].as_ref()?[Rows::new(region.dims, self.window.reach).at(y, z) + x];
         (level != NONE).then_some(level)
     }
 
-    /// The level of each window whose middle is in a frame.
+    /// Computes the level of each window with its centre in a frame.
     fn levels_of(&mut self, region: &Region, frame: usize) -> Vec<u8> {
         let [nx, ny, nz] = region.dims;
         let frames: Vec<&[u8]> =
@@ -128,7 +130,8 @@ impl Voting {
         out
     }
 
-    /// The level that separates the clusters of a window: voxels up to it are in the lower one.
+    /// Returns the level that separates the clusters of a window: voxels up to it are in the lower one. [`NONE`] if the
+    /// clusters do not pass.
     fn level(&mut self, counts: &Counts) -> u8 {
         let Some((low, high)) = counts.two_means(self.window.threshold) else { return NONE };
         let enough = LEAST_SHARE * f64::from(low.count + high.count);
@@ -143,8 +146,8 @@ impl Voting {
         ((low.mean() + high.mean()) / 2.0) as u8
     }
 
-    /// The faces between the voxels of `frame` and the next ones, in `other` frame for those along time, that windows
-    /// with their middles in the frames `around` separate.
+    /// Counts votes for the faces between the voxels of `frame` and the next ones along a direction, which are in the
+    /// frame `other` for faces along time. The windows with centres in the frames `around` vote.
     fn votes(
         &self,
         region: &Region,
@@ -180,7 +183,7 @@ impl Voting {
     }
 }
 
-/// Voxels and the next ones: the lower level of each two, and by how much the other is higher.
+/// Pairs of neighbouring voxels: the lower intensity of each pair, and the difference.
 struct Pairs {
     low: [u8; LANES],
     span: [u8; LANES],
@@ -198,7 +201,7 @@ impl Pairs {
 
 /// The windows that vote for faces along one direction in one frame.
 struct Ballot<'a> {
-    /// Of their frames.
+    /// The levels of each frame with window centres.
     levels: Vec<&'a [u8]>,
     rows: Rows,
     dims: [usize; 3],
@@ -206,18 +209,18 @@ struct Ballot<'a> {
 }
 
 impl Ballot<'_> {
-    /// Along an axis, the middles of the windows that hold a voxel and the next one.
+    /// Returns the centres, along an axis, of the windows that contain a voxel and the next one.
     fn middles(&self, at: usize, axis: usize) -> std::ops::Range<usize> {
         let first = at + usize::from(self.direction == axis);
         first.saturating_sub(self.rows.reach)..(at + self.rows.reach + 1).min(self.dims[axis])
     }
 
-    /// The most votes that a face can get.
+    /// Returns the maximum number of votes for a face: the number of windows that contain both of its voxels.
     fn most(&self, at: [usize; 3]) -> usize {
         [X, Y, Z].map(|axis| self.middles(at[axis], axis).len()).iter().product::<usize>() * self.levels.len()
     }
 
-    /// The votes for the faces after a voxel and those next to it.
+    /// Returns the votes for the faces after [`LANES`] consecutive voxels along x, from the given one on.
     fn votes(&self, [x, y, z]: [usize; 3], pairs: &Pairs) -> [u16; LANES] {
         let mut votes = [0u16; LANES];
         if pairs.span == [0; LANES] {
@@ -228,7 +231,7 @@ impl Ballot<'_> {
         for level in &self.levels {
             for z in self.middles(z, Z) {
                 for y in self.middles(y, Y) {
-                    // A row has room for `reach` windows before its first voxel.
+                    // A row has padding for `reach` windows before its first voxel.
                     let from = self.rows.at(y, z) + x + usize::from(self.direction == X) - reach;
                     count(&level[from..from + windows + LANES], windows, pairs, &mut votes);
                 }
@@ -239,7 +242,7 @@ impl Ballot<'_> {
 }
 
 impl Window {
-    /// The frames whose windows reach a frame, and that its window reaches.
+    /// Returns the frames within a window's extent in time around a frame, with `count` frames in total.
     fn around(&self, frame: usize, count: usize) -> Vec<usize> {
         let reach = self.frames.min(if self.cyclic { (count - 1) / 2 } else { count });
         let at = |offset: usize| {
@@ -250,19 +253,19 @@ impl Window {
     }
 }
 
-/// Adds, for each of the pairs, the windows of a row whose level separates it.
+/// Counts, for each pair of voxels, the windows of a row whose level separates it, and adds them to `votes`.
 #[inline]
 fn count(levels: &[u8], windows: usize, pairs: &Pairs, votes: &mut [u16; LANES]) {
     let (low, span) = (u8x16::new(pairs.low), u8x16::new(pairs.span));
     let mut few = u8x16::ZERO;
-    // Compilers do not make vectors of this by themselves for wasm, and it is most of the work of the votes.
+    // Vectorised by hand: compilers do not do it for wasm, and this is most of the work of the votes.
     for row in levels.windows(LANES).take(windows).filter_map(<[u8]>::first_chunk) {
         few += span.saturating_sub(u8x16::new(*row) - low).min(u8x16::ONE);
     }
     votes.iter_mut().zip(few.to_array()).for_each(|(all, few)| *all += u16::from(few));
 }
 
-/// Where rows of levels begin: with room for windows beyond both ends.
+/// The layout of levels in rows along x, with padding for windows beyond both ends.
 struct Rows {
     ny: usize,
     nz: usize,
@@ -279,13 +282,13 @@ impl Rows {
         self.row * self.ny * self.nz
     }
 
-    /// The first voxel of a row.
+    /// Returns the index of the first voxel of a row.
     fn at(&self, y: usize, z: usize) -> usize {
         (z * self.ny + y) * self.row + self.reach
     }
 }
 
-/// How often each level occurs.
+/// A histogram of quantised intensities.
 #[derive(Clone)]
 struct Counts([u16; 256]);
 
@@ -295,7 +298,7 @@ impl Default for Counts {
     }
 }
 
-/// Number of voxels and sum of their levels.
+/// The number of voxels in a cluster, and the sum of their intensities.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Cluster {
     count: u32,
@@ -317,7 +320,7 @@ impl Counts {
         self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a -= b);
     }
 
-    /// Voxels with levels in a range.
+    /// Returns the number and sum of the voxels with intensities in a range.
     fn within(&self, levels: std::ops::Range<usize>) -> Cluster {
         let mut cluster = Cluster::default();
         for level in levels {
@@ -328,8 +331,8 @@ impl Counts {
         cluster
     }
 
-    /// Two clusters of levels by Lloyd's iterations from the least and the greatest one; nothing where those differ by
-    /// no more than `threshold`.
+    /// Splits the histogram into two clusters by Lloyd iterations from its lowest and highest intensity; `None` if
+    /// those differ by no more than `threshold`.
     fn two_means(&self, threshold: f64) -> Option<(Cluster, Cluster)> {
         let least = self.0.iter().position(|&count| count > 0)?;
         let greatest = self.0.iter().rposition(|&count| count > 0)?;
@@ -337,7 +340,7 @@ impl Counts {
             return None;
         }
         let all = self.within(least..greatest + 1);
-        // Levels up to `end` are nearer to the lower mean.
+        // Intensities up to `end` are nearer to the lower mean.
         let mut end = (least + greatest) / 2;
         let mut low = self.within(least..end + 1);
         for _ in 0..ITERATIONS {
@@ -346,7 +349,7 @@ impl Counts {
             if middle == end {
                 return Some((low, high));
             }
-            // What changes sides alone is counted anew.
+            // Only voxels that change clusters are counted again.
             let changing = self.within(end.min(middle) + 1..end.max(middle) + 1);
             if middle > end {
                 low = Cluster { count: low.count + changing.count, sum: low.sum + changing.sum };
@@ -359,7 +362,8 @@ impl Counts {
     }
 }
 
-/// Counts of the voxels at each x within a window's reach of (y, z) in several frames: a window is some of them in a row.
+/// Histograms of the slabs at each x, of the voxels within a window's reach of (y, z) in several frames. A window is
+/// the sum of consecutive slabs.
 struct Slabs<'a> {
     dims: [usize; 3],
     reach: usize,
@@ -373,7 +377,7 @@ impl<'a> Slabs<'a> {
         Self { dims, reach, frames, at: None, counts: vec![Counts::default(); dims[0]] }
     }
 
-    /// To a row: by what comes in and goes out where it is the next one.
+    /// Moves the slabs to a row; incrementally if it follows the current one.
     fn go_to(&mut self, y: usize, z: usize) {
         let ny = self.dims[1];
         if y > 0 && self.at == Some((y - 1, z)) {
@@ -392,7 +396,7 @@ impl<'a> Slabs<'a> {
         self.at = Some((y, z));
     }
 
-    /// Changes the counts of all voxels in the row y of the slices around z.
+    /// Changes the counts of all voxels in row y of the slices within reach of z.
     fn change(&mut self, y: usize, z: usize, change: impl Fn(&mut u16)) {
         let [nx, ny, nz] = self.dims;
         for z in z.saturating_sub(self.reach)..(z + self.reach + 1).min(nz) {
@@ -405,7 +409,7 @@ impl<'a> Slabs<'a> {
         }
     }
 
-    /// Takes the slab at `x` into a window, and the one that it leaves behind out of it.
+    /// Adds the slab at `x` to the histogram of a sliding window, and subtracts the one that leaves it.
     fn slide(&self, window: &mut Counts, x: usize) {
         if let Some(counts) = self.counts.get(x) {
             window.add(counts);
@@ -423,7 +427,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Noise about two levels.
+    /// An image of noise around two intensities.
     fn region(dims: [usize; 3], frames: usize) -> Region {
         let mut random = Random::new(8);
         let [nx, ny, nz] = dims;
@@ -446,7 +450,7 @@ mod tests {
         }
     }
 
-    /// The voxels of one window: of those in the image, index and frame.
+    /// Returns the voxels of one window that are in the image, as index and frame.
     fn window_at(region: &Region, window: &Window, at: [usize; 3], frame: usize) -> Vec<(usize, usize)> {
         let [nx, ny, nz] = region.dims;
         let near = |a: usize, b: usize| a.abs_diff(b) <= window.reach;
@@ -459,7 +463,7 @@ mod tests {
             .collect()
     }
 
-    /// As section 2 says, on the levels themselves: the level between the clusters of a window that passes.
+    /// Computes the level between the clusters of a window that passes, directly as in section 2.
     fn level_of(values: &[u8], threshold: f64) -> Option<f64> {
         let (mut low, mut high) = (f64::from(*values.iter().min()?), f64::from(*values.iter().max()?));
         if high - low <= threshold {
@@ -529,7 +533,7 @@ mod tests {
                         }
                         let found = faces[direction].iter().find(|face| face.voxel as usize == i);
                         let weight = found.map_or(0.0, |face| face.weight);
-                        // Two frames in a circle have none in common.
+                        // Two frames of a cyclic sequence have no window in common.
                         let expected = votes as f32 / all.max(1) as f32;
                         assert!((weight - expected).abs() < 1e-6, "{direction} {i} {t}: {weight} {expected}");
                         voted += usize::from(votes > 0);

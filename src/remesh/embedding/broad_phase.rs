@@ -1,4 +1,5 @@
-//! Broad phase: pairs of non-adjacent vertices that are near each other, so that their triangles may intersect soon.
+//! Broad phase: finds pairs of non-adjacent vertices that are so near each other that their triangles may intersect
+//! soon.
 
 use super::motion_bound::Check;
 use super::{Embedding, NEAREST_CORNER, Nearby, PIERCING, SEARCH_SKIN};
@@ -6,7 +7,8 @@ use crate::math::Bounds;
 use crate::mesh::{Mesh, VertexId};
 use crate::spatial::{Proximity, VertexBall, near_pairs};
 
-/// The whole mesh is swept if at least one in this many vertices has to be searched around; else only those are. Found by timing.
+/// The whole mesh is swept if at least one in this many vertices has to be searched around; otherwise only those
+/// vertices are. Tuned by timing.
 const MANY: usize = 8;
 
 impl Embedding {
@@ -86,7 +88,7 @@ impl Embedding {
         }
     }
 
-    /// Stores a pair, unless the two are the same or adjacent.
+    /// Stores a pair, unless its vertices are identical or adjacent.
     fn add_pair(&mut self, mesh: &Mesh, a: &VertexBall, b: &VertexBall, proximity: Proximity) {
         if a.vertex == b.vertex || mesh.ring(a.vertex).contains(b.vertex) {
             return;
@@ -94,7 +96,7 @@ impl Embedding {
         let is_close = a.position.distance_squared(b.position) < proximity.least * proximity.least;
         for (v, w) in [(a.vertex, b.vertex), (b.vertex, a.vertex)] {
             if self.position_of(v, w).is_none() {
-                // The other may still have a certificate.
+                // The other vertex may still have a certificate of the pair.
                 let until = self.position_of(w, v).map_or(0.0, |k| self.nearby[w.index()][k].until);
                 self.nearby[v.index()].push(Nearby { vertex: w, until });
             }
@@ -104,12 +106,12 @@ impl Embedding {
         }
     }
 
-    /// The position of `w` among the vertices near `v`.
+    /// Returns the position of `w` among the vertices near `v`.
     pub(super) fn position_of(&self, v: VertexId, w: VertexId) -> Option<usize> {
         self.nearby[v.index()].iter().position(|near| near.vertex == w)
     }
 
-    /// How near two vertices are that can intersect or touch before either is searched around again.
+    /// Returns the distance below which two vertices can intersect or touch before either is searched around again.
     fn proximity(&self) -> Proximity {
         // Distance and edges change by twice the skin at most.
         let change = 2.0 * (SEARCH_SKIN * self.edge + self.finest());
@@ -120,7 +122,7 @@ impl Embedding {
         }
     }
 
-    /// The vertices in a box, sorted.
+    /// Returns the vertices in a box, sorted.
     pub fn vertices_in(&mut self, mesh: &Mesh, bounds: &Bounds) -> Vec<VertexId> {
         self.follow(mesh);
         let mut found = Vec::new();
@@ -130,13 +132,14 @@ impl Embedding {
         found
     }
 
-    /// Whether [`Self::for_each_contact`] may find any for `v`.
+    /// Returns whether [`Self::for_each_contact`] may find any contact of `v`.
     pub fn may_have_contacts(&self, v: VertexId) -> bool {
         self.may_touch[v.index()]
     }
 
-    /// Calls `found` with every vertex that is not adjacent to `v` and nearer than `distance`, and with the squared distance. `distance`
-    /// is at most the contact distance of the sampling that belongs to the ordinary edge.
+    /// Calls `found` with every vertex that is not adjacent to `v` and nearer than `distance`, and the squared
+    /// distance. `distance` must not exceed the contact distance of the sampling whose longest edge is the ordinary
+    /// edge.
     pub fn for_each_contact(
         &self,
         mesh: &Mesh,

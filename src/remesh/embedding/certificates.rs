@@ -1,45 +1,52 @@
-//! Certificates: until when a pair of one-rings is known not to intersect, however the tests of other pairs end.
+//! Certificates: how long a pair of one-rings is known not to intersect, independent of the tests of other pairs.
 //!
-//! Each vertex has an odometer, the sum of the largest displacements in its one-ring. A test with clearance c certifies its pair until
-//! the odometers of the two vertices together have advanced by 2 c. When the motion bound of a vertex is used up, only the pairs
-//! without a valid certificate are tested again; the bounds of the others are half of what is left. (Certificates with failure times, as in
-//! kinetic data structures: Basch, Guibas, Hershberger, *Data structures for mobile data*, 1999.)
+//! Each vertex has an odometer, the sum of the largest displacements in its one-ring. A test with clearance c certifies
+//! its pair until the odometers of the two vertices together have advanced by 2 c. When the motion bound of a vertex is
+//! used up, only the pairs without a valid certificate are tested again; the bounds of the others are half of the
+//! remainder. (Certificates with failure times, as in kinetic data structures: Basch, Guibas, Hershberger, *Data
+//! structures for mobile data*, 1999.)
 
 use super::one_ring::ORDINARY_RING;
 use crate::math::lower;
 use crate::mesh::VertexId;
 use smallvec::SmallVec;
 
-/// The valence up to which the certificates of a vertex need no memory of their own.
+/// The valence up to which the certificates of a vertex are stored inline, without heap allocation.
 const ORDINARY: usize = ORDINARY_RING / 2;
 
-/// A clearance counts as this much at most, in the ordinary edge: more than is ever used up between two edits around a vertex.
+/// The largest clearance that is stored, relative to the ordinary edge: more than is ever used up between two edits
+/// around a vertex.
 const MOST: f32 = 1.0;
 
-/// A certificate is worth keeping while more than this is left of it for each vertex, in the ordinary edge; a new test may give more.
+/// A certificate is reused while its remainder for each vertex exceeds this, relative to the ordinary edge; otherwise a
+/// new test may give a larger one.
 const WORTH: f32 = 0.01;
 
-/// Relative rounding of sums of odometers, in single precision, generously.
+/// Generous bound on the relative rounding error of sums of odometers, in single precision.
 const ROUNDING: f32 = 4e-7;
 
-/// Odometers beyond this, in the ordinary edge, are too coarse; then everything begins anew.
+/// The largest reading of an odometer, relative to the ordinary edge: beyond it single precision is too coarse, and all
+/// certificates are discarded.
 const LONGEST: f32 = 500.0;
 
-/// The certificates of all pairs of adjacent one-rings, and odometers. Those of non-adjacent ones are stored with the pairs.
+/// The odometers, and the certificates of all pairs of adjacent one-rings. Those of non-adjacent pairs are stored with
+/// the pairs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Certificates {
     edge: f32,
-    /// By vertex, how far its one-ring has moved, and more wherever an edit changed it.
+    /// The odometer of each vertex: the accumulated displacement of its one-ring, increased further by edits that
+    /// change it.
     odometer: Vec<f32>,
-    /// By vertex, the reading up to which its own one-ring is certified.
+    /// The odometer reading up to which the one-ring of each vertex itself is certified.
     own: Vec<f32>,
-    /// By vertex and position in its ring, the sum of both readings up to which the pair is certified.
+    /// The sum of both readings up to which a pair of adjacent vertices is certified, by vertex and position in its
+    /// ring.
     along_edges: Vec<SmallVec<[f32; ORDINARY]>>,
     worn: bool,
 }
 
 impl Certificates {
-    /// Discards everything.
+    /// Discards all certificates and resets the odometers.
     pub(super) fn begin(&mut self, edge: f32, slots: usize) {
         *self = Self { edge, ..Self::default() };
         self.resize(slots);
@@ -51,26 +58,26 @@ impl Certificates {
         self.along_edges.resize(slots, SmallVec::new());
     }
 
-    /// Whether odometers are too coarse by now.
+    /// Returns whether an odometer exceeds [`LONGEST`], so that the certificates must be reset.
     pub(super) fn are_worn(&self) -> bool {
         self.worn
     }
 
-    /// Advances the odometer of a vertex.
+    /// Advances the odometer of a vertex by the displacement of its one-ring.
     pub(super) fn advance(&mut self, v: VertexId, displacement: f32) {
         let odometer = &mut self.odometer[v.index()];
         *odometer = (*odometer + displacement).next_up();
         self.worn |= *odometer > LONGEST * self.edge;
     }
 
-    /// Makes all certificates of a vertex invalid, which an edit made or changed.
+    /// Invalidates all certificates of a vertex, which an edit created or changed.
     pub(super) fn revoke(&mut self, v: VertexId) {
         self.along_edges[v.index()].clear();
         self.own[v.index()] = 0.0;
         self.advance(v, 2.0 * MOST * self.edge);
     }
 
-    /// Prepares for tests of a vertex of some valence; with `anew`, certificates do not count.
+    /// Prepares for tests of a vertex with the given valence; if `anew`, its certificates are discarded.
     pub(super) fn prepare(&mut self, v: VertexId, valence: usize, anew: bool) {
         let along_edges = &mut self.along_edges[v.index()];
         if anew || along_edges.len() != valence {
@@ -82,26 +89,27 @@ impl Certificates {
         }
     }
 
-    /// Both readings together.
+    /// Returns the sum of the odometers of both vertices.
     fn sum(&self, [v, w]: [VertexId; 2]) -> f32 {
         self.odometer[v.index()] + self.odometer[w.index()]
     }
 
-    /// What is left for each of two vertices of a certificate up to a sum of readings, if it is worth keeping.
+    /// Returns the remainder for each vertex of a certificate that is valid up to a sum of readings, if it is large
+    /// enough to be reused.
     pub(super) fn left(&self, pair: [VertexId; 2], until: f32) -> Option<f32> {
         let left = 0.5 * (until - self.sum(pair));
         (left > WORTH * self.edge).then_some(left)
     }
 
-    /// The sum of readings up to which a clearance certifies a pair.
+    /// Returns the sum of readings up to which a clearance certifies a pair.
     pub(super) fn until(&self, pair: [VertexId; 2], clearance: f32) -> f32 {
         let sum = self.sum(pair);
         let until = (sum + 2.0 * lower(MOST * self.edge, clearance)) * (1.0 - ROUNDING);
-        // An odometer that has overflown certifies nothing.
+        // An odometer that has overflowed certifies nothing.
         if until < f32::INFINITY { until } else { 0.0 }
     }
 
-    /// What is left of the certificate of a one-ring.
+    /// Returns the remainder of the certificate of a one-ring itself.
     pub(super) fn left_of_own(&self, v: VertexId) -> Option<f32> {
         self.left([v, v], 2.0 * self.own[v.index()])
     }
@@ -110,12 +118,12 @@ impl Certificates {
         self.own[v.index()] = 0.5 * self.until([v, v], clearance);
     }
 
-    /// What is left of the certificate of `v` and the neighbour at a position in its ring.
+    /// Returns the remainder of the certificate of a vertex and the neighbour at a position in its ring.
     pub(super) fn left_along(&self, pair: [VertexId; 2], position: usize) -> Option<f32> {
         self.left(pair, *self.along_edges[pair[0].index()].get(position)?)
     }
 
-    /// Sets the certificate of a pair at one of the two, by the position of the other in its ring.
+    /// Sets the certificate of a pair of adjacent vertices at one of them, by the position of the other in its ring.
     pub(super) fn set_along(&mut self, v: VertexId, position: usize, until: f32) {
         if let Some(own) = self.along_edges[v.index()].get_mut(position) {
             *own = until;

@@ -1,7 +1,7 @@
-//! Clearances pair by pair of triangles, for one-rings that no plane separates as a whole.
+//! Clearances between individual pairs of triangles, for one-rings that no plane separates as a whole.
 //!
-//! Two triangles do not intersect if their projections onto some axis are disjoint (separating axes: Gottschalk, Lin, Manocha, OBBTree,
-//! SIGGRAPH 1996). Half the gap there is the clearance of the pair.
+//! Two triangles do not intersect if their projections onto some axis are disjoint (separating axes: Gottschalk, Lin,
+//! Manocha, OBBTree, SIGGRAPH 1996). Half the gap between the projections is the clearance of the pair.
 
 use super::one_ring::{ORDINARY_RING, ROUNDING, clearance_beside_line, unit};
 use crate::math::{Bounds, Vec3, higher, lower};
@@ -9,15 +9,16 @@ use crate::mesh::{Mesh, VertexId};
 use smallvec::SmallVec;
 use wide::f32x4;
 
-/// The square of the shortest product of two edges with a direction, in the longest edge.
+/// The smallest squared length of the cross product of two edges that has a reliable direction, with edges relative to
+/// the longest.
 const SHORTEST: f32 = 1e-30;
 
 type Triangle = [Vec3; 3];
 
-/// The clearance between the triangles at `u` and those at `v` without a common corner; not positive where some pair is not known to be
-/// disjoint. The search ends at `enough`. `longest` is the longest edge at `u` and `v`.
+/// Returns the clearance between the triangles at `u` and those at `v` without a common corner; not positive if some
+/// pair is not known to be disjoint. The search ends at `enough`. `longest` is the longest edge at `u` and `v`.
 pub(super) fn triangle_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32, enough: f32) -> f32 {
-    // Lengths in the longest edge, so that squares of products of edges neither over- nor underflow.
+    // Lengths are relative to the longest edge, so that squares of products of edges neither over- nor underflow.
     let (origin, per_length) = (mesh.position(u), 1.0 / longest);
     let at = |w: VertexId| (mesh.position(w) - origin) * per_length;
     let enough = enough * per_length;
@@ -55,8 +56,8 @@ pub(super) fn triangle_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f3
     clearance * longest
 }
 
-/// The clearance between the triangles at `v`, beyond their common corners and edges; not positive where some pair may intersect.
-/// `longest` is the longest edge at `v`.
+/// Returns the clearance between the triangles at `v`, except for their common corners and edges; not positive if some
+/// pair may intersect. `longest` is the longest edge at `v`.
 pub(super) fn fan_clearance(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
     let ring = mesh.ring(v).as_slice();
     let origin = mesh.position(v);
@@ -79,7 +80,8 @@ pub(super) fn fan_clearance(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
     clearance
 }
 
-/// The clearance of two triangles on the edge from the origin to `edge`, with these tips, from being folded onto each other.
+/// Returns the clearance from folding onto each other of two triangles with the given tips that share the edge from the
+/// origin to `edge`.
 fn fold_clearance(edge: Vec3, tips: [Vec3; 2], longest: f32) -> f32 {
     let square = edge.length_squared();
     let per_length = edge * (1.0 / square);
@@ -92,9 +94,9 @@ fn fold_clearance(edge: Vec3, tips: [Vec3; 2], longest: f32) -> f32 {
     clearance_beside_line(gap, reach, square, longest)
 }
 
-/// The largest gap between the projections of two triangles onto their normals and the cross products of their edges, or one above
-/// `wanted`; negative where all overlap. `axis` is tried first and becomes the one found: an axis that separates two triangles often
-/// separates their neighbours.
+/// Returns the largest gap between the projections of two triangles onto their normals and the cross products of their
+/// edges, or one above `wanted`; negative if all overlap. `axis` is tried first and replaced by the axis found: an axis
+/// that separates two triangles often separates their neighbours.
 fn gap_between(s: &Triangle, t: &Triangle, wanted: f32, axis: &mut Vec3) -> f32 {
     let mut gap = gap_along(*axis, s, t);
     if gap > wanted {
@@ -117,7 +119,7 @@ fn gap_between(s: &Triangle, t: &Triangle, wanted: f32, axis: &mut Vec3) -> f32 
     gap
 }
 
-/// Four vectors side by side.
+/// Four vectors in SIMD lanes.
 #[derive(Clone, Copy)]
 struct Vectors([f32x4; 3]);
 
@@ -135,7 +137,7 @@ impl Vectors {
         Self([b * z - c * y, c * x - a * z, a * y - b * x])
     }
 
-    /// Unit vectors; 0 for those without a direction.
+    /// Returns unit vectors; 0 for those without a direction.
     fn unit(self) -> Self {
         let [x, y, z] = self.0;
         let square = x * x + y * y + z * z;
@@ -149,7 +151,7 @@ impl Vectors {
         x * f32x4::splat(p.x) + y * f32x4::splat(p.y) + z * f32x4::splat(p.z)
     }
 
-    /// The gaps between the projections of two triangles onto each.
+    /// Returns the gap between the projections of two triangles onto each of the four vectors.
     fn gaps(self, s: &Triangle, t: &Triangle) -> f32x4 {
         let ([a, b, c], [p, q, r]) = (s.map(|corner| self.dot(corner)), t.map(|corner| self.dot(corner)));
         let (low, high) = (lower_of(lower_of(a, b), c), higher_of(higher_of(a, b), c));
@@ -158,25 +160,25 @@ impl Vectors {
     }
 }
 
-/// As [`lower`], lane by lane.
+/// Returns the lower of two numbers in each lane, as [`lower`] does.
 fn lower_of(a: f32x4, b: f32x4) -> f32x4 {
     b.simd_lt(a).select(b, a)
 }
 
-/// As [`higher`], lane by lane.
+/// Returns the higher of two numbers in each lane, as [`higher`] does.
 fn higher_of(a: f32x4, b: f32x4) -> f32x4 {
     b.simd_gt(a).select(b, a)
 }
 
-/// Whether two triangles are known to be further apart than `margin`, by axes in the plane of either and normal to one of its edges. Most
-/// triangles near each other lie on one sheet, where exact predicates are slowest. `reach` is the longest distance between two of their
-/// corners.
+/// Returns whether two triangles are known to be further apart than `margin`, by axes in the plane of either and normal
+/// to one of its edges. Most triangles near each other lie on one sheet, where exact predicates are slowest. `reach` is
+/// the longest distance between two of their corners.
 pub(super) fn are_beside(s: &Triangle, t: &Triangle, reach: f32, margin: f32) -> bool {
     let gap = margin + ROUNDING * reach;
     is_beside_edge(s, t, gap) || is_beside_edge(t, s, gap)
 }
 
-/// Whether `t` is beyond an edge of `s` by more than `gap`.
+/// Returns whether `t` is beyond an edge of `s` by more than `gap`.
 fn is_beside_edge(s: &Triangle, t: &Triangle, gap: f32) -> bool {
     let normal = (s[1] - s[0]).cross(s[2] - s[0]);
     [[0, 1, 2], [1, 2, 0], [2, 0, 1]].into_iter().any(|[from, to, tip]| {
@@ -196,16 +198,16 @@ fn gap_along(direction: Vec3, s: &Triangle, t: &Triangle) -> f32 {
     higher(other_low - high, low - other_high)
 }
 
-/// The largest gap along an axis; negative where the boxes meet.
+/// Returns the largest gap between two boxes along a coordinate axis; negative if they intersect.
 fn gap_between_boxes(a: &Bounds, b: &Bounds) -> f32 {
     (b.min - a.max).max(a.min - b.max).max_element()
 }
 
-/// The distance of the tips of two triangles, whose common corner is the origin, from a separating plane through it; not positive where
-/// none was found.
+/// Returns the distance of the tips of two triangles, whose common corner is the origin, from a separating plane
+/// through it; not positive if none was found.
 ///
-/// With the tips of one of them mirrored at the origin, all four are on one side of the plane. Its normal is the mean of those of the
-/// faces of the cone around them.
+/// If the tips of one triangle are mirrored at the origin, all four are on one side of the plane. Its normal is the
+/// mean of those of the faces of the cone around them.
 pub(super) fn gap_between_corners([a, b]: [Vec3; 2], [c, d]: [Vec3; 2]) -> f32 {
     let rays = [a, b, -c, -d];
     let mut normal = Vec3::ZERO;
@@ -235,7 +237,7 @@ mod tests {
         Vec3::from([(); 3].map(|()| 2.0 * random.unit() as f32 - 1.0))
     }
 
-    /// A sphere with some noise, sometimes flattened.
+    /// Returns a sphere with noise, sometimes flattened.
     fn rough(random: &mut Random) -> Mesh {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.8).unwrap();
         let (rough, flat) = (0.6 * random.unit() as f32, [1.0, 0.1][random.below(2) as usize]);
@@ -247,7 +249,7 @@ mod tests {
         mesh
     }
 
-    /// The mesh with each vertex moved by nearly `displacement`.
+    /// Returns the mesh with each vertex moved by nearly `displacement`.
     fn shaken(mesh: &Mesh, displacement: f32, random: &mut Random) -> Mesh {
         let mut mesh = mesh.clone();
         let names: Vec<VertexId> = mesh.vertices().collect();
@@ -257,7 +259,8 @@ mod tests {
         mesh
     }
 
-    /// Nothing intersects, by the exact test `intersections`, as long as no vertex moves further than `clearance`.
+    /// Asserts that nothing intersects, by the exact test `intersections`, as long as no vertex moves further than
+    /// `clearance`.
     fn assert_holds(
         mesh: &Mesh,
         clearance: f32,
@@ -272,7 +275,7 @@ mod tests {
         assert!(crossing.is_empty(), "with clearance for {clearance}");
     }
 
-    /// Two triangles side by side or overlapping, sometimes exactly in one plane.
+    /// Returns two triangles beside each other or overlapping, sometimes exactly in one plane.
     fn two_triangles(random: &mut Random) -> [Triangle; 2] {
         let flat = [0.0, 0.0, 0.02, 1.0][random.below(4) as usize];
         let apart = Vec3::X * (2.0 * random.unit() as f32);

@@ -1,10 +1,11 @@
 //! Collision handling: keeps a mesh free of self-intersections by rejecting edits and shortening displacements.
 //!
-//! The mesh had none before, so a state without is always at hand. Detection has three parts:
-//! - [`broad_phase`]: pairs of non-adjacent vertices whose triangles may intersect, from a grid that follows the mesh ([`VertexGrid`]);
+//! The previous state of the mesh has no self-intersections, so it can always be restored. Detection has three parts:
+//! - [`broad_phase`]: pairs of non-adjacent vertices whose triangles may intersect, from a grid that is updated with
+//!   the mesh ([`VertexGrid`]);
 //! - [`narrow_phase`]: conservative filters (`one_ring`, `clearance`), then exact predicates on pairs of triangles;
-//! - [`motion_bound`]: each filter returns a displacement below which its pair cannot intersect; the pair is not tested again before
-//!   the displacements of its vertices add up to that ([`certificates`]).
+//! - [`motion_bound`]: each filter returns a displacement bound below which its pair cannot intersect; the pair is not
+//!   tested again before the displacements of its vertices add up to that bound ([`certificates`]).
 //!
 //! Two triangles intersect in one of three configurations, each tested where it can occur:
 //! - they share a corner: in the one-ring of a vertex;
@@ -33,84 +34,90 @@ use one_ring::longest_edge;
 use output::OutputSpace;
 use smallvec::SmallVec;
 
-/// 1/√3, rounded up: the distance of a point of a triangle from its nearest corner, in the triangle's longest edge.
+/// 1/√3, rounded up: the largest distance of a point of a triangle from its nearest corner, relative to the longest
+/// edge of the triangle.
 const NEAREST_CORNER: f32 = 0.577_351;
 
-/// √(1/4 + 1/3), rounded up: the distance between corners of two intersecting triangles, in the longest edge of both.
+/// √(1/4 + 1/3), rounded up: the largest distance between the nearest corners of two intersecting triangles, relative
+/// to the longest edge of both.
 const PIERCING: f32 = 0.763_763;
 
-/// The skin of the broad phase: how far a one-ring may move before its vertex is searched for neighbours again, in the ordinary edge.
-/// A wider skin gives more pairs, a narrower one more searches. Few vertices of an ordinary mesh have any pair.
+/// The skin of the broad phase: the displacement of a one-ring after which its vertex is searched for neighbours again,
+/// relative to the ordinary edge (that of [`Embedding::follow_with`]). A wider skin gives more pairs, a narrower one
+/// more searches. Few vertices of an ordinary mesh have any pair.
 const SEARCH_SKIN: f32 = 0.04;
 
-/// Squares of shorter lengths lose their digits to rounding. Edges and displacements count as at least this long, and a smaller clearance
-/// as none.
+/// The smallest length that is distinguished: squares of shorter lengths lose their digits to rounding. Edges and
+/// displacements count as at least this long, and a smaller clearance as none.
 const FINEST: f32 = 1e-17;
 
-/// A non-adjacent vertex near one, and the sum of both odometers up to which the pair is certified.
+/// A non-adjacent vertex found near another, and the sum of both odometers up to which the pair is certified.
 #[derive(Clone, Copy, Debug)]
 struct Nearby {
     vertex: VertexId,
     until: f32,
 }
 
-/// Keeps one mesh embedded.
+/// Collision guard of one mesh: tests edits and moves, and prevents those that would cause self-intersections.
 ///
 /// Motion bounds decide when a pair is tested, never the result of a test.
 #[derive(Clone, Debug, Default)]
 pub struct Embedding {
     grid: VertexGrid,
-    /// An edge that is longer than most of the mesh.
+    /// The ordinary edge: a length that most edges of the mesh do not exceed.
     edge: f32,
-    /// By vertex, its longest edge when it was last measured.
+    /// The longest edge of each vertex, as last measured.
     longest: Vec<f32>,
-    /// By vertex, the non-adjacent vertices found near it by the broad phase.
+    /// The non-adjacent vertices that the broad phase found near each vertex.
     nearby: Vec<SmallVec<[Nearby; 4]>>,
-    /// By vertex, whether a non-adjacent one may be within the contact distance.
+    /// Whether a non-adjacent vertex may be within the contact distance, by vertex.
     may_touch: Vec<bool>,
-    /// By vertex, how far its one-ring may still move before it is tested again.
+    /// The motion bounds of each vertex: the displacement of its one-ring up to the next test.
     motion_bounds: Vec<MotionBounds>,
     certificates: Certificates,
-    /// By vertex, the largest displacement in its one-ring during a move, and the vertices where it is not 0.
+    /// The largest displacement in the one-ring of each vertex during a move; `touched` are the vertices where it is
+    /// not 0.
     travelled: Vec<f32>,
     touched: Vec<VertexId>,
-    /// Vertices that edits made or changed since the last move; the pairs of their neighbours do not include them yet.
+    /// Vertices that edits created or changed since the last move; the pairs of their neighbours do not include them
+    /// yet.
     edited: Vec<VertexId>,
-    /// By vertex, the pending checks, and the vertices that have any.
+    /// The pending checks of each vertex; `dirty` are the vertices that have any.
     pending: Vec<Checks>,
     dirty: Vec<VertexId>,
-    /// The geometry version of the mesh that this is in sync with.
+    /// The geometry version of the mesh with which this is synchronised.
     version: Option<u32>,
-    /// The geometry version at which the whole mesh was entered in the grid.
+    /// The geometry version at which the whole mesh was entered into the grid.
     entered: Option<u32>,
-    /// A vertex is marked where its entry is the newest mark.
+    /// Visited marks: a vertex is marked if its entry equals `newest`.
     marks: Vec<u32>,
     newest: u32,
     found: Vec<VertexId>,
-    /// Positions before the current move.
+    /// Vertex positions before the current move.
     from: Vec<Vec3>,
-    /// Whether, since the whole mesh was last checked, a self-intersection was found at a vertex without displacement.
+    /// Whether a self-intersection was found at a vertex without displacement since the last full synchronisation.
     stuck: bool,
     effort: u64,
-    /// The space of the output, where triangles must not intersect either.
+    /// The output space, in which triangles must not intersect either.
     output: Option<OutputSpace>,
 }
 
 impl Embedding {
-    /// Also keeps the mesh, which stays within `bounds`, free of self-intersections after `map` and rounding to single precision. Has no
-    /// effect where that rounding is coarser than a hundredth of a unit of the mesh.
+    /// Also keeps the mesh, which stays within `bounds`, free of self-intersections after mapping by `map` and rounding
+    /// to single precision. Has no effect if that rounding is coarser than a hundredth of a unit of the mesh.
     pub fn watch_output(&mut self, map: DAffine3, bounds: &Bounds) {
         self.output = OutputSpace::new(map, bounds);
         self.version = None;
     }
 
-    /// The clearance up to which triangles are tested exactly.
+    /// Returns the clearance below which triangles are tested by exact predicates.
     fn finest(&self) -> f32 {
         output::finest(self.output.as_ref())
     }
 
-    /// As [`Self::follow`], for a mesh most of whose edges are shorter than `edge`. That affects speed and the largest distance of
-    /// [`Self::for_each_contact`], not which intersections are found.
+    /// Synchronises with `mesh` as [`Self::follow`] does, and sets the ordinary edge: a length that most edges do not
+    /// exceed. It affects speed and the largest distance of [`Self::for_each_contact`], not which intersections are
+    /// found.
     pub fn follow_with(&mut self, mesh: &Mesh, edge: f32) {
         let edge = higher(FINEST, edge);
         if self.edge != edge {
@@ -126,7 +133,7 @@ impl Embedding {
         self.grid.fill_cells();
     }
 
-    /// As [`Self::follow`], without filling the cells of the grid: a check of the whole mesh does not need them.
+    /// Synchronises without filling the cells of the grid: a check of the whole mesh does not need them.
     fn sync(&mut self, mesh: &Mesh) {
         if self.version == Some(mesh.geometry_version()) && !self.certificates.are_worn() {
             return;
@@ -147,10 +154,10 @@ impl Embedding {
         self.entered = self.version;
     }
 
-    /// Makes one or more edits as a transaction, and rolls it back if triangles would intersect.
+    /// Performs one or more edits as a transaction, and rolls it back if triangles would intersect.
     ///
     /// # Errors
-    /// That of the edit; [`EditError::WouldCross`]. The mesh is then as it was.
+    /// That of the edit; [`EditError::WouldCross`]. The mesh is unchanged on error.
     pub fn attempt<T>(
         &mut self,
         mesh: &mut Mesh,
@@ -159,7 +166,8 @@ impl Embedding {
         self.attempt_with(mesh, edit, Self::changes_intersect)
     }
 
-    /// As [`Self::attempt`], testing only pairs of triangles that share a corner. [`Self::crossing`] finds the other intersections.
+    /// Performs edits as [`Self::attempt`] does, but tests only pairs of triangles that share a corner.
+    /// [`Self::crossing`] finds the other intersections.
     ///
     /// # Errors
     /// As [`Self::attempt`].
@@ -189,7 +197,7 @@ impl Embedding {
         done
     }
 
-    /// Takes over the changes since [`Mesh::begin`], unless they make triangles intersect.
+    /// Updates this structure with the changes since [`Mesh::begin`]; an error if they make triangles intersect.
     fn accept_changes(
         &mut self,
         mesh: &Mesh,
@@ -203,23 +211,25 @@ impl Embedding {
         Ok(())
     }
 
-    /// Whether no two triangles share more than their common corners and edges; exact.
+    /// Returns whether the mesh is free of self-intersections: no two triangles have more than their common corners and
+    /// edges in common; exact.
     pub fn is_embedded(&mut self, mesh: &Mesh) -> bool {
         self.check_all(mesh).is_empty()
     }
 
-    /// The corners of all triangles that intersect another, sorted.
+    /// Returns the corners of all triangles that intersect another, sorted.
     pub fn crossing(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         self.check_all(mesh)
     }
 
-    /// The number of nearby vertices visited for edits since the beginning: a measure of work.
+    /// Returns the total number of nearby vertices visited for edits: a measure of work, by which
+    /// [`Resolver`](super::Resolver) limits a call.
     pub fn effort(&self) -> u64 {
         self.effort
     }
 
-    /// Appends the components of another mesh; returns the new vertices, and the corners of all triangles that intersect one of those
-    /// components, sorted.
+    /// Appends the components of another mesh; returns the new vertices, and the corners of all triangles that
+    /// intersect one of those components, sorted.
     ///
     /// # Errors
     /// As [`Mesh::append`].
@@ -233,7 +243,7 @@ impl Embedding {
         self.resize_for(mesh.slots());
         self.pending.resize(mesh.slots(), Checks::default());
         for &v in &added {
-            // Its slot may have been that of another.
+            // Its slot may be one of a deleted vertex.
             self.forget(v);
             self.measure(mesh, v);
             self.enter(mesh, v);
@@ -245,7 +255,7 @@ impl Embedding {
         Ok((added, crossing))
     }
 
-    /// Deletes the component of `v` and returns how many vertices it had.
+    /// Deletes the component of `v`, and returns its number of vertices.
     pub fn remove_component(&mut self, mesh: &mut Mesh, v: VertexId) -> usize {
         self.follow(mesh);
         let members = mesh.component_of(v, usize::MAX);
@@ -255,7 +265,7 @@ impl Embedding {
         count
     }
 
-    /// Resizes the arrays by vertex; nothing is known of new vertices.
+    /// Resizes the arrays by vertex; new vertices are untested.
     fn resize_for(&mut self, slots: usize) {
         self.longest.resize(slots, 0.0);
         self.nearby.resize(slots, SmallVec::new());
@@ -269,12 +279,12 @@ impl Embedding {
         self.longest[v.index()] = longest_edge(mesh, v);
     }
 
-    /// Enters `v` in the grid, with its longest edge as last measured.
+    /// Enters `v` into the grid, with its longest edge as last measured.
     fn enter(&mut self, mesh: &Mesh, v: VertexId) {
         self.grid.set(v, mesh.position(v), self.longest[v.index()]);
     }
 
-    /// Updates grid and motion bounds by the changes since [`Mesh::begin`].
+    /// Updates the grid and the motion bounds with the changes since [`Mesh::begin`].
     fn follow_changes(&mut self, mesh: &Mesh, changed: &[[VertexId; 3]]) {
         self.resize_for(mesh.slots());
         for v in mesh.touched() {
@@ -301,7 +311,7 @@ impl Embedding {
         }
     }
 
-    /// Discards what is known of `v`, which an edit made or changed.
+    /// Discards the motion bounds and certificates of `v`, which an edit created or changed.
     fn forget(&mut self, v: VertexId) {
         self.may_touch[v.index()] = true;
         self.certificates.revoke(v);

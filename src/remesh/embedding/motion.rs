@@ -1,4 +1,4 @@
-//! Moves vertices as far as no triangles intersect.
+//! Moves vertices by their displacements, shortened so that no triangles intersect.
 
 use super::Embedding;
 use super::motion_bound::Checks;
@@ -6,24 +6,25 @@ use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use std::collections::BTreeMap;
 
-/// Vertices of intersecting triangles move by this share of their displacement; where triangles still intersect, they stay.
+/// The factor on the displacement of vertices of intersecting triangles; if triangles still intersect, these vertices
+/// do not move.
 const LESS: f32 = 0.25;
 
 impl Embedding {
-    /// Whether the mesh intersects itself after it was moved: only where it did before.
+    /// Returns whether the mesh still intersects itself after a move, which happens only if it did before.
     pub fn left_crossing(&mut self, mesh: &Mesh) -> bool {
         self.stuck && !self.is_embedded(mesh)
     }
 
-    /// As [`Self::carry_some`], of all vertices.
+    /// Moves all vertices, as [`Self::carry_some`] does.
     pub fn carry(&mut self, mesh: &mut Mesh, displacements: &mut [Vec3]) -> Vec<(VertexId, f32)> {
         let all: Vec<VertexId> = mesh.vertices().collect();
         self.carry_some(mesh, &all, displacements)
     }
 
-    /// Moves some vertices by `displacements`, by slot; those whose triangles would intersect by a quarter of it, or not at all.
-    /// `displacements` becomes what was applied. Returns the vertices that were held back, sorted, and the share of its displacement
-    /// that each moved by.
+    /// Moves the vertices `moving` by `displacements`, given by slot; those whose triangles would intersect move by a
+    /// quarter of it, or not at all. `displacements` is set to the displacements applied. Returns the vertices that
+    /// were held back, sorted, and the share of its displacement by which each moved.
     ///
     /// A mesh without self-intersections has none afterwards: in the worst case no vertex moves.
     pub fn carry_some(
@@ -80,7 +81,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// An edit may put triangles near a vertex whose skin is not used up.
+    /// An edit may create triangles near a vertex whose skin is not used up.
     #[test]
     fn triangles_that_an_edit_puts_near_are_detected() {
         let mut mesh = Mesh::icosahedron(Vec3::ZERO, 1.0);
@@ -119,7 +120,7 @@ mod tests {
             mesh.append(&Mesh::icosphere(Vec3::Z, 0.6, 0.4).unwrap()).unwrap();
             let mut unit = || 2.0 * random.unit() as f32 - 1.0;
             let speed = 0.1 * unit() * unit();
-            // Neighbours go similar ways, each at its own speed; some stand still.
+            // Neighbours have similar displacements, each at its own speed; some vertices do not move.
             let swirl = [(); 3].map(|()| Vec3::new(unit(), unit(), unit()));
             let displacements: Vec<Vec3> = (0..mesh.slots())
                 .map(|i| {
@@ -145,7 +146,8 @@ mod tests {
         assert!(all_held > 1000, "{all_held} held back");
     }
 
-    /// Certificates outlive tests of other pairs: a part that tumbles towards another is held back where a test of everything would do so.
+    /// Certificates remain valid after tests of other pairs: a component that tumbles towards another is held back
+    /// exactly as by a test of everything.
     #[test]
     fn certificates_change_no_result() {
         let mut all_held = 0;

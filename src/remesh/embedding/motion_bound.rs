@@ -1,26 +1,27 @@
-//! Motion bounds: how far the one-ring of each vertex may move before the vertex must be tested again.
+//! Motion bounds: the displacement of a vertex's one-ring up to which the vertex need not be tested again.
 //!
-//! A test of the triangles at two vertices returns a clearance: they cannot intersect before some vertex of both one-rings has moved
-//! that far. So they are tested again when the largest displacements in one of the two one-rings add up to the clearance.
+//! A test of the triangles at two vertices returns a clearance: they cannot intersect before some vertex of both
+//! one-rings has moved by that distance. So they are tested again when the largest displacements in one of the two
+//! one-rings add up to the clearance.
 
 use super::{Embedding, FINEST};
 use crate::math::{Vec3, higher};
 use crate::mesh::{Mesh, VertexId};
 
-/// A kind of check with a motion bound of its own.
+/// A kind of collision check with a motion bound of its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Check {
-    /// Pairs of triangles that are both at the vertex, or one at the vertex and one at an adjacent one.
+    /// Pairs of triangles that are both at the vertex, or one at the vertex and one at an adjacent vertex.
     OneRing,
-    /// Pairs of triangles at the vertex and at a non-adjacent one near it.
+    /// Pairs of triangles, one at the vertex and one at a non-adjacent vertex near it.
     Nearby,
-    /// The search for non-adjacent vertices near it.
+    /// The search for non-adjacent vertices near the vertex.
     Search,
 }
 
 const CHECKS: [Check; 3] = [Check::OneRing, Check::Nearby, Check::Search];
 
-/// A set of checks.
+/// A set of collision checks, such as those pending for a vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Checks(u8);
 
@@ -42,12 +43,12 @@ impl Checks {
     }
 }
 
-/// How far a one-ring may still move, by check; used up where it is not positive.
+/// The remaining displacement of a one-ring before each kind of check; used up if it is not positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MotionBounds([f32; 3]);
 
 impl MotionBounds {
-    /// Of a vertex that was never tested.
+    /// The bounds of a vertex that was never tested.
     pub(super) const NONE: Self = Self([0.0; 3]);
 
     pub(super) fn set(&mut self, check: Check, clearance: f32) {
@@ -74,13 +75,13 @@ impl MotionBounds {
 }
 
 impl Embedding {
-    /// Subtracts displacements from the motion bounds of all one-rings that the moved vertices are in, and marks those dirty whose bounds
-    /// are used up. `moved`: the vertices, and their positions before.
+    /// Subtracts displacements from the motion bounds of all one-rings that contain a moved vertex, and marks those
+    /// vertices dirty whose bounds are used up. `moved` contains the moved vertices and their previous positions.
     pub(super) fn spend_motion(&mut self, mesh: &Mesh, moved: impl IntoIterator<Item = (VertexId, Vec3)>) {
         self.travelled.resize(mesh.slots(), 0.0);
         let mut touched = std::mem::take(&mut self.touched);
         for (v, from) in moved {
-            // The displacement after rounding.
+            // The displacement after rounding of the position.
             let to = mesh.position(v);
             if from != to {
                 let displacement = higher(FINEST, to.distance(from));
@@ -104,7 +105,7 @@ impl Embedding {
         self.touched = touched;
     }
 
-    /// Marks vertices dirty that edits made or changed.
+    /// Marks vertices dirty that edits created or changed.
     pub(super) fn mark_edited_dirty(&mut self, mesh: &Mesh) {
         let mut edited = std::mem::take(&mut self.edited);
         for v in edited.drain(..).filter(|&v| mesh.is_live(v)) {

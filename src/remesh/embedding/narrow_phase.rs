@@ -1,4 +1,4 @@
-//! Narrow phase: tests the triangles at dirty vertices for intersections, and derives new motion bounds.
+//! Narrow phase: tests the triangles at dirty vertices for intersections, and computes new motion bounds.
 
 use super::clearance::{fan_clearance, triangle_clearance};
 use super::motion_bound::{Check, Checks};
@@ -10,14 +10,15 @@ use super::{Embedding, Nearby};
 use crate::math::higher;
 use crate::mesh::{Mesh, VertexId};
 
-/// With a smaller clearance, in the ordinary edge, the next filter is tried, too.
+/// The clearance, relative to the ordinary edge, above which no further filter is tried.
 const AMPLE: f32 = 0.03;
 
-/// Checks of pairs of triangles.
+/// The checks that test pairs of triangles.
 const PAIRS: [Check; 2] = [Check::OneRing, Check::Nearby];
 
 impl Embedding {
-    /// As [`Self::check_dirty`], for every vertex, whatever is certified.
+    /// Runs all checks at every vertex, as [`Self::check_dirty`] does but regardless of certificates; returns the
+    /// corners of all triangles that intersect another, sorted.
     pub(super) fn check_all(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         self.sync(mesh);
         self.pending.resize(mesh.slots(), Checks::default());
@@ -25,8 +26,8 @@ impl Embedding {
         self.check(mesh, true)
     }
 
-    /// Runs the pending checks of dirty vertices and stores the clearances found as motion bounds and certificates. Returns the corners of
-    /// all triangles that intersect another, sorted.
+    /// Runs the pending checks of dirty vertices, and stores the clearances found as motion bounds and certificates.
+    /// Returns the corners of all triangles that intersect another, sorted.
     pub(super) fn check_dirty(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         self.check(mesh, false)
     }
@@ -109,7 +110,7 @@ impl Embedding {
     fn check_nearby(&mut self, mesh: &Mesh, v: VertexId, crossing: &mut Vec<VertexId>) {
         for k in 0..self.nearby[v.index()].len() {
             let Nearby { vertex: w, until } = self.nearby[v.index()][k];
-            // Edits may have changed either since the pair was found.
+            // Edits may have changed either vertex since the pair was found.
             if !mesh.is_live(w) || w == v || mesh.ring(v).contains(w) {
                 continue;
             }
@@ -126,7 +127,8 @@ impl Embedding {
         }
     }
 
-    /// Takes over the clearance of two one-rings, by exact tests where there is none; returns until when it certifies the pair.
+    /// Records the clearance of two one-rings, and runs exact tests if there is none; returns the sum of odometer
+    /// readings up to which the pair is certified.
     fn settle_pair(
         &mut self,
         mesh: &Mesh,
@@ -143,7 +145,8 @@ impl Embedding {
         self.certificates.until(pair, clearance)
     }
 
-    /// The clearance between the one-rings of two non-adjacent vertices; not positive where exact tests have to decide.
+    /// Returns the clearance between the one-rings of two non-adjacent vertices; not positive if exact tests have to
+    /// decide.
     fn nearby_clearance(&self, mesh: &Mesh, [v, w]: [VertexId; 2]) -> f32 {
         let longest = self.longest_of(v, w);
         if let Some(edge) = common_edge(mesh, v, w) {
@@ -164,7 +167,8 @@ impl Embedding {
         }
     }
 
-    /// `clearance`, found by planes between two one-rings, or the one between their triangles where that is larger and needed.
+    /// Returns `clearance`, found by planes between two one-rings, or, if it is not ample, the one between their
+    /// triangles if that is larger.
     fn or_triangle_clearance(&self, mesh: &Mesh, [v, w]: [VertexId; 2], clearance: f32) -> f32 {
         if self.is_ample(clearance) {
             return clearance;
@@ -172,7 +176,7 @@ impl Embedding {
         higher(clearance, triangle_clearance(mesh, [v, w], self.longest_of(v, w), AMPLE * self.edge))
     }
 
-    /// The clearance, or 0 where exact tests have to decide.
+    /// Returns the clearance, or 0 if exact tests have to decide.
     fn or_none(&self, clearance: f32) -> f32 {
         if clearance > self.finest() { clearance } else { 0.0 }
     }
@@ -185,7 +189,7 @@ impl Embedding {
         clearance > AMPLE * self.edge
     }
 
-    /// Whether the pair `w`, `v` is tested from `w`, so that `v` can skip it.
+    /// Returns whether the pair `w`, `v` is tested from `w`, so that `v` can skip it.
     pub(super) fn is_checked_from(&self, w: VertexId, v: VertexId, check: Check) -> bool {
         w < v && self.pending[w.index()].has(check)
     }
@@ -196,7 +200,7 @@ impl Embedding {
     }
 }
 
-/// The edge that `v` and `w` are opposite to each other across.
+/// Returns the edge across which `v` and `w` are opposite each other.
 fn common_edge(mesh: &Mesh, v: VertexId, w: VertexId) -> Option<[VertexId; 2]> {
     mesh.ring(v).pairs().find(|&(a, b)| mesh.ring(a).before(b) == Some(w)).map(|(a, b)| [a, b])
 }
@@ -217,7 +221,8 @@ mod tests {
         values[random.below(N as u32) as usize]
     }
 
-    /// A closed part of some size: smooth, rough or crumpled, perhaps flat or with a needle or with vertices on each other.
+    /// Returns a random closed component: smooth, rough or crumpled, possibly flat, with a needle or with coincident
+    /// vertices.
     fn part(random: &mut Random) -> Mesh {
         let mut mesh = match random.below(8) {
             0 => Mesh::icosphere(Vec3::ZERO, 1.0, 1.0).unwrap(),
@@ -252,7 +257,7 @@ mod tests {
         mesh
     }
 
-    /// The corners of the triangles that intersect, by testing all pairs.
+    /// Returns the corners of the triangles that intersect, by testing all pairs.
     fn expected(mesh: &Mesh) -> Vec<VertexId> {
         let triangles = mesh.to_triangles();
         let names: Vec<VertexId> = mesh.vertices().collect();
@@ -322,7 +327,7 @@ mod tests {
             assert_eq!(added.len(), parts.vertex_count());
             assert_eq!(found, expected(&mesh), "seed {seed}");
             *if found.is_empty() { &mut sound } else { &mut intersecting } += 1;
-            // What was found before is still known, and what is new moves as all else does.
+            // Motion bounds remain valid for old vertices, and new ones move like all others.
             let mut displacements = vec![Vec3::X * 0.02; mesh.slots()];
             embedding.carry(&mut mesh, &mut displacements);
             assert_eq!(embedding.check_all(&mesh), expected(&mesh), "seed {seed}");
@@ -330,7 +335,7 @@ mod tests {
         assert!(sound > 50 && intersecting > 50, "{sound} sound, {intersecting} intersecting");
     }
 
-    /// A new component gets the slots of one that was removed, and nothing of what was known of that.
+    /// A new component reuses the slots of a removed one, and must not inherit its motion bounds.
     #[test]
     fn components_in_slots_of_removed_ones_are_tested() {
         let mut intersecting = 0;
@@ -342,7 +347,7 @@ mod tests {
             let mut embedding = Embedding::default();
             embedding.follow_with(&mesh, 1.2);
             assert!(embedding.check_all(&mesh).is_empty());
-            // Slots are handed out again in the order in which vertices are found.
+            // Slots are reused in the order in which vertices are found.
             let members = mesh.component_of(VertexId::from_index(first), usize::MAX);
             let position = |v: VertexId| members.iter().position(|&w| w == v).unwrap() as u32;
             let closer = any(random) * 0.03 - Vec3::X * 0.08;

@@ -1,7 +1,8 @@
-//! Tests of the triangles in one one-ring, or in two.
+//! Collision tests of the triangles in one one-ring, or between two.
 //!
-//! Exact predicates decide intersections. Conservative filters run first; each returns a clearance: a displacement of all vertices below
-//! which no pair of triangles can intersect, not positive where the filter does not apply. Filters allow for rounding by a wide margin.
+//! Exact predicates decide intersections. Conservative filters run first; each returns a clearance: a displacement of
+//! all vertices below which no pair of triangles can intersect, not positive if the filter does not apply. Filters
+//! allow for rounding by a wide margin.
 
 use super::FINEST;
 use super::clearance::gap_between_corners;
@@ -10,21 +11,24 @@ use crate::math::{Bounds, DVec3, Vec3, higher, lower};
 use crate::mesh::{Facet, Mesh, VertexId};
 use smallvec::SmallVec;
 
-/// The valence up to which nothing is allocated on the heap.
+/// The valence up to which one-rings are stored inline, without heap allocation.
 pub(super) const ORDINARY_RING: usize = 16;
 
-/// The rounding error of lengths and areas, in the longest edge and its square: a hundred times the actual one.
+/// Bound on the rounding error of lengths and areas, relative to the longest edge and its square: a hundred times the
+/// actual one.
 pub(super) const ROUNDING: f32 = 1e-4;
 
-/// Clearances hold for displacements below this share of the lengths they were derived from.
+/// The largest clearance, relative to the lengths from which it was derived: the bounds hold for smaller displacements
+/// only.
 const SMALL: f32 = 0.125;
 
-/// The share of the distance from a plane that is left after the plane was turned by the displacements of two vertices in it that are at
-/// least six times as far apart: the cosine of the angle, √(1 − (1/3)²), rounded down.
+/// The remaining share of the distance from a plane after the plane was turned by the displacements of two vertices in
+/// it that are at least six times as far apart: the cosine of the angle, √(1 − (1/3)²), rounded down. `TURN` is the
+/// largest such displacement relative to their distance.
 const LEFT_BY_TURN: f32 = 0.94;
 const TURN: f32 = 1.0 / 6.0;
 
-/// The longest edge at `v`; not less than [`FINEST`].
+/// Returns the length of the longest edge at `v`; not less than [`FINEST`].
 pub(super) fn longest_edge(mesh: &Mesh, v: VertexId) -> f32 {
     let p = mesh.position(v);
     let square = mesh.ring(v).as_slice().iter().fold(0.0f32, |longest, &w| {
@@ -34,7 +38,8 @@ pub(super) fn longest_edge(mesh: &Mesh, v: VertexId) -> f32 {
     higher(FINEST, square.sqrt())
 }
 
-/// The unit vector, or 0 for the null vector. In double precision where the squared length over- or underflows.
+/// Returns the unit vector in the direction of `offset`, or 0 for the null vector. In double precision if the squared
+/// length over- or underflows.
 pub(super) fn unit(offset: Vec3) -> Vec3 {
     let square = offset.length_squared();
     if (1e-30..1e30).contains(&square) {
@@ -44,8 +49,8 @@ pub(super) fn unit(offset: Vec3) -> Vec3 {
     }
 }
 
-/// The clearance of a one-ring whose triangles all face a direction and wind about it once: projected along the direction they do not
-/// overlap. `longest` is the longest edge at `v`.
+/// Returns the clearance of a one-ring whose triangles all face in a direction and wind about it once: projected along
+/// this direction they do not overlap. `longest` is the longest edge at `v`.
 ///
 /// If vertices move by f, twice the projected area of a triangle with perimeter P changes by less than f·P + 3·f².
 fn facing_clearance(mesh: &Mesh, v: VertexId, direction: Vec3, longest: f32) -> f32 {
@@ -57,7 +62,8 @@ fn facing_clearance(mesh: &Mesh, v: VertexId, direction: Vec3, longest: f32) -> 
     let mut previous_length = previous.length();
     let mut clearance = SMALL * longest;
     let (rounding, spare) = (ROUNDING * longest * longest, 3.0 * SMALL * longest);
-    // Spokes that turn one way by less than half a turn each complete a turn whenever they leave the half plane behind the first.
+    // Spokes that turn in one direction by less than half a turn each complete a turn whenever they leave the half
+    // plane behind the first.
     let (mut turns, mut before) = (0, false);
     for (k, &w) in ring.iter().enumerate() {
         let offset = mesh.position(w) - centre;
@@ -69,27 +75,27 @@ fn facing_clearance(mesh: &Mesh, v: VertexId, direction: Vec3, longest: f32) -> 
         before = behind;
         (previous, previous_length) = (offset, length);
     }
-    // With fewer than five spokes there is no second turn.
+    // Fewer than five spokes cannot make a second turn.
     let once = ring.len() < 5 || turns + u32::from(before) == 1;
-    // Where squares overflow nothing is known.
+    // If squares overflow, nothing is known.
     if once && longest < f32::INFINITY { clearance } else { 0.0 }
 }
 
-/// The clearance of a one-ring that is a height field along its normal: its triangles do not intersect. `longest` is the longest edge at
-/// `v`.
+/// Returns the clearance of a one-ring that is a height field along its normal, so that its triangles do not intersect.
+/// `longest` is the longest edge at `v`.
 pub(super) fn flat_clearance(mesh: &Mesh, v: VertexId, longest: f32) -> f32 {
     facing_clearance(mesh, v, unit(mesh.area_normal(v)), longest)
 }
 
-/// The clearance between the one-rings of two adjacent vertices that both face one direction, where neither reaches into the corners
-/// behind the two vertices opposite their edge. `longest` is the longest edge at `u` and `v`.
+/// Returns the clearance between the one-rings of two adjacent vertices that both face in one direction, if neither
+/// reaches into the corners behind the two vertices opposite their edge. `longest` is the longest edge at `u` and `v`.
 ///
 /// ```text
-///        . behind .
-///         .      .        Seen from that side, a point that triangles S at u and T at v have in common is not in the
-///          .    .         triangle u v p; from u it is beyond p, and from v it is, so it is behind p. No triangle at u
-///            p            comes there if none crosses the line through v and p; nor does one at v, if none crosses
-///          /   \          the line through u and p. On the other side of u v it is the same with q.
+///        . behind .       In projection along the direction, a common point of triangles S at u and T at v is not
+///         .      .        in the triangle u v p. Seen from u it is past p, and seen from v, too, so it is behind p.
+///          .    .         No triangle at u reaches that region if none crosses the line through v and p, and no
+///            p            triangle at v does if none crosses the line through u and p. The same holds for q on the
+///          /   \          other side of u v.
 ///         u-----v
 /// ```
 pub(super) fn spread_clearance(
@@ -104,7 +110,8 @@ pub(super) fn spread_clearance(
     if shown <= 0.0 {
         return 0.0;
     }
-    // Twice the smallest area of the triangles between a line and the neighbours of a vertex on its side.
+    // Twice the smallest signed area of the triangles between a line and the vertices of a one-ring that must be on its
+    // side.
     let before_line = |hub: VertexId, [from, to]: [VertexId; 2]| {
         let across = normal.cross(at(to) - at(from));
         let others = mesh.ring(hub).as_slice().iter().filter(|&&w| w != from && w != to);
@@ -117,11 +124,12 @@ pub(super) fn spread_clearance(
     lower(shown, (lower(at_left, at_right) - rounding) / (6.5 * longest))
 }
 
-/// The clearance between the triangles at `u` and those at `v` without a common corner, by a separating plane through two common
-/// neighbours `p` and `q`. `longest` is the longest edge at `u` and `v`.
+/// Returns the clearance between the triangles at `u` and those at `v` without a common corner, by a separating plane
+/// through two common neighbours `p` and `q`. `longest` is the longest edge at `u` and `v`.
 ///
-/// The plane follows `p` and `q`, turning about the direction in it across the line through them. If all vertices move by f, a corner at
-/// distance g from the plane, beside the point p + t·(q − p) of that line, keeps at least [`LEFT_BY_TURN`]·g − f·(1 + |t| + |1 − t|).
+/// The plane moves with `p` and `q`, and turns about the direction in it that is perpendicular to the line through
+/// them. If all vertices move by f, a corner at distance g from the plane, beside the point p + t·(q − p) of that line,
+/// keeps at least a distance of [`LEFT_BY_TURN`]·g − f·(1 + |t| + |1 − t|).
 pub(super) fn plane_clearance(
     mesh: &Mesh,
     [u, v]: [VertexId; 2],
@@ -133,7 +141,7 @@ pub(super) fn plane_clearance(
     let square = divider.length_squared();
     let per_length = divider * (1.0 / square);
     let offset = mesh.position(v) - mesh.position(u);
-    // Without length there is no plane and no clearance: distances are NaN or 0.
+    // If `p` and `q` or `u` and `v` coincide, there is no plane and no clearance: distances are NaN or 0.
     let normal = unit(offset - divider * offset.dot(per_length));
     let (mut gap, mut reach) = (f32::INFINITY, 1.0);
     let mut meet = |w: VertexId, side: f32| {
@@ -150,27 +158,30 @@ pub(super) fn plane_clearance(
     clearance_beside_line(gap, reach, square, longest)
 }
 
-/// The clearance of vertices from a plane through two of them: `gap` is the least distance from it, beside points of the line through the
-/// two with |t| + |1 − t| up to `reach`, and `square` their squared distance. See [`plane_clearance`].
+/// Returns the clearance of vertices from a plane through two of them: `gap` is the smallest distance from it, beside
+/// points of the line through the two with |t| + |1 − t| up to `reach`, and `square` their squared distance. See
+/// [`plane_clearance`].
 pub(super) fn clearance_beside_line(gap: f32, reach: f32, square: f32, longest: f32) -> f32 {
     let clearance = (LEFT_BY_TURN * gap - ROUNDING * longest) / (1.0 + reach);
     lower(clearance, TURN * square.sqrt())
 }
 
-/// As [`plane_clearance`], by the plane through the common neighbour `p` that is normal to `v` − `u`.
+/// Returns the clearance as [`plane_clearance`] does, by the plane through the common neighbour `p` that is normal to
+/// `v` − `u`.
 pub(super) fn corner_plane_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], p: VertexId, longest: f32) -> f32 {
     let normal = unit(mesh.position(v) - mesh.position(u));
-    // The plane follows p and keeps its normal.
+    // The plane moves with p and keeps its normal.
     0.5 * (gap(mesh, [u, v], [p, p], mesh.position(p), normal) - ROUNDING * longest)
 }
 
-/// As [`plane_clearance`], by the bisecting plane of `u` and `v`.
+/// Returns the clearance as [`plane_clearance`] does, by the bisecting plane of `u` and `v`.
 pub(super) fn mid_plane_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) -> f32 {
     let (p, q) = (mesh.position(u), mesh.position(v));
     gap(mesh, [u, v], [u, v], (p + q) * 0.5, unit(q - p)) - ROUNDING * longest
 }
 
-/// As [`plane_clearance`], by a plane between two sheets that face each other or away from each other.
+/// Returns the clearance as [`plane_clearance`] does, by a plane between two sheets that face each other or away from
+/// each other.
 pub(super) fn sheet_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) -> f32 {
     let normal = unit(mesh.area_normal(u) - mesh.area_normal(v));
     let (p, q) = (mesh.position(u), mesh.position(v));
@@ -182,8 +193,8 @@ pub(super) fn sheet_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32) 
     0.5 * (other - own) - ROUNDING * longest
 }
 
-/// The least distance from a plane of `u` and its neighbours on the back, and of `v` and its neighbours on the front; those `in_plane` are
-/// left out. Not positive where one is on the wrong side.
+/// Returns the smallest distance from a plane of `u` and its neighbours, which should be behind it, and of `v` and its
+/// neighbours, which should be in front; those `in_plane` are ignored. Not positive if one is on the wrong side.
 fn gap(mesh: &Mesh, [u, v]: [VertexId; 2], in_plane: [VertexId; 2], origin: Vec3, normal: Vec3) -> f32 {
     let height = |w: VertexId| (mesh.position(w) - origin).dot(normal);
     let mut least = lower(-height(u), height(v));
@@ -201,7 +212,8 @@ fn gap(mesh: &Mesh, [u, v]: [VertexId; 2], in_plane: [VertexId; 2], origin: Vec3
     least
 }
 
-/// Adds the corners of all pairs of triangles at `v` that intersect beyond their common corners; exact.
+/// Appends to `crossing` the corners of all pairs of triangles at `v` that intersect beyond their common corners;
+/// exact.
 pub(super) fn intersections_around(
     mesh: &Mesh,
     v: VertexId,
@@ -216,8 +228,8 @@ pub(super) fn intersections_around(
     }
 }
 
-/// Whether one of the `changed` triangles at `v` intersects another triangle there beyond their common corners; exact. `longest` is the
-/// longest edge at `v`.
+/// Returns whether one of the `changed` triangles at `v` intersects another triangle there beyond their common corners;
+/// exact. `longest` is the longest edge at `v`.
 pub(super) fn changes_intersect_around(
     mesh: &Mesh,
     v: VertexId,
@@ -241,13 +253,14 @@ pub(super) fn changes_intersect_around(
     })
 }
 
-/// Whether a plane through the common corner of two triangles is known to separate them by more than `margin`.
+/// Returns whether a plane through the common corner of two triangles is known to separate them by more than `margin`.
 fn are_apart_at_corner(corner: Vec3, s: &Facet, t: &Facet, margin: f32) -> bool {
     let tips = |facet: &Facet| [facet.points[1] - corner, facet.points[2] - corner];
     gap_between_corners(tips(s), tips(t)) > margin
 }
 
-/// Adds the corners of all pairs of intersecting triangles without a common corner, one at `u` and one at `v`; exact.
+/// Appends to `crossing` the corners of all pairs of intersecting triangles without a common corner, one at `u` and one
+/// at `v`; exact.
 pub(super) fn intersections_between(
     mesh: &Mesh,
     [u, v]: [VertexId; 2],

@@ -1,20 +1,22 @@
-//! The output space, where the mesh must not intersect itself either.
+//! The output space, in which the mesh must not intersect itself either.
 //!
-//! Sheets pressed on each other are nearer than the rounding of positions in world space, so that a mesh without self-intersections may
-//! have some after it was mapped there. Triangles that rounding can bring together are tested in that space, too, after rounding.
+//! Sheets in contact are nearer than the rounding of positions in world space, so that a mesh without
+//! self-intersections may have some after it was mapped to world space. Triangles that rounding can bring together are
+//! tested there, too, after rounding.
 
 use super::FINEST;
 use crate::math::{Bounds, DAffine3, DVec3, Vec3, higher};
 use crate::mesh::{Facet, facets_cross};
 
-/// Half a unit in the last place of single precision, relative to the number, times √3 for three axes and 2 to be safe.
+/// Half a unit in the last place of single precision, relative to the number, times √3 for three axes and a safety
+/// factor of 2.
 const ROUNDING: f64 = 2.1e-7;
 
-/// The coarsest rounding, in lengths of the mesh, that is respected. Beyond that the output space cannot represent the surface, and
-/// respecting it would stop all motion.
+/// The coarsest rounding, in units of the mesh, that is taken into account. Beyond that, the output space cannot
+/// represent the surface, and testing it would stop all motion.
 const COARSEST: f64 = 0.01;
 
-/// The map to the output space, and the largest displacement of a vertex by rounding there.
+/// The map to the output space, and the largest displacement of a vertex by rounding there, in units of the mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OutputSpace {
     map: DAffine3,
@@ -22,7 +24,7 @@ pub(super) struct OutputSpace {
 }
 
 impl OutputSpace {
-    /// The space that `map` leads to, for meshes within `bounds`. `None` where single precision is too coarse for it.
+    /// Creates the output space of `map` for meshes within `bounds`; `None` if single precision is too coarse for it.
     pub(super) fn new(map: DAffine3, bounds: &Bounds) -> Option<Self> {
         let corner = |k: usize| {
             let pick =
@@ -40,7 +42,7 @@ impl OutputSpace {
         (rounding < COARSEST).then_some(Self { map, rounding: rounding as f32 })
     }
 
-    /// The largest displacement of a vertex by rounding in the output space, in lengths of the mesh.
+    /// Returns the largest displacement of a vertex by rounding in the output space, in units of the mesh.
     pub(super) fn rounding(&self) -> f32 {
         self.rounding
     }
@@ -51,17 +53,17 @@ impl OutputSpace {
     }
 }
 
-/// The clearance up to which triangles are tested exactly.
+/// Returns the clearance below which triangles are tested by exact predicates.
 pub(super) fn finest(output: Option<&OutputSpace>) -> f32 {
     output.map_or(FINEST, |space| higher(FINEST, space.rounding()))
 }
 
-/// Whether two triangles intersect, in the space of the mesh or in its output space.
+/// Returns whether two triangles intersect, in the space of the mesh or in its output space.
 pub(super) fn intersect(s: &Facet, t: &Facet, output: Option<&OutputSpace>) -> bool {
     facets_cross(s, t) || output.is_some_and(|space| facets_cross(&space.facet(s), &space.facet(t)))
 }
 
-/// The bounding box of a triangle, widened by the rounding of the output space.
+/// Returns the bounding box of a triangle, enlarged by the rounding of the output space.
 pub(super) fn bounds(facet: &Facet, output: Option<&OutputSpace>) -> Bounds {
     let Bounds { min, max } = Bounds::of(&facet.points);
     let margin = Vec3::splat(output.map_or(0.0, OutputSpace::rounding));

@@ -1,4 +1,4 @@
-//! Tests whether the triangles that an edit changed intersect any other.
+//! Tests whether the triangles changed by an edit intersect any others.
 
 use super::clearance::are_beside;
 use super::one_ring::{changes_intersect_around, flat_clearance, longest_edge};
@@ -7,13 +7,13 @@ use super::{Embedding, NEAREST_CORNER};
 use crate::math::Bounds;
 use crate::mesh::{Facet, Mesh, VertexId};
 
-/// The number of triangles that an ordinary edit changes at most.
+/// The largest number of triangles that an ordinary edit changes; larger edits count as more work.
 const ORDINARY_PATCH: usize = 24;
 
-/// The work that counts for an edit tested in one-rings only.
+/// The work counted for an edit that is tested in one-rings only, in nearby vertices visited.
 const UNSEARCHED: u64 = 30;
 
-/// A changed triangle and the box around it.
+/// A changed triangle and its bounding box.
 type Changed = (Facet, Bounds);
 
 fn changed(facet: Facet, output: Option<&OutputSpace>) -> Changed {
@@ -21,25 +21,25 @@ fn changed(facet: Facet, output: Option<&OutputSpace>) -> Changed {
 }
 
 impl Embedding {
-    /// Whether the triangles changed since [`Mesh::begin`], by their corners, intersect each other or any other. The grid still holds the
-    /// mesh before the edit.
+    /// Returns whether the triangles changed since [`Mesh::begin`], given by their corners, intersect each other or any
+    /// others. The grid still holds the mesh before the edit.
     pub(super) fn changes_intersect(&mut self, mesh: &Mesh, names: &[[VertexId; 3]]) -> bool {
         let edited: Vec<Changed> =
             names.iter().map(|&names| changed(mesh.facet(names), self.output.as_ref())).collect();
-        // Rejections by the tests below are cheap, not free.
+        // Counted even if the cheap tests below reject the edit.
         self.effort += 1;
         self.any_one_ring_intersects(mesh, names)
             || intersect_each_other(&edited, self.output.as_ref())
             || self.intersect_others(mesh, &edited)
     }
 
-    /// As [`Self::changes_intersect`], for pairs of triangles with a common corner only.
+    /// Does the same as [`Self::changes_intersect`], for pairs of triangles with a common corner only.
     pub(super) fn one_rings_intersect(&mut self, mesh: &Mesh, names: &[[VertexId; 3]]) -> bool {
         self.effort += UNSEARCHED;
         self.any_one_ring_intersects(mesh, names)
     }
 
-    /// Whether two triangles with a common corner intersect, at the corners of the changed ones.
+    /// Returns whether two triangles with a common corner intersect, at the corners of the changed triangles.
     fn any_one_ring_intersects(&self, mesh: &Mesh, changed: &[[VertexId; 3]]) -> bool {
         let mut hubs: Vec<VertexId> = changed.iter().flatten().copied().collect();
         hubs.sort_unstable();
@@ -51,7 +51,7 @@ impl Embedding {
         })
     }
 
-    /// Whether a changed triangle intersects an unchanged one without a common corner.
+    /// Returns whether a changed triangle intersects an unchanged one without a common corner.
     fn intersect_others(&mut self, mesh: &Mesh, edited: &[Changed]) -> bool {
         let whole = edited.iter().fold(Bounds::EMPTY, |whole, (_, bounds)| whole.joined(bounds));
         let mut near = std::mem::take(&mut self.found);
@@ -75,7 +75,7 @@ impl Embedding {
     }
 }
 
-/// Whether all corners are beyond one side of the box.
+/// Returns whether all corners of a triangle are beyond one side of the box.
 #[inline]
 fn is_beside(facet: &Facet, bounds: &Bounds) -> bool {
     let [a, b, c] = facet.points;
@@ -88,13 +88,13 @@ fn intersect_each_other(edited: &[Changed], output: Option<&OutputSpace>) -> boo
     edited.iter().enumerate().any(|(k, s)| edited[..k].iter().any(|t| intersect_apart(s, t, output)))
 }
 
-/// Whether a triangle that is not among the changed ones intersects one of them.
+/// Returns whether a triangle that is not among the changed ones intersects one of them.
 fn intersects_one(other: &Changed, edited: &[Changed], output: Option<&OutputSpace>) -> bool {
     let same = |(facet, _): &Changed| other.0.corners.iter().all(|v| facet.corners.contains(v));
     !edited.iter().any(same) && edited.iter().any(|changed| intersect_apart(other, changed, output))
 }
 
-/// Whether two triangles intersect that have no common corner.
+/// Returns whether two triangles without a common corner intersect.
 fn intersect_apart(s: &Changed, t: &Changed, output: Option<&OutputSpace>) -> bool {
     s.1.meets(&t.1)
         && s.0.corners.iter().all(|v| !t.0.corners.contains(v))
@@ -102,7 +102,7 @@ fn intersect_apart(s: &Changed, t: &Changed, output: Option<&OutputSpace>) -> bo
         && intersect(&s.0, &t.0, output)
 }
 
-/// Whether two triangles are known to be disjoint, in the output space, too.
+/// Returns whether two triangles are known to be disjoint, including in the output space.
 fn are_beside_each_other(
     (s, around_s): &Changed,
     (t, around_t): &Changed,

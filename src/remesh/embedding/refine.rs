@@ -4,11 +4,11 @@ use super::Embedding;
 use crate::mesh::{Mesh, MeshError, VertexId};
 
 impl Embedding {
-    /// Refines the mesh as [`Mesh::refine`] does, and flips new edges back where triangles would intersect others.
+    /// Refines the mesh as [`Mesh::refine`] does, and flips new edges back if their triangles would intersect others.
     ///
-    /// Centre points do not change the surface; edges flipped across old ones do, by as much as the triangles of a thin fold or of facing
-    /// sheets are apart. Where flipping back does not help either, since triangles are as near as rounding, the mesh stays unrefined.
-    /// Returns whether it was refined.
+    /// Inserting centre points does not change the surface; flipping the old edges does, and can make triangles of a
+    /// thin fold or of facing sheets intersect. If flipping back does not help either, since triangles are as near as
+    /// rounding, the mesh stays unrefined. Returns whether it was refined.
     ///
     /// # Errors
     /// As [`Mesh::refine`].

@@ -1,36 +1,37 @@
-//! Separates sheets that intersect a little, as edits leave them that were tested in one-rings only.
+//! Separates sheets that intersect slightly, as left by edits that were tested in one-rings only.
 
 use super::Embedding;
 use crate::math::Vec3;
 use crate::mesh::{Groups, Mesh, VertexId};
 
-/// Displacements along the normals that are tried in turn, in the ordinary edge.
+/// Displacements along the normals that are tried in turn, relative to the ordinary edge.
 const OFFSETS: [f32; 8] = [-0.02, 0.02, -0.06, 0.06, -0.12, 0.12, -0.2, 0.2];
 
-/// Shares of the way to the mean of the neighbours that are tried in turn.
+/// Fractions of the displacement to the mean of the neighbours that are tried in turn.
 const SHARES: [f32; 2] = [0.5, 1.0];
 
-/// The distance between vertices of one place, in the ordinary edge.
+/// The largest distance between neighbouring vertices of one cluster, relative to the ordinary edge.
 const PLACE: f32 = 1.0;
 
-/// With more corners of intersecting triangles, more is wrong than can be mended by moving a few.
+/// The largest number of corners of intersecting triangles: with more, moving a few vertices is no remedy.
 const MOST: usize = 4000;
 
-/// Vertices, each with a direction.
+/// Vertices, each with its displacement before scaling.
 type Moves = Vec<(VertexId, Vec3)>;
 
 impl Embedding {
-    /// Moves corners of intersecting triangles a little until none intersect, place by place. Returns whether none do afterwards; if some
-    /// do, other places may have been changed.
+    /// Moves corners of intersecting triangles slightly until none intersect, one spatial cluster after the other; used
+    /// at the start from a contour. Returns whether none intersect afterwards; if some do, other clusters may have been
+    /// changed.
     ///
-    /// `crossing` are all corners of intersecting triangles, as [`Self::crossing`] finds them.
+    /// `crossing` must contain all corners of intersecting triangles, as returned by [`Self::crossing`].
     pub fn separate(&mut self, mesh: &mut Mesh, crossing: &[VertexId]) -> bool {
         crossing.len() <= MOST
             && places(mesh, crossing, PLACE * self.edge).iter().all(|place| self.separate_place(mesh, place))
     }
 
-    /// Tries to move all vertices of a place along their normals, then those of one sheet, then vertices to their neighbours: a spike
-    /// that pierces a sheet is drawn back.
+    /// Separates one cluster: tries to move all its vertices along their normals, then those of one sheet, then
+    /// vertices towards the mean of their neighbours, which retracts a spike that pierces a sheet.
     fn separate_place(&mut self, mesh: &mut Mesh, place: &[VertexId]) -> bool {
         let normal = |v: VertexId| mesh.area_normal(v).normalize_or_zero() * self.edge;
         let all: Moves = place.iter().map(|&v| (v, normal(v))).collect();
@@ -48,7 +49,8 @@ impl Embedding {
         any_moves(&sheets, &OFFSETS) || any_moves(&spikes, &SHARES)
     }
 
-    /// Moves vertices of a place by a share of their directions, if no triangle of the place intersects any other then.
+    /// Moves vertices of a cluster by `share` times their displacements, if no triangle of the cluster then intersects
+    /// any other; returns whether they were moved.
     fn separates(&mut self, mesh: &mut Mesh, place: &[VertexId], moves: &Moves, share: f32) -> bool {
         let triangles = mesh.triangles_at(place);
         let edit = |mesh: &mut Mesh| {
@@ -59,14 +61,14 @@ impl Embedding {
     }
 }
 
-/// From a vertex to the mean of its neighbours.
+/// Returns the vector from a vertex to the mean of its neighbours.
 fn to_neighbours(mesh: &Mesh, v: VertexId) -> Vec3 {
     let ring = mesh.ring(v).as_slice();
     let sum: Vec3 = ring.iter().map(|&w| mesh.position(w) - mesh.position(v)).sum();
     sum * (1.0 / ring.len() as f32)
 }
 
-/// The vertices in groups of those near each other.
+/// Groups the vertices into clusters: those nearer than `distance`, directly or via others, are together.
 fn places(mesh: &Mesh, vertices: &[VertexId], distance: f32) -> Vec<Vec<VertexId>> {
     let mut groups = Groups::new(vertices.len());
     for (i, &v) in vertices.iter().enumerate() {
@@ -90,7 +92,8 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Two balls that overlap by a hundredth of an edge, one of them with a spike into the other; and a torus.
+    /// Returns two spheres that overlap by up to about a hundredth of an edge, and a torus inside the first one; a vertex of the first
+    /// sphere is displaced inwards as a spike.
     fn overlapping(seed: u64) -> Mesh {
         let mut random = Random::new(seed);
         let overlap = 0.02 * random.unit() as f32;

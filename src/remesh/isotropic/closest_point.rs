@@ -3,27 +3,29 @@
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 
-/// Steps of one walk. Vertices move by less than an edge at a time; this many suffice on an input a hundred times finer than the bounds.
-/// Longer walks would only slow down malformed meshes.
+/// The largest number of steps of one walk. Vertices move by less than an edge at a time; this many suffice on an input
+/// a hundred times finer than the bounds. Longer walks would only cost time on malformed meshes.
 const STEPS: usize = 200;
 
-/// A point inside a triangle is accepted at once if its squared distance is below this share of that to the corner: no other triangle
-/// around the corner is much nearer, except on rough surfaces.
+/// A point inside a triangle is accepted at once if its squared distance is below this share of the squared distance to
+/// the corner: no other triangle around the corner is much nearer, except on rough surfaces.
 const NEAR: f32 = 0.04;
 
-/// The squared sine of an angle below which only the edges of a triangle are tested: the side of a point is lost in rounding there.
+/// The squared sine of an angle below which only the edges of a triangle are tested: rounding makes barycentric
+/// coordinates meaningless there.
 const SLIVER: f32 = 1e-6;
 
-/// A point of the input surface.
+/// A closest point on the input surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ClosestPoint {
-    /// Its position.
+    /// The position of the point.
     pub point: Vec3,
-    /// A corner of its triangle.
+    /// The nearest corner of its triangle, where the next walk can start.
     pub anchor: VertexId,
 }
 
-/// The closest point to `p` by descent from `anchor`: closest on the same sheet, where a search in space might find another one.
+/// Returns the closest point to `p` on the input surface, by descent from `anchor`: the closest one on the same sheet,
+/// whereas a search in space might find one on another.
 pub(super) fn closest_point(surface: &Mesh, anchor: VertexId, p: Vec3) -> ClosestPoint {
     let mut best = ClosestPoint { point: surface.position(anchor), anchor };
     let mut least = f32::INFINITY;
@@ -41,7 +43,8 @@ pub(super) fn closest_point(surface: &Mesh, anchor: VertexId, p: Vec3) -> Closes
     best
 }
 
-/// The closest point on the triangles around `centre`, anchored at the nearest corner, and its squared distance.
+/// Returns the closest point on the triangles around `centre`, anchored at its nearest corner, and the squared
+/// distance.
 fn closest_in_ring(surface: &Mesh, centre: VertexId, p: Vec3) -> Option<(f32, ClosestPoint)> {
     let origin = surface.position(centre);
     let target = p - origin;
@@ -62,7 +65,7 @@ fn closest_in_ring(surface: &Mesh, centre: VertexId, p: Vec3) -> Option<(f32, Cl
     best.map(|(point, anchor)| (least, ClosestPoint { point: origin + point, anchor }))
 }
 
-/// A point a·A + b·B of a triangle with corners at the origin, A and B.
+/// Barycentric coordinates of the point a·A + b·B of a triangle with corners at the origin, A and B.
 #[derive(Clone, Copy, Debug)]
 struct Barycentric {
     a: f32,
@@ -70,7 +73,7 @@ struct Barycentric {
 }
 
 impl Barycentric {
-    /// The corner with the largest weight: 0 for the origin, 1 for A, 2 for B.
+    /// Returns the corner with the largest weight: 0 for the origin, 1 for A, 2 for B.
     fn nearest_corner(self) -> usize {
         let Self { a, b } = self;
         let rest = 1.0 - a - b;
@@ -84,7 +87,8 @@ impl Barycentric {
     }
 }
 
-/// The point closest to `p` in the triangle with corners at the origin, `a` and `b`, and whether `p` projects into it.
+/// Returns the point closest to `p` in the triangle with corners at the origin, `a` and `b`, and whether `p` projects
+/// into it.
 fn nearest_in([a, b]: [Vec3; 2], p: Vec3) -> (Barycentric, bool) {
     let (aa, ab, bb) = (a.length_squared(), a.dot(b), b.length_squared());
     let (pa, pb) = (p.dot(a), p.dot(b));
@@ -117,7 +121,7 @@ fn nearest_in([a, b]: [Vec3; 2], p: Vec3) -> (Barycentric, bool) {
     (best.1, false)
 }
 
-/// The parameter of a point along a segment, in 0..=1, from dot products.
+/// Returns the parameter of a point projected onto a segment, in 0..=1, from dot products.
 fn share(along: f32, whole: f32) -> f32 {
     if whole > 0.0 { (along / whole).clamp(0.0, 1.0) } else { 0.0 }
 }
@@ -138,7 +142,7 @@ mod tests {
         };
         for k in 0..20_000 {
             let (a, p) = (any(), any() * 2.0);
-            // Thin ones, flat ones and points, too.
+            // Slivers, degenerate triangles and points, too.
             let b = [any(), a * 0.5 + any() * 1e-3, a, Vec3::ZERO, any() * 1e-4][k % 5];
             let (at, inside) = nearest_in([a, b], p);
             let found = (a * at.a + b * at.b).distance(p);

@@ -1,21 +1,21 @@
-//! Regions of the input surface where unchecked edits made triangles intersect.
+//! Regions of the input surface where unchecked edits caused self-intersections.
 
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
 use std::collections::BTreeSet;
 
-/// The radius around intersections in which the surface is left unchanged, in the target edge. With a smaller one edits beside it intersect
-/// in the next run; a larger one needs more checked edits.
+/// The radius around intersections in which the surface is left unchanged, in units of the target edge. With a smaller
+/// one, edits next to the region cause intersections in the next run; a larger one needs more checked edits.
 const REACH: f32 = 3.0;
 
-/// A set of vertices of the input surface.
+/// The set of vertices of the input surface near self-intersections found so far, which the next run leaves unchanged.
 pub(super) struct ConflictMask<'a> {
     surface: &'a Mesh,
     marked: Vec<bool>,
 }
 
 impl<'a> ConflictMask<'a> {
-    /// The empty set.
+    /// Creates an empty set.
     pub fn new(surface: &'a Mesh) -> Self {
         Self { surface, marked: vec![false; surface.slots()] }
     }
@@ -24,12 +24,12 @@ impl<'a> ConflictMask<'a> {
         !self.marked.contains(&true)
     }
 
-    /// The complement, by slot.
+    /// Returns the complement of the set, by slot.
     pub fn complement(&self) -> Vec<bool> {
         self.marked.iter().map(|marked| !marked).collect()
     }
 
-    /// The set dilated by `reach` along the surface, by slot.
+    /// Returns the set dilated by `reach` along the surface, by slot.
     pub fn dilated(&self, reach: f32) -> Vec<bool> {
         let mut wider = self.marked.clone();
         let is_marked = |v: VertexId| self.marked[v.index()];
@@ -41,7 +41,8 @@ impl<'a> ConflictMask<'a> {
         wider
     }
 
-    /// Adds the surroundings of a vertex of an intersecting triangle, at `position` near the vertex `anchor` of the surface.
+    /// Adds the vertices near `position`, that of a corner of an intersecting triangle; `anchor` is a nearby vertex of the
+    /// input surface.
     pub fn add(&mut self, anchor: VertexId, position: Vec3, target_edge: f32) {
         mark_around(self.surface, anchor, position, REACH * target_edge, &mut self.marked);
     }

@@ -1,17 +1,17 @@
-//! The distance of a vertex from the triangles that replace its own.
+//! The distance of a vertex from the triangles that replace its one-ring after a move or collapse.
 
 use crate::math::{Vec3, triangle};
 use smallvec::SmallVec;
 
-/// The squared cosine of the angle to the mean normal up to which triangles count as flat: they then cover the old ones, and the distance
-/// from their planes is no less than from themselves.
+/// The squared cosine of the largest angle to the mean normal at which the triangles count as flat: they then cover the
+/// old ones, and the distance from their planes is at least that from the triangles themselves.
 const FLAT: f32 = 0.5;
 
-/// The triangles around `to` that replace those around `from`.
+/// The triangles around `to` that replace those around `from`, and a bound on the distance of `from` from them.
 pub(super) struct Fan {
     from: Vec3,
     to: Vec3,
-    /// The other two corners of each, and its normal.
+    /// The other two corners of each triangle, and its normal.
     sides: SmallVec<[(Vec3, Vec3, Vec3); 12]>,
     sum: Vec3,
 }
@@ -21,7 +21,7 @@ impl Fan {
         Self { from, to, sides: SmallVec::new(), sum: Vec3::ZERO }
     }
 
-    /// Adds a triangle; returns its normal, whose length is twice the area.
+    /// Adds the triangle of `to`, `a` and `b`; returns its normal, whose length is twice the area.
     pub fn push(&mut self, a: Vec3, b: Vec3) -> Vec3 {
         let normal = (a - self.to).cross(b - self.to);
         self.sides.push((a, b, normal));
@@ -29,7 +29,7 @@ impl Fan {
         normal
     }
 
-    /// The distance of `from` from the triangles, or a slightly larger bound.
+    /// Returns the distance of `from` from the triangles, or a slightly larger upper bound.
     pub fn gap(&self) -> f32 {
         let (sum, squared) = (self.sum, self.sum.length_squared());
         let mut most = 0.0;

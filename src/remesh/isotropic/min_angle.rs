@@ -1,4 +1,4 @@
-//! Minimum-angle optimisation: improves the worst angles one by one, by a flip, a collapse or a move.
+//! Minimum-angle optimisation: increases the smallest angles one by one, by a flip, a collapse or a move.
 
 use super::one_ring::{Move, OneRing, angle_quality, has_better_angle, least_quality, moved};
 use super::session::Session;
@@ -10,24 +10,25 @@ use crate::remesh::{Changes, EdgeBounds, EditPolicy};
 /// The squared sine of 33°: triangles with a smaller angle are improved.
 const POOR: f32 = 0.2966;
 
-/// Passes over all poor triangles; most improvements are made in three.
+/// The largest number of passes over all poor triangles; most improvements are made in three.
 const ROUNDS: usize = 6;
 
-/// Step lengths tried, in the target edge, and the number of steps of a vertex.
+/// Step lengths tried, as fractions of the target edge, and the largest number of steps of a vertex.
 const STEPS: [f32; 3] = [0.2, 0.1, 0.05];
 const MOVES: usize = 4;
 
 /// The highest valence after a flip: with eleven neighbours one angle must be below 33°.
 const MOST_VALENCE: usize = 10;
 
-/// Improves poor angles where edges stay within bounds or come nearer to them.
+/// Improves angles below 33° by edits that keep edges within bounds or bring them nearer to them; returns the changes
+/// made.
 pub(super) fn improve_angles<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
     session: &mut Session<E>,
 ) -> Changes {
     let mut changes = Changes::default();
-    // Failed attempts are repeated only where something has changed around them.
+    // Failed attempts are repeated only around vertices where something has changed.
     let mut changed = vec![true; mesh.slots()];
     for _ in 0..ROUNDS {
         let may_be_improved = |&v: &VertexId| session.is_free(v) && is_poor(mesh, v);
@@ -51,7 +52,7 @@ pub(super) fn improve_angles<E: EditPolicy>(
     changes
 }
 
-/// Tries to improve the angles at `v`; `ring` are its neighbours before.
+/// Tries to improve the angles at `v`; `ring` contains its neighbours before the edits.
 fn improve_around<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
@@ -77,7 +78,7 @@ fn improve_around<E: EditPolicy>(
     changes
 }
 
-/// Flips an edge if the smallest angle of its two triangles grows.
+/// Flips an edge if that increases the smallest angle of its two triangles.
 fn flip<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
@@ -102,7 +103,7 @@ fn flip<E: EditPolicy>(
         && session.attempt(mesh, |mesh| mesh.flip(u, v)).is_ok()
 }
 
-/// Collapses `gone` into `kept` if the smallest angle around it grows from `now`.
+/// Collapses `gone` into `kept` if that increases the smallest angle around it from `now`.
 fn collapse<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
@@ -122,7 +123,7 @@ fn collapse<E: EditPolicy>(
     done
 }
 
-/// Moves `v` along the surface to a larger smallest angle.
+/// Moves `v` along the surface in steps that increase the smallest angle around it.
 fn shift<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, v: VertexId, session: &mut Session<E>) {
     let mut step = 0;
     for _ in 0..MOVES {
@@ -137,7 +138,7 @@ fn shift<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, v: VertexId, sessio
     }
 }
 
-/// Makes the best step of one length, if it improves anything.
+/// Moves `v` by the best step of length `reach`, if it increases the smallest angle; returns whether it moved.
 fn best_step<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
@@ -153,7 +154,7 @@ fn best_step<E: EditPolicy>(
     let towards = ring.iter().map(|&w| mesh.position(w) - p).flat_map(|direction| [direction, -direction]);
     for direction in towards {
         let position = p + star.along(direction.normalize_or(Vec3::ZERO) * reach);
-        // The closest point is nearby, so most steps can be rejected without it.
+        // The closest point is near `position`, so most steps can be rejected without computing it.
         if !all_better(mesh, mesh.ring(v).pairs(), position, most) {
             continue;
         }
@@ -171,7 +172,8 @@ fn is_poor(mesh: &Mesh, v: VertexId) -> bool {
     !all_better(mesh, mesh.ring(v).pairs(), mesh.position(v), POOR)
 }
 
-/// Whether all triangles with a corner at `position` and the given others have a better angle than `now`.
+/// Returns whether all triangles formed by `position` and the given vertex pairs have a better [`angle_quality`] than
+/// `now`.
 fn all_better(
     mesh: &Mesh,
     mut others: impl Iterator<Item = (VertexId, VertexId)>,

@@ -1,15 +1,16 @@
-//! Isotropic remeshing: edges within bounds, valences near six, shape preserved.
+//! Isotropic remeshing: edge lengths within bounds, valences near six, shape preserved.
 //!
-//! Rounds of [`restructure`](super::restructure) alternate with tangential relaxation and projection onto the input surface (Botsch &
-//! Kobbelt, *A remeshing approach to multiresolution modeling*, 2004); then the worst angles are improved one by one (`min_angle`).
+//! Rounds of [`restructure`](super::restructure()) alternate with tangential relaxation and projection onto the input
+//! surface (Botsch & Kobbelt, *A remeshing approach to multiresolution modeling*, 2004); then the smallest angles are
+//! improved one by one (`min_angle`).
 //!
-//! Guarantees: a closed, oriented manifold stays one, with the same components and χ; no self-intersections are added. Aims: all edges within
-//! bounds (lower bounds may be violated where shape, topology or another sheet is in the way), no angle below 33°, and a surface within half
-//! an edge of the input.
+//! Guarantees: a closed, oriented manifold stays one, with the same components and χ; no self-intersections are added.
+//! Goals, without guarantee: all edges within bounds (shape, topology or a nearby sheet can prevent that for lower
+//! bounds), no angle below 33°, and a surface within half an edge of the input.
 //!
-//! Edits are unchecked at first, since checks take most of the time and intersections are rare; the result is checked as a whole. Sheets
-//! that intersect a little are separated, and remeshed there with checked edits (`conflicts`). Where that fails, another run from the start
-//! leaves the region unchanged for the checked edits.
+//! Edits are unchecked at first, since checks take most of the time and intersections are rare; the result is checked
+//! as a whole. Sheets that intersect a little are separated, and remeshed nearby with checked edits (`conflicts`). If
+//! that fails, another run from the start leaves the region unchanged; it is then remeshed with checked edits.
 
 mod closest_point;
 mod conflicts;
@@ -27,35 +28,39 @@ use min_angle::improve_angles;
 use relax::relax;
 use session::Session;
 
-/// Rounds of restructuring, and relaxations in each. One fewer of either leaves twice as many poor angles for the end; more cost more than
-/// they save.
+/// The number of rounds of restructuring, and of relaxation sweeps in each. One fewer of either leaves twice as many
+/// poor angles for the final optimisation; more cost more than they save.
 const ROUNDS: usize = 5;
 const SWEEPS: usize = 2;
 
-/// The ratio of the bounds used in rounds, by Botsch & Kobbelt: triangles with such edges have no angle below 33°. With a smaller ratio
-/// halves of long edges are too short; wider bounds are narrowed no further than this.
+/// The ratio of the bounds used in rounds, by Botsch & Kobbelt: triangles with such edges have no angle below 33°. With
+/// a smaller ratio, halves of long edges are too short. `MOST_INSIDE` is the largest factor by which wider bounds are
+/// narrowed.
 const INNER_RATIO: f32 = 5.0 / 3.0;
 const MOST_INSIDE: f32 = 1.2;
 
-/// Runs with unchecked edits. Usually the second one has no intersections; after this many all edits are checked.
+/// The largest number of runs with unchecked edits. Usually the second one has no intersections; after this many, all
+/// edits are checked.
 const TRUSTING_RUNS: usize = 4;
 
-/// The unsuccessful run after which the input is tested. That takes longer than a run to long edges, and only an input that intersects
-/// itself fails often.
+/// The index of the unsuccessful run after which the input is tested for self-intersections. The test takes longer than
+/// a run to long edges, and only an input that intersects itself fails often.
 const INPUT_TESTED: usize = 1;
 
-/// Brings edges within bounds and valences near six, preserving shape, components and χ; returns the changes made. Vertices are renumbered.
+/// Remeshes isotropically: brings edge lengths within bounds and valences near six, preserving shape, components and χ;
+/// returns the changes made. Vertices are renumbered.
 ///
-/// Edges become about √(min max) long, and vertices lie on the input surface, or within a fifth of an edge of it where sheets would
-/// intersect otherwise. No self-intersections are added; where the input has some, edges may stay out of bounds. Attributes are blended by collapses and splits; moves do not change them.
+/// Edges become about √(min max) long. Vertices lie on the input surface, or within a fifth of an edge of it where sheets
+/// had to be separated. No self-intersections are added; if the input has some, edges may stay out of bounds. Attributes
+/// are blended by collapses and splits; moves do not change them.
 ///
 /// # Errors
-/// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice as much;
-/// [`MeshError::TooLarge`] where more than eight million vertices would be needed. The mesh is then as it was.
+/// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice `min`;
+/// [`MeshError::TooLarge`] if more than eight million vertices would be needed. The mesh is unchanged on error.
 pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError> {
     bounds.check_for(mesh)?;
     let before = mesh.clone();
-    // Scaled to edges of about 1, whose squares neither over- nor underflow; by a power of two, which rounds nothing.
+    // Scaled to edges of about 1, whose squares neither over- nor underflow; by a power of two, which is exact.
     let (_, exponent) = libm::frexpf(bounds.max);
     let exponent = exponent.clamp(-EXPONENTS, EXPONENTS);
     let [shrink, grow] = [-exponent, exponent].map(|power| libm::ldexpf(1.0, power));
@@ -70,7 +75,7 @@ pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError>
     Ok(changes)
 }
 
-/// The exponents of two by which lengths can be multiplied and divided within range.
+/// The largest exponent of two by which lengths can be multiplied and divided without leaving the range of `f32`.
 const EXPONENTS: i32 = 120;
 
 /// Remeshes with unchecked edits, then with checked ones where needed.
@@ -136,7 +141,7 @@ fn last_round<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut 
     changes
 }
 
-/// As [`restructure`](super::restructure), up to a number of vertices.
+/// Does the same as [`restructure`](super::restructure()), with a limit on the number of vertices.
 fn pass<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
     let mut changes = collapse_short(mesh, bounds, session);
     changes += split_long(mesh, bounds, MOST_VERTICES, session);
@@ -144,7 +149,8 @@ fn pass<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Sessio
     changes
 }
 
-/// The bounds used in rounds, a little narrower than those asked for, so that moves leave few edges out of bounds.
+/// Returns the bounds used in rounds, a little narrower than the requested ones, so that moves leave few edges out of
+/// bounds.
 fn inside(EdgeBounds { min, max }: EdgeBounds) -> EdgeBounds {
     let margin = (max / min / INNER_RATIO).sqrt();
     let margin = if margin < MOST_INSIDE { margin } else { MOST_INSIDE };

@@ -7,20 +7,21 @@ use crate::mesh::{Mesh, VertexId};
 use crate::remesh::restructure::faces_alike;
 use crate::remesh::{EdgeBounds, EditPolicy};
 
-/// The cost of moving along the surface relative to moving off it. Higher values wear off sharp edges; with lower ones vertices on curved
-/// parts hardly move.
+/// The cost of moving along the surface relative to moving off it. Higher values wear off sharp edges; with lower ones
+/// vertices on curved regions hardly move.
 const SLACK: f32 = 0.04;
 
-/// Sums over the triangles around a vertex.
+/// The one-ring of a vertex as needed for moves along the surface: its centroid and a tangential projection.
 pub(super) struct OneRing {
-    /// From the vertex to the centroid of the triangles.
+    /// The vector from the vertex to the area-weighted centroid of its triangles.
     pub to_centroid: Vec3,
-    /// Projects displacements onto the planes of the triangles: onto a plane, onto a sharp edge, and to nothing at a corner.
+    /// Projects displacements approximately onto the planes of the triangles: onto a plane, onto a sharp edge, and to
+    /// nearly 0 at a corner.
     along: Mat3,
 }
 
 impl OneRing {
-    /// The one-ring of `v`; `None` if it has no area.
+    /// Computes the one-ring of `v`; `None` if it has no area.
     pub fn of(mesh: &Mesh, v: VertexId) -> Option<Self> {
         let p = mesh.position(v);
         let (mut area, mut sum) = (0.0, Vec3::ZERO);
@@ -47,25 +48,25 @@ impl OneRing {
         Some(Self { to_centroid: sum / (3.0 * area), along: stiff.inverse() })
     }
 
-    /// The part of a displacement along the surface.
+    /// Returns the tangential component of a displacement.
     pub fn along(&self, displacement: Vec3) -> Vec3 {
         self.along * (self.along * displacement)
     }
 }
 
-/// The squared sine of the smallest angle of a triangle; 0 without area.
+/// Returns the squared sine of the smallest angle of a triangle; 0 if it has no area.
 pub(super) fn angle_quality(corners: [Vec3; 3]) -> f32 {
     let [part, whole] = angle_quality_fraction(corners);
     if whole > 0.0 { part / whole } else { 0.0 }
 }
 
-/// Whether a triangle has area and a higher [`angle_quality`].
+/// Returns whether a triangle has nonzero area and a higher [`angle_quality`] than the given one.
 pub(super) fn has_better_angle(corners: [Vec3; 3], angle_quality: f32) -> bool {
     let [part, whole] = angle_quality_fraction(corners);
     part > angle_quality * whole
 }
 
-/// [`angle_quality`] as a fraction.
+/// Returns [`angle_quality`] as numerator and denominator.
 #[inline]
 fn angle_quality_fraction([a, b, c]: [Vec3; 3]) -> [f32; 2] {
     let (ab, bc, ca) = (b - a, c - b, a - c);
@@ -81,15 +82,16 @@ fn angle_quality_fraction([a, b, c]: [Vec3; 3]) -> [f32; 2] {
     [ab.cross(ca).length_squared() * least, x * y * z]
 }
 
-/// The outcome of moving a vertex.
+/// The result of moving a vertex, as computed by [`moved`].
 pub(super) struct Move {
-    /// The least [`angle_quality`] around it.
+    /// The lowest [`angle_quality`] around it.
     pub least_quality: f32,
     /// The accumulated deviation from the input surface.
     pub deviation: f32,
 }
 
-/// The outcome of moving `v` to `position`; `None` if a triangle would turn over, an edge leave its bounds, or the surface deviate too far.
+/// Returns the result of moving `v` to `position`, without moving it; `None` if a triangle would turn over, an edge
+/// leave its bounds, or the surface deviate too far.
 pub(super) fn moved<E: EditPolicy>(
     mesh: &Mesh,
     v: VertexId,
@@ -119,12 +121,12 @@ pub(super) fn moved<E: EditPolicy>(
     Some(Move { least_quality, deviation: session.deviation_after(v, fan.gap())? })
 }
 
-/// Whether an edge out of bounds was nearer to them before; squared lengths.
+/// Returns whether an edge out of bounds was nearer to them before; squared lengths.
 fn leaves(new: f32, old: f32, shortest: f32) -> bool {
     if new < shortest { new < old } else { new > old }
 }
 
-/// The least [`angle_quality`] around `v`.
+/// Returns the lowest [`angle_quality`] around `v`.
 pub(super) fn least_quality(mesh: &Mesh, v: VertexId) -> f32 {
     let p = mesh.position(v);
     let of = |(a, b)| angle_quality([p, mesh.position(a), mesh.position(b)]);

@@ -9,10 +9,10 @@ use crate::remesh::{EdgeBounds, EditPolicy};
 /// The squared sine of 35°: moves may reduce angles that stay above it.
 const GOOD: f32 = 0.329;
 
-/// Shorter steps, in the target edge, are skipped; with a higher value angles stay smaller.
+/// The shortest step that is made, as a fraction of the target edge; with a higher value angles stay smaller.
 const SHORTEST_STEP: f32 = 0.02;
 
-/// Moves every vertex once, one after the other; returns the number moved.
+/// Moves every vertex once, one after the other; returns the number of vertices moved.
 pub(super) fn relax<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> usize {
     let mut moves = 0;
     let shortest = SHORTEST_STEP * session.target_edge();

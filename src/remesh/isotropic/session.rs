@@ -1,4 +1,5 @@
-//! The state of a remeshing run: by vertex, an anchor on the input surface and the deviation from it, which edits must keep small.
+//! The state of a remeshing run: for each vertex, an anchor on the input surface and the deviation from it, which edits
+//! must keep small.
 
 use super::closest_point::{ClosestPoint, closest_point};
 use super::fan::Fan;
@@ -6,31 +7,32 @@ use crate::math::Vec3;
 use crate::mesh::{EditError, Mesh, VertexId};
 use crate::remesh::EditPolicy;
 
-/// The largest deviation accumulated by collapses and moves, and the largest depth of a flip, in the target edge. Higher values shorten
-/// thin parts and blunt sharp edges; with lower ones edges on rough surfaces stay out of bounds.
+/// The largest deviation accumulated by collapses and moves, and the largest depth of a flip, as fractions of the
+/// target edge. Higher values shorten thin parts and blunt sharp edges; with lower ones, edges on rough surfaces stay
+/// out of bounds.
 const MOST_DEVIATION: f32 = 0.25;
 const FLIP_DEPTH: f32 = 0.15;
 
-/// A remeshing run.
+/// State of a remeshing run, and the [`EditPolicy`] that keeps the mesh close to the input surface.
 pub(super) struct Session<'a, E> {
     /// The input surface.
     pub surface: &'a Mesh,
-    /// By slot of the input surface, its normals.
+    /// Unit vertex normals of the input surface, by its slots.
     normals: Vec<Vec3>,
-    /// By slot, a nearby vertex of the input surface.
+    /// A nearby vertex of the input surface for each vertex, by slot.
     anchors: Vec<VertexId>,
-    /// By slot of the input surface, whether edits other than splits are allowed there.
+    /// Whether edits other than splits are allowed near a vertex of the input surface, by its slots.
     free: Vec<bool>,
-    /// By slot, an upper bound of the deviation from the input surface.
+    /// An upper bound of the deviation from the input surface, by slot.
     deviation: Vec<f32>,
-    /// The deviation after the collapse that was asked about last.
+    /// The deviation after the last collapse passed to `may_collapse`.
     pending_deviation: f32,
     target_edge: f32,
     edits: E,
 }
 
 impl<'a, E: EditPolicy> Session<'a, E> {
-    /// For a copy of `surface`, to be remeshed to edges of about `target_edge`.
+    /// Starts a run on a copy of `surface`, to be remeshed to edges of about `target_edge`.
     pub fn new(surface: &'a Mesh, target_edge: f32, free: Vec<bool>, edits: E) -> Self {
         let slots = surface.slots();
         let anchors = (0..slots).map(VertexId::from_index).collect();
@@ -47,39 +49,39 @@ impl<'a, E: EditPolicy> Session<'a, E> {
         }
     }
 
-    /// The same run with another policy.
+    /// Continues this run with another edit policy and another set of free vertices.
     pub fn with<F>(self, free: Vec<bool>, edits: F) -> Session<'a, F> {
         let Self { surface, normals, anchors, deviation, pending_deviation, target_edge, .. } = self;
         Session { surface, normals, free, anchors, deviation, pending_deviation, target_edge, edits }
     }
 
-    /// A nearby vertex of the input surface.
+    /// Returns the anchor of `v`: a nearby vertex of the input surface.
     pub fn anchor(&self, v: VertexId) -> VertexId {
         self.anchors[v.index()]
     }
 
-    /// Whether `v` may be moved and its edges collapsed and flipped.
+    /// Returns whether `v` may be moved and its edges collapsed and flipped.
     pub fn is_free(&self, v: VertexId) -> bool {
         self.free[self.anchors[v.index()].index()]
     }
 
-    /// The target edge length.
+    /// Returns the target edge length.
     pub fn target_edge(&self) -> f32 {
         self.target_edge
     }
 
-    /// The point of the input surface closest to `p`, found from the anchor of `v`.
+    /// Returns the point of the input surface closest to `p`, found by a walk from the anchor of `v`.
     pub fn closest_point(&self, v: VertexId, p: Vec3) -> ClosestPoint {
         closest_point(self.surface, self.anchors[v.index()], p)
     }
 
-    /// Whether a triangle with these corners and this normal faces out of the input surface.
+    /// Returns whether a triangle with these corners and this normal faces out of the input surface.
     pub fn faces_outwards(&self, corners: [VertexId; 3], normal: Vec3) -> bool {
         let [u, v, w] = corners.map(|corner| self.normals[self.anchors[corner.index()].index()]);
         normal.dot(u) > 0.0 || normal.dot(v) > 0.0 || normal.dot(w) > 0.0
     }
 
-    /// Moves `v` to a point of the input surface, if the policy allows it.
+    /// Moves `v` to a point of the input surface, if the policy allows it; returns whether it was moved.
     pub fn move_to(&mut self, mesh: &mut Mesh, v: VertexId, closest: ClosestPoint, deviation: f32) -> bool {
         let moved = self.edits.attempt(mesh, |mesh| {
             mesh.set_position(v, closest.point);
@@ -92,7 +94,8 @@ impl<'a, E: EditPolicy> Session<'a, E> {
         moved.is_ok()
     }
 
-    /// The distance of `gone` from the surface after its collapse; `None` if a triangle would not face outwards.
+    /// Returns the distance of `gone` from the surface after its collapse; `None` if a triangle would not face
+    /// outwards.
     fn gap_without(&self, mesh: &Mesh, kept: VertexId, gone: VertexId) -> Option<f32> {
         let mut fan = Fan::new(mesh.position(gone), mesh.position(kept));
         for (a, b) in mesh.ring(gone).pairs().filter(|&(a, b)| a != kept && b != kept) {
@@ -103,13 +106,13 @@ impl<'a, E: EditPolicy> Session<'a, E> {
         Some(fan.gap())
     }
 
-    /// The deviation at `v` with `gap` added; `None` if it is too large.
+    /// Returns the deviation at `v` increased by `gap`; `None` if it exceeds the limit.
     pub fn deviation_after(&self, v: VertexId, gap: f32) -> Option<f32> {
         let deviation = self.deviation[v.index()] + gap;
         (deviation <= MOST_DEVIATION * self.target_edge).then_some(deviation)
     }
 
-    /// Renumbers the mesh along its surface.
+    /// Renumbers the mesh in memory order along its surface, together with the arrays by slot.
     pub fn reorder(&mut self, mesh: &mut Mesh) {
         let names = mesh.reorder();
         let (mut anchors, mut deviation) = (vec![VertexId(0); mesh.slots()], vec![0.0; mesh.slots()]);
@@ -167,7 +170,7 @@ impl<E: EditPolicy> EditPolicy for Session<'_, E> {
     }
 }
 
-/// Unit normals by slot; zero without area.
+/// Returns unit vertex normals by slot; zero at vertices without area.
 fn unit_normals(surface: &Mesh) -> Vec<Vec3> {
     (0..surface.slots())
         .map(|slot| surface.area_normal(VertexId::from_index(slot)).normalize_or_zero())

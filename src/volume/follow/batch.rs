@@ -1,8 +1,8 @@
-//! Points whose values are needed next, evaluated piece by piece.
+//! A batch of points whose function values are needed next, evaluated in parts within a budget.
 
 use crate::math::DVec3;
 
-/// Points, and the values of the first of them.
+/// Points, and the function values of the first of them.
 #[derive(Default)]
 pub(super) struct Batch {
     points: Vec<DVec3>,
@@ -15,29 +15,29 @@ impl Batch {
         self.values.clear();
     }
 
-    /// Adds points, in an order that keeps near ones together.
+    /// Appends points, in an order in which neighbouring points are adjacent.
     pub fn extend(&mut self, points: impl IntoIterator<Item = DVec3>) {
         self.points.extend(points);
     }
 
-    /// Evaluates the next `most` points at most; gives back how many.
+    /// Evaluates `f` at the next points, at most `most`; returns their number.
     pub fn evaluate(&mut self, most: usize, f: &mut dyn FnMut(&[DVec3], &mut [f64])) -> usize {
         let done = self.values.len();
         let count = most.min(self.points.len() - done);
         if count > 0 {
-            // A value that the function leaves out is not a number, and so outside.
+            // A value that the function does not write is NaN, hence outside.
             self.values.resize(done + count, f64::NAN);
             f(&self.points[done..done + count], &mut self.values[done..]);
         }
         count
     }
 
-    /// The share of the points that is evaluated.
+    /// Returns the share of points that are evaluated.
     pub fn progress(&self) -> f64 {
         if self.points.is_empty() { 0.0 } else { self.values.len() as f64 / self.points.len() as f64 }
     }
 
-    /// The values, in the order of the points, once all are there.
+    /// Returns the values, in the order of the points, or `None` while some are missing.
     pub fn values(&self) -> Option<&[f64]> {
         (self.values.len() == self.points.len()).then_some(&self.values)
     }

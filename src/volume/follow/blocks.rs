@@ -1,8 +1,8 @@
-//! Values at the nodes of a large lattice, kept in blocks of 8 × 8 × 8 that are made where they are needed.
+//! Sparse storage of values at the nodes of a large lattice, in blocks of 8 × 8 × 8 that are allocated on demand.
 //!
-//! The lattice is padded by one layer of nodes that are outside, so lattice node (i, j, k) is node
-//! (i + 1, j + 1, k + 1) here. A cell is named by its corner of lowest coordinates. A slot is the number of a node,
-//! or of the cell that starts there, in the blocks so far.
+//! The lattice is padded by one layer of outside nodes, so node (i, j, k) of the lattice is node (i + 1, j + 1, k + 1)
+//! here. A cell is identified by its corner of lowest coordinates. A slot is the index of a node, or of the cell that
+//! starts there, in the allocated blocks.
 
 use super::super::cube_cases::corner;
 use super::super::error::{VolumeError, reserve};
@@ -10,66 +10,66 @@ use super::super::error::{VolumeError, reserve};
 /// A node of the padded lattice.
 pub(super) type Node = [usize; 3];
 
-/// Nodes along the side of a block. Smaller, and the table of blocks grows; larger, and more of each block lies off
+/// Nodes along the side of a block. If it is smaller, the table of blocks grows; if larger, more of each block lies off
 /// the surface.
 const SIDE: usize = 8;
-/// Nodes of a block.
+/// Number of nodes in a block.
 const BLOCK: usize = SIDE * SIDE * SIDE;
-/// Three vertices a node can still be told apart by a `u32` with this many blocks.
+/// Largest number of blocks: three vertices per node still have distinct `u32` indices.
 const MAX_BLOCKS: usize = u32::MAX as usize / (3 * BLOCK);
 
-/// Slot of a node whose block has not been made, and block of a place that has none.
+/// Marks a node whose block is not allocated (as a slot), and a table entry without a block.
 pub(super) const ABSENT: u32 = u32::MAX;
 
-/// Value of a node that has not been asked for.
+/// Value of a node that has not been evaluated.
 const UNKNOWN: f64 = f64::NAN;
-/// Value of a node beyond the lattice, and of one where the function is not a number.
+/// Value of a node in the padding, and of one where the function is NaN.
 const OUTSIDE: f64 = f64::NEG_INFINITY;
 
-/// Whether a value is that of a node inside.
+/// Returns whether a node with this value is inside the surface.
 pub(super) fn is_inside(value: f64) -> bool {
     value >= 0.0
 }
 
-/// What is kept of a function's value: not a number is far outside.
+/// Replaces NaN by [`OUTSIDE`], since NaN marks unknown values in the storage.
 pub(super) fn sound(value: f64) -> f64 {
     if value.is_nan() { OUTSIDE } else { value }
 }
 
-/// The node one further along an axis.
+/// Returns the next node along an axis.
 pub(super) fn next(mut node: Node, axis: usize) -> Node {
     node[axis] += 1;
     node
 }
 
-/// Offset of a cell's corner, numbered as in [`corner`].
+/// Returns the offset of a cell's corner, numbered as in [`corner`].
 fn corner_offset(number: usize) -> [usize; 3] {
     [number >> 2 & 1, number & 1, number >> 1 & 1]
 }
 
-/// Number of a node within its block.
+/// Returns the index of a node within its block.
 fn local(node: Node) -> usize {
     let [x, y, z] = node.map(|k| k % SIDE);
     (z * SIDE + y) * SIDE + x
 }
 
-/// Values and marks of the nodes of all blocks so far.
+/// Sparse block storage of node values and of marks for visited cells.
 pub(super) struct Blocks {
-    /// Nodes of the padded lattice.
+    /// Number of nodes of the padded lattice along each axis.
     nodes: [usize; 3],
-    /// Blocks that cover them.
+    /// Number of blocks that cover them, along each axis.
     dims: [usize; 3],
-    /// The block at each place.
+    /// Index of the block at each block position, or [`ABSENT`].
     table: Vec<u32>,
     /// The first node of each block.
     origins: Vec<[u16; 3]>,
     values: Vec<f64>,
-    /// A bit a cell: whether the flood has looked at it, or is about to.
+    /// One bit per cell: whether the flood has visited or queued it.
     seen: Vec<u64>,
 }
 
 impl Blocks {
-    /// No blocks yet, for a lattice of `dims` nodes, padded here.
+    /// Creates empty storage for a lattice of `dims` nodes, which is padded here.
     pub fn new(dims: [usize; 3]) -> Result<Self, VolumeError> {
         let nodes = dims.map(|n| n + 2);
         let dims = nodes.map(|n| n.div_ceil(SIDE));
@@ -79,7 +79,7 @@ impl Blocks {
         Ok(Self { nodes, dims, table, origins: Vec::new(), values: Vec::new(), seen: Vec::new() })
     }
 
-    /// Bytes held.
+    /// Returns the bytes allocated.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.table[..])
             + size_of_val(&self.origins[..])
@@ -87,17 +87,17 @@ impl Blocks {
             + size_of_val(&self.seen[..])
     }
 
-    /// One more than the highest slot.
+    /// Returns the number of slots.
     pub fn slots(&self) -> usize {
         self.values.len()
     }
 
-    /// Cells along each axis.
+    /// Returns the number of cells of the padded lattice along each axis.
     pub fn cells(&self) -> [usize; 3] {
         self.nodes.map(|n| n - 1)
     }
 
-    /// Whether a node lies beyond the lattice proper.
+    /// Returns whether a node belongs to the padding.
     pub fn is_padding(&self, node: Node) -> bool {
         (0..3).any(|k| node[k] == 0 || node[k] + 1 >= self.nodes[k])
     }
@@ -107,7 +107,7 @@ impl Blocks {
         (z * self.dims[1] + y) * self.dims[0] + x
     }
 
-    /// The slot of a node, [`ABSENT`] where its block has not been made.
+    /// Returns the slot of a node, [`ABSENT`] if its block is not allocated.
     pub fn slot(&self, node: Node) -> u32 {
         match self.table[self.place(node)] {
             ABSENT => ABSENT,
@@ -115,20 +115,20 @@ impl Blocks {
         }
     }
 
-    /// The node of a slot.
+    /// Returns the node of a slot.
     pub fn node(&self, slot: u32) -> Node {
         let (block, local) = (slot as usize / BLOCK, slot as usize % BLOCK);
         let [x, y, z] = self.origins[block].map(usize::from);
         [x + local % SIDE, y + local / SIDE % SIDE, z + local / (SIDE * SIDE)]
     }
 
-    /// A number that orders slots by block, then node, whichever block was made first.
+    /// Returns a sort key that orders slots by block position, then node, independent of the order of allocation.
     pub fn rank(&self, slot: u32) -> u64 {
         let place = self.place(self.node(slot)) as u64;
         place * BLOCK as u64 + u64::from(slot) % BLOCK as u64
     }
 
-    /// The slot of a node, whose block is made if need be.
+    /// Returns the slot of a node, allocating its block if necessary.
     pub fn open(&mut self, node: Node) -> Result<u32, VolumeError> {
         if self.slot(node) == ABSENT {
             self.make_block(node)?;
@@ -136,7 +136,7 @@ impl Blocks {
         Ok(self.slot(node))
     }
 
-    /// Makes the blocks of a cell's corners.
+    /// Allocates the blocks of all corners of a cell.
     pub fn open_corners(&mut self, cell: u32) -> Result<(), VolumeError> {
         let node = self.node(cell);
         if node.iter().any(|k| k % SIDE == SIDE - 1) {
@@ -166,7 +166,7 @@ impl Blocks {
         Ok(())
     }
 
-    /// The slots of a cell's corners, numbered as in [`corner`]; [`ABSENT`] where a block has not been made.
+    /// Returns the slots of a cell's corners, numbered as in [`corner`]; [`ABSENT`] if a block is not allocated.
     pub fn corners(&self, cell: u32) -> [u32; 8] {
         let first = cell as usize % BLOCK;
         let at_border = [first % SIDE, first / SIDE % SIDE, first / (SIDE * SIDE)].contains(&(SIDE - 1));
@@ -177,12 +177,12 @@ impl Blocks {
         std::array::from_fn(|number| cell + local(corner_offset(number)) as u32)
     }
 
-    /// The value at a node; not a number where it is not known.
+    /// Returns the value at a node; NaN if it is unknown.
     pub fn value(&self, slot: u32) -> f64 {
         self.values.get(slot as usize).copied().unwrap_or(UNKNOWN)
     }
 
-    /// Whether the value at a node has still to be asked for.
+    /// Returns whether the value at a node has not been evaluated.
     pub fn is_unknown(&self, slot: u32) -> bool {
         self.value(slot).is_nan()
     }
@@ -192,13 +192,13 @@ impl Blocks {
         self.values[slot as usize] = sound(value);
     }
 
-    /// The case of a cell, a bit a corner inside. Corners that are not known count as outside.
+    /// Returns the marching cubes case of a cell, one bit per inside corner. Unknown corners count as outside.
     pub fn case(&self, cell: u32) -> u8 {
         let corners = self.corners(cell).into_iter().enumerate();
         corners.fold(0, |case, (number, slot)| case | u8::from(is_inside(self.value(slot))) << number)
     }
 
-    /// Marks a cell as seen; false where it was already.
+    /// Marks a cell as visited; returns false if it was marked already.
     pub fn see(&mut self, cell: u32) -> bool {
         let (word, bit) = (&mut self.seen[cell as usize / 64], 1 << (cell % 64));
         let is_new = *word & bit == 0;
@@ -206,15 +206,16 @@ impl Blocks {
         is_new
     }
 
-    /// Whether a cell was marked as seen.
+    /// Returns whether a cell is marked as visited.
     pub fn is_seen(&self, cell: u32) -> bool {
         self.seen.get(cell as usize / 64).is_some_and(|word| word >> (cell % 64) & 1 == 1)
     }
 
-    /// Whether the surface followed so far crosses a straight line an odd number of times, while no cell is left to be
-    /// looked at. The line runs from `from` along `axis` up to coordinate `to`.
+    /// Returns whether the surface found so far crosses a straight lattice line an odd number of times; valid when the
+    /// flood's queue is empty. The line runs from `from` along `axis` up to coordinate `to`.
     ///
-    /// All four cells at a cut edge are joined through its faces, so it is enough to look at the one that starts there.
+    /// The four cells around a cut edge are connected through its faces, so it suffices to test the one that starts
+    /// there.
     pub fn crosses_oddly(&self, from: Node, axis: usize, to: usize) -> bool {
         let mut odd = false;
         let mut node = from;
@@ -234,7 +235,7 @@ impl Blocks {
     }
 }
 
-/// A corner of the cell that starts at a node.
+/// Returns a corner of the cell that starts at a node.
 fn at_corner(node: Node, number: usize) -> Node {
     let offset = corner_offset(number);
     debug_assert_eq!(corner(offset), number);

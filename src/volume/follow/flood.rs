@@ -1,50 +1,50 @@
-//! The flood: from cells at the seeds through all cells that the surface crosses.
+//! The flood: a breadth-first traversal from the cells of the seeds through all cells that the surface crosses.
 //!
-//! It goes in waves. The corners of all cells in the queue are evaluated; each cell that the surface crosses is kept,
-//! and queues its neighbours beyond the faces it crosses. When no cell is left, seeds with no surface in their own
-//! cell or those around are looked at, and their 26 neighbours queued.
+//! It proceeds in waves. The corners of all queued cells are evaluated; each cell that the surface crosses is stored,
+//! and its neighbours across the crossed faces are queued. When the queue is empty, the 26 neighbours of seed cells are
+//! queued if the surface crosses neither the seed cell nor a visited neighbour.
 
 use super::super::error::VolumeError;
 use super::Lattice;
 use super::batch::Batch;
 use super::blocks::{ABSENT, Blocks, Node};
 
-/// Axis, whether it is the far one, and corners (as bits of a case) of each face of a cell.
+/// The six faces of a cell: axis, whether it is the far face, and its corners as a mask of case bits.
 const FACES: [(usize, bool, u8); 6] =
     [(0, false, 0x0F), (0, true, 0xF0), (1, false, 0x55), (1, true, 0xAA), (2, false, 0x33), (2, true, 0xCC)];
 
-/// A cell that the surface crosses.
+/// A cell that the surface crosses, with its marching cubes case.
 #[derive(Clone, Copy)]
 pub(super) struct CutCell {
     pub slot: u32,
-    /// A bit a corner inside.
+    /// Marching cubes case: one bit per corner, set if it is inside.
     pub case: u8,
 }
 
-/// What has been followed, and where it goes on.
+/// State of the flood: the crossed cells found so far and the cells to visit next.
 #[derive(Default)]
 pub(super) struct Flood {
-    /// Cells of seeds that came since the last wave.
+    /// Cells of seeds added since the last wave.
     seeds: Vec<Node>,
-    /// Cells of seeds that may yet turn out to have no surface near.
+    /// Visited cells of seeds whose neighbours are queued if no surface is found near them.
     waiting: Vec<u32>,
     /// Cells of the next wave.
     queue: Vec<u32>,
-    /// Cells of this wave that are not yet dealt with.
+    /// Unprocessed cells of the current wave.
     wave: Vec<u32>,
-    /// Nodes evaluated for this wave.
+    /// Slots of the nodes evaluated for the current wave.
     wanted: Vec<u32>,
-    /// All crossed cells so far, in the order they were found.
+    /// All crossed cells found so far, in the order of discovery.
     pub cut: Vec<CutCell>,
 }
 
 impl Flood {
-    /// Starts at a cell, and in the cells around it should the surface cross none of them.
+    /// Adds a seed cell; its neighbours are visited, too, if no surface is found near it.
     pub fn seed(&mut self, cell: Node) {
         self.seeds.push(cell);
     }
 
-    /// Queues a cell, unless it was seen before: then false.
+    /// Queues a cell unless it was visited or queued before; returns whether it was queued.
     pub fn look_at(&mut self, cell: Node, blocks: &mut Blocks) -> Result<bool, VolumeError> {
         let slot = blocks.open(cell)?;
         let is_new = blocks.see(slot);
@@ -54,7 +54,7 @@ impl Flood {
         Ok(is_new)
     }
 
-    /// Fills `batch` with what the next wave needs, which may be nothing; false where no cell is left.
+    /// Fills `batch` with the points of the next wave, which may be none; returns false if no cell is left.
     pub fn ask(
         &mut self,
         blocks: &mut Blocks,
@@ -68,19 +68,20 @@ impl Flood {
         for &cell in &self.queue {
             blocks.open_corners(cell)?;
         }
-        // From here on nothing can fail: after an error above, the queue is as it was.
+        // Nothing below can fail: after an error above, the queue is unchanged.
         self.wave = std::mem::take(&mut self.queue);
         let corners = self.wave.iter().flat_map(|&cell| blocks.corners(cell));
         self.wanted.clear();
         self.wanted.extend(corners.filter(|&slot| blocks.is_unknown(slot)));
-        // By block and node: near ones stay together.
+        // Sorted by block and node, so that neighbouring points are adjacent.
         self.wanted.sort_unstable();
         self.wanted.dedup();
         batch.extend(self.wanted.iter().map(|&slot| lattice.position(blocks.node(slot))));
         Ok(!self.wave.is_empty())
     }
 
-    /// Takes the values of the wave, and queues the next one. After an error it can be called again.
+    /// Stores the values of the wave, records its crossed cells and queues the next wave. Can be called again after an
+    /// error.
     pub fn take(&mut self, values: &[f64], blocks: &mut Blocks) -> Result<(), VolumeError> {
         for (&slot, &value) in self.wanted.iter().zip(values) {
             blocks.set(slot, value);
@@ -97,8 +98,8 @@ impl Flood {
         Ok(())
     }
 
-    /// Queues the cells beyond the faces that the surface crosses. There is one beyond each: the lattice ends in nodes
-    /// that are outside.
+    /// Queues the neighbours of a cell across the faces that the surface crosses. They always exist: the outermost
+    /// nodes of the padded lattice are outside.
     fn cross_faces(&mut self, slot: u32, case: u8, blocks: &mut Blocks) -> Result<(), VolumeError> {
         let cell = blocks.node(slot);
         for (axis, is_far, mask) in FACES {
@@ -122,7 +123,7 @@ impl Flood {
         Ok(())
     }
 
-    /// Queues the cells around those seeds near which nothing was found.
+    /// Queues the neighbours of those seed cells near which no surface was found.
     fn widen(&mut self, blocks: &mut Blocks) -> Result<(), VolumeError> {
         self.waiting.sort_unstable();
         self.waiting.dedup();
@@ -135,13 +136,13 @@ impl Flood {
     }
 }
 
-/// Whether a cell was looked at and the surface crosses it.
+/// Returns whether a cell was visited and the surface crosses it.
 fn is_followed(cell: Node, blocks: &Blocks) -> bool {
     let slot = blocks.slot(cell);
     slot != ABSENT && blocks.is_seen(slot) && !matches!(blocks.case(slot), 0 | 255)
 }
 
-/// A cell and those around it, within the padded lattice.
+/// Returns a cell and its neighbours, up to 27 within the padded lattice.
 fn around(cell: u32, blocks: &Blocks) -> Vec<Node> {
     let (cell, cells) = (blocks.node(cell), blocks.cells());
     let step = |k: usize, by: usize| (cell[k] + by).checked_sub(1).filter(|&at| at < cells[k]);

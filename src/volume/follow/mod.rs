@@ -1,18 +1,18 @@
-//! Marching cubes that follows a surface: the zero set of a function, evaluated only near it.
+//! Surface-following marching cubes: extracts the zero set of an implicit function, evaluated only near the surface.
 //!
-//! For functions that are dear and best evaluated many points at a time. A [`Follower`] starts in the cells of its
-//! seeds and goes from cell to cell through the faces that the surface crosses (`flood`); a coarse look at the rest of
-//! the lattice finds pieces without a seed (`scan`); a few steps along its lattice edge bring each vertex onto the
-//! surface (`root`). It goes on in slices of as many evaluations as the caller likes, with a mesh of what there is so
-//! far after each.
+//! For functions that are expensive and best evaluated for many points at a time. A [`Follower`] starts in the cells of
+//! its seeds and continues from cell to cell through the faces that the surface crosses (`flood`); a coarse scan of the
+//! rest of the lattice finds components without a seed (`scan`); a few root-finding iterations along its lattice edge
+//! move each vertex onto the surface (`root`). Work is done in slices of a given number of evaluations, and the mesh
+//! found so far is available after each.
 //!
-//! What holds: cubes are filled as by [`marching_cubes`](super::marching_cubes), values of 0 and above are inside,
-//! NaN and all beyond the lattice outside. So the mesh is closed, oriented, 2-manifold and free of crossings
-//! whatever the function, provided that it always gives the same value at the same point. The mesh depends neither on
-//! the slices nor on the order in which the surface was found. Every node evaluated by the flood, but for those
-//! around seeds that lie off the surface, is a corner of a cell that the surface crosses.
+//! Guarantees: cubes are triangulated as by [`marching_cubes`](super::marching_cubes), values of 0 and above are
+//! inside, NaN and everything beyond the lattice are outside. So the mesh is closed, oriented, 2-manifold and free of
+//! self-intersections for any function that always returns the same value at the same point. The mesh depends neither
+//! on the slices nor on the order in which the surface was found. Every node evaluated by the flood is a corner of a
+//! cell that the surface crosses, except for those around seeds off the surface.
 //!
-//! What does not: a piece that no seed leads to, and that passes between the nodes of the scan, is not found.
+//! Limitation: a component that contains no seed and passes between the nodes of the scan is not found.
 
 mod batch;
 mod blocks;
@@ -32,23 +32,24 @@ use flood::Flood;
 use scan::Scan;
 use surface::Surface;
 
-/// Nodes along an axis: the table of blocks of such a cube takes 68 MB, and of one twice as wide more than half a
-/// gigabyte.
+/// Largest number of nodes along an axis: the table of blocks of a cube of this size takes 68 MB, and of one twice as
+/// wide more than half a gigabyte.
 const MAX_NODES: usize = 2048;
-/// Edges from the world's origin: there rounding to `f32` moves a vertex by 1/2048 of an edge at most, and vertices keep
-/// 1/256 away from nodes. Much further, and vertices fall together.
+/// Largest distance of the lattice from the world's origin, in edges: there, rounding to `f32` moves a vertex by 1/2048
+/// of an edge at most, and vertices keep 1/256 away from nodes. Much further away, vertices coincide.
 const MAX_EDGES_AWAY: f64 = 8192.0;
-/// Far below it, `f32` has too few digits left to tell vertices apart.
+/// Smallest accepted edge length, in world units: far below it, `f32` cannot distinguish vertices.
 const MIN_EDGE: f64 = 1e-30;
 
-/// A lattice of cubes in the world. Node (i, j, k) stands at origin + edge × (i, j, k).
+/// A regular lattice of cubes in world space on which [`Follower`] extracts a surface. Node (i, j, k) is at origin +
+/// edge × (i, j, k).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
-    /// Where node (0, 0, 0) stands.
+    /// World position of node (0, 0, 0).
     pub origin: DVec3,
-    /// From a node to the next, in world units.
+    /// Edge length of the cubes, in world units.
     pub edge: f64,
-    /// Nodes along x, y and z, 1 to 2048 each.
+    /// Number of nodes along x, y and z, 1 to 2048 each.
     pub dims: [usize; 3],
 }
 
@@ -76,12 +77,12 @@ impl Lattice {
         Err(VolumeError::invalid("origin", problem))
     }
 
-    /// Where a node of the padded lattice stands.
+    /// Returns the world position of a node of the padded lattice.
     fn position(&self, node: Node) -> DVec3 {
         DVec3::from(std::array::from_fn(|k| self.coordinate(k, node[k] as f64 - 1.0)))
     }
 
-    /// The point at a fraction of the way from a node of the padded lattice to the next along an axis.
+    /// Returns the world position at a fraction of the way from a node of the padded lattice to the next along an axis.
     fn on_edge(&self, node: Node, axis: usize, fraction: f64) -> DVec3 {
         let mut p = self.position(node);
         p[axis] = self.coordinate(axis, node[axis] as f64 - 1.0 + fraction);
@@ -92,7 +93,7 @@ impl Lattice {
         self.origin[axis] + self.edge * steps
     }
 
-    /// The padded lattice's cell with a point in it.
+    /// Returns the cell of the padded lattice that contains a world position; `None` if it is outside or not finite.
     fn cell(&self, p: DVec3) -> Option<Node> {
         let mut cell = [0; 3];
         for k in 0..3 {
@@ -106,7 +107,7 @@ impl Lattice {
     }
 }
 
-/// What the present batch of values is for.
+/// The stage that requested the current batch of values.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Task {
     Nothing,
@@ -115,7 +116,7 @@ enum Task {
     Refine,
 }
 
-/// The surface where a function passes 0, followed cell by cell over a large lattice.
+/// Extractor of the zero set of an implicit function by surface-following marching cubes on a large lattice.
 ///
 /// ```
 /// use vesicle::math::DVec3;
@@ -139,10 +140,10 @@ pub struct Follower {
     blocks: Blocks,
     flood: Flood,
     scan: Option<Scan>,
-    /// Steps for each vertex, and how many have been taken.
+    /// Refinement steps requested per vertex; `taken` is the number performed.
     steps: usize,
     taken: usize,
-    /// The surface while it is refined, and after.
+    /// The surface during and after refinement.
     surface: Option<Surface>,
     batch: Batch,
     task: Task,
@@ -151,11 +152,11 @@ pub struct Follower {
 }
 
 impl Follower {
-    /// Nothing followed yet.
+    /// Creates an extractor without seeds.
     ///
     /// # Errors
-    /// A lattice out of the ranges given there, or that lies further than 8192 edges from the world's origin, where
-    /// `f32` positions would not do; [`VolumeError::TooLarge`].
+    /// A lattice outside the ranges given for [`Lattice`], or further than 8192 edges from the world's origin, where
+    /// `f32` positions are too coarse; [`VolumeError::TooLarge`].
     pub fn new(lattice: Lattice) -> Result<Self, VolumeError> {
         lattice.check()?;
         Ok(Self {
@@ -173,18 +174,19 @@ impl Follower {
         })
     }
 
-    /// Has the surface followed from a place on or near it: from the cell with `p` in it, or, where the surface
-    /// crosses neither that cell nor one of the 26 around that was reached from elsewhere, from those 26.
+    /// Adds a seed on or near the surface: extraction starts in the cell that contains `p`. If the surface crosses
+    /// neither that cell nor one of its 26 neighbours that was reached from elsewhere, it starts in those 26.
     ///
-    /// False, and nothing else, for a place more than one edge outside the lattice or not finite.
+    /// Returns false, and adds nothing, if `p` is more than one edge outside the lattice or not finite.
     pub fn seed(&mut self, p: DVec3) -> bool {
         let cell = self.lattice.cell(p);
         cell.into_iter().for_each(|cell| self.flood.seed(cell));
         cell.is_some()
     }
 
-    /// Has pieces looked for that no seed leads to, once all seeds are followed: on the lines between every
-    /// `stride`-th node along each axis. Those that cross a line an odd number of times are found and followed, too.
+    /// Requests a scan, after all seeds are followed, for components of the surface that contain no seed. It tests the
+    /// lattice lines between every `stride`-th node along each axis: components that cross a line an odd number of
+    /// times are found and extracted, too.
     ///
     /// # Errors
     /// A stride of 0; [`VolumeError::TooLarge`].
@@ -199,23 +201,24 @@ impl Follower {
         Ok(())
     }
 
-    /// Has every vertex brought nearer to where the function is 0, by at most `steps` evaluations each, once all is
-    /// followed. Without, a vertex stands where the line through the values at the ends of its edge passes 0.
+    /// Requests refinement of every vertex towards the zero of the function, by at most `steps` evaluations each, after
+    /// all components are extracted. Without it, a vertex is placed by linear interpolation between the values at the
+    /// ends of its edge.
     ///
-    /// On a sphere of 45 edges radius the error falls from 3e-3 edges to 2e-7 by one step, which is what `f32` holds,
-    /// and to 4e-12 by two. A vertex takes no more steps once they would not move it, and stays 1/256 of an edge away
-    /// from nodes.
+    /// On a sphere of 45 edges radius the error falls from 3e-3 edges to 2e-7 by one step, which is the resolution of
+    /// `f32`, and to 4e-12 by two. A vertex takes no more steps once they would not move it, and stays 1/256 of an edge
+    /// away from nodes.
     pub fn refine(&mut self, steps: usize) {
         self.steps = steps;
     }
 
-    /// Goes on with at most `budget` evaluations, but at least one; true when all is done.
+    /// Continues with at most `budget` evaluations, but at least one; returns true when the extraction is complete.
     ///
-    /// `f` is given points of the world and fills in a value for each: 0 and above is inside, NaN outside. It must
-    /// give the same value at the same point whatever stands beside it.
+    /// `f` receives world positions and writes a value for each: 0 and above is inside, NaN outside. It must return the
+    /// same value at the same point, whatever the other points of the call.
     ///
     /// # Errors
-    /// [`VolumeError::TooLarge`]; what was followed stays.
+    /// [`VolumeError::TooLarge`]; the surface extracted so far is kept.
     pub fn advance(
         &mut self,
         budget: usize,
@@ -237,7 +240,7 @@ impl Follower {
         }
     }
 
-    /// Hands the values of the batch to where they are needed; false while some are missing.
+    /// Passes the values of the batch to the stage that requested them; returns false if some are missing.
     fn take(&mut self) -> Result<bool, VolumeError> {
         let Some(values) = self.batch.values() else { return Ok(false) };
         match self.task {
@@ -255,7 +258,7 @@ impl Follower {
         Ok(true)
     }
 
-    /// Chooses what is next and fills the batch for it: first the flood, then the scan, then refinement.
+    /// Selects the next stage and fills the batch for it: first the flood, then the scan, then refinement.
     fn ask(&mut self) -> Result<Task, VolumeError> {
         let Self { lattice, blocks, flood, batch, .. } = self;
         if flood.ask(blocks, lattice, batch)? {
@@ -276,7 +279,7 @@ impl Follower {
         Ok(if surface.ask(blocks, lattice, batch) { Task::Refine } else { Task::Nothing })
     }
 
-    /// Forgets the present batch where it is for `task`.
+    /// Discards the current batch if `task` requested it.
     fn drop_batch_of(&mut self, task: Task) {
         if self.task == task {
             self.batch.clear();
@@ -284,10 +287,10 @@ impl Follower {
         }
     }
 
-    /// The surface followed so far, in world space, triangles counter-clockwise seen from outside; vertices and
-    /// triangles in the order of where they are. Closed half an edge beyond the lattice, as by
-    /// [`marching_cubes`](super::marching_cubes); open where the flood has still to go on, where a vertex may belong to
-    /// no triangle.
+    /// Returns the surface extracted so far, in world space, triangles counter-clockwise seen from outside; vertices
+    /// and triangles are in spatial order. Closed half an edge beyond the lattice, as by
+    /// [`marching_cubes`](super::marching_cubes). Open where the flood has to continue; a vertex there may belong to no
+    /// triangle.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].
@@ -295,7 +298,7 @@ impl Follower {
         self.with_surface(|surface| surface.mesh(&self.blocks, &self.lattice))
     }
 
-    /// The vertices of [`Self::mesh`] before they are rounded to `f32`.
+    /// Returns the vertices of [`Self::mesh`] before they are rounded to `f32`.
     ///
     /// # Errors
     /// [`VolumeError::TooLarge`].
@@ -315,7 +318,8 @@ impl Follower {
         }
     }
 
-    /// About how much of the work is done: how many waves are still to come is not known before the last.
+    /// Returns an estimate of the completed share of the work, from 0 to 1, for a progress bar; the number of remaining
+    /// waves is unknown until the last. 0 when nothing is pending.
     pub fn progress(&self) -> f64 {
         let share = self.batch.progress();
         let waves = f64::from(self.waves) + share;
@@ -327,23 +331,24 @@ impl Follower {
         }
     }
 
-    /// Pieces of the surface that no seed led to and a scan found, as far as they are apart: pieces that share a cell
-    /// are one.
+    /// Returns the number of components of the surface without a seed that the scan found; components that share a cell
+    /// count as one.
     pub fn found_by_scan(&self) -> usize {
         self.scan.as_ref().map_or(0, |scan| scan.found)
     }
 
-    /// Cells that the surface crosses, so far.
+    /// Returns the number of cells that the surface crosses, as found so far.
     pub fn crossed_cells(&self) -> usize {
         self.flood.cut.len()
     }
 
-    /// Values asked for so far.
+    /// Returns the number of function evaluations so far.
     pub fn evaluations(&self) -> usize {
         self.evaluations
     }
 
-    /// Bytes held for the lattice's values: in proportion to the area, beside 4 for each block of 8³ nodes.
+    /// Returns the bytes allocated for lattice values: in proportion to the surface area, plus 4 for each block of 8³
+    /// nodes of the lattice.
     pub fn bytes(&self) -> usize {
         self.blocks.bytes()
     }

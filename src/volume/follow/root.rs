@@ -1,58 +1,60 @@
-//! Where a function passes 0 on a lattice edge.
+//! Root finding on a lattice edge: the zero of a function between an inside and an outside node.
 
 use super::super::contour::MARGIN;
 use super::blocks::{is_inside, sound};
 
-/// A step of less than this fraction of an edge is not worth an evaluation: steps shrink so fast that the next one is
-/// far less than `f32` positions can show.
+/// Convergence threshold, as a fraction of the edge: a smaller step is not worth an evaluation. Steps shrink so fast
+/// that the next one is far below the resolution of `f32` positions.
 const SETTLED: f64 = 1e-6;
 
-/// Bend of a parabola, beyond which a straight line is taken. At 1 it is level at one end, as where the surface is tangent
-/// to an edge; a jump makes far more, and the parabola would creep along one side of it.
+/// Largest relative curvature for which parabolic interpolation is used instead of linear. At 1 the parabola is level
+/// at one end, as when the surface is tangent to the edge. A jump gives a much larger value, and parabolic steps would
+/// converge slowly from one side of it.
 const MAX_BEND: f64 = 4.0;
 
-/// A place on the edge, as a fraction of the way along it, and the value there.
+/// A sample on the edge: the position as a fraction of the edge, and the function value.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     at: f64,
     value: f64,
 }
 
-/// A zero on an edge between a place inside and one outside, ever nearer to each other.
+/// Bracketing root finder on a lattice edge: an inside and an outside sample that converge to the zero.
 ///
-/// The estimate is where the parabola through both and the one before them passes 0: an edge that the surface is nearly
-/// tangent to is bent as much as it falls, and a straight line would take many steps.
+/// The estimate is the zero of the parabola through both samples and the previous one: on an edge to which the surface
+/// is nearly tangent, curvature is as large as slope, and linear interpolation would take many steps.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Root {
     inside: Sample,
     outside: Sample,
-    /// The one that was last replaced; at first its value is not a number.
+    /// The sample that was last replaced; its value is NaN at first.
     before: Sample,
 }
 
 impl Root {
-    /// Between values `start` and `end`, one of them inside and the other outside.
+    /// Creates a bracket from the values at the ends of the edge, one of them inside and the other outside.
     pub fn between(start: f64, end: f64) -> Self {
         let (start, end) = (Sample { at: 0.0, value: start }, Sample { at: 1.0, value: end });
         let (inside, outside) = if is_inside(start.value) { (start, end) } else { (end, start) };
         Self { inside, outside, before: Sample { at: 0.5, value: f64::NAN } }
     }
 
-    /// In the middle for good.
+    /// Creates a converged root at the middle of the edge, used where the edge leads into the padding.
     pub fn fixed() -> Self {
         let (inside, outside) = (Sample { at: 0.5, value: 1.0 }, Sample { at: 0.5, value: -1.0 });
         Self { inside, outside, before: inside }
     }
 
-    /// The fraction to be evaluated next.
+    /// Returns the estimated position of the zero, where the function is evaluated next.
     pub fn estimate(&self) -> f64 {
         let Self { inside, outside, .. } = self;
         inside.at + self.share() * (outside.at - inside.at)
     }
 
-    /// Share of the way from inside to outside at which the parabola passes 0; half of it next to infinite values.
+    /// Returns the zero of the parabola as a fraction of the way from the inside to the outside sample; one half if a
+    /// value is infinite.
     ///
-    /// On that way it is, over the fall from one value to the other, height − s + bend s (s − 1) at share s.
+    /// At fraction s, the parabola divided by the difference of the two values is height − s + bend s (s − 1).
     fn share(&self) -> f64 {
         let Self { inside, outside, before } = self;
         let fall = inside.value - outside.value;
@@ -67,23 +69,23 @@ impl Root {
         }
         let slope = 1.0 + bend;
         let share = 2.0 * height / (slope + (slope * slope - 4.0 * bend * height).sqrt());
-        // Rounding can lead out of the bracket, and a zero at its very end to 0 / 0.
+        // Rounding can give a zero outside the bracket, and a zero at its end gives 0 / 0.
         if (0.0..=1.0).contains(&share) { share } else { height }
     }
 
-    /// Takes the value at [`Self::estimate`].
+    /// Adds the function value at [`Self::estimate`] and shrinks the bracket.
     pub fn take(&mut self, value: f64) {
         let sample = Sample { at: self.estimate(), value: sound(value) };
         let end = if is_inside(sample.value) { &mut self.inside } else { &mut self.outside };
         self.before = std::mem::replace(end, sample);
     }
 
-    /// Whether another value would not move the estimate to speak of.
+    /// Returns whether the root has converged: another evaluation would move it by a negligible amount.
     pub fn is_settled(&self) -> bool {
         [self.inside, self.outside].iter().any(|end| (self.estimate() - end.at).abs() <= SETTLED)
     }
 
-    /// The estimate, kept [`MARGIN`] away from both ends of the edge.
+    /// Returns the estimate, kept [`MARGIN`] away from both ends of the edge: the vertex position on it.
     pub fn fraction(&self) -> f64 {
         let margin = f64::from(MARGIN);
         self.estimate().clamp(margin, 1.0 - margin)
@@ -96,7 +98,7 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// The root and the number of evaluations until it settles, at most `most`.
+    /// Returns the root and the number of evaluations until it converges, at most `most`.
     fn solved(f: impl Fn(f64) -> f64, most: usize) -> (Root, usize) {
         let mut root = Root::between(f(0.0), f(1.0));
         let mut steps = 0;

@@ -1,9 +1,9 @@
-//! The scan: a coarse look at the whole lattice for pieces of the surface that no seed led to.
+//! The scan: a coarse search of the whole lattice for components of the surface without a seed.
 //!
-//! Every so many nodes one is evaluated. Between two neighbouring ones runs a straight line of lattice edges, which the
-//! surface crosses an odd number of times if one end is inside and the other outside, and an even number of times
-//! otherwise. Where what was followed crosses it otherwise, a piece is missing. Halving the line keeps a half of
-//! which the same is true, down to a lattice edge that is cut and was not followed; the flood goes on from there.
+//! Every `stride`-th node along each axis is evaluated. Two neighbouring coarse nodes are joined by a straight line of
+//! lattice edges, which the surface crosses an odd number of times if exactly one end is inside, and an even number of
+//! times otherwise. If the surface found so far crosses it with the other parity, a component is missing. Bisection
+//! keeps a half with the same property, down to a cut lattice edge that was not found; the flood continues from there.
 
 use super::super::error::{VolumeError, reserve};
 use super::Lattice;
@@ -11,21 +11,22 @@ use super::batch::Batch;
 use super::blocks::{Blocks, Node, is_inside};
 use super::flood::Flood;
 
-/// Coarse nodes evaluated in one batch: bounds memory, and is plenty for a sum that works in batches.
+/// Number of coarse nodes evaluated in one batch: limits memory, and is large enough for functions that are evaluated
+/// in batches.
 const BATCH: usize = 4096;
 
-/// A straight line of lattice edges, and whether its ends are inside.
+/// A straight line of lattice edges between two nodes, and whether its ends are inside.
 #[derive(Clone, Copy)]
 struct Line {
     from: Node,
     axis: usize,
-    /// Coordinate of the other end.
+    /// Coordinate of the other end along `axis`.
     to: usize,
     inside: [bool; 2],
 }
 
 impl Line {
-    /// Whether the surface crosses the line where it was not followed.
+    /// Returns whether a component of the surface that crosses the line has not been found, by parity.
     fn misses_a_piece(&self, blocks: &Blocks) -> bool {
         (self.inside[0] != self.inside[1]) != blocks.crosses_oddly(self.from, self.axis, self.to)
     }
@@ -40,7 +41,7 @@ impl Line {
         self.to == self.from[self.axis] + 1
     }
 
-    /// The half that misses a piece, as one of them does if the line does.
+    /// Returns a half with a missing component; one half has one if the line does.
     fn halved(&self, middle_inside: bool, blocks: &Blocks) -> Line {
         let middle = self.middle();
         let first = Line { to: middle[self.axis], inside: [self.inside[0], middle_inside], ..*self };
@@ -49,28 +50,28 @@ impl Line {
     }
 }
 
-/// Coarse nodes, what is known of them, and how far the scan has come.
+/// State of the scan: the coarse nodes, whether they are inside, and the line being processed.
 pub(super) struct Scan {
-    /// Coordinates of the coarse nodes along each axis, in the padded lattice with both its ends.
+    /// Coordinates of the coarse nodes along each axis, in the padded lattice, including both ends.
     axes: [Vec<usize>; 3],
     /// Whether each coarse node is inside, x fastest, then y, z.
     inside: Vec<bool>,
-    /// Coarse nodes that have been asked for.
+    /// Number of coarse nodes that were evaluated or requested.
     known: usize,
-    /// Those of the present batch.
+    /// Coarse nodes of the current batch.
     asked: Vec<usize>,
-    /// Number of the next line: axis + 3 × the coarse node where it starts.
+    /// Index of the next line: axis + 3 × the coarse node where it starts.
     next_line: usize,
-    /// The line that is being halved.
+    /// The line that is being bisected.
     line: Option<Line>,
-    /// Whether a piece was found since the first line.
+    /// Whether a component was found in the current pass over all lines.
     found_some: bool,
-    /// Pieces found so far.
+    /// Number of components found so far.
     pub found: usize,
 }
 
 impl Scan {
-    /// A look at every `stride`-th node of the lattice, the first and the last along each axis among them.
+    /// Creates a scan of every `stride`-th node of the lattice, including the first and last along each axis.
     pub fn new(stride: usize, blocks: &Blocks) -> Result<Self, VolumeError> {
         let axes = blocks.cells().map(|end| {
             let mut axis: Vec<usize> = (1..end).step_by(stride).collect();
@@ -86,7 +87,8 @@ impl Scan {
         Ok(Self { axes, inside, known: 0, asked, next_line: 0, line: None, found_some: false, found: 0 })
     }
 
-    /// Fills `batch` with what the scan needs next, or queues a cell in the flood; false when it is done.
+    /// Fills `batch` with the points the scan needs next, or queues a cell in the flood; returns false when the scan is
+    /// complete.
     pub fn ask(
         &mut self,
         blocks: &mut Blocks,
@@ -102,7 +104,7 @@ impl Scan {
         self.line = self.line.or_else(|| self.find_line(blocks));
         let Some(line) = self.line else { return Ok(false) };
         if line.is_edge() {
-            // Seen before only where the function changes its mind: such a line would be found for ever.
+            // The cell was visited before only if the function is inconsistent: such a line would be found for ever.
             let is_new = flood.look_at(line.from, blocks)?;
             self.line = None;
             self.found += usize::from(is_new);
@@ -113,18 +115,18 @@ impl Scan {
         Ok(true)
     }
 
-    /// Takes the values that were asked for.
+    /// Stores the values of the batch: of coarse nodes, or of the middle of the line being bisected.
     pub fn take(&mut self, values: &[f64], blocks: &Blocks) {
         for (coarse, &value) in self.asked.drain(..).zip(values) {
             self.inside[coarse] = is_inside(value);
         }
-        // While coarse nodes are asked for there is no line yet.
+        // There is no line until all coarse nodes are evaluated.
         if let (Some(line), Some(&value)) = (self.line, values.first()) {
             self.line = Some(line.halved(is_inside(value), blocks));
         }
     }
 
-    /// Chooses the next coarse nodes to be evaluated, and fills in those that the flood evaluated.
+    /// Selects the next coarse nodes to evaluate, and reuses values that the flood evaluated.
     fn ask_nodes(&mut self, blocks: &Blocks) {
         self.asked.clear();
         while self.known < self.inside.len() && self.asked.len() < BATCH {
@@ -139,8 +141,8 @@ impl Scan {
         }
     }
 
-    /// The next line on which a piece is missing. A piece that was followed can show that a line has another one, so
-    /// the lines are gone through until nothing is found.
+    /// Returns the next line with a missing component. A component just found can reveal another one on a line already
+    /// tested, so the passes over all lines are repeated until nothing is found.
     fn find_line(&mut self, blocks: &Blocks) -> Option<Line> {
         loop {
             while self.next_line < 3 * self.inside.len() {
@@ -157,7 +159,7 @@ impl Scan {
         }
     }
 
-    /// The line from a coarse node to its next neighbour along an axis, where there is one.
+    /// Returns the line from a coarse node to the next one along an axis, if there is one.
     fn line(&self, number: usize) -> Option<Line> {
         let (axis, coarse) = (number % 3, number / 3);
         let to = *self.axes[axis].get(self.index(coarse)[axis] + 1)?;

@@ -1,4 +1,4 @@
-//! Vertices and triangles of the crossed cells, in an order that does not depend on how they were found.
+//! The mesh of the crossed cells, in an order independent of the order of discovery.
 
 use super::super::cube_cases::{Case, EDGES, cases, corner};
 use super::super::error::{VolumeError, reserve};
@@ -12,33 +12,33 @@ use crate::mesh::TriangleMesh;
 
 const NONE: u32 = u32::MAX;
 
-/// The cut edges that start where a cell does, bit by axis.
+/// Returns the cut edges that start at the cell's first node, one bit per axis.
 fn near_cuts(case: u8) -> u8 {
     let far_ends = [corner([1, 0, 0]), corner([0, 1, 0]), corner([0, 0, 1])];
     (0..3).fold(0, |cuts, axis| cuts | ((case ^ case >> far_ends[axis]) & 1) << axis)
 }
 
-/// A vertex: where the surface cuts the lattice edge from a node along an axis.
+/// A mesh vertex: the intersection of the surface with the lattice edge from a node (`slot`) along an axis.
 struct Vertex {
     slot: u32,
     axis: usize,
     root: Root,
 }
 
-/// Crossed cells and their vertices, both by block, then node.
+/// The crossed cells and their vertices, both sorted by block, then node.
 pub(super) struct Surface {
     cells: Vec<CutCell>,
-    /// The vertex on the first cut edge that starts where each cell does; the others follow.
+    /// For each cell, the vertex on the first cut edge that starts at its first node; those on its other edges follow.
     first: Vec<u32>,
-    /// Where the cell of each slot stands in `cells`.
+    /// For each slot, the index of its cell in `cells`, or [`NONE`].
     index: Vec<u32>,
     vertices: Vec<Vertex>,
-    /// Vertices whose values were asked for.
+    /// Vertices in the current refinement batch.
     asked: Vec<usize>,
 }
 
 impl Surface {
-    /// The surface in the given cells, vertices where lines through the nodes' values pass 0.
+    /// Builds the surface of the given cells, with vertices placed by linear interpolation of the node values.
     pub fn new(cut: &[CutCell], blocks: &Blocks) -> Result<Self, VolumeError> {
         let (mut order, mut cells) = (reserve(cut.len())?, reserve(cut.len())?);
         order.extend(cut.iter().map(|cell| blocks.rank(cell.slot)).zip(0_u32..));
@@ -57,7 +57,7 @@ impl Surface {
         Ok(Self { cells, first, index, vertices, asked: Vec::new() })
     }
 
-    /// Fills `batch` with the estimates of all vertices that are not settled; false where all are.
+    /// Fills `batch` with the estimates of all vertices that have not converged; returns false if all have.
     pub fn ask(&mut self, blocks: &Blocks, lattice: &Lattice, batch: &mut Batch) -> bool {
         let Self { vertices, asked, .. } = self;
         asked.clear();
@@ -69,19 +69,19 @@ impl Surface {
         !asked.is_empty()
     }
 
-    /// Takes the values that were asked for.
+    /// Passes the values of the refinement batch to the roots of its vertices.
     pub fn take(&mut self, values: &[f64]) {
         for (v, &value) in self.asked.drain(..).zip(values) {
             self.vertices[v].root.take(value);
         }
     }
 
-    /// Where the vertices are.
+    /// Returns the world positions of the vertices.
     pub fn positions(&self, blocks: &Blocks, lattice: &Lattice) -> impl ExactSizeIterator<Item = DVec3> {
         self.vertices.iter().map(|v| lattice.on_edge(blocks.node(v.slot), v.axis, v.root.fraction()))
     }
 
-    /// The triangles whose vertices are all there, which are all once the flood is done.
+    /// Builds the mesh of all triangles whose three vertices exist, which are all once the flood is complete.
     pub fn mesh(&self, blocks: &Blocks, lattice: &Lattice) -> Result<TriangleMesh, VolumeError> {
         let cases = cases();
         let case = |cell: &CutCell| &cases[usize::from(cell.case)];
@@ -108,7 +108,8 @@ impl Surface {
         case.triangles.iter().filter_map(move |&[a, b, c]| Some([on_edge(a)?, on_edge(b)?, on_edge(c)?]))
     }
 
-    /// The vertex on the cut edge from a node along an axis; none while the cell that starts there is still to come.
+    /// Returns the vertex on the cut edge from a node along an axis; `None` if the cell that starts there has not been
+    /// found yet.
     fn vertex(&self, slot: u32, axis: usize) -> Option<u32> {
         let at = *self.index.get(slot as usize)? as usize;
         let before = near_cuts(self.cells.get(at)?.case) & ((1 << axis) - 1);
@@ -116,7 +117,7 @@ impl Surface {
     }
 }
 
-/// The zero on a cut edge; in its middle for good where it leads out of the lattice.
+/// Returns the root on a cut edge, fixed at its middle if one end is in the padding.
 fn root(slot: u32, axis: usize, blocks: &Blocks) -> Root {
     let from = blocks.node(slot);
     let to = next(from, axis);

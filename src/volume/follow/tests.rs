@@ -1,4 +1,4 @@
-//! Whole surfaces, against what is known of them and against marching cubes over all nodes.
+//! Extracted surfaces, compared with known properties and with marching cubes over all nodes.
 
 use super::super::{Grid, marching_cubes};
 use super::*;
@@ -20,7 +20,7 @@ fn run(follower: &mut Follower, budget: usize, f: impl Fn(DVec3) -> f64) {
     while !follower.advance(budget, &mut f).unwrap() {}
 }
 
-/// Followed from `seeds` and, for a stride above 0, by a scan.
+/// Extracts a surface from `seeds` and, if `stride` is above 0, by a scan.
 fn followed(lattice: Lattice, seeds: &[DVec3], stride: usize, f: impl Fn(DVec3) -> f64) -> Follower {
     let mut follower = Follower::new(lattice).unwrap();
     seeds.iter().for_each(|&p| assert!(follower.seed(p)));
@@ -31,7 +31,8 @@ fn followed(lattice: Lattice, seeds: &[DVec3], stride: usize, f: impl Fn(DVec3) 
     follower
 }
 
-/// The measures of a mesh that is closed, oriented, manifold and free of crossings.
+/// Returns the measures of a mesh, after asserting that it is closed, oriented, manifold and free of
+/// self-intersections.
 fn healthy(mesh: &TriangleMesh) -> Measures {
     let report = report(mesh).unwrap();
     assert!(report.is_healthy(), "{report:?}");
@@ -46,7 +47,7 @@ fn dense(n: usize, f: impl Fn(DVec3) -> f64) -> TriangleMesh {
     marching_cubes(&Grid::new([n; 3], values).unwrap(), 0.0).unwrap()
 }
 
-/// Triangles by the bits of their corners, each from its lowest corner on.
+/// Returns the set of triangles as bits of their corners, each rotated to start at its lowest corner.
 fn triangle_set(mesh: &TriangleMesh) -> BTreeSet<[[u32; 3]; 3]> {
     let triangles = mesh.corners().map(|corners| {
         let mut bits = corners.map(|p| p.to_array().map(f32::to_bits));
@@ -69,7 +70,8 @@ fn hash(seed: u64, p: DVec3) -> u64 {
     state
 }
 
-/// Noise whose zeros between two nodes `f32` and `f64` agree on to the bit; denser for higher `share` of 16.
+/// Returns noise whose zeros by linear interpolation between two nodes are identical in `f32` and `f64`; denser for a
+/// higher `share` of 16.
 fn noise(seed: u64, share: u64) -> impl Fn(DVec3) -> f64 + Copy {
     move |p| {
         let hash = hash(seed, p);
@@ -279,7 +281,7 @@ fn noise_refined_in_any_way_crosses_nothing() {
     for seed in 0..12 {
         let mut follower = followed(unit(12), &[], 1, noise(seed, 3 + seed % 10));
         follower.refine(4);
-        // Between the nodes it is other noise: zeros anywhere on the edges.
+        // Between the nodes the noise is independent: zeros anywhere on the edges.
         run(&mut follower, usize::MAX, noise(seed, 3 + seed % 10));
         healthy(&follower.mesh().unwrap());
     }
@@ -331,14 +333,14 @@ fn seeds_and_their_order_make_no_difference() {
     let f = ball(centre, 10.0);
     let expected = followed(unit(31), &[centre + DVec3::X * 10.0], 0, f).mesh().unwrap();
     assert_eq!(healthy(&expected).components, 1);
-    // On it, a cell off it, many, and one twice.
+    // One on the surface, one a cell off it, several, and one twice.
     let on = [DVec3::NEG_Y, DVec3::Z, DVec3::NEG_X].map(|d| centre + d * 10.0);
     let off = centre + DVec3::new(0.0, 11.2, 0.0);
     assert!(off.floor() != (centre + DVec3::Y * 10.0).floor());
     for seeds in [&on[..1], &[off], &on, &[on[2], off, on[2], on[1]]] {
         assert_eq!(followed(unit(31), seeds, 0, f).mesh().unwrap(), expected);
     }
-    // Two cells off it nothing is found.
+    // Nothing is found from a seed at the centre, far off the surface.
     let far = followed(unit(31), &[centre], 0, f);
     assert_eq!((far.mesh().unwrap(), far.evaluations()), (TriangleMesh::default(), 64));
 }
@@ -416,7 +418,7 @@ fn what_is_not_a_number_is_outside() {
     assert_eq!((measures.components, measures.genus), (1, 0));
     assert!((measures.bounds[1].x - 10.3).abs() < 0.01, "{}", measures.bounds[1].x);
     assert_eq!(followed(unit(6), &[DVec3::splat(2.5)], 1, |_| f64::NAN).crossed_cells(), 0);
-    // Nor is a value that the function leaves out.
+    // A value that the function does not write is outside, too.
     let mut silent = Follower::new(unit(6)).unwrap();
     silent.scan(1).unwrap();
     assert!(silent.advance(usize::MAX, &mut |_, _| {}).unwrap());

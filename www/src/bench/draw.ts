@@ -3,7 +3,7 @@ import { scaleOf } from './scale';
 import type { Chart, Section } from './sections';
 import { askedOf, type Bar, type Figure, meets, type Target, verdict, withUnit } from './targets';
 
-/** One bench: what was measured and how, its charts, and the same numbers as tables. */
+/** Draws one benchmark: what was measured and how, its charts, and the same numbers as tables. */
 export function drawSection({ id, title, measured, command, notes, charts }: Section): HTMLElement {
   const list = notes.length > 0 ? [h('ul', { class: 'notes' }, ...notes.map((note) => h('li', {}, note)))] : [];
   return h(
@@ -71,12 +71,12 @@ function drawBar(figure: Figure, bar: Bar, drawn: Drawing): HTMLElement {
   return row;
 }
 
-/** The bar itself and the mark of what was asked; the number beside it says the same. */
+/** Draws the bar and the mark of its target; decorative, since the number beside it says the same. */
 function track(figure: Figure, bar: Bar, value: number, { at, base }: Drawing): HTMLElement {
   const missed = meets(figure, bar) === false;
   const [from, to] = [Math.min(at(value), base), Math.max(at(value), base)];
   const filled = h('div', { class: missed ? 'bench-fill missed' : 'bench-fill' });
-  // By script: the page's policy allows no style in the markup.
+  // Set by script: the page's content security policy allows no inline style in the markup.
   filled.style.left = percent(from);
   filled.style.width = percent(to - from);
   const element = h('div', { class: 'bench-track', 'aria-hidden': true }, filled);
@@ -85,7 +85,7 @@ function track(figure: Figure, bar: Bar, value: number, { at, base }: Drawing): 
   return element;
 }
 
-/** What is asked of one host is not shown on the others. */
+/** Returns the target that applies to a bar; a target for one host is not shown on the others. */
 function limitFor(target: Target | undefined, { label }: Bar): number | undefined {
   return target && (!target.host || label.startsWith(target.host)) ? target.limit : undefined;
 }
@@ -105,12 +105,12 @@ function axis({ ticks, at }: Drawing): HTMLElement {
 
 const short = (value: number) => new Intl.NumberFormat('en', { maximumSignificantDigits: 3 }).format(value);
 
-/** The numbers of a chart: a row for each figure where all have the same hosts, else for each bar. */
+/** Creates the table of a chart: a row per figure if all have the same hosts, else a row per bar. */
 function tableOf(section: string, chart: Chart): HTMLElement {
   const { title, kind } = chart;
   const [head, rows] = kind === 'ratio' ? listed(chart) : byHost(chart);
   return scrolling(
-    // Charts of several sections have the same title.
+    // Charts of different sections have the same title.
     `${section}: ${title}`,
     h(
       'table',
@@ -122,7 +122,7 @@ function tableOf(section: string, chart: Chart): HTMLElement {
   );
 }
 
-/** A table may be wider than a telephone; then it is moved by itself, also by keyboard. */
+/** Wraps a table that may be wider than a phone, so that it scrolls by itself, also by keyboard. */
 export function scrolling(label: string, table: HTMLElement): HTMLElement {
   return h('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': label }, table);
 }

@@ -18,7 +18,7 @@ function askedIn({ charts }: Section): Asked[] {
   return charts.flatMap((chart) => chart.figures.filter(({ target }) => target).map((figure) => ({ chart, figure })));
 }
 
-/** Everything that something was asked of, with what came. */
+/** Summarises all measurements with a target and their results. */
 function summary(sections: Section[]): HTMLElement {
   const asked = sections.flatMap(askedIn);
   const met = asked.filter(({ figure }) => verdict(figure) === 'met').length;
@@ -53,7 +53,7 @@ function summaryRow({ chart, figure }: Asked): HTMLElement {
   return row;
 }
 
-/** The bar that decides. */
+/** Returns the value of the worst bar with a target. */
 function foundIn({ bars, target }: Figure, unit: string): string {
   const sign = target?.sense === 'least' ? -1 : 1;
   const judged = bars.filter(({ label, value }) => value !== undefined && label.startsWith(target?.host ?? ''));
@@ -74,6 +74,6 @@ if (root) {
     summary(sections),
     ...sections.map((section) => drawSection(section)),
   );
-  // An address that names a bench came before it was drawn.
+  // Scrolls to the benchmark in the address, which was not drawn yet when the page was opened.
   document.getElementById(location.hash.slice(1))?.scrollIntoView();
 }

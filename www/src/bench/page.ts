@@ -1,4 +1,4 @@
-/** How the app itself starts, keeps up and what it holds. */
+/** Benchmarks of the app itself: start-up time, frame rate and memory. */
 import { count } from '../ui/format';
 import type { Report } from './report';
 import type { Section } from './sections';

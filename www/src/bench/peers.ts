@@ -1,10 +1,10 @@
-/** Our figures beside those of other people's software. */
+/** Comparison of this library's measurements with those of other software. */
 import { count } from '../ui/format';
 import type { PeerRow, Report, Side } from './report';
 import type { Section } from './sections';
 import { type Bar, type Figure, withUnit } from './targets';
 
-/** As at the head of bench/peers.py, in short. */
+/** Short form of the notes at the head of bench/peers.py. */
 const NOTES = [
   'Below 1× ours takes less time, above 1× more. No figure was asked for here.',
   'Theirs is native code; ours is WebAssembly, but for remeshing, which is native on both sides. All have one thread.',
@@ -27,7 +27,7 @@ export function peerSection({ rows, load = 0, cores }: NonNullable<Report['peers
   };
 }
 
-/** A figure a task, with a bar for each package. */
+/** Returns a figure for each task, with a bar for each package. */
 function figuresOf(rows: PeerRow[]): Figure[] {
   const tasks = new Map(rows.map(({ task, name }) => [task, name]));
   return [...tasks].map(([task, name]) => ({ name, bars: rows.filter((row) => row.task === task).map(barOf) }));
@@ -43,7 +43,7 @@ function barOf(row: PeerRow): Bar {
 
 const said = ([whose, figure, ...rest]: string[]) => `${whose} ${figure}${rest.map((one) => `, ${one}`).join('')}`;
 
-/** Without a word for the day it was packed on. */
+/** Removes the post-release suffix of a version. */
 export const shortVersion = (version: string) => version.replace(/\.post\d+$/, '');
 
 function figureOf({ unit }: PeerRow, { figure }: Side): string {
@@ -51,7 +51,7 @@ function figureOf({ unit }: PeerRow, { figure }: Side): string {
   return withUnit(figure, unit);
 }
 
-/** What came out, where it tells how far the two can be compared. */
+/** Returns the results that show how far the two runs are comparable. */
 function outcomeOf({ triangles, vertices, volume, minAngleDegrees, refused }: Side): string[] {
   if (refused) return ['not a closed surface'];
   const words = [];

@@ -1,4 +1,4 @@
-/** What scripts/bench.mjs writes into bench.json, as far as it is drawn. Times are in milliseconds. */
+/** The part of bench.json, written by scripts/bench.mjs, that is drawn. Times are in milliseconds. */
 export interface Report {
   processor?: string;
   bestOf: number;
@@ -9,13 +9,13 @@ export interface Report {
   steps?: (Host & { rows: StepRow[] })[];
   head?: (Host & HeadFigures)[];
   phantom?: (Host & HeadFigures)[];
-  /** `load` is what the machine was busy with when it began. */
+  /** `load` is the load of the machine at the start of the measurement. */
   peers?: { bestOf: number; load?: number; cores?: number; rows: PeerRow[] };
   page?: Host & PageFigures;
 }
 
 export interface Host {
-  /** The name and, where there is one, the version. */
+  /** Name of the host and its version, if any. */
   host: string;
 }
 
@@ -36,7 +36,7 @@ export interface PointFigures {
 
 export interface RemeshRow {
   name: string;
-  /** Length of the edges asked for, in the mean edge of before. */
+  /** Target edge length, relative to the mean edge before remeshing. */
   factor: number;
   milliseconds: number;
   triangles: number;
@@ -57,7 +57,7 @@ export interface TrackFigures {
 
 export interface StepRow {
   vertices: number;
-  /** Nanoseconds a vertex. */
+  /** Duration of a step per vertex, nanoseconds. */
   step: number;
   topology: number;
 }
@@ -87,7 +87,7 @@ interface Turning {
   triangles: number;
 }
 
-/** Of the app in a browser; memory in bytes. */
+/** Measurements of the app in a browser; memory in bytes. */
 export interface PageFigures {
   cold: Start;
   warm: Start;
@@ -96,7 +96,7 @@ export interface PageFigures {
   memory: { heap: number; arrays: number; wasm?: number; gpu: number };
 }
 
-/** What one side needed in the row's unit, and what came out. */
+/** Measurement of one side in the row's unit, and its result. */
 export interface Side {
   figure: number;
   vertices?: number;
@@ -115,8 +115,8 @@ export interface PeerRow {
   version?: string;
   ours: Side & Host;
   theirs?: Side & { what: string };
-  /** Ours to theirs. */
+  /** Ratio of this library's figure to the other's. */
   ratio?: number;
-  /** Why there is nothing of theirs. */
+  /** Reason why there is no measurement of the other software. */
   skipped?: string;
 }

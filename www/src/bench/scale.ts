@@ -1,14 +1,14 @@
-/** Where numbers lie along a chart, from 0 at its left end to 1 at its right. */
+/** Scale of a chart's axis, mapping values to 0 at its left end and 1 at its right. */
 export interface Scale {
   at: (value: number) => number;
-  /** Where bars begin. */
+  /** Position at which bars start. */
   base: number;
   ticks: number[];
 }
 
 export type Kind = 'linear' | 'log' | 'ratio';
 
-/** A scale that all values fit on: from 0, by powers of ten, or by powers of ten on both sides of 1. */
+/** Returns a scale that contains all values: linear from 0, logarithmic, or logarithmic on both sides of 1. */
 export function scaleOf(kind: Kind, values: number[]): Scale {
   const good = values.filter((value) => Number.isFinite(value) && (kind === 'linear' || value > 0));
   if (kind === 'linear') return linear(Math.max(...good, 0));
@@ -17,13 +17,13 @@ export function scaleOf(kind: Kind, values: number[]): Scale {
 
 function linear(most: number): Scale {
   const step = niceStep(most || 1);
-  // The longest bar ends a little before the right end.
+  // Leaves some space to the right of the longest bar.
   const end = Math.max(most * 1.02, step);
   const ticks = Array.from({ length: Math.floor(end / step + 1e-9) + 1 }, (_, k) => k * step);
   return { at: (value) => clamped(value / end), base: 0, ticks };
 }
 
-/** 1, 2 or 5 times a power of ten, about a fourth of the length. */
+/** Returns a tick step of 1, 2 or 5 times a power of ten, about a quarter of the length. */
 function niceStep(length: number): number {
   const power = 10 ** Math.floor(Math.log10(length / 4));
   const part = length / 4 / power;

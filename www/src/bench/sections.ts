@@ -1,4 +1,4 @@
-/** Which figures of the report are drawn, in which units, and what was asked of them. */
+/** Selects the measurements of the report that are drawn, with their units and targets. */
 import { count, plural } from '../ui/format';
 import { pageSection } from './page';
 import { peerSection } from './peers';
@@ -16,15 +16,15 @@ export interface Chart {
 export interface Section {
   id: string;
   title: string;
-  /** What was measured, in a sentence. */
+  /** Description of the measurement in one sentence. */
   measured: string;
   command: string;
-  /** What else there is to know before reading the figures. */
+  /** Notes to read before the figures. */
   notes: string[];
   charts: Chart[];
 }
 
-/** What can be drawn of a report: parts that it does not have are left out. */
+/** Returns the sections that can be drawn from a report; missing parts are omitted. */
 export function sectionsOf(report: Report): Section[] {
   const { head, phantom, steps, points, skin, track, remesh, page, peers } = report;
   const made = [
@@ -44,12 +44,12 @@ export function sectionsOf(report: Report): Section[] {
 const SECOND = 1000;
 const MEGABYTE = 1e6;
 
-/** A figure with a bar for each host. */
+/** Returns a figure with a bar for each host. */
 function figure<T extends Host>(name: string, hosts: T[], value: (host: T) => number, target?: Target): Figure {
   return { name, bars: hosts.map((host): Bar => ({ label: shortHost(host.host), value: value(host) })), target };
 }
 
-/** A figure for each row that the hosts have in common, which is the k-th of each. */
+/** Returns a figure for each row that the hosts have in common, by index. */
 function figuresOfRows<Row>(
   hosts: (Host & { rows: Row[] })[],
   name: (row: Row) => string,
@@ -132,7 +132,7 @@ function spread(rows: StepRow[]): number {
   return Math.max(...steps) / Math.min(...steps);
 }
 
-/** Only the size in the middle has something to keep to. */
+/** Only the middle size has a target. */
 function topologyFigures(hosts: Steps[]): Figure[] {
   return figuresOfRows(
     hosts,
@@ -142,7 +142,7 @@ function topologyFigures(hosts: Steps[]): Figure[] {
   );
 }
 
-/** What the hosts need to what the same needs natively, where that was measured. */
+/** Returns the chart of each host's time relative to native code, if that was measured. */
 function overNative(hosts: Steps[]): Chart[] {
   const native = hosts.find(({ host }) => host === 'native');
   if (!native) return [];
@@ -188,7 +188,7 @@ function pointSection(hosts: NonNullable<Report['points']>): Section {
   };
 }
 
-/** Only sizes near 20,000 triangles have something to keep to. */
+/** Returns the target of a row; only sizes near 20,000 triangles have one. */
 function asked({ name, triangles }: SkinRow): Target | undefined {
   return near(triangles, 20_000) ? atLeast(name === 'lava lamp' ? 30 : 10) : undefined;
 }

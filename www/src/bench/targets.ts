@@ -1,18 +1,18 @@
-/** What was asked of a figure. */
+/** The target of a measurement. */
 export interface Target {
   limit: number;
   sense: 'most' | 'least';
-  /** Where it counts; everywhere unless said. */
+  /** Host to which it applies; all by default. */
   host?: string;
 }
 
 export interface Bar {
-  /** Where it was measured, or whose it is. */
+  /** The host or software that was measured. */
   label: string;
   value?: number;
-  /** Beside the value. */
+  /** Remark beside the value. */
   remark?: string;
-  /** Why there is no value. */
+  /** Reason why there is no value. */
   skipped?: string;
 }
 
@@ -25,20 +25,20 @@ export interface Figure {
 export const atMost = (limit: number, host?: string): Target => ({ limit, sense: 'most', host });
 export const atLeast = (limit: number): Target => ({ limit, sense: 'least' });
 
-/** Whether a bar keeps to its figure's target; undefined where nothing is asked of it. */
+/** Returns whether a bar meets its figure's target; undefined if no target applies. */
 export function meets({ target }: Figure, { label, value }: Bar): boolean | undefined {
   if (!target || value === undefined || (target.host && !label.startsWith(target.host))) return undefined;
   return target.sense === 'most' ? value <= target.limit : value >= target.limit;
 }
 
-/** A figure is as good as the worst of the bars that something is asked of. */
+/** Returns the verdict on a figure: met only if all bars with a target meet it. */
 export function verdict(figure: Figure): 'met' | 'not met' | 'not measured' {
   const judged = figure.bars.map((bar) => meets(figure, bar)).filter((met) => met !== undefined);
   if (judged.length === 0) return 'not measured';
   return judged.every(Boolean) ? 'met' : 'not met';
 }
 
-/** A number with its unit, three digits of it. */
+/** Formats a number with its unit, to three significant digits (integers from 100). */
 export function withUnit(value: number, unit: string): string {
   if (unit === 's' && value < 0.1) return withUnit(1000 * value, 'ms');
   const digits = Math.abs(value) >= 100 ? { maximumFractionDigits: 0 } : { maximumSignificantDigits: 3 };
@@ -50,5 +50,5 @@ export function askedOf({ limit, sense, host }: Target, unit: string): string {
   return `${sense === 'most' ? '≤' : '≥'} ${withUnit(limit, unit)}${host ? ` ${host}` : ''}`;
 }
 
-/** A host without the small numbers of its version. */
+/** Shortens a host's version to its major number. */
 export const shortHost = (host: string) => host.replace(/^(\S+ \d+)\..*/, '$1');

@@ -1,4 +1,6 @@
-/** Series of DICOM files, read by ITK: every transfer syntax that its GDCM knows, sorted along the normal of the slices. */
+/**
+ * Reads series of DICOM files with ITK: all transfer syntaxes supported by GDCM, with slices sorted along their normal.
+ */
 import { type Image, InterfaceTypes, runPipeline } from 'itk-wasm';
 import type { VolumeInit, VoxelArray } from 'vesicle';
 import type { NamedBytes } from '../protocol';
@@ -6,15 +8,18 @@ import { Refusal } from '../worker/refusal';
 
 const PIPELINE = 'read-image-dicom-file-series';
 
-/** The program lies beside the page; it runs in the worker that asks. */
+/** The ITK program is served beside the page; it runs in the calling worker. */
 const options = () => ({ pipelineBaseUrl: new URL('./dicom', pageAddress()).href, webWorker: false });
 
-/** Of the page that this worker belongs to: the worker's own file lies in a folder of the built page. */
+/**
+ * Returns the address of the page that this worker belongs to: the worker's own file is in a subfolder of the built
+ * page.
+ */
 function pageAddress(): string {
   return new URL(import.meta.env.DEV ? import.meta.env.BASE_URL : '../', self.location.href).href;
 }
 
-/** The volume of one series, in LPS as DICOM has it. */
+/** Reads the volume of one series, in LPS as in DICOM. */
 export async function readSeries(files: NamedBytes[]): Promise<VolumeInit> {
   const paths = files.map((_, k) => `${k}.dcm`);
   const inputs = files.map(({ bytes }, k) => ({
@@ -50,7 +55,7 @@ function volumeOf({ imageType, data, size, spacing, origin, direction }: Image):
   };
 }
 
-/** Column-major; ITK's direction has the axes of the image in its columns, row by row. */
+/** Returns the column-major affine matrix; ITK's direction matrix is row-major, with the image axes in its columns. */
 function affineOf(spacing: number[], origin: number[], direction: number[]): number[] {
   const column = (axis: number) => [0, 1, 2].map((row) => (direction[3 * row + axis] ?? 0) * (spacing[axis] ?? 1));
   return [...[0, 1, 2].flatMap((axis) => [...column(axis), 0]), ...[0, 1, 2].map((axis) => origin[axis] ?? 0), 1];

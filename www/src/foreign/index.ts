@@ -1,9 +1,9 @@
-/** Formats that others’ libraries read: fetched when such a file is opened, and not before. */
+/** Formats read by other libraries, which are loaded only when such a file is opened. */
 import type { VolumeInit } from 'vesicle';
 import type { NamedBytes } from '../protocol';
 import { Refusal } from '../worker/refusal';
 
-/** Bytes before the letters DICM at the head of a DICOM file. */
+/** Number of bytes before the letters DICM at the start of a DICOM file. */
 const PREAMBLE = 128;
 
 const hasBytes = (bytes: Uint8Array, at: number, expected: number[]) =>
@@ -13,23 +13,26 @@ export function isDicom({ bytes, name }: NamedBytes): boolean {
   return hasBytes(bytes, PREAMBLE, [0x44, 0x49, 0x43, 0x4d]) || /\.(dcm|dicom)$/i.test(name);
 }
 
-/** Of either byte order; the larger kind with addresses of 64 bits, too. */
+/** Whether a file is a TIFF of either byte order; includes BigTIFF with 64-bit offsets. */
 export function isTiff({ bytes }: NamedBytes): boolean {
   return [42, 43].some(
     (kind) => hasBytes(bytes, 0, [0x49, 0x49, kind, 0]) || hasBytes(bytes, 0, [0x4d, 0x4d, 0, kind]),
   );
 }
 
-/** The volume in a series of DICOM files, or in TIFF files one a slice or one with all; undefined where they are neither. */
+/**
+ * Reads the volume from a series of DICOM files, or from TIFF files with one slice each or all in one; undefined if
+ * they are neither.
+ */
 export async function readForeign(files: NamedBytes[]): Promise<VolumeInit | undefined> {
-  // Folders of DICOM hold other files as well, without that name at their end.
+  // DICOM folders contain other files as well, and DICOM files without that extension.
   const series = files.filter(isDicom);
   if (series.length > 0) return solid('DICOM', await (await import('./dicom')).readSeries(series));
   if (files.length > 0 && files.every(isTiff)) return solid('TIFF', await (await import('./tiff')).readStack(files));
   return undefined;
 }
 
-/** Of a single slice there is no surface. */
+/** Rejects a single slice, which has no surface. */
 function solid(format: string, init: VolumeInit): VolumeInit {
   if (init.dims[2] > 1) return init;
   throw new Refusal('bad-file', `${format}: a single slice; choose or drop all files of the series together`);

@@ -1,16 +1,16 @@
-/** What a TIFF file says in words of the stack in it: OME’s XML, or the lines of ImageJ. */
+/** Parses the description of the stack in a TIFF file: OME's XML, or the lines of ImageJ. */
 
 export interface Stack {
-  /** Pages of the volume, x and y within each, then z, then time. */
+  /** Page indices of the volume in order: z, then time. */
   pages: number[];
   frames: number;
-  /** Sizes of a voxel that were told. */
+  /** Voxel sizes, as far as the description contains them. */
   spacing: [number | undefined, number | undefined, number | undefined];
-  /** The resolution of a page is in the unit of the stack. */
+  /** Whether the resolution of a page is in the unit of the stack. */
   perUnit: boolean;
 }
 
-/** The stack in a description; where there is none, all pages are slices. */
+/** Parses the description of a stack; without one, all pages are slices. */
 export function describedIn(text: string, count: number): Stack {
   if (/<OME[\s>]/.test(text)) return fromOme(text, count);
   if (text.startsWith('ImageJ=')) return fromImageJ(text, count);
@@ -19,7 +19,7 @@ export function describedIn(text: string, count: number): Stack {
 
 const range = (count: number) => Array.from({ length: count }, (_, k) => k);
 
-/** A number above 0. */
+/** Parses a number above 0; undefined for anything else. */
 function positive(text: string | undefined): number | undefined {
   const value = Number(text);
   return text !== undefined && Number.isFinite(value) && value > 0 ? value : undefined;
@@ -44,7 +44,10 @@ function fromImageJ(text: string, count: number): Stack {
   return { ...ordered({ Z: slices, C: channels, T: frames }, 'CZT', count), spacing, perUnit: true };
 }
 
-/** Pages of the first channel, z before time, of a file in which they come in `order`, fastest first. */
+/**
+ * Returns the pages of the first channel, z before time, from a file in which they are stored in `order`, fastest
+ * first.
+ */
 function ordered(sizes: Record<string, number>, order: string, count: number): Pick<Stack, 'pages' | 'frames'> {
   const { Z = 1, T = 1 } = sizes;
   const stride = (letter: string) => {
@@ -52,7 +55,7 @@ function ordered(sizes: Record<string, number>, order: string, count: number): P
     return before.reduce((product, other) => product * (sizes[other] ?? 1), 1);
   };
   const pages = range(T).flatMap((t) => range(Z).map((z) => z * stride('Z') + t * stride('T')));
-  // Words that do not fit the pages are about something else.
+  // A description that does not fit the pages is ignored.
   const fits = pages.every((page) => page < count);
   return fits ? { pages, frames: T } : { pages: range(count), frames: 1 };
 }

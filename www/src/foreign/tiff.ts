@@ -1,4 +1,4 @@
-/** Stacks of TIFF pictures, as microscopes and Fiji write them: pages of one file, or one file a slice. */
+/** Reads stacks of TIFF images, as written by microscopes and Fiji: pages of one file, or one file per slice. */
 import { fromArrayBuffer, type GeoTIFFImage } from 'geotiff';
 import type { VolumeInit, VoxelArray } from 'vesicle';
 import type { NamedBytes } from '../protocol';
@@ -7,7 +7,7 @@ import { describedIn, type Stack } from './tiff-description';
 
 const KINDS = [Uint8Array, Int8Array, Uint16Array, Int16Array, Uint32Array, Int32Array, Float32Array, Float64Array];
 
-/** The volume of all pages, in the order of the files' names; of several channels the first. */
+/** Reads the volume from all pages, in the order of the file names; of several channels the first. */
 export async function readStack(files: NamedBytes[]): Promise<VolumeInit> {
   const byName = [...files].sort((a, b) => a.name.localeCompare(b.name, 'en', { numeric: true }));
   const pages = (await Promise.all(byName.map(pagesOf))).flat();
@@ -53,13 +53,16 @@ async function valuesOf(plane: GeoTIFFImage, k: number): Promise<VoxelArray> {
   return values as VoxelArray;
 }
 
-/** A field of a page; undefined where it has none of that name. */
+/** Returns a field of a page; undefined if there is none of that name. */
 async function tagOf(page: GeoTIFFImage, name: 'ImageDescription' | 'XResolution' | 'YResolution'): Promise<unknown> {
   const directory = page.getFileDirectory();
   return directory.hasTag(name) ? directory.loadValue(name) : undefined;
 }
 
-/** What is said of the stack wins over the resolution of the page, which scanners set to that of paper. */
+/**
+ * Returns the voxel size. The description of the stack takes precedence over the page's resolution, which scanners set
+ * to that of paper.
+ */
 async function pixelSize(page: GeoTIFFImage, { spacing, perUnit }: Stack): Promise<[number, number, number]> {
   const resolution = async (tag: 'XResolution' | 'YResolution') => {
     const [count = 0, units = 0] = perUnit ? Array.from(((await tagOf(page, tag)) ?? []) as ArrayLike<number>) : [];

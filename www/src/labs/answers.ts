@@ -1,31 +1,38 @@
-/** How soon a hand is answered: by the surface that goes along at once, and by the model's own frame. */
+/**
+ * Measures the latency of moving an ellipsoid: until the displayed surface is carried along, and until the model's
+ * frame follows.
+ */
 export class Answers {
-  /** Poses that no frame of the model has followed yet. */
+  /** Poses sent that no frame of the model has followed yet: their number, the time, and the frames drawn by then. */
   #waiting: { turn: number; at: number; drawn: number }[] = [];
   #drawn = 0;
   #alongMs: number | undefined;
-  /** Of the last pose that the model answered: milliseconds, and frames of the model. */
+  /** Latency of the model for the last pose it followed: milliseconds, and frames drawn. */
   #last: { milliseconds: number; frames: number } | undefined;
 
-  /** Milliseconds from the last move to the surface on the screen that goes along. */
+  /** Display latency: milliseconds from the last move to the displayed surface that was carried along. */
   get alongMs(): number | undefined {
     return this.#alongMs;
   }
 
+  /** Latency of the model for the last pose it followed: milliseconds, and frames drawn. */
   get last(): { milliseconds: number; frames: number } | undefined {
     return this.#last;
   }
 
+  /** Records that a pose was sent. */
   sent(turn: number, at: number): void {
     this.#waiting.push({ turn, at, drawn: this.#drawn });
   }
 
-  /** The surface on the screen goes along with a move that was `milliseconds` ago. */
+  /** Records that the surface drawn follows a move `milliseconds` ago. */
   along(milliseconds: number): void {
     this.#alongMs = milliseconds;
   }
 
-  /** A frame that follows all poses up to `turn` is on the screen; true where that answers one. */
+  /**
+   * Records that a frame following all poses up to `turn` was drawn; returns whether any pose was pending until then.
+   */
   drawn(turn: number, at: number): boolean {
     this.#drawn += 1;
     const oldest = this.#waiting.find((one) => one.turn <= turn);

@@ -3,7 +3,10 @@ import type { History } from '../ui/history';
 const PLAIN = ['iteration', 'phase', 'residual', 'tolerance', 'vertices', 'triangles', 'components', 'euler'] as const;
 const EVENTS = ['creations', 'deletions', 'inversions', 'axial', 'annular', 'vanished', 'seeds'] as const;
 
-/** One line an iteration: all that the plots, the list of events and the table of times show. Times in milliseconds; `residual` is what the method calls it. */
+/**
+ * Returns the history as CSV, one line per iteration, with the data of the plots, the event list and the table of times
+ * (in milliseconds). `residual` is the method's name for that column.
+ */
 export function toCsv({ reports }: History, residual = 'energy'): string {
   const parts = [...new Set(reports.flatMap(({ times }) => Object.keys(times)))];
   const head = [...PLAIN.map((name) => (name === 'residual' ? residual : name)), ...EVENTS, ...parts.map(inMs)];

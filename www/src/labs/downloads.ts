@@ -1,15 +1,15 @@
-/** Files that come with the page. */
+/** Downloads that were started ahead, by address. */
 const early = new Map<string, Promise<Uint8Array>>();
 
-/** Begins with a file that will be wanted as soon as the engine has started. */
+/** Starts to download a file that will be needed as soon as the engine has loaded. */
 export function fetchAhead(url: string): void {
   const bytes = download(url);
-  // Whoever wants it hears of it.
+  // `fetchBytes` reports the error.
   bytes.catch(() => undefined);
   early.set(url, bytes);
 }
 
-/** The bytes of a file, which are the caller's to give away. */
+/** Returns the bytes of a file; the caller may transfer them. */
 export function fetchBytes(url: string): Promise<Uint8Array> {
   const bytes = early.get(url) ?? download(url);
   early.delete(url);
@@ -20,7 +20,9 @@ async function download(url: string): Promise<Uint8Array> {
   return new Uint8Array(await (await fetched(url)).arrayBuffer());
 }
 
-/** A file that comes with the page, from the server or as it was kept. */
+/**
+ * Fetches a file that is served with the page, over the network or from the offline cache. Throws if neither has it.
+ */
 export async function fetched(url: string): Promise<Response> {
   const response = await fetch(url).catch(() => undefined);
   if (!response)

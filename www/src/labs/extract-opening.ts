@@ -16,22 +16,22 @@ import { Opening, type Source } from './opening';
 
 export type ExtractSource = Source<Example, Linked, VolumeSource>;
 
-/** A volume that was opened, and the model of it that has not begun. */
+/** An opened volume, and its model before the first step. */
 interface Opened extends Loaded {
   choice: StartChoice;
   setup: Setup;
 }
 
-/** Opens volumes. */
+/** Opens volumes in the Extract lab, and builds models of them. */
 export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opened> {
   protected readonly first = EXAMPLES[0];
   readonly #client: Client;
   readonly #ui: ExtractParts;
   readonly #settings: ExtractSettings;
   readonly #results: ExtractResults;
-  /** Tells a new engine what the view wants to know of the surface. */
+  /** Sends a restarted engine the view's settings. */
   readonly #onRestart: () => Promise<unknown>;
-  /** What the method's parameters are where nothing is said. */
+  /** Default parameters of the method. */
   defaults: ParamValues = {};
 
   constructor(
@@ -50,14 +50,14 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
     this.#onRestart = onRestart;
   }
 
-  /** The volume that the address asks for comes while the engine starts. */
+  /** Starts to download the volume that the address asks for, while the engine loads. */
   static fetchLinked(): void {
     const linked = fromHash(location.hash);
     const example = linked?.example ? exampleById(linked.example) : EXAMPLES[0];
     if (example && !linked?.file && 'file' in example.source) fetchAhead(exampleUrl(example.source.file));
   }
 
-  /** What another lab passes on. */
+  /** Opens a volume passed on by another lab. */
   passedOn({ name, bytes, params }: PassedOn): Promise<void> {
     const opened = async () => ({ files: [{ name, bytes: bytes.slice() }] });
     return this.open({ name, opened, linked: { params, attractors: [] }, unit: '' });
@@ -101,10 +101,10 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
     await this.#client.request('play', undefined);
   }
 
-  /** The volume and the settings are as they were: back to the last state that was kept. */
+  /** After a restart of the engine, with volume and settings unchanged: restores the newest saved state. */
   async #takeUp({ choice, params }: Opened, { example }: ExtractSource): Promise<void> {
     this.#ui.data.choose(example);
-    // The new engine does not know the slices yet.
+    // Sends the slice planes to the new engine.
     this.#ui.stage.goTo(this.#ui.stage.crosshair);
     const { newest } = this.#settings;
     if (newest) {
@@ -133,7 +133,10 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
     return this.#onRestart();
   }
 
-  /** What suits an example; for a file, the settings as they are, except the iso value, which no other volume shares. */
+  /**
+   * Returns the settings for an example; a file keeps the present ones, except the iso value, which is specific to a
+   * volume.
+   */
   #setupFor({ example, linked }: ExtractSource, choice: StartChoice): Setup {
     const { iso: _, ...params } = this.#settings.params;
     const wanted: ParamValues = { ...(example?.params ?? params), ...linked?.params };
@@ -142,7 +145,10 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
     return setup;
   }
 
-  /** What suits an example; for a file, the start as it is, except lengths and places of another volume's world. */
+  /**
+   * Returns the start for an example; a file keeps the present one, except lengths and positions, which are specific to
+   * a volume.
+   */
   #startFor({ example, linked }: ExtractSource): StartChoice {
     const choice = this.#ui.start.value;
     const suits: StartChoice = example

@@ -3,7 +3,7 @@ import type { VolumeView } from '../protocol';
 import { h, section, uniqueId } from '../ui/dom';
 import { figure } from '../ui/format';
 
-/** The parts the page is put together from. */
+/** Elements that the lab's page is laid out from. */
 export interface Parts {
   data: HTMLElement;
   figure: HTMLElement;
@@ -34,7 +34,7 @@ export interface Parts {
   exercises: HTMLElement;
 }
 
-/** Lays the lab out: set-up on one side, the view in the middle, what comes of it on the other side. */
+/** Lays the lab out: setup on one side, the view in the middle, results on the other side. */
 export function layOut(root: HTMLElement, parts: Parts): void {
   root.className = 'lab';
   const view = h('div', { class: 'view' }, parts.canvas, parts.options, parts.legend, parts.banner, parts.drop);
@@ -74,15 +74,15 @@ export function layOut(root: HTMLElement, parts: Parts): void {
   );
 }
 
-/** A titled part of a column that is closed at first. */
+/** Returns a titled section of a column that is collapsed at first. */
 export function folded(title: string, ...children: Node[]): HTMLDetailsElement {
   return h('details', { class: 'panel' }, h('summary', {}, h('h2', {}, title)), ...children);
 }
 
-/** What is told of a volume, so that its place is there before one is open. */
+/** Names of the facts about a volume; they are shown before one is open, so that the layout does not shift. */
 const FACTS = ['File', 'Voxels', 'Voxel size', 'Intensities'];
 
-/** Which volume is open, and how to open another. */
+/** Panel that shows the open volume and opens others. */
 export class DataPanel {
   readonly element: HTMLElement;
   readonly #examples: HTMLSelectElement;
@@ -118,12 +118,13 @@ export class DataPanel {
     );
   }
 
-  /** Shows in the list which example is open, or that a file is. */
+  /** Selects the open example in the list, or “Your file” if it is none. */
   choose(example: Example | undefined): void {
     this.#own.hidden = example !== undefined;
     this.#examples.value = example?.id ?? '';
   }
 
+  /** Shows the facts and credits of a volume. */
   show(volume: VolumeView, example: Example | undefined): void {
     this.choose(example);
     const spacing = volume.spacing.map(figure).join(' × ');

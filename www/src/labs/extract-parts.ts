@@ -52,7 +52,10 @@ export interface PartEvents extends TransportEvents {
   onError: (title: string, error: unknown) => void;
 }
 
-/** All that the Extract lab shows, put in its place. It shows what it is told and tells what was asked for. */
+/**
+ * All controls and views of the Extract lab, laid out. They display what they are given and report the user's actions
+ * as events.
+ */
 export class ExtractParts {
   readonly #canvas = h('canvas', {
     tabindex: 0,
@@ -198,7 +201,7 @@ export class ExtractParts {
     this.#paramsHolder.replaceWith(this.#params.element);
   }
 
-  /** Another volume is open. */
+  /** Shows a newly opened volume, and clears results of the previous one. */
   adopt(volume: VolumeView, { example, unit = 'mm' }: ExtractSource): void {
     this.saving.name = volume.name;
     this.measures.unit = example?.unit ?? unit;
@@ -228,7 +231,7 @@ export class ExtractParts {
     else this.#params?.complain(name, message);
   }
 
-  /** Those that are in force, in the list and in the views. */
+  /** Shows the attractors in force, in the list and in the views. */
   showAttractors(attractors: Attractor[]): void {
     this.attractors.show(attractors);
     this.stage.showAttractors(attractors);
@@ -241,7 +244,7 @@ export class ExtractParts {
     this.#log.update(this.#history);
   }
 
-  /** Another past than the one that was shown. */
+  /** Shows a history that was cleared or set back, not only extended. */
   replaceHistory(): void {
     this.#log.clear();
     this.transport.showReport(this.#history.reports.at(-1));

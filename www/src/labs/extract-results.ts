@@ -11,20 +11,20 @@ export type ResultEvent = SnapshotEvent | ProgressEvent | SectionsEvent;
 const VANISHED =
   'It found nothing to hold it: try fewer pyramid levels (thin parts blur away on coarse ones), another iso value or start shape, or less rigidity.';
 
-/** What comes of a run, on the screen: surface, sections, measures and history as the worker tells them. */
+/** Displays the worker's results: surface, cross-sections, measures and history. */
 export class ExtractResults {
   readonly #client: Client;
   readonly #ui: ExtractParts;
   readonly #states: LabStates;
   readonly #history: History;
-  /** The level the model is on. */
+  /** Pyramid level that the model is on. */
   #level = 0;
-  /** The newest, until it is shown. */
+  /** The newest snapshot, until it is displayed. */
   #snapshot: SnapshotEvent | undefined;
-  /** The surface on the screen, in the worker's buffers. */
+  /** The displayed surface, in buffers of the worker. */
   #shown: SurfaceBuffers | undefined;
   #framePending = 0;
-  /** Counts what was asked to be shown of the pyramid. */
+  /** Counts requests for the pyramid, so that only the reply to the newest is displayed. */
   #pyramids = 0;
 
   constructor(client: Client, ui: ExtractParts, states: LabStates, history: History) {
@@ -40,13 +40,13 @@ export class ExtractResults {
     else this.#ui.stage.showSections(event.sections);
   }
 
-  /** A model that was just built has no past. */
+  /** Clears the history, for a newly built model. */
   startOver(): void {
     this.#history.clear();
     this.#ui.replaceHistory();
   }
 
-  /** Marks this run at an iteration, which may be told only later. */
+  /** Returns a function that marks this run's history at an iteration, which may become known later. */
   marker(): (iteration: number) => HistoryMark {
     return this.#history.marker();
   }
@@ -56,7 +56,7 @@ export class ExtractResults {
     this.#ui.replaceHistory();
   }
 
-  /** Asks for the coarser copies the model works on, to show them. */
+  /** Requests the pyramid levels that the model uses, and displays them. */
   async showPyramid({ dims }: VolumeView, levels: number): Promise<void> {
     const asked = ++this.#pyramids;
     try {
@@ -67,13 +67,13 @@ export class ExtractResults {
     }
   }
 
-  /** The model runs or stands: says how far it has come, and why where nothing is left of it. */
+  /** Describes the state in the status line; if the surface has vanished, explains why. */
   showState(state: LabState): void {
     this.#ui.status.say(this.describe(state));
     if (this.#history.reports.at(-1)?.vertices === 0) this.#ui.banner.show('The surface has vanished.', VANISHED);
   }
 
-  /** In words, for the status line. */
+  /** Describes a state for the status line. */
   describe(state: LabState): string {
     const last = this.#history.reports.at(-1);
     if (!last) return state === 'running' ? 'Running.' : 'Ready to start.';
@@ -84,7 +84,7 @@ export class ExtractResults {
     return `Paused at iteration ${count(last.iteration)}: ${where}.`;
   }
 
-  /** Another engine has buffers of its own. */
+  /** Forgets the displayed buffers, which belong to an engine that was replaced. */
   forgetBuffers(): void {
     this.#shown = undefined;
   }
@@ -94,7 +94,7 @@ export class ExtractResults {
     cancelAnimationFrame(this.#framePending);
   }
 
-  /** Shows a snapshot at the next animation frame; only then the worker may send another. */
+  /** Displays a snapshot at the next animation frame; only then may the worker send another. */
   #takeSnapshot(event: SnapshotEvent): void {
     this.#takeReports(event.reports);
     if (this.#snapshot) this.#client.giveBack(this.#snapshot.surface);
@@ -112,7 +112,7 @@ export class ExtractResults {
     this.#snapshot = undefined;
     this.#ui.stage.showSurface(snapshot.surface);
     this.#ui.stage.showSections(snapshot.sections);
-    // The one before is not drawn any more.
+    // The previous surface is no longer drawn.
     if (this.#shown) this.#client.giveBack(this.#shown);
     this.#shown = snapshot.surface;
     this.#ui.showHistory();

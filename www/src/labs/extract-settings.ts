@@ -9,23 +9,24 @@ import type { ExtractResults } from './extract-results';
 import type { LabStates } from './lab-states';
 import { type Moment, Rewinder } from './rewinder';
 
-/** Radius of the sphere placed at the crosshair, as a part of the volume's smallest side. */
+/** Radius of the sphere placed at the crosshair, as a fraction of the volume's shortest side. */
 const SPHERE_PART = 0.1;
-/** Reach of a new attractor in the same measure. */
+/** Radius of a new attractor, as a fraction of the volume's shortest side. */
 const ATTRACTOR_PART = 0.15;
 
+/** Why nothing can be changed after a failure of the engine. */
 const BROKEN = 'The engine has stopped; Reset starts it again.';
 
-/** What the page holds beside the model, and undo brings back. */
+/** State of the page besides the model, which undo restores. */
 interface PageState {
   choice: StartChoice;
   params: ParamValues;
   attractors: Attractor[];
-  /** What had happened, up to whatever iteration the model was saved at. */
+  /** Marks the history at the iteration at which the model was saved. */
   mark: (iteration: number) => HistoryMark;
 }
 
-/** What a model is started from and with: changed here, handed to the worker, undone. */
+/** Settings that a model is built and run with: changes them, sends them to the worker, and undoes changes. */
 export class ExtractSettings {
   readonly #client: Client;
   readonly #ui: ExtractParts;
@@ -34,12 +35,12 @@ export class ExtractSettings {
   readonly #onChange: () => void;
   readonly #rewinder: Rewinder<PageState, SavedRun>;
   #volume: VolumeView | undefined;
-  /** Those in force; they outlive a reset. */
+  /** The parameters in force; a reset keeps them. */
   #params: ParamValues = {};
-  /** Those the model has; the list may hold one that is being asked for. */
+  /** The model's attractors; the list on the page may contain one whose request is pending. */
   #attractors: Attractor[] = [];
 
-  /** `onChange` hears whenever something else may be in force. */
+  /** `onChange` is called whenever the settings in force may have changed. */
   constructor(client: Client, ui: ExtractParts, states: LabStates, results: ExtractResults, onChange: () => void) {
     this.#client = client;
     this.#ui = ui;
@@ -61,23 +62,23 @@ export class ExtractSettings {
     return this.#attractors;
   }
 
-  /** Where the sphere would be that the model may start from. */
+  /** The sphere at the crosshair that the model may start from. */
   get sphere(): { center: Vec3; radius: number } {
     return { center: this.#ui.stage.crosshair, radius: SPHERE_PART * this.#smallestSide };
   }
 
-  /** Where to go on when the engine was started again. */
+  /** The newest saved state, to resume from after a restart of the engine. */
   get newest(): Moment<PageState, SavedRun> | undefined {
     return this.#rewinder.newest;
   }
 
-  /** What a model of the present volume is made with. */
+  /** Returns all that a model of the present volume is built from. */
   setup(choice: StartChoice, params = this.#params, attractors = this.#attractors): Setup {
     const { levels, edge } = choice;
     return { start: this.#startShape(choice), levels, edge, params, attractors };
   }
 
-  /** Another volume, and a model of it that has not begun: what was done to the former cannot be undone. */
+  /** Adopts another volume and its new model, and clears the undo history. */
   adopt(volume: VolumeView, choice: StartChoice, params: ParamValues, attractors: Attractor[]): void {
     this.#volume = volume;
     this.#rewinder.clear();
@@ -87,28 +88,31 @@ export class ExtractSettings {
     this.#adoptModel(choice, params);
   }
 
-  /** A model of the present volume that has not begun, after the engine was started again. */
+  /** Adopts a new model of the present volume, before its first step. */
   begin(choice: StartChoice, params: ParamValues): void {
     this.#states.stand('Ready to start.');
     this.#adoptModel(choice, params);
   }
 
-  /** Keeps what is, in case that opening something else has to be cancelled. */
+  /** Saves the present state, in case the user cancels opening something else. */
   keep(): void {
     void this.#rewinder.keep();
   }
 
-  /** Settled when all that was to be kept is. */
+  /** Settles when all pending saves are complete. */
   get kept(): Promise<unknown> {
     return this.#rewinder.kept;
   }
 
-  /** Keeps what is, before it is changed. */
+  /** Saves the present state for undo, before a change. Returns a function that forgets it. */
   remember(label: string, together = ''): () => void {
     return this.#rewinder.remember(label, together);
   }
 
-  /** Another picture of the figure that is open: other parameters, from the same start or from where the surface is. */
+  /**
+   * Changes to another variant of the open figure: sets its parameters, and restarts the model or continues from the
+   * present surface.
+   */
   changeTo({ params: usual, startsOver }: Preset, { id, params: differing }: Variant): Promise<void> {
     const params = { ...usual, ...differing };
     return this.#change(`figure ${id}`, 'That did not work.', async () => {
@@ -118,7 +122,7 @@ export class ExtractSettings {
     });
   }
 
-  /** Adds what the surface leaves out, and runs on where there was something. */
+  /** Adds missing parts to the surface, and continues the run if there were any. */
   seed(): Promise<void> {
     const { coverage } = this.#ui;
     return this.#change('seeding', 'Missing parts could not be seeded.', async () => {
@@ -128,14 +132,14 @@ export class ExtractSettings {
     });
   }
 
-  /** The model from its start, with the parameters as they are. */
+  /** Rebuilds the model from its start, with the parameters unchanged. */
   startOver(): Promise<void> {
     return this.#change('Reset', 'The model could not be built.', async () => {
       await this.#rebuild(this.#ui.start.inForce, this.#params);
     });
   }
 
-  /** Starts over from the start that is chosen, and plays. When it is refused, the model that was there goes on. */
+  /** Rebuilds the model from the chosen start, and runs it. If the start is rejected, the previous model continues. */
   async restart(): Promise<void> {
     if (!this.#states.canChange) return this.#ui.start.refuse(this.#why('Not while a volume is opened.'));
     await this.#states.inTurn(async () => {
@@ -156,7 +160,7 @@ export class ExtractSettings {
     });
   }
 
-  /** Live: the run goes on, or is taken up again, with the new value. */
+  /** Sets a parameter of the live model; a run continues, and a converged one is resumed. */
   setParam(name: string, value: unknown): Promise<void> {
     return this.#states.inTurn(async () => {
       if (this.#states.engineBroken) return this.#refuseParam(name, BROKEN);
@@ -174,7 +178,10 @@ export class ExtractSettings {
     });
   }
 
-  /** Live, too. The same `what` again soon after belongs to it where it is `tuning`. */
+  /**
+   * Sets the attractors of the live model. With `tuning`, changes with the same label in short succession are undone as
+   * one.
+   */
   setAttractors(attractors: Attractor[], what: string, tuning: boolean): Promise<void> {
     return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return this.#ui.attractors.show(this.#attractors);
@@ -209,7 +216,7 @@ export class ExtractSettings {
     });
   }
 
-  /** The page as it was at that moment; the model is there already. */
+  /** Restores the page to a saved state that the model has already been restored to. */
   adoptMoment({ saved, page }: Moment<PageState, SavedRun>): void {
     this.#ui.start.show(page.choice);
     this.#attractors = page.attractors;
@@ -221,7 +228,7 @@ export class ExtractSettings {
     this.#showPyramid(page.choice);
   }
 
-  /** What does to the model what `label` says; when it fails, what was there stays. */
+  /** Does a change that undo can revert; if it fails, the previous state stays. */
   #change(label: string, complaint: string, work: () => Promise<void>): Promise<void> {
     return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return;
@@ -254,7 +261,7 @@ export class ExtractSettings {
     this.#onChange();
   }
 
-  /** A model that had settled has further to go under other forces. */
+  /** Resumes a converged run: under other forces it can move on. */
   #goOn(): void {
     if (this.#states.beneath === 'done') this.#play();
   }
@@ -292,7 +299,7 @@ export class ExtractSettings {
     }
   }
 
-  /** Of the volume, in world units. */
+  /** Shortest side of the volume, in world units. */
   get #smallestSide(): number {
     const { dims = [1, 1, 1], spacing = [1, 1, 1] } = this.#volume ?? {};
     return Math.min(...dims.map((n, axis) => n * (spacing[axis] ?? 1)));

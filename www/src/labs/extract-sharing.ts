@@ -1,4 +1,4 @@
-/** Gives on what the Extract lab has: as an address, and to the Sculpt lab. */
+/** Shares the state of the Extract lab as an address, and passes its surface to the Sculpt lab. */
 import type { Client } from '../client';
 import { copyAddress, FILE_LACKS, showAddress } from './address';
 import type { ExtractOpening } from './extract-opening';
@@ -23,7 +23,7 @@ export class ExtractSharing {
     this.#opening = opening;
   }
 
-  /** The page's address says what is open and how it is set. */
+  /** Updates the page's address with what is open and the settings. */
   updateAddress(): void {
     const { source, defaults } = this.#opening;
     if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
@@ -39,7 +39,7 @@ export class ExtractSharing {
         color: this.#ui.options.value.color,
       }),
     );
-    // The lab without an address is this one, as it opens by itself.
+    // An empty address opens this lab, too, and may stay empty.
     if (hash !== ADDRESS || location.hash) showAddress(hash);
   }
 
@@ -48,7 +48,7 @@ export class ExtractSharing {
     await copyAddress(this.#ui.status, [!this.#opening.source?.example && FILE_LACKS]);
   }
 
-  /** The surface as a mesh to be deformed. */
+  /** Passes the surface on as a mesh to deform. */
   toSculpt(passOn: PassOn): void {
     this.#client.request('export', { format: 'ply' }).then(
       (bytes) => passOn({ lab: 'sculpt', name: `${this.#ui.saving.name} (surface)`, bytes, params: {} }),

@@ -15,12 +15,12 @@ import { LabStates } from './lab-states';
 import type { Lab, PassedOn, PassOn } from './labs';
 
 /**
- * The Extract lab: a deformable surface grows onto a volume. Here its parts are put together; what is opened, set, shown
- * and given on is each in a file of its own.
+ * The Extract lab: a deformable surface is fitted to a volume. This class connects the lab's parts; opening, settings,
+ * results and sharing are in files of their own.
  */
 export class ExtractLab implements Lab {
   readonly #root: HTMLElement;
-  /** Takes every listener of the page back when the lab is closed. */
+  /** Removes all event listeners when the lab is closed. */
   readonly #closing = new AbortController();
   readonly #client = new Client((event) => this.#onEvent(event));
   readonly #ui: ExtractParts;
@@ -30,7 +30,7 @@ export class ExtractLab implements Lab {
   readonly #opening: ExtractOpening;
   readonly #sharing: ExtractSharing;
   readonly #passOn: PassOn;
-  /** What the surface's vertices are asked for. */
+  /** The quantity requested for each vertex. */
   #shade: Shade | undefined;
 
   constructor(root: HTMLElement, help: HTMLElement, passOn: PassOn) {
@@ -59,7 +59,7 @@ export class ExtractLab implements Lab {
     offerShortcuts(this.#shortcuts(), help, GUIDES.extract, signal);
   }
 
-  /** Opens what another lab passes on, or what the address says, or else the built-in example, and runs it. */
+  /** Opens what another lab passes on, or what the address asks for, or else the first example, and runs it. */
   async start(passedOn?: PassedOn): Promise<void> {
     if (!passedOn) ExtractOpening.fetchLinked();
     const open = passedOn && (() => this.#opening.passedOn(passedOn));
@@ -75,7 +75,7 @@ export class ExtractLab implements Lab {
     this.#root.replaceChildren();
   }
 
-  /** What is asked for on the page, and who does it. */
+  /** Maps the user's actions to the parts that handle them. */
   #events(): PartEvents {
     return {
       onFiles: (files) => void this.#opening.files(files),
@@ -156,7 +156,7 @@ export class ExtractLab implements Lab {
     await (engineBroken ? this.#opening.again() : this.#settings.startOver());
   }
 
-  /** The same extraction twice, direct and coarse to fine. */
+  /** Runs the same extraction twice, direct and coarse to fine, and shows the comparison. */
   async #compare(): Promise<void> {
     if (!this.#states.canChange) return;
     const { compare, start } = this.#ui;
@@ -180,7 +180,7 @@ export class ExtractLab implements Lab {
     }
   }
 
-  /** Waits for nothing; tells when it fails. */
+  /** Reports a request's failure, without waiting for its reply. */
   #ask(request: Promise<unknown>): void {
     request.catch((error) => this.#states.fail('That did not work.', error));
   }

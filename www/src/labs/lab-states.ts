@@ -2,24 +2,24 @@ import { toFailure } from '../channel';
 import { type LabState, Observable } from '../state';
 import type { ErrorBanner, StatusLine } from '../ui/status';
 
-/** The state a lab is in, with what went wrong laid over it until it has been read. */
+/** The state of a lab; an error covers it until the user dismisses it. */
 export class LabStates {
   readonly #state = new Observable<LabState>('loading');
   readonly #banner: ErrorBanner;
   readonly #status: StatusLine;
   readonly #signal: AbortSignal;
-  /** What the model does, beneath what is shown: none is there at first. */
+  /** State of the model beneath an error; 'loading' until there is one. */
   #model: 'loading' | 'running' | 'paused' | 'done' = 'loading';
-  /** Something else is being opened: what the model does that is still there counts no more. */
+  /** Whether something else is being opened; the state of the present model is then ignored. */
   #opening = false;
-  /** One change after the other. */
+  /** Settles when the last queued change is complete. */
   #turns: Promise<unknown> = Promise.resolve();
-  /** There is a model. */
+  /** Whether there is a model. */
   ready = false;
-  /** The worker has to be started again before it can do anything. */
+  /** Whether the worker has to be restarted before it can serve requests. */
   engineBroken = false;
 
-  /** Nothing is shown any more once `signal` is aborted. */
+  /** Once `signal` is aborted, no failure is displayed any more. */
   constructor(banner: ErrorBanner, status: StatusLine, signal: AbortSignal) {
     this.#banner = banner;
     this.#status = status;
@@ -38,53 +38,62 @@ export class LabStates {
     return this.#state.value;
   }
 
-  /** The state beneath an error that is being shown. */
+  /** The state beneath a displayed error. */
   get beneath(): LabState {
     return this.value === 'error' ? this.#model : this.value;
   }
 
+  /** Whether the settings can be changed. */
   get canChange(): boolean {
     return this.ready && !this.engineBroken && this.value !== 'loading';
   }
 
+  /** Whether the model can be run or stepped. */
   get canRun(): boolean {
     return this.ready && !this.engineBroken && this.beneath === 'paused';
   }
 
+  /** Enters the loading state, with a text for the status line. */
   load(text: string): void {
     this.#banner.hide();
     this.#state.value = 'loading';
     this.#status.say(text);
   }
 
-  /** Something else is about to be opened: once what is being changed has been. Nothing else is until it is {@link opened}. */
+  /**
+   * Prepares for opening something else: waits until queued changes are complete. Until {@link opened} is called, the
+   * present model's state is ignored.
+   */
   async open(text: string): Promise<void> {
     this.#opening = true;
     this.load(text);
     await this.#turns;
   }
 
-  /** All that comes from now on is of what was opened, where there is a model that has not begun; else of what was there before. */
+  /** Ends {@link open}. From now on the state is that of the new model if `isThere`, else that of the previous one. */
   opened(isThere: boolean): void {
     this.#opening = false;
     if (isThere) this.#model = 'paused';
   }
 
-  /** One change after the other, so that each begins with what the one before it left. */
+  /** Queues changes, so that each starts from the result of the previous one. */
   inTurn(work: () => Promise<void>): Promise<void> {
     const turn = this.#turns.then(work);
     this.#turns = turn.catch(() => undefined);
     return turn;
   }
 
-  /** Loading is over, and nothing runs yet. */
+  /** Ends loading with a model that is not running. */
   stand(text: string, state: 'paused' | 'done' = 'paused'): void {
     if (this.#opening) return;
     this.#state.value = state;
     this.#status.say(text);
   }
 
-  /** Loading came to nothing: what was there before is there again, in words too. */
+  /**
+   * Returns to the model's state after loading has failed or changed nothing; `describe` gives the text for the status
+   * line.
+   */
   back(describe: (state: LabState) => string): void {
     if (this.#opening) return;
     this.#state.value = this.#model;
@@ -92,8 +101,8 @@ export class LabStates {
   }
 
   /**
-   * What the model does now; false where this does not count: while something is loading only a start does, while
-   * something else is being opened nothing.
+   * Enters the model's new state. Returns false if it is ignored: during loading, all states but 'running'; while
+   * something else is being opened, all.
    */
   enter(state: 'running' | 'paused' | 'done'): boolean {
     this.#model = state;
@@ -102,12 +111,12 @@ export class LabStates {
     return true;
   }
 
-  /** Says what went wrong; what was there stays, and what runs goes on. */
+  /** Displays a failure. The model stays, and a run continues. */
   fail(title: string, error: unknown): void {
     if (this.#signal.aborted) return;
     const failure = toFailure(error);
     if (failure.code === 'internal') this.engineBroken = true;
-    // It is of what is to be replaced, or else whoever opens tells it.
+    // The failure concerns the model being replaced, or else `Opening` reports it.
     if (this.#opening) return;
     const hint =
       this.engineBroken && this.ready
@@ -117,11 +126,11 @@ export class LabStates {
     if (this.value === 'running' && !this.engineBroken) return;
     this.#status.say('');
     if (this.#model === 'running' && this.engineBroken) this.#model = 'paused';
-    // What was to replace it failed, or was refused: it goes on.
+    // If the failed change was to replace a running model, that one continues.
     this.#state.value = this.#model === 'running' ? 'running' : 'error';
   }
 
-  /** The error has been read; true where the lab is back in the state from before. */
+  /** Hides the error; returns whether the lab is back in its previous state. */
   dismiss(): boolean {
     this.#banner.hide();
     if (this.value !== 'error' || !this.ready) return false;

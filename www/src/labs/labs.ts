@@ -1,34 +1,36 @@
-/** What the page and its labs have to do with each other. */
+/** The interface between the page and its labs. */
 import type { ParamValues } from '../protocol';
 
-/** What one lab passes on to another: a volume to Extract, with the parameters that suit it, or a mesh to Sculpt. */
+/** Data that one lab passes to another: a volume for Extract, with suitable parameters, or a mesh for Sculpt. */
 export interface PassedOn {
-  /** Its address, without the hash. */
+  /** The receiving lab's name in addresses. */
   lab: 'extract' | 'sculpt';
   name: string;
-  /** A file. */
+  /** Content of a volume or mesh file. */
   bytes: Uint8Array;
   params: ParamValues;
 }
 
+/** A lab that is open. */
 export interface Lab {
   start(passedOn?: PassedOn): Promise<void>;
-  /** Gives worker, GPU memory and listeners back. */
+  /** Releases the worker, GPU memory and event listeners. */
   close(): void;
 }
 
-/** Opens another lab on it. */
+/** Opens another lab with the given data. */
 export type PassOn = (passedOn: PassedOn) => void;
 
+/** A lab as the page lists it, before its code is loaded. */
 export interface LabKind {
-  /** As the address has it after the hash. */
+  /** Its name in addresses, after the hash. */
   id: string;
   name: string;
   tagline: string;
-  /** Where the documentation says how it works. */
+  /** Address of its page in the documentation. */
   guide: string;
   /** Starts its worker. */
   spawn: () => Worker;
-  /** Fetches its code. */
+  /** Loads its code; returns the lab's class. */
   load: () => Promise<new (root: HTMLElement, help: HTMLElement, passOn: PassOn) => Lab>;
 }

@@ -1,4 +1,4 @@
-/** The lab's settings as the part of an address after `#extract?`, and back. */
+/** Converts the Extract lab's settings to the hash of an address, `#extract?…`, and back. */
 import { EXAMPLES, type Example } from '../examples';
 import { exampleById, isPreset, PAPER, startOf } from '../presets';
 import type { Attractor, ParamValues, Vec3 } from '../protocol';
@@ -8,43 +8,44 @@ import type { ColorMode } from '../ui/view-options';
 export const ADDRESS = '#extract';
 
 /**
- * Links say which defaults they count on. Those without a version were written when the lab started from an enclosing
- * surface, with the method as in the paper.
+ * Version of the defaults that a link relies on. Links without one were written when the lab started from an enclosing
+ * surface, with the method as published.
  */
 const VERSION = '2';
 
+/** The settings in a link; missing ones are as in the example, or else the method's defaults. */
 export interface Linked {
   /** The example or figure that is open. */
   example?: string;
-  /** The name of a file of one's own: it is not in the link. */
+  /** Name of the user's own file, which is not part of the link. */
   file?: string;
   start?: string;
   bubbles?: number;
   sphere?: { center: Vec3; radius: number };
   levels?: number;
-  /** 0 where the model chooses. */
+  /** Mean edge length in world units; 0 if the model chooses it. */
   edge?: number;
   params: ParamValues;
   attractors: Attractor[];
   color?: ColorMode;
 }
 
-/** Everything a link may have to tell. */
+/** Present settings of the lab, from which a link is made. */
 export interface LabSettings {
   example: Example | undefined;
-  /** The name of the file that is open where no example is. */
+  /** Name of the open file, used if no example is open. */
   file: string;
   choice: StartChoice;
-  /** Where the sphere would be that the model may start from. */
+  /** The sphere at the crosshair that the model may start from. */
   sphere: { center: Vec3; radius: number };
   params: ParamValues;
-  /** What the parameters are where nothing is said. */
+  /** Default parameters of the method. */
   defaults: ParamValues;
   attractors: Attractor[];
   color: ColorMode;
 }
 
-/** Only what differs from what the example, or else the method, brings along. */
+/** Returns the settings that differ from those of the example, or else from the method's defaults. */
 export function linkOf(settings: LabSettings): Linked {
   const { example, file, choice, sphere, params, defaults, attractors, color } = settings;
   const usual = { levels: 1, edge: undefined, ...example };
@@ -64,11 +65,12 @@ export function linkOf(settings: LabSettings): Linked {
   };
 }
 
+/** Returns the values that differ from `usual`. */
 export function differing(values: ParamValues, usual: ParamValues): ParamValues {
   return Object.fromEntries(Object.entries(values).filter(([name, value]) => !Object.is(usual[name], value)));
 }
 
-/** A start as a link wants it. */
+/** Applies a link's settings to a start. */
 export function withLink(choice: StartChoice, { start, bubbles, levels, edge }: Linked): StartChoice {
   return {
     kind: isStartKind(start) ? start : choice.kind,
@@ -80,6 +82,7 @@ export function withLink(choice: StartChoice, { start, bubbles, levels, edge }: 
 
 const numbers = (values: number[]) => values.map((value) => Number(value.toPrecision(7))).join(',');
 
+/** Returns the hash of an address for a link's settings. */
 export function toHash(linked: Linked): string {
   const query = new URLSearchParams();
   const { example, file, start, bubbles, sphere, levels, edge, params, attractors, color } = linked;
@@ -94,7 +97,10 @@ export function toHash(linked: Linked): string {
   return text ? `${ADDRESS}?${text}` : ADDRESS;
 }
 
-/** What an address asks for; nothing where it is not this lab's or says nothing. What makes no sense is left out. */
+/**
+ * Parses the hash of an address; undefined if it is for another lab or contains no settings. Invalid settings are
+ * ignored.
+ */
 export function fromHash(hash: string): Linked | undefined {
   const [address, text] = hash.split(/\?(.*)/s, 2);
   if (address !== ADDRESS || !text) return undefined;
@@ -118,12 +124,13 @@ export function fromHash(hash: string): Linked | undefined {
   return query.has('v') ? linked : asBefore(linked);
 }
 
-/** A link without a version, as it was meant. A figure brings all of that along. */
+/** Adds the defaults that a link without a version relies on. Figures set all of them themselves. */
 function asBefore(linked: Linked): Linked {
   if (isPreset(exampleById(linked.example ?? ''))) return linked;
   return { start: 'enclosing', ...linked, params: { ...PAPER, ...linked.params } };
 }
 
+/** Parses a parameter value: a number if possible, else the text. */
 export function readValue(text: string): unknown {
   const value = Number(text);
   return text !== '' && Number.isFinite(value) ? value : text;

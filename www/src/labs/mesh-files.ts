@@ -1,12 +1,14 @@
-/** Meshes from an example or from files of the user's. */
+/** Opens meshes of the Sculpt lab, from an example or from the user's files. */
 import { dataUrl } from '../reconstruct/examples';
 import type { ExampleMesh, SculptExample } from '../sculpt/examples';
 import type { MeshSource, MeshTexture, SceneSource } from '../sculpt/protocol';
 import { readFiles } from '../ui/files';
 import { fetched } from './downloads';
 
+/** File extensions that the Sculpt lab opens. */
 export const ACCEPT = '.glb,.obj,.ply,.stl,.png,.jpg,.jpeg,.webp';
 
+/** Media types of textures by file extension. */
 const PICTURES: [RegExp, MeshTexture['type']][] = [
   [/\.png$/i, 'image/png'],
   [/\.jpe?g$/i, 'image/jpeg'],
@@ -24,7 +26,10 @@ async function fetchMesh(mesh: ExampleMesh): Promise<MeshSource> {
   return { file: { name: mesh.file, bytes: new Uint8Array(await response.arrayBuffer()) } };
 }
 
-/** The detailed surface, with the picture on it where one comes along; of two, the larger one with the smaller one as its base. */
+/**
+ * Reads a detailed surface and its texture, if there is one. Of two meshes, the larger file is the detailed surface and
+ * the smaller one its base. Throws if there is no mesh, or more files than the lab can use.
+ */
 export async function fromFiles(files: File[]): Promise<SceneSource> {
   const pictures = files.filter(({ name }) => typeOf(name));
   const meshes = files.filter((file) => !pictures.includes(file));

@@ -4,22 +4,22 @@ import type { Failure, ParamSpec } from '../protocol';
 import type { ErrorBanner, StatusLine } from '../ui/status';
 import type { LabStates } from './lab-states';
 
-/** Milliseconds that a worker has to give its model away before it is stopped. */
+/** Milliseconds that a busy worker has to save its model before it is stopped. */
 const KEEPING = 1000;
 
-/** What a lab has open, or is to open: enough to open it again after a failure of the engine. */
+/** Something that a lab opens, with all that is needed to open it again after a failure of the engine. */
 export interface Source<Example, Linked, Data> {
   name: string;
-  /** Gets it, from the disk or the network. */
+  /** Reads or downloads the data. */
   opened: () => Promise<Data>;
   example?: Example;
-  /** What a link asks for beyond the example. */
+  /** Settings of a link, in addition to the example. */
   linked?: Linked;
-  /** Of lengths, where no example says. */
+  /** Unit of lengths, if there is no example to define it. */
   unit?: Unit;
 }
 
-/** The page, as far as it tells what is opened, and begins when the engine has. */
+/** The page's controls that opening affects. */
 interface OpeningParts<Example> {
   makeParams(specs: ParamSpec[]): void;
   banner: ErrorBanner;
@@ -27,28 +27,28 @@ interface OpeningParts<Example> {
   data: { choose(example: Example | undefined): void };
 }
 
-/** The lab's worker, as far as it is started again. */
+/** The lab's worker, as needed to restart it. */
 interface Engine {
   restart(failure: Failure): void;
   request(kind: 'hello', body: undefined): Promise<{ specs: ParamSpec[] }>;
 }
 
 /**
- * Opens examples, files and links: gets the data and has the worker make a model of it. What is asked for last counts;
- * when it fails, everything stays as it was. What differs from lab to lab is in a subclass.
+ * Opens examples, files and links: gets the data and has the worker build a model of it. The newest request wins; when
+ * it fails, everything stays as before. Subclasses implement what differs between the labs.
  */
 export abstract class Opening<Example, Linked extends { example?: string; file?: string }, Data, Opened> {
   readonly #engine: Engine;
   readonly #ui: OpeningParts<Example>;
   protected readonly states: LabStates;
   #source: Source<Example, Linked, Data> | undefined;
-  /** A link that waits for its file. */
+  /** Link whose file the user has yet to open. */
   #awaiting: Linked | undefined;
-  /** Counts what was asked to be opened, so that a slow download does not replace what came after it. */
+  /** Counts requests, so that a slow download does not replace what was opened after it. */
   #turn = 0;
-  /** Settled when the worker has answered all that was to be loaded. */
+  /** Settles when the worker has answered the last load request. */
   #loads: Promise<unknown> = Promise.resolve();
-  /** The worker has another model than the page shows, or none. */
+  /** Whether the worker's model is not the one displayed, or is missing. */
   #astray = false;
 
   constructor(engine: Engine, ui: OpeningParts<Example>, states: LabStates) {
@@ -57,49 +57,57 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     this.states = states;
   }
 
-  /** What is opened where nothing else is asked for. */
+  /** The example that opens by default. */
   protected abstract readonly first: Example;
 
-  /** The example of that name. */
+  /** Returns the example with this id. */
   protected abstract find(id: string): Example | undefined;
 
-  /** What an address asks for. */
+  /** Parses an address for this lab. */
   protected abstract linkedBy(hash: string): Linked | undefined;
 
+  /** Describes an example as a source. */
   protected abstract fromExample(example: Example): Source<Example, Linked, Data>;
 
+  /** Describes the user's files as a source. */
   protected abstract fromFiles(files: File[]): Source<Example, Linked, Data>;
 
-  /** Has the worker make a model; `again`: of what is open, after the engine was started again. */
+  /**
+   * Has the worker build a model of the data. With `again`, the source is already open, and the engine was restarted.
+   */
   protected abstract load(source: Source<Example, Linked, Data>, data: Data, again: boolean): Promise<Opened>;
 
-  /** Shows what was opened, as its example or link wants it, and runs it; `again` as it was. */
+  /**
+   * Displays what was opened, with the settings of its example or link, and runs it; with `again`, with the previous
+   * settings.
+   */
   protected abstract adopt(opened: Opened, source: Source<Example, Linked, Data>, again: boolean): Promise<void>;
 
-  /** What counts as open from now on. */
+  /** Returns the source to remember as open; a subclass may replace it. */
   protected asOpen(source: Source<Example, Linked, Data>, _opened: Opened, _data: Data): Source<Example, Linked, Data> {
     return source;
   }
 
-  /** Has the worker give away what is needed to come back to the model as it is now. */
+  /** Has the worker save the present model, so that it can be restored. */
   protected keep(): void {}
 
-  /** Settled when the worker has given away all that is needed to come back. */
+  /** Settles when all pending saves are complete. */
   protected async kept(): Promise<unknown> {
     return undefined;
   }
 
-  /** The engine is there, and has told of its parameters. */
+  /** Called when the engine has loaded, with the parameters of the method. */
   protected greeted(_specs: ParamSpec[]): void {}
 
-  /** Another engine is there, which knows nothing yet. */
+  /** Called when the engine was restarted, to send it the view's settings again. */
   protected async restarted(): Promise<unknown> {
     return undefined;
   }
 
   /**
-   * Opens what another lab passes on, or what the address says, or else the first example; then follows the address, until
-   * aborted. Also where that could not be followed it is to be that of what is open: `onFollowed` sees to it.
+   * Opens what another lab passes on, or what the address asks for, or else the first example; then follows changes of
+   * the address until aborted. After each, `onFollowed` is called, which corrects an address that could not be
+   * followed.
    */
   async start(signal: AbortSignal, onFollowed: () => void, passedOn?: () => Promise<void>): Promise<void> {
     try {
@@ -113,43 +121,49 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     await (passedOn ? passedOn() : this.#link(this.first));
   }
 
-  /** Waits until the engine is there. */
+  /** Waits until the engine has loaded, and makes controls for its parameters. */
   async #greet(): Promise<void> {
     const { specs } = await this.#engine.request('hello', undefined);
     this.#ui.makeParams(specs);
     this.greeted(specs);
   }
 
-  /** What is open. */
+  /** The source that is open. */
   get source(): Source<Example, Linked, Data> | undefined {
     return this.#source;
   }
 
-  /** What is still being opened is not taken any more. */
+  /** Discards everything that is still being opened. */
   close(): void {
     this.#turn += 1;
   }
 
+  /** Opens an example, with the settings of a link. */
   example(example: Example, linked?: Linked): Promise<void> {
     return this.open({ ...this.fromExample(example), ...(linked && { linked }) });
   }
 
+  /** Opens the user's files; a link that lacks its file applies to them. */
   files(files: File[]): Promise<void> {
     const linked = this.#awaiting;
     return this.open({ ...this.fromFiles(files), ...(linked && { linked }) });
   }
 
+  /** Opens the example with this id, if there is one. */
   byId(id: string): void {
     const example = this.find(id);
     if (example) void this.example(example);
   }
 
-  /** What is open once more, after a failure of the engine. */
+  /** Opens the present source again, after a failure of the engine. */
   async again(): Promise<void> {
     if (this.#source) await this.open(this.#source, true);
   }
 
-  /** Stops what is being opened or prepared: the worker is in the midst of it, so it is started anew. */
+  /**
+   * Cancels opening or preparing: since the worker is busy with it, the engine is restarted, and the previous source
+   * opened again.
+   */
   async cancel(): Promise<void> {
     const turn = this.#turn;
     await Promise.race([this.kept(), later(KEEPING)]);
@@ -161,7 +175,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     if (own === this.#turn && !this.#ui.banner.shown) this.#ui.status.say('Cancelled.');
   }
 
-  /** Opens what the page's address asks for; says why where that cannot be. `otherwise` is opened then. */
+  /** Opens what the address asks for. If that is not possible, opens `otherwise` and says why. */
   async #link(otherwise?: Example): Promise<void> {
     const linked = this.linkedBy(location.hash);
     const example = linked && this.#exampleOf(linked);
@@ -179,6 +193,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     return file ? undefined : this.first;
   }
 
+  /** Opens a source, unless a newer request comes first. */
   protected async open(source: Source<Example, Linked, Data>, again = false): Promise<void> {
     const turn = ++this.#turn;
     if (this.states.canChange) this.keep();
@@ -187,7 +202,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       await this.#needEngine();
       await calm;
       const data = await source.opened();
-      // One after the other: what the worker has is what was asked for last.
+      // In turn, so that the worker ends up with the newest request.
       await this.#loads;
       if (turn !== this.#turn) return;
       await this.#needEngine();
@@ -224,14 +239,14 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     this.states.fail(`${source.name} could not be opened.`, error);
   }
 
-  /** What a link leads to without what it says of settings: something in them is refused. */
+  /** Opens a link's example with its own settings, after one of the link's settings was rejected. */
   async #openWithoutLink({ linked: _, ...source }: Source<Example, Linked, Data>, why: string): Promise<void> {
     await this.open(source);
     if (this.states.value === 'error' || this.#source !== source) return;
     this.#ui.banner.show('The link’s settings are left out.', `One of them cannot be: ${why}.`);
   }
 
-  /** Starts the engine again where it broke. */
+  /** Restarts the engine if it is broken. */
   async #needEngine(): Promise<void> {
     if (!this.states.engineBroken) return;
     this.#engine.restart({ code: 'internal', message: 'the engine was started again' });

@@ -1,7 +1,7 @@
-/** Photographs with their cameras: read, decoded, and masked. */
+/** Reads photographs with their cameras and masks. */
 import type { CameraView } from '../reconstruct/protocol';
 
-/** A camera, and its picture where there is one, for the page and for the worker. */
+/** A camera and its photograph, if there is one: as data for the worker, and as an image for the page. */
 export interface Photograph {
   name: string;
   view: CameraView;
@@ -23,13 +23,16 @@ interface CameraFile {
   cameras: CameraEntry[];
 }
 
-/** A file by the name the list of cameras gives it; undefined where there is none. */
+/** Finds a file by its name in the list of cameras; undefined if there is none. */
 export type FileByName = (name: string) => Promise<Blob | undefined>;
 
-/** Alpha below this is no part of the thing. */
+/** Pixels of a mask darker than this (of 255) are masked out. */
 const MASKED = 128;
 
-/** All cameras of a list, with the pictures that are there. */
+/**
+ * Reads all cameras of a list, and the photographs that are available. Throws if the list is malformed, or a photograph
+ * cannot be decoded or does not fit its camera.
+ */
 export async function readPhotographs(text: string, fileOf: FileByName): Promise<Photograph[]> {
   const file = parseCameras(text);
   return Promise.all(file.cameras.map((entry, i) => readOne(entry, i, file, fileOf)));
@@ -81,7 +84,7 @@ function pixelsOf(picture: ImageBitmap): ImageData {
   return context.getImageData(0, 0, picture.width, picture.height);
 }
 
-/** Leaves out what is dark in the mask. */
+/** Makes all pixels transparent that are dark in the mask; a mask of another size is ignored. */
 function applyMask(pixels: ImageData, mask: ImageData): void {
   if (mask.data.length !== pixels.data.length) return;
   for (let i = 0; i < pixels.data.length; i += 4) if ((mask.data[i] ?? 0) < MASKED) pixels.data[i + 3] = 0;

@@ -1,4 +1,4 @@
-/** What clicks in the view do to the points. */
+/** Editing points by clicks in the Reconstruct lab's view. */
 import type { Vec3 } from '../protocol';
 import type { Edits } from '../reconstruct/protocol';
 import type { EditTool } from '../ui/edit-tools';
@@ -6,7 +6,10 @@ import type { Hit } from '../view/reconstruction';
 
 export const NO_EDITS: Edits = { added: [], removed: [], outside: [] };
 
-/** What a click changes: nothing where it changes nothing. `distance` is a length in world units. */
+/**
+ * Returns the edits after a click with a tool; undefined if it changes nothing. `distance`, in world units, is the
+ * offset of a new point along the surface normal, or the radius for removal.
+ */
 export function editedBy(
   tool: EditTool,
   { point, normal }: Hit,
@@ -27,7 +30,7 @@ export function editedBy(
   }
 }
 
-/** Without all points near a place, those added by hand, too. */
+/** Removes all points within `reach` of a position, including those added by hand; undefined if there are none. */
 function withoutNear(place: Vec3, reach: number, edits: Edits, points: Float32Array): Edits | undefined {
   const near = (x = 0, y = 0, z = 0) => Math.hypot(x - place[0], y - place[1], z - place[2]) <= reach;
   const gone = new Set(edits.removed);
@@ -40,7 +43,7 @@ function withoutNear(place: Vec3, reach: number, edits: Edits, points: Float32Ar
   return { ...edits, added, removed: [...edits.removed, ...found] };
 }
 
-/** Values, three of each point, without those of some. */
+/** Returns packed triples without those of the removed points. */
 export function without(values: Float32Array, removed: number[]): Float32Array {
   const gone = new Set(removed);
   return gone.size > 0 ? values.filter((_, i) => !gone.has(Math.floor(i / 3))) : values;

@@ -1,15 +1,16 @@
-/** Points, cameras and photographs from an example or from files of the user's. */
+/** Opens points, cameras and photographs of the Reconstruct lab, from an example or from the user's files. */
 import { type CloudExample, dataUrl } from '../reconstruct/examples';
 import type { CloudSource } from '../reconstruct/protocol';
 import { readFiles } from '../ui/files';
 import { fetched } from './downloads';
 import { type Photograph, readPhotographs } from './photographs';
 
+/** File extensions that the Reconstruct lab opens. */
 export const ACCEPT = '.ply,.obj,.xyz,.pts,.csv,.txt,.json,.png,.jpg,.jpeg,.webp';
 
-/** What is opened together. */
+/** Files opened together. */
 export interface Opened {
-  /** Nothing where only cameras were given, for the points that are there. */
+  /** The points; undefined if only cameras were opened, for the present points. */
   source?: CloudSource;
   photographs: Photograph[];
 }
@@ -32,7 +33,10 @@ async function fetchPhotographs(folder: string): Promise<Photograph[]> {
   return readPhotographs(list, async (name) => (await fetched(dataUrl(`${folder}/${name}`))).blob());
 }
 
-/** Points in one file; a list of cameras and the photographs it names. */
+/**
+ * Reads points from one file, and a list of cameras with the photographs it names. Throws if there are several files
+ * with points, or photographs without a list of cameras.
+ */
 export async function fromFiles(files: File[]): Promise<Opened> {
   const lists = files.filter(({ name }) => /\.json$/i.test(name));
   const pictures = files.filter(({ name, type }) => type.startsWith('image/') || /\.(png|jpe?g|webp)$/i.test(name));
@@ -43,7 +47,7 @@ export async function fromFiles(files: File[]): Promise<Opened> {
       'Photographs need a cameras.json with the projection of each, chosen or dropped together with them.',
     );
   const byName = new Map(pictures.map((file) => [file.name, file]));
-  // A list may name them with a folder.
+  // A list may name photographs with their folder.
   const find = async (name: string) => byName.get(name.replace(/^.*[/\\]/, ''));
   const photographs = lists[0] ? await readPhotographs(await lists[0].text(), find) : [];
   if (!points) return { photographs };

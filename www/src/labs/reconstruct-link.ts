@@ -1,4 +1,4 @@
-/** The Reconstruct lab's settings as the part of an address after `#reconstruct?`, and back. */
+/** Converts the Reconstruct lab's settings to the hash of an address, `#reconstruct?…`, and back. */
 import type { ParamValues, Vec3 } from '../protocol';
 import { CLOUDS, type CloudExample } from '../reconstruct/examples';
 import { isCloudPreset } from '../reconstruct/presets';
@@ -7,20 +7,22 @@ import type { CloudChoice } from '../ui/cloud-setup';
 import { differing, readValue } from './link';
 
 const ADDRESS = '#reconstruct';
-/** More points by hand than this do not go into a link: some programs cut long addresses. */
+/** Most points changed by hand that a link includes: some programs truncate long addresses. */
 export const MOST_EDITS = 200;
 
+/** The settings in a link; missing ones are as in the example, or else the method's defaults. */
 export interface LinkedCloud extends Partial<CloudChoice> {
   example?: string;
-  /** The name of a file of one's own: it is not in the link. */
+  /** Name of the user's own file, which is not part of the link. */
   file?: string;
   params: ParamValues;
   edits: Edits;
   color?: string;
-  /** The photograph that the view looks through, from 1; 0 for none. */
+  /** Number of the photograph whose camera the view uses, from 1; 0 for none. */
   photo?: number;
 }
 
+/** Present settings of the lab, from which a link is made. */
 export interface CloudSettings {
   example: CloudExample | undefined;
   file: string;
@@ -32,7 +34,10 @@ export interface CloudSettings {
   photo: number | undefined;
 }
 
-/** Only what differs from what the example, or else the method, brings along. 0 stands for the method's own choice. */
+/**
+ * Returns the settings that differ from those of the example, or else from the method's defaults. 0 means the method's
+ * own choice.
+ */
 export function linkOf(settings: CloudSettings): LinkedCloud {
   const { example, file, choice, params, defaults, edits, color, photo } = settings;
   const { maxPoints, keepComponents } = choice;
@@ -48,23 +53,23 @@ export function linkOf(settings: CloudSettings): LinkedCloud {
   };
 }
 
-/** The photograph that an example opens with. */
+/** Returns the index of the photograph that an example opens with. */
 function photoOf(example: CloudExample | undefined): number | undefined {
   return isCloudPreset(example) ? example.photo : undefined;
 }
 
-/** The photograph to look through; `photo` of a link counts from 1, and 0 is none. */
+/** Returns the index of the photograph for the view; `photo` of a link counts from 1, and 0 means none. */
 export function photoFor(example: CloudExample | undefined, photo: number | undefined): number | undefined {
   if (photo === undefined) return photoOf(example);
   return photo > 0 ? photo - 1 : undefined;
 }
 
-/** Whether a link can hold what was changed by hand. */
+/** Tests whether the points changed by hand are few enough for a link. */
 export function fits({ added, removed, outside }: Edits): boolean {
   return added.length + removed.length + outside.length <= MOST_EDITS;
 }
 
-/** The choice as a link wants it. */
+/** Applies a link's settings to the choice of points. */
 export function withLink(choice: CloudChoice, { maxPoints, keepComponents }: Partial<CloudChoice>): CloudChoice {
   return {
     maxPoints: maxPoints === undefined ? choice.maxPoints : maxPoints || undefined,
@@ -74,6 +79,7 @@ export function withLink(choice: CloudChoice, { maxPoints, keepComponents }: Par
 
 const packed = (point: Vec3) => point.map((value) => Number(value.toPrecision(6))).join(',');
 
+/** Returns the hash of an address for a link's settings. */
 export function toHash(linked: LinkedCloud): string {
   const query = new URLSearchParams();
   for (const name of ['example', 'file', 'maxPoints', 'keepComponents', 'color', 'photo'] as const) {
@@ -88,7 +94,7 @@ export function toHash(linked: LinkedCloud): string {
   return text ? `${ADDRESS}?${text}` : ADDRESS;
 }
 
-/** Undefined where the address is not one of this lab with something to say. */
+/** Parses the hash of an address; undefined if it is for another lab or contains no settings. */
 export function fromHash(hash: string): LinkedCloud | undefined {
   const [address = '', text] = hash.split(/\?(.*)/s);
   if (address !== ADDRESS || !text) return undefined;

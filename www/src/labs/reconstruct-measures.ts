@@ -4,7 +4,7 @@ import type { History } from '../ui/history';
 import type { MoreMeasure } from '../ui/measures';
 import type { PlotKind } from '../ui/plots';
 
-/** What is measured of points and fit. */
+/** Measures of the points and the fit, shown besides those of the surface. */
 export const FIT_ROWS: MoreMeasure[] = [
   {
     name: 'fitMean',
@@ -34,6 +34,7 @@ export const FIT_ROWS: MoreMeasure[] = [
   { name: 'residual', label: 'Residual', help: 'Of the solve, relative to its right side', text: figure },
 ];
 
+/** Returns the values of these measures by name. */
 export function fitValues(fit: Fit): Record<string, unknown> {
   const { fitness, ...rest } = fit;
   if (!fitness) return { ...rest };
@@ -41,6 +42,7 @@ export function fitValues(fit: Fit): Record<string, unknown> {
   return { ...rest, fitMean: mean, fitRms: rms, fitMax: max, meanCurvature };
 }
 
+/** Plot of the solver's residual over the iterations. */
 export const RESIDUAL_PLOT: PlotKind = {
   title: 'Residual of the solve',
   log: true,

@@ -14,23 +14,23 @@ import type { ModelSettings } from './reconstruct-settings';
 
 export type CloudOrigin = Source<CloudExample, LinkedCloud, Data>;
 
-/** What has been opened: the worker has a model of it that has not begun. */
+/** Opened points, and the settings of their model, which the worker has built. */
 export interface OpenedCloud {
   cloud: Cloud;
   params: ParamValues;
   photographs: Photograph[];
   setup: Setup;
-  /** The points: those that were there already where only cameras came. */
+  /** Source of the points; if only cameras were opened, that of the present points. */
   from: CloudSource;
 }
 
-/** Opens points, with cameras and photographs or without. */
+/** Opens points in the Reconstruct lab, with or without cameras and photographs. */
 export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data, OpenedCloud> {
   protected readonly first = CLOUDS[0];
   readonly #client: ReconstructClient;
   readonly #settings: ModelSettings;
   readonly #onOpened: (opened: OpenedCloud, origin: CloudOrigin) => Promise<void>;
-  /** What the method's parameters are where nothing is said. */
+  /** Default parameters of the method. */
   defaults: ParamValues = {};
 
   constructor(
@@ -75,7 +75,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     return { ...(await this.#client.request('load', { source: from, cameras, setup })), photographs, setup, from };
   }
 
-  /** With cameras alone it is the points of before, now seen from them, that are open. */
+  /** If only cameras were opened, the source is the present points, now with these cameras. */
   protected override asOpen(origin: CloudOrigin, { from, photographs }: OpenedCloud, { source }: Data): CloudOrigin {
     if (source) return origin;
     return { ...origin, name: this.source?.name ?? origin.name, opened: async () => ({ source: from, photographs }) };
@@ -85,7 +85,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     return this.#onOpened(opened, origin);
   }
 
-  /** For cameras that come after their points. */
+  /** Returns the present points, for cameras that are opened after them. */
   async #presentPoints(): Promise<CloudSource> {
     if (!this.source) throw new Error('Open points first, or together with their cameras.');
     const { source } = await this.source.opened();
@@ -103,7 +103,10 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     };
   }
 
-  /** The settings before a link says otherwise: an example's own; those in force from file to file; else the method's. */
+  /**
+   * Returns the settings before a link changes them: an example's own; for one file after another, those in force; else
+   * the defaults.
+   */
   #usual({ example, linked }: CloudOrigin, samePoints: boolean): CloudChoice & { params: ParamValues } {
     if (example) {
       const first = variantOf(example);
@@ -114,7 +117,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     if (samePoints) return { params, ...choice };
     if (linked || !this.source || this.source.example)
       return { params: this.defaults, maxPoints: undefined, keepComponents: undefined };
-    // A cell is a length in the units of other points.
+    // The cell size is a length in the units of other points.
     const { cell: _, ...others } = params;
     return { params: others, ...choice };
   }

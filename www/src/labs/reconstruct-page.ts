@@ -3,7 +3,7 @@ import { h, section, uniqueId } from '../ui/dom';
 import { count } from '../ui/format';
 import { folded } from './extract-page';
 
-/** The parts the page is put together from. */
+/** Elements that the lab's page is laid out from. */
 export interface Parts {
   data: HTMLElement;
   figure: HTMLElement;
@@ -34,7 +34,7 @@ export interface Parts {
   exercises: HTMLElement;
 }
 
-/** Lays the lab out: set-up on one side, the view in the middle, what comes of it on the other side. */
+/** Lays the lab out: setup on one side, the view in the middle, results on the other side. */
 export function layOut(root: HTMLElement, parts: Parts): void {
   root.className = 'lab reconstruct';
   const view = h(
@@ -69,10 +69,10 @@ export function layOut(root: HTMLElement, parts: Parts): void {
   );
 }
 
-/** What is told of points, so that its place is there before some are open. */
+/** Names of the facts about points; they are shown before any are open, so that the layout does not shift. */
 const FACTS = ['File', 'Points', 'Colours', 'Cameras'];
 
-/** Which points are open, and how to open others. */
+/** Panel that shows the open points and opens others. */
 export class CloudPanel {
   readonly element: HTMLElement;
   readonly #examples: HTMLSelectElement;
@@ -112,7 +112,7 @@ export class CloudPanel {
     );
   }
 
-  /** Shows in the list which example is open, or that a file is. */
+  /** Selects the open example in the list, or “Your file” if it is none. */
   choose(example: CloudExample | undefined): void {
     this.#own.hidden = example !== undefined;
     this.#examples.value = example?.id ?? '';

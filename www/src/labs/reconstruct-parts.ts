@@ -56,7 +56,10 @@ export interface PartEvents extends TransportEvents {
   onError: (title: string, error: unknown) => void;
 }
 
-/** All that the Reconstruct lab shows, put in its place. It shows what it is told and tells what was asked for. */
+/**
+ * All controls and views of the Reconstruct lab, laid out. They display what they are given and report the user's
+ * actions as events.
+ */
 export class ReconstructParts {
   readonly #canvas = h('canvas', {
     tabindex: 0,
@@ -167,7 +170,7 @@ export class ReconstructParts {
     this.#paramsHolder.replaceWith(this.#params.element);
   }
 
-  /** Other points are open. */
+  /** Shows newly opened points. */
   adopt(cloud: Cloud, photographs: Photograph[], example: CloudExample | undefined, name: string): void {
     const { points, colors, normals } = cloud;
     this.#photographs = photographs;
@@ -188,7 +191,7 @@ export class ReconstructParts {
     this.warning.textContent = '';
   }
 
-  /** Parameters in force; the width of the Gaussian is there only where it is used, δ and τ only where they are. */
+  /** Shows the parameters in force; hides the constants of other kernels than the one in use. */
   showParams(params: ParamValues, preset: CloudPreset | undefined, variant: CloudVariant | undefined): void {
     this.#params?.show(params);
     const isMulti = params.kernel === 'multi-order';

@@ -10,15 +10,15 @@ import type { ReconstructParts } from './reconstruct-parts';
 
 export type ResultEvent = ProgressEvent | SurfaceEvent | ConstraintsEvent | MeasuredEvent | TimedEvent;
 
-/** What comes of a run, on the screen: progress, constraints, surface and measures as the worker tells them. */
+/** Displays the worker's results: progress, constraints, surface and measures. */
 export class Results {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;
   readonly #history: History;
-  /** A complete surface is shown: what is being extracted must not replace it. */
+  /** Whether the displayed surface is complete; previews must not replace it. */
   #whole = false;
-  /** To be shown at the next animation frame. */
+  /** The newest surface, until it is displayed at the next animation frame. */
   #surface: SurfaceEvent | undefined;
   #framePending = 0;
 
@@ -29,7 +29,7 @@ export class Results {
     this.#history = history;
   }
 
-  /** Whether there is a complete surface, to be saved or passed on. */
+  /** Whether there is a complete surface to save or pass on. */
   get whole(): boolean {
     return this.#whole;
   }
@@ -55,14 +55,14 @@ export class Results {
     }
   }
 
-  /** The model runs or stands: says how far it has come, and why where nothing came of it. */
+  /** Describes the state in the status line; if a finished run has no surface, explains why. */
   showState(state: LabState): void {
     this.#showHistory();
     this.#ui.status.say(this.describe(state));
     if (state === 'done' && this.#history.reports.at(-1)?.vertices === 0) this.#showNothing();
   }
 
-  /** In words, for the status line. */
+  /** Describes a state for the status line. */
   describe(state: LabState): string {
     const last = this.#history.reports.at(-1);
     if (state === 'running') return 'Running.';
@@ -72,12 +72,12 @@ export class Results {
     return `Done: ${count(last.vertices)} vertices in ${plural(last.components, 'component')}, residual ${figure(last.residual)}.`;
   }
 
-  /** A new run begins; the surface stays until the new one is there. */
+  /** Clears the history for a new run; the surface stays until the new one is complete. */
   startOver(): void {
     this.#history.clear();
   }
 
-  /** Nothing on the screen but the points. */
+  /** Clears the history and the surface; only the points stay. */
   clear(): void {
     this.#whole = false;
     this.#surface = undefined;
@@ -90,7 +90,7 @@ export class Results {
     cancelAnimationFrame(this.#framePending);
   }
 
-  /** Shows a surface at the next animation frame; only then the worker may send another. */
+  /** Displays a surface at the next animation frame; only then may the worker send another. */
   #takeSurface(event: SurfaceEvent): void {
     if (event.preview && this.#whole) {
       this.#client.shown();
@@ -120,7 +120,7 @@ export class Results {
     this.#ui.csv.disabled = this.#history.reports.length === 0;
   }
 
-  /** What was shown belongs to other settings. */
+  /** Clears a surface that belongs to other settings, and explains why there is none. */
   #showNothing(): void {
     this.#whole = false;
     this.#ui.clearSurface();

@@ -2,7 +2,7 @@ import type { ReconstructClient } from '../reconstruct/client';
 import type { LabStates } from './lab-states';
 import type { ReconstructParts } from './reconstruct-parts';
 
-/** Plays, pauses and steps the model. */
+/** Runs, pauses and steps the model of the Reconstruct lab. */
 export class Running {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
@@ -31,7 +31,7 @@ export class Running {
     this.ask(this.#client.request('step', { count: steps }));
   }
 
-  /** Waits for nothing; tells when it fails. */
+  /** Reports a request's failure, without waiting for its reply. */
   ask(request: Promise<unknown>): void {
     request.catch((error) => this.#states.fail('That did not work.', error));
   }

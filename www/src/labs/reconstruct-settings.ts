@@ -10,18 +10,19 @@ import type { Results } from './reconstruct-results';
 import type { Running } from './reconstruct-running';
 import { UndoStack } from './undo';
 
+/** Limits of the undo history. */
 const UNDO_LIMITS = { entries: 60, bytes: 96e6 };
-/** Milliseconds within which changes of the same thing are one, as when a slider is dragged. */
+/** Milliseconds within which repeated changes of the same setting count as one, as when a slider is dragged. */
 const TOGETHER = 1500;
 
-/** All that undo brings back. */
+/** The settings that undo restores. */
 interface Settings {
   choice: CloudChoice;
   params: ParamValues;
   edits: Edits;
 }
 
-/** The points, and all that the model of them is made with: changed here, handed to the worker, undone. */
+/** The points and the settings of their model: changes them, sends them to the worker, and undoes changes. */
 export class ModelSettings {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
@@ -35,7 +36,7 @@ export class ModelSettings {
   #params: ParamValues = {};
   #edits: Edits = NO_EDITS;
 
-  /** `onParams` hears whenever other parameters may be in force. */
+  /** `onParams` is called whenever the parameters in force may have changed. */
   constructor(
     client: ReconstructClient,
     ui: ReconstructParts,
@@ -64,7 +65,7 @@ export class ModelSettings {
     return this.#ui.setup.value;
   }
 
-  /** Other points are open: what was done to the former cannot be undone. */
+  /** Adopts newly opened points, and clears the undo history. */
   adopt(cloud: Cloud, setup: Setup): void {
     this.#cloud = cloud;
     const removed = setup.edits.removed.filter((index) => index < cloud.points.length / 3);
@@ -75,23 +76,25 @@ export class ModelSettings {
     this.#showEdits();
   }
 
-  /** What the worker says is in force. */
+  /** Adopts the parameters that the worker reports. */
   showParams(params: ParamValues): void {
     this.#params = params;
     this.#onParams(params);
   }
 
-  /** Other settings; the surface stays until the new one is there. When they are refused, all stays. */
+  /**
+   * Changes settings; the surface stays until the new one is complete. If the settings are rejected, nothing changes.
+   */
   change(changed: Partial<Settings>, label: string): Promise<void> {
     return this.#states.inTurn(() => this.#change(changed, label));
   }
 
-  /** Live: the run goes on, or is taken up again, with the new value. */
+  /** Sets a parameter of the live model; a run continues, and a finished one is resumed. */
   setParam(name: string, value: unknown): Promise<void> {
     return this.#states.inTurn(() => this.#setParam(name, value));
   }
 
-  /** A click in the view, with the tool that is chosen. */
+  /** Handles a click in the view with the selected tool. */
   pick(hit: Hit): Promise<void> {
     const { tool, distance } = this.#ui.tools;
     const length = distance * this.#ui.view.size;
@@ -111,7 +114,7 @@ export class ModelSettings {
     return this.#states.inTurn(() => this.#travel(way));
   }
 
-  /** A new model with the same settings, before its first step. */
+  /** Builds a new model with the same settings, before its first step. */
   rebuild(): Promise<void> {
     return this.#states.inTurn(async () => this.showParams(await this.#handOver(this.#now)));
   }
@@ -173,8 +176,8 @@ export class ModelSettings {
   }
 
   /**
-   * Has the worker work with these settings; gives the parameters in force. Where points by hand alone have changed,
-   * the living model takes them, and revises what it has solved; else it is made anew.
+   * Sends settings to the worker; returns the parameters in force. If only points by hand have changed, the live model
+   * takes them and updates its solution; else a new model is built.
    */
   async #handOver({ choice, params, edits }: Settings): Promise<ParamValues> {
     const before = this.#now;

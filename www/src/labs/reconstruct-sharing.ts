@@ -10,7 +10,10 @@ import type { ModelSettings } from './reconstruct-settings';
 /** Voxels along the longest side of a volume that is saved or passed on. */
 const VOLUME_SIZE = 96;
 
-/** Gives on what the lab has: as an address, as a volume to save, and to the Extract lab. */
+/**
+ * Shares the state of the Reconstruct lab as an address, saves f as a volume, and passes volume or surface to other
+ * labs.
+ */
 export class Sharing {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
@@ -32,7 +35,7 @@ export class Sharing {
     this.#opening = opening;
   }
 
-  /** The page's address says what is open and how it is set. */
+  /** Updates the page's address with what is open and the settings. */
   updateAddress(): void {
     const { source, defaults } = this.#opening;
     if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
@@ -66,7 +69,7 @@ export class Sharing {
     });
   }
 
-  /** The function as a volume that the deformable model follows: inside is above the level. */
+  /** Passes f on to the Extract lab as a volume; inside is above the level. */
   toExtract(passOn: PassOn): void {
     this.#ui.status.say('Making a volume.');
     this.#tryTo(async () => {
@@ -75,7 +78,7 @@ export class Sharing {
     });
   }
 
-  /** The surface as a mesh to be deformed. */
+  /** Passes the surface on as a mesh to deform. */
   toSculpt(passOn: PassOn): void {
     this.#tryTo(async () => {
       const bytes = await this.#client.request('export', { format: 'ply' });

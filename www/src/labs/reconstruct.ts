@@ -18,8 +18,8 @@ import { ModelSettings } from './reconstruct-settings';
 import { Sharing } from './reconstruct-sharing';
 
 /**
- * The Reconstruct lab: an implicit surface through points. Here its parts are put together; what is opened, set,
- * run, shown and given on is each in a file of its own.
+ * The Reconstruct lab: an implicit surface is fitted to points. This class connects the lab's parts; opening, settings,
+ * running, results and sharing are in files of their own.
  */
 export class ReconstructLab implements Lab {
   readonly #root: HTMLElement;
@@ -58,7 +58,7 @@ export class ReconstructLab implements Lab {
     offerShortcuts(this.#shortcuts(), help, GUIDES.reconstruct, signal);
   }
 
-  /** Opens what the address says, or else the built-in example, and runs it. */
+  /** Opens what the address asks for, or else the first example, and runs it. */
   async start(): Promise<void> {
     await this.#opening.start(this.#closing.signal, () => this.#sharing.updateAddress());
   }
@@ -72,7 +72,7 @@ export class ReconstructLab implements Lab {
     this.#root.replaceChildren();
   }
 
-  /** What is asked for on the page, and who does it. */
+  /** Maps the user's actions to the parts that handle them. */
   #events(): PartEvents {
     return {
       onFiles: (files) => void this.#opening.files(files),
@@ -118,7 +118,7 @@ export class ReconstructLab implements Lab {
     ];
   }
 
-  /** Shows points that have been opened, as their example or link wants it, and runs the model. */
+  /** Displays opened points, with the settings of their example or link, and runs the model. */
   async #adopt(opened: OpenedCloud, { name, example, linked }: CloudOrigin): Promise<void> {
     const { cloud, params, photographs, setup } = opened;
     const pictured = photographs.some(({ picture }) => picture);
@@ -157,7 +157,7 @@ export class ReconstructLab implements Lab {
     this.#sharing.updateAddress();
   }
 
-  /** Starts over, with nothing on the screen but the points. */
+  /** Rebuilds the model and clears the surface; only the points stay. */
   async #reset(): Promise<void> {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
@@ -184,7 +184,7 @@ export class ReconstructLab implements Lab {
     this.#ui.showState(beneath, ready, state !== 'loading' && this.#results.whole);
   }
 
-  /** Away with what is in the way: a message, else the tool that clicks are for, else the photograph. */
+  /** Handles Escape: dismisses the message, else deselects the tool, else leaves the photograph. */
   #putAway(): void {
     const { banner, tools, photos } = this.#ui;
     if (banner.shown) this.#dismiss();

@@ -1,34 +1,35 @@
 import { UndoStack } from './undo';
 
+/** Limits of the undo history. */
 const LIMITS = { entries: 60, bytes: 96e6 };
-/** Milliseconds within which changes of the same thing are one, as when a slider is dragged. */
+/** Milliseconds within which repeated changes of the same setting count as one, as when a slider is dragged. */
 const TOGETHER = 1500;
 
-/** A moment one can go back to. */
+/** A state to go back to: of the model, and of the page. */
 export interface Moment<Page, Saved> {
   saved: Saved;
   page: Page;
 }
 
-/** A worker whose model can be saved, and brought back. */
+/** A worker whose model can be saved and restored. */
 export interface SavingWorker<Saved> {
   request(kind: 'save', body: undefined): Promise<Saved>;
   request(kind: 'pause', body: undefined): Promise<undefined>;
   request(kind: 'restore', body: Saved): Promise<unknown>;
 }
 
-/** Undo and redo of everything that changes the model: the worker's saved states, kept by the page. */
+/** Undo and redo of all changes to the model: keeps the worker's saved states, and the page's state with each. */
 export class Rewinder<Page, Saved extends { state: Uint8Array }> {
   readonly #client: SavingWorker<Saved>;
   readonly #page: () => Page;
   readonly #onChange: (undoable: string | undefined, redoable: string | undefined) => void;
   readonly #stack = new UndoStack<Moment<Page, Saved>>(LIMITS);
-  /** Resolves when all that was to be remembered is. */
+  /** Resolves when all saves for the undo history are complete. */
   #ready: Promise<void> = Promise.resolve();
   #last = { together: '', at: 0 };
   #newest: Moment<Page, Saved> | undefined;
   #saving: Promise<unknown> = Promise.resolve();
-  /** Counts volumes: what is still on its way from the one before is not taken. */
+  /** Counts volumes, so that saves of a previous one are discarded. */
   #volume = 0;
 
   constructor(
@@ -41,17 +42,17 @@ export class Rewinder<Page, Saved extends { state: Uint8Array }> {
     this.#onChange = onChange;
   }
 
-  /** The newest moment that was kept, also where nothing was done after it: for when the engine fails. */
+  /** The newest saved state, even if no change followed it: to resume from after a failure of the engine. */
   get newest(): Moment<Page, Saved> | undefined {
     return this.#newest;
   }
 
-  /** Settled when the worker has answered for all that was to be kept. */
+  /** Settles when the worker has answered the last save request. */
   get kept(): Promise<unknown> {
     return this.#saving;
   }
 
-  /** Another volume: no state of the one before fits it. */
+  /** Forgets all states: none fits another volume. */
   clear(): void {
     this.#volume += 1;
     this.#last = { together: '', at: 0 };
@@ -60,7 +61,7 @@ export class Rewinder<Page, Saved extends { state: Uint8Array }> {
     this.#tell();
   }
 
-  /** Keeps the state as it is, for {@link newest} alone. Where the engine broke there is nothing to keep. */
+  /** Saves the present state as {@link newest} only. Undefined if the engine is broken. */
   async keep(): Promise<Moment<Page, Saved> | undefined> {
     const page = this.#page();
     const volume = this.#volume;
@@ -71,15 +72,15 @@ export class Rewinder<Page, Saved extends { state: Uint8Array }> {
       if (volume === this.#volume) this.#newest = moment;
       return moment;
     } catch {
-      // Whoever asks it next tells.
+      // The next request reports the failure.
       return undefined;
     }
   }
 
   /**
-   * Keeps the state as it is before something is done. Requests are answered in order, so the state comes before
-   * whatever is asked of the worker next. Changes with the same `together` soon after each other count as one.
-   * Returns how to forget it, for when nothing was done after all.
+   * Saves the present state for undo, before a change. Requests are answered in order, so the state is that before any
+   * request made after this call. Changes with the same `together` in short succession count as one. Returns a function
+   * that forgets the state, to call if the change fails.
    */
   remember(label: string, together = ''): () => void {
     const now = performance.now();
@@ -105,7 +106,10 @@ export class Rewinder<Page, Saved extends { state: Uint8Array }> {
     };
   }
 
-  /** Goes back, or forth again; gives the moment the model is now in, or nothing where there is none. */
+  /**
+   * Undoes or redoes a change; returns the state that the model is in then, or undefined if there is nothing to undo or
+   * redo.
+   */
   async travel(way: 'undo' | 'redo'): Promise<Moment<Page, Saved> | undefined> {
     await this.#ready;
     if ((way === 'undo' ? this.#stack.undoable : this.#stack.redoable) === undefined) return undefined;

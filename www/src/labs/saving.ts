@@ -3,30 +3,30 @@ import { download } from '../ui/files';
 import type { History } from '../ui/history';
 import { toCsv } from './csv';
 
-/** Saves what the lab has, under the name of what is open; `say` hears what was saved. */
+/** Saves a lab's results as files named after the open volume or mesh; `say` is told the name of each. */
 export class Saving {
   readonly #fetch: (format: MeshFormat) => Promise<Uint8Array>;
   readonly #say: (text: string) => void;
-  /** Of the volume or file that is open. */
+  /** Name of the open volume or file. */
   name = 'surface';
 
-  /** `fetch` gives the surface in a format. */
+  /** `fetch` returns the surface in a format. */
   constructor(fetch: (format: MeshFormat) => Promise<Uint8Array>, say: (text: string) => void) {
     this.#fetch = fetch;
     this.#say = say;
   }
 
-  /** The surface as it is now. */
+  /** Saves the present surface. */
   async mesh(format: MeshFormat, type: string, suffix = ''): Promise<void> {
     this.bytes(format, await this.#fetch(format), type, suffix);
   }
 
-  /** What the plots show. */
+  /** Saves the data of the plots as CSV. */
   plots(history: History, residual?: string): void {
     this.bytes('csv', new TextEncoder().encode(toCsv(history, residual)), 'text/csv');
   }
 
-  /** `suffix` tells files of the same kind apart. */
+  /** Saves bytes as a file; `suffix` distinguishes files of the same type. */
   bytes(extension: string, bytes: Uint8Array, type: string, suffix = ''): void {
     const stem = this.name
       .replace(/\.(nii|nrrd|nhdr|mha|mhd|gz|ply|obj|xyz|pts|csv|txt)\b.*$/i, '')

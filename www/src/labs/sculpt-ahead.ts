@@ -4,45 +4,46 @@ import type { FrameEvent, Pose, Surface } from '../sculpt/protocol';
 import type { SculptureView } from '../view/sculpture';
 
 /**
- * Keeps the surface under a hand that is ahead of the model: between two frames of the model what is drawn goes along
- * with the ellipsoids at once, and each frame of the model takes its place.
+ * Carries the displayed surface along with the ellipsoids at once during a drag, between two frames of the model; each
+ * frame of the model replaces it.
  */
 export class Ahead {
   readonly #view: SculptureView;
   /** The last frame of the model. */
   #frame: FrameEvent | undefined;
-  /** Where the hand is, until the model is there too. */
+  /** Pose under the pointer, until the model has reached it. */
   #hand: { pose: Pose; turn: number } | undefined;
 
   constructor(view: SculptureView) {
     this.#view = view;
   }
 
-  /** The hand has moved; true where the surface went along. */
+  /** Carries the surface to a dragged pose; returns whether that was possible. */
   follow(pose: Pose, turn: number): boolean {
     this.#hand = { pose, turn };
     return this.#carry();
   }
 
-  /** A frame of the model is shown. */
+  /** Takes a frame of the model, and carries it on if the pointer is still ahead. */
   shown(frame: FrameEvent): void {
     this.#frame = frame;
     const hand = this.#hand;
     if (!hand) return;
-    // The model is on its way to the hand as long as it has not heard the newest, or nobody has sent it elsewhere.
+    // The model still approaches the dragged pose if it has not received the newest, or has not been sent elsewhere
+    // since.
     const onItsWay = frame.turn < hand.turn || samePose(frame.pose, hand.pose);
     if (!onItsWay || samePose(frame.ellipsoids, hand.pose)) this.#hand = undefined;
     else this.#carry();
   }
 
-  /** Nothing moves any more: what is seen is the model. */
+  /** Displays the surface of the model itself, once nothing moves. */
   rest(): void {
     if (!this.#hand) return;
     this.#hand = undefined;
     this.#place((surface) => surface.positions);
   }
 
-  /** Another scene. */
+  /** Forgets the frame and the pose, for another scene. */
   clear(): void {
     this.#frame = undefined;
     this.#hand = undefined;
@@ -50,7 +51,7 @@ export class Ahead {
 
   #carry(): boolean {
     const [before, after] = [this.#frame?.ellipsoids, this.#hand?.pose];
-    // While some vanish, the two are not about the same ellipsoids.
+    // While ellipsoids vanish, the poses do not correspond.
     if (!before || !after || before.length !== after.length) return false;
     this.#place(({ positions, vertices }) => carried(positions, before, after, vertices));
     return true;

@@ -5,10 +5,10 @@ import type { LabStates } from './lab-states';
 import type { SculptParts } from './sculpt-parts';
 import type { ModelSettings } from './sculpt-settings';
 
-/** How long each frame of a recording is seen. */
+/** Duration of a recorded frame, in seconds. */
 const FRAME_SECONDS = 1 / 25;
 
-/** Makes films of keyframes, and files of films. */
+/** Edits films by keyframes, and records them as files. */
 export class Filming {
   readonly #client: SculptClient;
   readonly #ui: SculptParts;
@@ -22,7 +22,7 @@ export class Filming {
     this.#settings = settings;
   }
 
-  /** The present pose as the last keyframe. */
+  /** Appends the present pose as a keyframe. */
   addKey(): void {
     const { film, pose } = this.#settings;
     const known =
@@ -51,7 +51,7 @@ export class Filming {
     if (film) this.#change({ ...film, loop }, 'change of the loop', frame);
   }
 
-  /** To a frame, without playing: the ellipsoids go there. */
+  /** Moves the film to a frame, and the ellipsoids to its pose, without playing. */
   seek(frame: number): void {
     const { film } = this.#settings;
     if (!film || !this.#states.canChange) return;
@@ -60,7 +60,7 @@ export class Filming {
     void this.#settings.setFilm(film, frame).catch((error) => this.#states.fail('That did not work.', error));
   }
 
-  /** The whole film as one file. */
+  /** Records the whole film as one file. */
   async record(): Promise<void> {
     if (!this.#states.canChange) return;
     this.#ui.film.showRecording(0);

@@ -1,4 +1,4 @@
-/** The Sculpt lab's settings as the part of an address after `#sculpt?`, and back. */
+/** Converts the Sculpt lab's settings to the hash of an address, `#sculpt?…`, and back. */
 import type { ParamValues } from '../protocol';
 import { lengthsOf, packed, unpacked } from '../sculpt/ellipsoids';
 import { SCENES, type SculptExample } from '../sculpt/examples';
@@ -7,18 +7,19 @@ import type { Pose } from '../sculpt/protocol';
 import { differing, readValue } from './link';
 
 const ADDRESS = '#sculpt';
-/** More keyframes than this do not go into a link: some programs cut long addresses. */
+/** Most keyframes that a link includes: some programs truncate long addresses. */
 export const MOST_KEYS = 12;
 
+/** The settings in a link; missing ones are as in the example, or else the method's defaults. */
 export interface LinkedScene {
   example?: string;
-  /** The name of a file of one's own: it is not in the link. */
+  /** Name of the user's own file, which is not part of the link. */
   file?: string;
   params: ParamValues;
-  /** Where the ellipsoids go, if by hand. */
+  /** Pose that the ellipsoids move to, if set by hand. */
   pose?: Pose;
   names?: string[];
-  /** A film of one's own; with `loop` alone, the example's film as a loop. */
+  /** Keyframes of the user's own film; with `loop` alone, the example's film is looped. */
   keys?: Pose[];
   between?: number;
   loop?: boolean;
@@ -26,11 +27,12 @@ export interface LinkedScene {
   layout?: string;
 }
 
+/** Present settings of the lab, from which a link is made. */
 export interface SceneSettings {
   example: SculptExample | undefined;
   file: string;
   params: ParamValues;
-  /** What the parameters are where nothing is said. */
+  /** Parameters that the scene opened with. */
   usual: ParamValues;
   pose: Pose | undefined;
   film: Film | undefined;
@@ -38,7 +40,7 @@ export interface SceneSettings {
   layout: string;
 }
 
-/** Only what differs from what the example, or else the method, brings along. */
+/** Returns the settings that differ from those of the example, or else from the method's defaults. */
 export function linkOf({ example, file, params, usual, pose, film, color, layout }: SceneSettings): LinkedScene {
   const own = film !== example?.film && film && 'keys' in film && film.keys.length <= MOST_KEYS;
   const looped = film?.loop !== undefined && film.loop !== (example?.film?.loop ?? false);
@@ -54,13 +56,13 @@ export function linkOf({ example, file, params, usual, pose, film, color, layout
   };
 }
 
-/** The film that a link asks for, on top of the example's. */
+/** Returns the film that a link asks for, based on the example's. */
 export function filmOf({ keys, between, loop }: LinkedScene, usual: Film | undefined): Film | undefined {
   const film = keys && keys.length > 0 ? { keys, between: between ?? 24, loop: false } : usual;
   return film && loop !== undefined ? { ...film, loop } : film;
 }
 
-/** To a ten thousandth of the size of each: less than any hand does. */
+/** Converts a pose to text, to a ten-thousandth of each ellipsoid's size, which is finer than any drag. */
 function asText(pose: Pose): string {
   return pose
     .map((one) =>
@@ -81,6 +83,7 @@ function asPose(text: string): Pose | undefined {
   return pose.every((one) => one !== undefined) ? pose : undefined;
 }
 
+/** Returns the hash of an address for a link's settings. */
 export function toHash(linked: LinkedScene): string {
   const query = new URLSearchParams();
   for (const name of ['example', 'file', 'color', 'layout', 'between', 'loop'] as const) {
@@ -94,7 +97,10 @@ export function toHash(linked: LinkedScene): string {
   return text ? `${ADDRESS}?${text}` : ADDRESS;
 }
 
-/** Undefined where the address is not one of this lab with something to say. What makes no sense is left out. */
+/**
+ * Parses the hash of an address; undefined if it is for another lab or contains no settings. Invalid settings are
+ * ignored.
+ */
 export function fromHash(hash: string): LinkedScene | undefined {
   const [address = '', text] = hash.split(/\?(.*)/s);
   if (address !== ADDRESS || !text) return undefined;

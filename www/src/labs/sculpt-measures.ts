@@ -4,7 +4,7 @@ import type { History } from '../ui/history';
 import type { MoreMeasure } from '../ui/measures';
 import type { PlotKind } from '../ui/plots';
 
-/** What is measured beside the surface. */
+/** Measures of frames, detail and correspondence, shown besides those of the surface. */
 export const SCULPT_ROWS: MoreMeasure[] = [
   { name: 'frameMs', label: 'Time of a frame', help: 'Work of the last frame in the worker', text: milliseconds },
   {
@@ -49,6 +49,7 @@ export const SCULPT_ROWS: MoreMeasure[] = [
   },
 ];
 
+/** Plots of the Sculpt lab, over the frames. */
 export const SCULPT_PLOTS: PlotKind[] = [
   {
     title: 'Unrest of the skin',
@@ -73,7 +74,7 @@ export const SCULPT_PLOTS: PlotKind[] = [
   },
 ];
 
-/** Milliseconds of a step, all parts together. */
+/** Returns the duration of a step in milliseconds, the sum over its parts. */
 function timeOf({ times }: StepReport): number {
   return Object.values(times).reduce((sum, time) => sum + time, 0);
 }

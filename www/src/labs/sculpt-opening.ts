@@ -10,10 +10,10 @@ import type { SculptParts } from './sculpt-parts';
 
 export type SculptSource = Source<SculptExample, LinkedScene, SceneSource>;
 
-/** For meshes of the user's: a base has fewer triangles than a detail worth the name. */
+/** Parameters for the user's own meshes: the base has fewer triangles than their detail needs. */
 const OWN_PARAMS = { supersample: 2 };
 
-/** Opens meshes. */
+/** Opens meshes in the Sculpt lab, and builds models of them. */
 export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSource, Opened> {
   protected readonly first = SCENES[0];
   readonly #client: SculptClient;
@@ -30,7 +30,7 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
     this.#onOpened = onOpened;
   }
 
-  /** What another lab passes on. */
+  /** Opens a mesh passed on by another lab. */
   bytes(name: string, bytes: Uint8Array): Promise<void> {
     return this.open({ name, opened: async () => ({ detail: { file: { name, bytes } } }) });
   }

@@ -3,7 +3,7 @@ import { h, section, uniqueId } from '../ui/dom';
 import { count, milliseconds } from '../ui/format';
 import { folded } from './extract-page';
 
-/** The parts the page is put together from. */
+/** Elements that the lab's page is laid out from. */
 export interface Parts {
   data: HTMLElement;
   figure: HTMLElement;
@@ -28,7 +28,7 @@ export interface Parts {
   exercises: HTMLElement;
 }
 
-/** Lays the lab out: set-up on one side, the view in the middle, what comes of it on the other side. */
+/** Lays the lab out: setup on one side, the view in the middle, results on the other side. */
 export function layOut(root: HTMLElement, parts: Parts): void {
   root.className = 'lab sculpt';
   const scene = h('div', { class: 'scene' }, parts.canvas, parts.legend, parts.coarse, parts.captions);
@@ -61,10 +61,10 @@ export function layOut(root: HTMLElement, parts: Parts): void {
   );
 }
 
-/** What is told of a scene, so that its place is there before one is open. */
+/** Names of the facts about a scene; they are shown before one is open, so that the layout does not shift. */
 const FACTS = ['File', 'Detail', 'Bands', 'Made in'];
 
-/** Which scene is open, and how to open others. */
+/** Panel that shows the open scene and opens others. */
 export class ScenePanel {
   readonly element: HTMLElement;
   readonly #examples: HTMLSelectElement;
@@ -104,7 +104,7 @@ export class ScenePanel {
     );
   }
 
-  /** Shows in the list which example is open, or that a file is. */
+  /** Selects the open example in the list, or “Your file” if it is none. */
   choose(example: SculptExample | undefined): void {
     this.#own.hidden = example !== undefined;
     this.#examples.value = example?.id ?? '';

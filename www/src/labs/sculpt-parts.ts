@@ -42,7 +42,10 @@ export interface PartEvents extends TransportEvents, EllipsoidEvents, FilmEvents
   onError: (title: string, error: unknown) => void;
 }
 
-/** All that the Sculpt lab shows, put in its place. It shows what it is told and tells what was asked for. */
+/**
+ * All controls and views of the Sculpt lab, laid out. They display what they are given and report the user's actions as
+ * events.
+ */
 export class SculptParts {
   readonly #canvas = h('canvas', {
     tabindex: 0,
@@ -73,7 +76,7 @@ export class SculptParts {
   readonly #cancel: HTMLButtonElement;
   readonly #paramsHolder = h('div');
   #params: ParamControls | undefined;
-  /** Counts textures: what is still being decoded is not shown any more once another came. */
+  /** Counts textures, so that one that is still being decoded does not replace a newer one. */
   #pictures = 0;
   #texture: Texture | undefined;
 
@@ -146,7 +149,7 @@ export class SculptParts {
     this.#paramsHolder.replaceWith(this.#params.element);
   }
 
-  /** Another scene is open. */
+  /** Shows a newly opened scene. */
   adopt(
     { box, start, pose, detail, bands, made, texture }: Opened,
     example: SculptExample | undefined,
@@ -159,7 +162,7 @@ export class SculptParts {
     this.data.show({ name, detail, bands, made }, example);
   }
 
-  /** A picture that cannot be decoded is left out: the surface is there without it. */
+  /** Decodes and shows a texture. If that fails, the surface stays without one. */
   #showTexture(texture: MeshTexture | undefined): void {
     this.#pictures += 1;
     const turn = this.#pictures;
@@ -192,7 +195,7 @@ export class SculptParts {
     this.#params?.complain(name, message);
   }
 
-  /** `canPlay`: a film can be played once more where all is at rest. */
+  /** With `canPlay`, a model at rest can be played, since there is a film. */
   showState(state: LabState, ready: boolean, canPlay: boolean): void {
     this.transport.showState(state === 'done' && canPlay ? 'paused' : state, ready);
     this.#exports.enabled = ready && state !== 'loading';

@@ -5,28 +5,28 @@ import type { HandleMode } from '../view/handles';
 import type { SculptParts } from './sculpt-parts';
 import type { ModelSettings } from './sculpt-settings';
 
-/** One press of a key: a share of the size of the scene, radians, and a factor. */
+/** Effect of one key press: displacement as a share of the scene's size, rotation in radians, and scale factor. */
 const MOVE = 0.02;
 const TURN = 0.1;
 const GROW = 1.06;
-/** With Shift, so much of it. */
+/** Share of these effects with Shift. */
 const FINE = 0.2;
 
-/** Of a new ellipsoid: a share of the size of the scene. */
+/** Radius of a new ellipsoid, as a share of the scene's size. */
 const NEW = 0.12;
 
-/** Milliseconds after the last press of a key until the hand is at rest. */
+/** Milliseconds after the last key press until the change counts as ended. */
 const REST = 350;
 
 const MODE_KEYS: Record<string, HandleMode> = { m: 'move', t: 'turn', e: 'size' };
 const DONE: Record<HandleMode, string> = { move: 'moved', turn: 'turned', size: 'sized' };
 
-/** Chooses ellipsoids and moves, turns and sizes them: by handles, keys and numbers. */
+/** Selects ellipsoids and moves, rotates and scales them, by handles, keys and numbers. */
 export class Posing {
   readonly #ui: SculptParts;
   readonly #settings: ModelSettings;
   #mode: HandleMode = 'move';
-  /** Runs while keys are pressed one after the other. */
+  /** Timer that ends a series of key presses. */
   #resting = 0;
 
   constructor(ui: SculptParts, settings: ModelSettings) {
@@ -45,14 +45,14 @@ export class Posing {
     this.#ui.status.say(`Handles and arrow keys ${mode === 'size' ? 'change the size' : mode}.`);
   }
 
-  /** By numbers. */
+  /** Replaces the selected ellipsoid by one entered as numbers. */
   change(ellipsoid: ControlEllipsoid, what: string): void {
     this.#remember(what, true);
     this.#send(ellipsoid, false);
     this.#tell(what);
   }
 
-  /** One more, where one is chosen beside it, else in the middle; it grows from nothing. */
+  /** Adds an ellipsoid beside the selected one, or else in the middle of the scene; the model lets it grow. */
   add(): void {
     const { pose, chosen, names } = this.#settings;
     const size = NEW * this.#ui.view.size;
@@ -68,7 +68,7 @@ export class Posing {
     this.#settings.choose(pose.length);
   }
 
-  /** The chosen one shrinks and is gone. */
+  /** Removes the selected ellipsoid; the model lets it shrink until it vanishes. */
   remove(): void {
     const { pose, chosen, names } = this.#settings;
     if (chosen === undefined || pose.length < 2) return;
@@ -81,7 +81,7 @@ export class Posing {
     this.#ui.ellipsoids.focus();
   }
 
-  /** Nothing is sent any more. */
+  /** Stops the timer: no pose is sent any more. */
   close(): void {
     clearTimeout(this.#resting);
   }
@@ -104,7 +104,7 @@ export class Posing {
     this.#settings.remember(label, together ? label : '');
   }
 
-  /** Says where it is now, when the hand rests. */
+  /** Describes the ellipsoid's new position in the status line, once the change has ended. */
   #tell(what: string): void {
     const { pose, chosen } = this.#settings;
     const ellipsoid = chosen === undefined ? undefined : pose[chosen];
@@ -113,7 +113,7 @@ export class Posing {
     this.#ui.status.say(`${this.#settings.nameOf(chosen)}: ${what}; its centre is ${place}.`);
   }
 
-  /** Keys in the view; true where one was for an ellipsoid. */
+  /** Handles a key in the view; returns whether it was for an ellipsoid. */
   #key({ key, shiftKey }: KeyboardEvent, directions: Vec3[]): boolean {
     const mode = MODE_KEYS[key];
     const number = /^[1-9]$/.test(key) ? Number(key) : 0;
@@ -127,7 +127,7 @@ export class Posing {
     return true;
   }
 
-  /** The hand has left the keys: what was a preview gets fine. */
+  /** Ends a series of key presses, so that the preview ends, too. */
   #rest(): void {
     this.#settings.send(this.#settings.pose, false);
     this.#tell(DONE[this.#mode]);
@@ -168,10 +168,13 @@ const STEPS: Record<string, Step> = {
   PageDown: { axis: 2, sign: -1 },
 };
 
-/** Its front goes where the arrow points. */
+/** Signs of the rotations, by axis: the front of the ellipsoid turns in the direction of the arrow. */
 const TURN_SIGNS = [1, -1, 1] as const;
 
-/** Up and down for all axes, left and right for the first, and the third by the page keys. */
+/**
+ * Scales an ellipsoid: by up and down along all axes, by left and right along the first, by the page keys along the
+ * third.
+ */
 function sized(ellipsoid: ControlEllipsoid, { axis, sign }: Step, much: number): ControlEllipsoid {
   const factor = GROW ** (sign * much);
   const factors: Vec3 = axis === 1 ? [factor, factor, factor] : [axis === 0 ? factor : 1, 1, axis === 2 ? factor : 1];

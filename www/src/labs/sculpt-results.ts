@@ -6,10 +6,10 @@ import { type History, underWay } from '../ui/history';
 import type { LabStates } from './lab-states';
 import type { SculptParts } from './sculpt-parts';
 
-/** Milliseconds between two looks at what takes time to show, such as plots. */
+/** Least milliseconds between two updates of the plots, which take time to draw. */
 const SHOW_EVERY = 250;
 
-/** What comes of the steps, on the screen: frames, measures and plots as the worker tells them. */
+/** Displays the worker's results: frames, measures and plots. */
 export class Results {
   readonly #client: SculptClient;
   readonly #ui: SculptParts;
@@ -18,16 +18,16 @@ export class Results {
   readonly #follow: (frame: FrameEvent) => void;
   #frame: FrameEvent | undefined;
   #framePending = false;
-  /** Waits for the frame that it tells of. */
+  /** Measures to be displayed after the frame they belong to. */
   #measured: MeasuredEvent | undefined;
   #shownAt = 0;
   #more: Record<string, unknown> = {};
-  /** The undeformed meshes are shown, or on their way. */
+  /** Whether the undeformed meshes are displayed or were requested. */
   #originals = false;
-  /** Counts scenes: what is on its way from the one before is not shown. */
+  /** Counts scenes, so that replies for a previous one are discarded. */
   #scene = 0;
 
-  /** `follow` hears of each frame when it is on the screen. */
+  /** `follow` is called with each frame when it is displayed. */
   constructor(
     client: SculptClient,
     ui: SculptParts,
@@ -42,7 +42,7 @@ export class Results {
     this.#follow = follow;
   }
 
-  /** Another scene: nothing is known of it. */
+  /** Clears all results, for another scene. */
   clear(): void {
     this.#scene += 1;
     this.#frame = undefined;
@@ -55,13 +55,13 @@ export class Results {
     this.startOver();
   }
 
-  /** A new run of the same scene. */
+  /** Clears the history, for a new run of the same scene. */
   startOver(): void {
     this.#history.clear();
     this.#showHistory();
   }
 
-  /** Shows a frame at the next animation frame; only then the worker goes on. */
+  /** Displays a frame at the next animation frame; only then does the worker continue. */
   take(frame: FrameEvent): void {
     this.#history.add(frame.reports);
     if (this.#states.value === 'running') this.#ui.status.report(() => underWay(this.#history));
@@ -77,7 +77,7 @@ export class Results {
     });
   }
 
-  /** Shown after the frame that it tells of. */
+  /** Displays measures, after the frame they belong to. */
   measured(measured: MeasuredEvent): void {
     this.#measured = measured;
     if (!this.#framePending) this.#showMeasured();
@@ -98,7 +98,7 @@ export class Results {
     this.#ui.status.say(this.describe(state));
   }
 
-  /** In words, for the status line. */
+  /** Describes a state for the status line. */
   describe(state: LabState): string {
     const last = this.#history.reports.at(-1);
     if (state === 'running') return 'Running.';
@@ -108,7 +108,7 @@ export class Results {
     return state === 'done' ? `At rest: ${what}.` : `Paused at iteration ${count(last.iteration)}: ${what}.`;
   }
 
-  /** The undeformed meshes, where the layout shows them. */
+  /** Requests and displays the undeformed meshes, if the layout includes them. */
   showOriginals(): void {
     if (this.#originals || this.#ui.options.value.layout !== 'row' || !this.#states.ready) return;
     this.#originals = true;
@@ -123,7 +123,7 @@ export class Results {
     );
   }
 
-  /** Meshes that no model is needed for. */
+  /** Requests and displays stages of restructuring, which need no model. */
   showStages(kind: StageKind): void {
     const scene = this.#scene;
     this.#client.request('stages', kind).then(

@@ -8,7 +8,7 @@ import type { LabStates } from './lab-states';
 import { Rewinder } from './rewinder';
 import type { SculptParts } from './sculpt-parts';
 
-/** What the page holds beside the model, and undo brings back. */
+/** State of the page besides the model, which undo restores. */
 interface PageState {
   names: string[];
   posed: boolean;
@@ -16,17 +16,17 @@ interface PageState {
   mark: (iteration: number) => HistoryMark;
 }
 
-/** What a scene opens with. */
+/** The settings that a scene opens with. */
 export interface Adopted {
   pose: Pose;
   names: string[];
-  /** The pose is not the example's own. */
+  /** Whether the pose was set by hand, rather than by the example. */
   posed: boolean;
   film: Film | undefined;
   params: ParamValues;
 }
 
-/** The ellipsoids, the film and the parameters: changed here, handed to the worker, undone. */
+/** Ellipsoids, film and parameters: changes them, sends them to the worker, and undoes changes. */
 export class ModelSettings {
   readonly #client: SculptClient;
   readonly #ui: SculptParts;
@@ -41,10 +41,10 @@ export class ModelSettings {
   #posed = false;
   #film: Film | undefined;
   #frame = 0;
-  /** The last pose that was sent. */
+  /** Number of the last pose sent. */
   #turn = 0;
 
-  /** `onChange` hears whenever something else may be in force. */
+  /** `onChange` is called whenever the settings in force may have changed. */
   constructor(client: SculptClient, ui: SculptParts, states: LabStates, history: History, onChange: () => void) {
     this.#client = client;
     this.#ui = ui;
@@ -66,7 +66,7 @@ export class ModelSettings {
     return this.#pose;
   }
 
-  /** Whether the pose is one made by hand. */
+  /** Whether the pose was set by hand. */
   get posed(): boolean {
     return this.#posed;
   }
@@ -83,13 +83,13 @@ export class ModelSettings {
     return this.#chosen;
   }
 
-  /** Of an ellipsoid, in words. */
+  /** Returns the number and name of an ellipsoid, for messages. */
   nameOf(index: number): string {
     const name = this.#names[index];
     return name ? `Ellipsoid ${index + 1}, ${name}` : `Ellipsoid ${index + 1}`;
   }
 
-  /** Another scene: what was done to the former cannot be undone. */
+  /** Adopts another scene, and clears the undo history. */
   adopt({ pose, names, posed, film, params }: Adopted): void {
     this.#rewinder.clear();
     this.#pose = pose;
@@ -102,6 +102,7 @@ export class ModelSettings {
     this.show();
   }
 
+  /** Selects an ellipsoid, or none. */
   choose(index: number | undefined): void {
     const chosen = index !== undefined && index < this.#pose.length ? index : undefined;
     if (chosen !== this.#chosen)
@@ -110,12 +111,15 @@ export class ModelSettings {
     this.#showPose();
   }
 
-  /** Keeps what is, before it is changed. Changes with the same `together` soon after each other are one. */
+  /**
+   * Saves the present state for undo, before a change; changes with the same `together` in short succession count as
+   * one. Returns a function that forgets it.
+   */
   remember(label: string, together = ''): () => void {
     return this.#rewinder.remember(label, together);
   }
 
-  /** Sends the ellipsoids on their way. `names` where there are others than before. */
+  /** Sends the worker a target pose; `names` if the ellipsoids themselves have changed. */
   send(pose: Pose, dragging: boolean, names = this.#names): void {
     if (!this.#states.canChange) return;
     this.#ui.banner.hide();
@@ -129,12 +133,12 @@ export class ModelSettings {
     if (!dragging) this.#onChange();
   }
 
-  /** Under a hand the surface on the screen goes along at once; the model follows. */
+  /** During a drag, carries the displayed surface along at once; the model follows. Records both latencies. */
   #answer(dragging: boolean): void {
     const { ahead, answer } = this.#ui;
     const at = performance.now();
     answer.sent(this.#turn, at);
-    // After the drawing, which asked for the same animation frame before.
+    // After the drawing, which has requested the same animation frame.
     if (dragging && ahead.follow(this.#pose, this.#turn))
       requestAnimationFrame(() => answer.along(performance.now() - at));
   }
@@ -143,7 +147,7 @@ export class ModelSettings {
     return this.#names;
   }
 
-  /** The film, and where it is; the ellipsoids stay. */
+  /** Sets the film and its frame; the ellipsoids do not move. */
   async setFilm(film: Film | undefined, frame: number): Promise<void> {
     this.#film = film;
     this.#frame = frame;
@@ -151,7 +155,7 @@ export class ModelSettings {
     await this.#client.request('film', { film, frame });
   }
 
-  /** What a frame tells of the film and of where the ellipsoids go; not while a hand is ahead of it. */
+  /** Takes the film's frame and the target pose from a frame of the model, unless a newer pose was sent. */
   follow({ turn, frame, pose }: FrameEvent, playing: boolean): void {
     if (turn < this.#turn) return;
     if (playing && frame !== this.#frame) this.#posed = false;
@@ -164,7 +168,7 @@ export class ModelSettings {
     this.#ui.film.show(this.#film, frame);
   }
 
-  /** A pose that was refused: back to where the worker says they go. */
+  /** Returns to the previous target after the worker has rejected a pose. */
   refuse(pose: Pose, why: string): void {
     this.#pose = pose;
     this.#names = named(this.#names, pose.length);
@@ -172,7 +176,7 @@ export class ModelSettings {
     this.#ui.ellipsoids.complain(why);
   }
 
-  /** Live: the run goes on, or is taken up again, with the new value. */
+  /** Sets parameters of the live model; a run continues, and a model at rest is resumed. */
   setParams(values: ParamValues, what: string): Promise<void> {
     return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return this.show();
@@ -204,7 +208,7 @@ export class ModelSettings {
     });
   }
 
-  /** A new model of the same meshes, before its first step, with the parameters in force. */
+  /** Builds a new model of the same meshes with the parameters in force, before its first step. */
   rebuild(start: Pose | undefined): Promise<void> {
     return this.#states.inTurn(async () => {
       const ready = await this.#client.request('rebuild', { start, params: this.#params, pose: undefined });
@@ -219,7 +223,7 @@ export class ModelSettings {
     });
   }
 
-  /** Everything that is in force, on the page. */
+  /** Shows all settings in force on the page. */
   show(): void {
     this.#showPose();
     this.#ui.film.show(this.#film, this.#frame);
@@ -233,7 +237,7 @@ export class ModelSettings {
     this.#frame = saved.frame;
     this.#history.rewind(page.mark(saved.iteration));
     await this.#client.request('film', { film: page.film, frame: saved.frame });
-    // The worker went back to the state already; this tells what was in it.
+    // The worker has restored this state already; the reply contains its settings.
     const ready = await this.#client.request('restore', saved);
     this.#params = ready.params;
     this.#pose = ready.pose;
@@ -247,7 +251,7 @@ export class ModelSettings {
   }
 }
 
-/** As many names as ellipsoids. */
+/** Returns `count` names, padded with empty ones. */
 function named(names: string[], count: number): string[] {
   return Array.from({ length: count }, (_, k) => names[k] ?? '');
 }

@@ -20,11 +20,12 @@ import { Posing } from './sculpt-posing';
 import { Results } from './sculpt-results';
 import { ModelSettings } from './sculpt-settings';
 
+/** The colourings that the worker has to compute. */
 const SHADES: readonly string[] = ['area distortion', 'angle distortion', 'mean curvature'] satisfies SculptShade[];
 
 /**
- * The Sculpt lab: a detailed surface deformed by ellipsoids. Here its parts are put together; what is opened, set,
- * posed, filmed and shown is each in a file of its own.
+ * The Sculpt lab: a detailed surface is deformed by ellipsoids. This class connects the lab's parts; opening, settings,
+ * posing, filming and results are in files of their own.
  */
 export class SculptLab implements Lab {
   readonly #root: HTMLElement;
@@ -37,7 +38,7 @@ export class SculptLab implements Lab {
   readonly #posing: Posing;
   readonly #filming: Filming;
   readonly #opening: SculptOpening;
-  /** The parameters as the scene was opened, with what the model chose. */
+  /** Parameters that the scene opened with, including the model's own choices, but without changes by a link. */
   #usual: ParamValues = {};
   #shown: Shown = { layout: 'result', shade: undefined, textured: false };
 
@@ -59,7 +60,7 @@ export class SculptLab implements Lab {
     offerShortcuts(this.#shortcuts(), help, GUIDES.sculpt, signal);
   }
 
-  /** Opens what the address says, or else the built-in example, and runs it. */
+  /** Opens what another lab passes on, or what the address asks for, or else the first example, and runs it. */
   async start(passedOn?: PassedOn): Promise<void> {
     const open = passedOn && (() => this.#opening.bytes(passedOn.name, passedOn.bytes));
     await this.#opening.start(this.#closing.signal, () => this.#updateAddress(), open);
@@ -74,7 +75,7 @@ export class SculptLab implements Lab {
     this.#root.replaceChildren();
   }
 
-  /** What is asked for on the page, and who does it. */
+  /** Maps the user's actions to the parts that handle them. */
   #events(): PartEvents {
     return {
       onFiles: (files) => void this.#opening.files(files),
@@ -129,7 +130,7 @@ export class SculptLab implements Lab {
     ];
   }
 
-  /** Shows a scene that has been opened, as its example or link wants it, and plays it. */
+  /** Displays an opened scene, with the settings of its example or link, and plays it. */
   async #adopt(opened: Opened, { name, example, linked }: SculptSource): Promise<void> {
     this.#states.ready = true;
     this.#usual = { ...opened.params };
@@ -215,7 +216,7 @@ export class SculptLab implements Lab {
     this.#ask(this.#client.request('step', { count: steps }));
   }
 
-  /** Starts over, with the ellipsoids where the scene began. */
+  /** Rebuilds the model, with the ellipsoids in the scene's start pose. */
   async #reset(): Promise<void> {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
@@ -231,12 +232,12 @@ export class SculptLab implements Lab {
     }
   }
 
-  /** Waits for nothing; tells when it fails. */
+  /** Reports a request's failure, without waiting for its reply. */
   #ask(request: Promise<unknown>): void {
     request.catch((error) => this.#states.fail('That did not work.', error));
   }
 
-  /** The page's address says what is open and how it is set. */
+  /** Updates the page's address with what is open and the settings. */
   #updateAddress(): void {
     const { source } = this.#opening;
     if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;

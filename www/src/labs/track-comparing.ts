@@ -4,13 +4,14 @@ import { type ComparedRun, comparedRun, type Other } from '../ui/track-compare';
 import type { TrackResults } from './track-results';
 import type { TrackSettings } from './track-settings';
 
+/** Names of the enrichments in the comparison. */
 const NAMES: Record<Enrichment, string> = {
   none: 'as measured',
   linear: 'linear',
   flow: 'by flow',
 };
 
-/** The present run beside the same with one thing else; nothing when it was cancelled. */
+/** Repeats the present run with one setting changed; returns both for the comparison, or undefined if cancelled. */
 export async function compareWith(
   client: TrackClient,
   { setup, params }: TrackSettings,

@@ -1,4 +1,4 @@
-/** The Track lab's settings as the part of an address after `#track?`, and back. */
+/** Converts the Track lab's settings to the hash of an address, `#track?…`, and back. */
 import type { ParamValues, Vec3 } from '../protocol';
 import { FILMS, OWN_PREPARATION, type TrackExample } from '../track/examples';
 import { viewOf } from '../track/presets';
@@ -8,9 +8,10 @@ import { differing, readValue } from './link';
 
 const ADDRESS = '#track';
 
+/** The settings in a link; missing ones are as in the example, or else the defaults. */
 export interface LinkedTrack {
   example?: string;
-  /** The name of a file of one's own: it is not in the link. */
+  /** Name of the user's own file, which is not part of the link. */
   file?: string;
   params: ParamValues;
   preparation: Partial<Preparation>;
@@ -19,6 +20,7 @@ export interface LinkedTrack {
   view: Partial<TrackViewOptions>;
 }
 
+/** Present settings of the lab, from which a link is made. */
 export interface TrackSettings {
   example: TrackExample | undefined;
   file: string;
@@ -29,7 +31,7 @@ export interface TrackSettings {
 const SWITCHES = ['surface', 'edges', 'region'] as const;
 const ENRICHMENTS: readonly string[] = ['none', 'linear', 'flow'] satisfies Enrichment[];
 
-/** What the example, or else an image of one's own, is opened with, changed as a link says. */
+/** Returns the setup that an example, or else the user's own image, opens with, changed by a link. */
 export function setupOf(example: TrackExample | undefined, linked?: LinkedTrack): Setup {
   const { box, at } = linked ?? {};
   return {
@@ -40,7 +42,7 @@ export function setupOf(example: TrackExample | undefined, linked?: LinkedTrack)
   };
 }
 
-/** Only what differs from what the example, or else the method, brings along. */
+/** Returns the settings that differ from those of the example, or else from the defaults. */
 export function linkOf({ example, file, setup, view }: TrackSettings): LinkedTrack {
   const usual = setupOf(example);
   const same = (one: unknown, other: unknown) => JSON.stringify(one) === JSON.stringify(other);
@@ -57,6 +59,7 @@ export function linkOf({ example, file, setup, view }: TrackSettings): LinkedTra
 
 const asText = (values: number[]) => values.map((value) => Number(value.toFixed(3))).join(',');
 
+/** Returns the hash of an address for a link's settings. */
 export function toHash({ example, file, params, preparation, box, at, view }: LinkedTrack): string {
   const query = new URLSearchParams();
   for (const [name, value] of Object.entries({ example, file, ...preparation, ...view }))
@@ -68,7 +71,10 @@ export function toHash({ example, file, params, preparation, box, at, view }: Li
   return text ? `${ADDRESS}?${text}` : ADDRESS;
 }
 
-/** Undefined where the address is not one of this lab with something to say. What makes no sense is left out. */
+/**
+ * Parses the hash of an address; undefined if it is for another lab or contains no settings. Invalid settings are
+ * ignored.
+ */
 export function fromHash(hash: string): LinkedTrack | undefined {
   const [address = '', text] = hash.split(/\?(.*)/s);
   if (address !== ADDRESS || !text) return undefined;

@@ -6,7 +6,7 @@ import type { MoreMeasure } from '../ui/measures';
 const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
 const round = (value: number) => figure(Number(value.toPrecision(3)));
 
-/** What is measured beside the surface of the frame that is shown. */
+/** Measures of the tracking, shown besides those of the frame's surface. */
 export const TRACK_ROWS: MoreMeasure[] = [
   {
     name: 'ejection',
@@ -44,16 +44,17 @@ export const TRACK_ROWS: MoreMeasure[] = [
   { name: 'noise', label: 'Noise σ', help: 'Measured in the box, intensity units', text: round },
 ];
 
+/** The results so far that the measures are computed from. */
 export interface Tracked {
   frames: readonly TrackedFrame[];
-  /** Of the image. */
+  /** Number of frames of the image. */
   count: number;
   frame: number;
   closing: number | undefined;
   noise: number;
 }
 
-/** For the rows, and for other programs. */
+/** Returns the values of these measures by name, and more for programs that read the page. */
 export function moreOf({ frames, count, frame, closing, noise }: Tracked): Record<string, unknown> {
   const beat = frames.length === count ? beatOf(frames.map(({ facts }) => facts.volume)) : undefined;
   const shown = frames[frame];
@@ -73,7 +74,7 @@ const COLUMNS = [
   ...['volume', 'area', 'triangles', 'folded', 'rejected', 'held', 'retracted', 'steps', 'correction'],
 ] as const;
 
-/** One line a frame: all that the table shows, in world units. */
+/** Returns the data of all tracked frames as CSV, one line per frame, in world units. */
 export function framesCsv(frames: readonly TrackedFrame[], truth: readonly number[] | undefined): string {
   const known = frames.some(({ error }) => error);
   const head = ['frame', ...COLUMNS, 'crossings', ...(known ? ['error', 'error (95 %)', 'true volume'] : [])];

@@ -12,12 +12,12 @@ import type { TrackParts } from './track-parts';
 
 export type TrackSource = Source<TrackExample, LinkedTrack, FilmSource>;
 
-/** An image that was opened, and how the tracker of it was made. */
+/** An opened image, and the setup of its tracker. */
 export interface Opened extends OpenedFilm {
   setup: Setup;
 }
 
-/** Opens 4D images. */
+/** Opens 4D images in the Track lab, and builds trackers of them. */
 export class TrackOpening extends Opening<TrackExample, LinkedTrack, FilmSource, Opened> {
   protected readonly first = FILMS[0];
   readonly #client: TrackClient;

@@ -4,7 +4,7 @@ import { h, section, uniqueId } from '../ui/dom';
 import { figure, milliseconds } from '../ui/format';
 import { folded } from './extract-page';
 
-/** The parts the page is put together from. */
+/** Elements that the lab's page is laid out from. */
 export interface Parts {
   data: HTMLElement;
   figure: HTMLElement;
@@ -33,7 +33,7 @@ export interface Parts {
   exercises: HTMLElement;
 }
 
-/** Lays the lab out: set-up on one side, view and slices in the middle, what comes of it on the other side. */
+/** Lays the lab out: setup on one side, view and slices in the middle, results on the other side. */
 export function layOut(root: HTMLElement, parts: Parts): void {
   root.className = 'lab track';
   const scene = h('div', { class: 'scene' }, parts.canvas);
@@ -78,10 +78,10 @@ export function layOut(root: HTMLElement, parts: Parts): void {
   );
 }
 
-/** What is told of an image, so that its place is there before one is open. */
+/** Names of the facts about an image; they are shown before one is open, so that the layout does not shift. */
 const FACTS = ['File', 'Frames', 'Voxels', 'Size of a voxel', 'Tracked in', 'Prepared in'];
 
-/** Which image is open, and how to open others. */
+/** Panel that shows the open image and opens others. */
 export class FilmPanel {
   readonly element: HTMLElement;
   readonly #examples: HTMLSelectElement;
@@ -126,7 +126,7 @@ export class FilmPanel {
     );
   }
 
-  /** Shows in the list which example is open, or that a file is. */
+  /** Selects the open example in the list, or “Your file” if it is none. */
   choose(example: TrackExample | undefined): void {
     this.#own.hidden = example !== undefined;
     this.#examples.value = example?.id ?? '';

@@ -57,7 +57,10 @@ export interface PartEvents extends TransportEvents, RegionEvents {
   onError: (title: string, error: unknown) => void;
 }
 
-/** All that the Track lab shows, put in its place. It shows what it is told and tells what was asked for. */
+/**
+ * All controls and views of the Track lab, laid out. They display what they are given and report the user's actions as
+ * events.
+ */
 export class TrackParts {
   readonly #canvas = h('canvas', {
     tabindex: 0,
@@ -91,7 +94,7 @@ export class TrackParts {
   readonly #thresholdHolder = h('div');
   #params: ParamControls | undefined;
   #threshold: StepHeight | undefined;
-  /** k. */
+  /** Half width k of the window, in voxels. */
   #window = 2;
 
   constructor(root: HTMLElement, client: TrackClient, signal: AbortSignal, events: PartEvents) {
@@ -190,7 +193,7 @@ export class TrackParts {
     this.#thresholdHolder.replaceWith(this.#threshold.element);
   }
 
-  /** Another image is open. */
+  /** Shows a newly opened image. */
   adopt(opened: Opened, example: TrackExample | undefined, name: string): void {
     this.saving.name = (example?.id ?? name).replace(/^.*\//, '');
     this.measures.unit = example?.unit ?? 'mm';
@@ -216,7 +219,7 @@ export class TrackParts {
     else this.#params?.complain(name, message);
   }
 
-  /** `tracked`: so many frames have their surface; `here`: the one that is shown has. */
+  /** `tracked` is the number of frames with a surface; `here`, whether the displayed frame has one. */
   showState(state: LabState, ready: boolean, tracked: number, here: boolean): void {
     this.transport.showState(state, ready);
     const idle = ready && state !== 'loading';

@@ -7,22 +7,22 @@ import type { LabStates } from './lab-states';
 import { moreOf } from './track-measures';
 import type { TrackParts } from './track-parts';
 
-/** What has come of a run so far; nothing of it changes any more. */
+/** Immutable snapshot of the results so far, for undo. */
 export interface TrackRecord {
   frames: readonly TrackedFrame[];
   closing: number | undefined;
   mark: (iteration: number) => HistoryMark;
 }
 
-/** What of an image the results need. */
+/** The image, as far as the results need it. */
 interface Film {
   volume: VolumeView;
-  /** Slices of the image as it was opened. */
+  /** Number of slices of the image before its preparation. */
   slices: number;
   truth: number[] | undefined;
 }
 
-/** What comes of the steps, on the screen: one frame of it at a time, and what all together say. */
+/** Displays the worker's results: one frame at a time, and the volume curve of all. */
 export class TrackResults {
   readonly #client: TrackClient;
   readonly #ui: TrackParts;
@@ -32,16 +32,16 @@ export class TrackResults {
   #frames: readonly TrackedFrame[] = [];
   #closing: number | undefined;
   #frame = 0;
-  /** Somebody looks at a frame of their choice while others are being found. */
+  /** Whether the user has chosen the displayed frame, so that new frames do not replace it. */
   #held = false;
   #votes: Votes | undefined;
   #between: { key: string; between: Between } | undefined;
-  /** What was asked of the worker and has not come yet. */
+  /** Kinds of requests that are pending. */
   #asked = new Set<string>();
-  /** Counts runs: what is on its way from the one before is not shown. */
+  /** Counts runs, so that replies for a previous one are discarded. */
   #run = 0;
   #other: { volumes: number[]; name: string } | undefined;
-  /** Of the parameters in force. */
+  /** Parameters in force, and the noise of the image. */
   window = 2;
   threshold = 1;
   noise = 0;
@@ -57,7 +57,7 @@ export class TrackResults {
     return this.#frames;
   }
 
-  /** No step was done yet. */
+  /** Whether no step has been done yet. */
   get isNew(): boolean {
     return this.#history.reports.length === 0;
   }
@@ -74,30 +74,31 @@ export class TrackResults {
     return this.#film?.truth;
   }
 
-  /** Another image, or the same prepared in another way. */
+  /** Sets the image: another one, or the same after another preparation. */
   setFilm(volume: VolumeView, slices: number, truth: number[] | undefined, keep: boolean): void {
     this.#film = { volume, slices, truth };
     this.#between = undefined;
     this.#ui.view.setVolume(volume, keep);
   }
 
-  /** A new run of the image: nothing is known of it. */
+  /** Clears all results, for a new run. */
   startOver(): void {
     this.#history.clear();
     this.#begin([], undefined);
   }
 
-  /** Back to where so many steps were done: the surfaces of all frames are found anew. */
+  /** Sets the results back to an iteration at which no surface was found yet. */
   rewind(iteration: number): void {
     this.#history.rewind(this.#history.marker()(iteration));
     this.#begin([], undefined);
   }
 
+  /** Returns the results so far, for undo. */
   record(): TrackRecord {
     return { frames: this.#frames, closing: this.#closing, mark: this.#history.marker() };
   }
 
-  /** As it was after so many steps. */
+  /** Restores results as of an iteration. */
   restore({ frames, closing, mark }: TrackRecord, iteration: number, done: boolean): void {
     this.#history.rewind(mark(iteration));
     const count = this.#film?.volume.frames ?? 0;
@@ -117,11 +118,12 @@ export class TrackResults {
     this.show(frames.length > 0 ? Math.min(this.#frame, frames.length - 1) : 0);
   }
 
-  /** The run goes on: the newest frame is the one to look at. */
+  /** Displays the newest frame from now on, as the run continues. */
   follow(): void {
     this.#held = false;
   }
 
+  /** Takes the result of a step. */
   take({ report, index, frame, closing }: StepEvent): void {
     this.#history.add([report]);
     this.#closing = closing;
@@ -132,12 +134,13 @@ export class TrackResults {
     else this.show(newest);
   }
 
-  /** By hand: it stays, whatever comes meanwhile. */
+  /** Displays a frame chosen by the user, and stays at it while others are tracked. */
   choose(frame: number): void {
     this.#held = true;
     this.show(frame);
   }
 
+  /** Displays a frame with its measures, and updates everything that depends on it. */
   show(frame: number): void {
     const { view, frames: bar, measures } = this.#ui;
     const count = this.#film?.volume.frames ?? 1;
@@ -156,6 +159,7 @@ export class TrackResults {
     this.#root.dataset.frame = String(this.#frame + 1);
   }
 
+  /** Shows the volume curve and the table of frames. */
   showCurve(): void {
     const { curve, table } = this.#ui;
     const frames = this.#film?.volume.frames ?? 1;
@@ -166,19 +170,19 @@ export class TrackResults {
     table.show(facts, errors, this.#frame);
   }
 
-  /** Of lengths. */
+  /** Unit of lengths. */
   #unit = 'mm';
   set unit(unit: string) {
     this.#unit = unit;
   }
 
-  /** Another run's volumes beside these. */
+  /** Shows the volumes of another run beside these, for comparison. */
   set other(other: { volumes: number[]; name: string } | undefined) {
     this.#other = other;
     this.showCurve();
   }
 
-  /** The pictures below the view, and the points of the boundary; what they need is asked for. */
+  /** Shows the pictures below the view and the boundary votes; requests the data that is missing. */
   showStills(): void {
     const film = this.#film;
     if (!film) return;
@@ -200,7 +204,7 @@ export class TrackResults {
     });
   }
 
-  /** In words, for the status line. */
+  /** Describes a state for the status line. */
   describe(state: LabState): string {
     const count = this.#film?.volume.frames ?? 0;
     const steps = this.#history.reports.length;
@@ -216,7 +220,7 @@ export class TrackResults {
     return this.#ui.frames.element;
   }
 
-  /** The slice of the image as it was opened that is nearest to the crosshair and has two neighbours. */
+  /** Returns the index of the slice of the unprepared image that is nearest to the crosshair and has two neighbours. */
   #pair({ volume, slices }: Film): number {
     const { voxel } = this.#ui.view.crosshair;
     const factor = slices > 1 ? (volume.dims[2] - 1) / (slices - 1) : 1;
@@ -252,7 +256,7 @@ export class TrackResults {
     );
   }
 
-  /** One of a kind at a time; when it has come, what is needed then is asked for. */
+  /** Sends at most one request of a kind at a time; after the reply, requests what is needed by then. */
   #ask<Reply>(kind: string, request: () => Promise<Reply>, take: (reply: Reply) => void): void {
     if (this.#asked.has(kind)) return;
     this.#asked.add(kind);

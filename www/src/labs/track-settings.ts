@@ -7,12 +7,12 @@ import { Rewinder } from './rewinder';
 import type { TrackParts } from './track-parts';
 import type { TrackRecord, TrackResults } from './track-results';
 
-/** What the page holds beside the tracker, and undo brings back. */
+/** State of the page besides the tracker, which undo restores. */
 interface PageState {
   record: TrackRecord;
 }
 
-/** How the image is prepared and tracked: changed here, handed to the worker, undone. */
+/** Setup of the tracking: changes it, sends it to the worker, and undoes changes. */
 export class TrackSettings {
   readonly #client: TrackClient;
   readonly #ui: TrackParts;
@@ -29,7 +29,9 @@ export class TrackSettings {
   };
   #ready: Omit<Ready, 'volume'> = { params: {}, suggested: 1, noise: 0 };
 
-  /** `onChange` hears whenever something else may be in force; `onVolume` of the image prepared in another way. */
+  /**
+   * `onChange` is called whenever the settings in force may have changed, `onVolume` when the image was prepared again.
+   */
   constructor(
     client: TrackClient,
     ui: TrackParts,
@@ -51,36 +53,38 @@ export class TrackSettings {
     );
   }
 
-  /** As it was asked for: `params` are those that were not left to the method. */
+  /** The setup as requested; its `params` are those not left to the method. */
   get setup(): Setup {
     return this.#setup;
   }
 
-  /** All parameters as they are in force. */
+  /** All parameters in force. */
   get params(): ParamValues {
     return this.#ready.params;
   }
 
+  /** The edge threshold τ that the noise suggests. */
   get suggested(): number {
     return this.#ready.suggested;
   }
 
+  /** Standard deviation of the noise, in intensity units. */
   get noise(): number {
     return this.#ready.noise;
   }
 
-  /** Another image: what was done to the former cannot be undone. */
+  /** Adopts a newly opened image, and clears the undo history. */
   adopt(setup: Setup, ready: Ready): void {
     this.#rewinder.clear();
     this.#take(setup, ready);
   }
 
-  /** Keeps what is, before it is changed. */
+  /** Saves the present state for undo, before a change. Returns a function that forgets it. */
   remember(label: string, together = ''): () => void {
     return this.#rewinder.remember(label, together);
   }
 
-  /** What a tracker is made with is changed: a new one, which runs. */
+  /** Changes the setup: builds a new tracker, and runs it. */
   change(changed: Partial<Omit<Setup, 'params'>>, what: string): Promise<void> {
     return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return;
@@ -96,7 +100,7 @@ export class TrackSettings {
         await this.#client.request('play', undefined);
       } catch (error) {
         forget();
-        // Cancelled: the engine is being started again.
+        // Cancelled: the engine is being restarted.
         if (this.#states.engineBroken) return;
         this.#onChange();
         this.#states.fail(`That ${what} cannot be.`, error);
@@ -104,7 +108,7 @@ export class TrackSettings {
     });
   }
 
-  /** All frames anew with the new value, as far as it makes a difference to them. */
+  /** Sets parameters, and tracks again as far as the results depend on them. */
   setParams(values: ParamValues, what: string): Promise<void> {
     return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return;
@@ -129,7 +133,7 @@ export class TrackSettings {
     });
   }
 
-  /** A new tracker of the same image, before its first step. */
+  /** Builds a new tracker of the same image, before its first step. */
   rebuild(): Promise<void> {
     return this.#states.inTurn(async () => {
       const ready = await this.#client.request('rebuild', this.#setup);
@@ -152,7 +156,7 @@ export class TrackSettings {
   }
 
   async #goTo(saved: SavedTrack, { record }: PageState): Promise<void> {
-    // The worker went back to the state already; this tells what was in it.
+    // The worker has restored this state already; the reply contains its settings.
     const ready = await this.#client.request('restore', saved);
     const asBefore = JSON.stringify(saved.setup.preparation) === JSON.stringify(this.#setup.preparation);
     const volume = asBefore ? undefined : await this.#client.request('view', undefined);

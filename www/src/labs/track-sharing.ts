@@ -1,4 +1,6 @@
-/** Gives on what the Track lab has: as an address, as files, and to the Sculpt lab. */
+/**
+ * Shares the state of the Track lab as an address, saves its results as files, and passes a surface to the Sculpt lab.
+ */
 import { zipSync } from 'three/addons/libs/fflate.module.js';
 import type { TrackClient } from '../track/client';
 import { copyAddress, FILE_LACKS, showAddress } from './address';
@@ -35,7 +37,7 @@ export class TrackSharing {
     this.#opening = opening;
   }
 
-  /** The page's address says what is open and how it is set. */
+  /** Updates the page's address with what is open and the settings. */
   updateAddress(): void {
     const { source } = this.#opening;
     if (!source || (this.#states.value === 'loading' && !this.#states.ready)) return;
@@ -54,7 +56,7 @@ export class TrackSharing {
     work[what]().catch((error) => this.#states.fail('That could not be saved.', error));
   }
 
-  /** The surface of the frame that is shown, as a mesh to be deformed. */
+  /** Passes the displayed frame's surface on as a mesh to deform. */
   toSculpt(passOn: PassOn): void {
     const { frame } = this.#results;
     this.#client.request('export', { frame, format: 'ply' }).then(
@@ -63,7 +65,7 @@ export class TrackSharing {
     );
   }
 
-  /** The surface of each frame that is done, as PLY, in one archive. */
+  /** Saves the surfaces of all tracked frames as PLY files in one archive. */
   async #frames(): Promise<void> {
     const { frames } = this.#results;
     const files: Record<string, Uint8Array> = {};
@@ -72,7 +74,7 @@ export class TrackSharing {
       const name = `frame-${String(frame + 1).padStart(digits, '0')}.ply`;
       files[name] = await this.#client.request('export', { frame, format: 'ply' });
     }
-    // Numbers hardly shrink: quick rather than small.
+    // Fast compression: coordinates hardly compress anyway.
     this.#ui.saving.bytes('zip', zipSync(files, { level: 1 }), 'application/zip');
   }
 

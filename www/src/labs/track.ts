@@ -20,8 +20,8 @@ import { TrackSettings } from './track-settings';
 import { TrackSharing } from './track-sharing';
 
 /**
- * The Track lab: a surface that is followed through the frames of a 4D image. Here its parts are put together; what is
- * opened, set, shown, compared and saved is each in a file of its own.
+ * The Track lab: a surface is tracked through the frames of a 4D image. This class connects the lab's parts; opening,
+ * settings, results, comparison and sharing are in files of their own.
  */
 export class TrackLab implements Lab {
   readonly #root: HTMLElement;
@@ -35,10 +35,10 @@ export class TrackLab implements Lab {
   readonly #sharing: TrackSharing;
   readonly #passOn: PassOn;
   #volume: VolumeView | undefined;
-  /** Slices of the image as it was opened. */
+  /** Number of slices of the image before its preparation. */
   #slices = 1;
   #truth: number[] | undefined;
-  /** The milliseconds of the run, for comparisons; unknown where it was interrupted. */
+  /** Start and duration of the run in milliseconds, for comparisons; undefined if it was interrupted. */
   #began: number | undefined;
   #took: number | undefined;
 
@@ -65,7 +65,7 @@ export class TrackLab implements Lab {
     offerShortcuts(this.#shortcuts(), help, GUIDES.track, signal);
   }
 
-  /** Opens what the address says, or else the built-in example, and runs it. */
+  /** Opens what the address asks for, or else the first example, and runs it. */
   async start(_passedOn?: PassedOn): Promise<void> {
     await this.#opening.start(this.#closing.signal, () => this.#sharing.updateAddress());
   }
@@ -78,7 +78,7 @@ export class TrackLab implements Lab {
     this.#root.replaceChildren();
   }
 
-  /** What is asked for on the page, and who does it. */
+  /** Maps the user's actions to the parts that handle them. */
   #events(): PartEvents {
     return {
       onFiles: (files) => void this.#opening.files(files),
@@ -126,7 +126,7 @@ export class TrackLab implements Lab {
     ];
   }
 
-  /** Shows an image that has been opened, as its example or link wants it, and tracks. */
+  /** Displays an opened image, with the settings of its example or link, and starts tracking. */
   async #adopt(opened: Opened, { name, example, linked }: TrackSource): Promise<void> {
     const { setup } = opened;
     this.#states.ready = true;
@@ -149,7 +149,7 @@ export class TrackLab implements Lab {
     this.#results.setFilm(volume, this.#slices, this.#truth, keep);
   }
 
-  /** The voxels that are looked at. */
+  /** The region of interest in voxels; the whole image by default. */
   get #region(): VoxelBox | undefined {
     if (!this.#volume) return undefined;
     const { dims, affine } = this.#volume;
@@ -224,7 +224,7 @@ export class TrackLab implements Lab {
       .catch((error) => this.#states.fail('The step could not be done.', error));
   }
 
-  /** Starts over, with the settings as they are. */
+  /** Rebuilds the tracker, with the same settings. */
   async #reset(): Promise<void> {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
@@ -255,7 +255,7 @@ export class TrackLab implements Lab {
     }
   }
 
-  /** Waits for nothing; tells when it fails. */
+  /** Reports a request's failure, without waiting for its reply. */
   #ask(request: Promise<unknown>): void {
     request.catch((error) => this.#states.fail('That did not work.', error));
   }
@@ -270,7 +270,7 @@ export class TrackLab implements Lab {
     } else if (this.#states.enter(event.state)) this.#settled(event.state);
   }
 
-  /** Now and then, for those who listen: each frame would be too much. */
+  /** Reports progress to screen readers occasionally: every frame would be too often. */
   #report({ index }: StepEvent): void {
     if (index === undefined || this.#states.value !== 'running') return;
     const { frames } = this.#results;
@@ -285,7 +285,7 @@ export class TrackLab implements Lab {
     else this.#ui.frames.stop();
   }
 
-  /** A run from its first step to its end without a pause has a time that can be compared. */
+  /** Measures the duration of a run; only one without a pause can be compared. */
   #time(state: 'running' | 'paused' | 'done'): void {
     if (state === 'running') this.#began = this.#results.isNew ? performance.now() : undefined;
     else if (state === 'done' && this.#began !== undefined) this.#took = performance.now() - this.#began;

@@ -1,18 +1,20 @@
-/** What one can go back to: states of the run, newest last, as many as fit. */
+/** Undo history: saved states, newest last, within limits. */
 
+/** A saved state, from before a change. */
 export interface Checkpoint<State> {
-  /** What was done after it: 'change of rigidity', 'step'. */
+  /** Name of the change that followed, such as 'change of rigidity' or 'step'. */
   label: string;
   bytes: number;
   state: State;
 }
 
+/** Limits of the undo history: number and total size of its states. */
 export interface UndoLimits {
   entries: number;
   bytes: number;
 }
 
-/** Two stacks: what can be undone, and what was undone and can be done again until something else is done. */
+/** Undo and redo stacks; a new change clears the redo stack. */
 export class UndoStack<State> {
   readonly #limits: UndoLimits;
   #past: Checkpoint<State>[] = [];
@@ -22,11 +24,12 @@ export class UndoStack<State> {
     this.#limits = limits;
   }
 
-  /** What would be undone, in words. */
+  /** Name of the change that undo would revert. */
   get undoable(): string | undefined {
     return this.#past.at(-1)?.label;
   }
 
+  /** Name of the change that redo would repeat. */
   get redoable(): string | undefined {
     return this.#future.at(-1)?.label;
   }
@@ -36,23 +39,24 @@ export class UndoStack<State> {
     this.#future = [];
   }
 
-  /** Takes the state before something is done. What had been undone is gone then. */
+  /** Adds the state before a change, and clears the redo stack. */
   push(checkpoint: Checkpoint<State>): void {
     this.#future = [];
     this.#past.push(checkpoint);
     this.#trim();
   }
 
-  /** Forgets the newest state: what was to follow it did not happen. */
+  /** Removes a state whose change did not happen. */
   drop(checkpoint: Checkpoint<State>): void {
     this.#past = this.#past.filter((one) => one !== checkpoint);
   }
 
-  /** The state to go back to; `now` is kept for doing it again. */
+  /** Returns the state before the last change; `now` is kept for redo. */
   undo(now: Omit<Checkpoint<State>, 'label'>): State | undefined {
     return this.#exchange(this.#past, this.#future, now);
   }
 
+  /** Returns the state after the last undone change; `now` is kept for undo. */
   redo(now: Omit<Checkpoint<State>, 'label'>): State | undefined {
     return this.#exchange(this.#future, this.#past, now);
   }
@@ -69,7 +73,7 @@ export class UndoStack<State> {
     return checkpoint.state;
   }
 
-  /** Lets the oldest go; the last one to go back to stays, however large. */
+  /** Removes the oldest states beyond the limits; the last state to undo to stays, however large. */
   #trim(): void {
     const size = () => [...this.#past, ...this.#future].reduce((sum, { bytes }) => sum + bytes, 0);
     while (this.#past.length > this.#limits.entries || (this.#past.length > 1 && size() > this.#limits.bytes))

@@ -1,16 +1,17 @@
 import { Channel } from '../channel';
 import type { Requests, ShownMessage, WorkerEvent } from './protocol';
 
+/** Starts the Reconstruct lab's worker. */
 export const spawnReconstruct = () =>
   new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'vesicle reconstruct' });
 
-/** The Reconstruct lab's worker, from the page. */
+/** The page's client of the Reconstruct lab's worker. */
 export class ReconstructClient extends Channel<Requests, WorkerEvent> {
   constructor(onEvent: (event: WorkerEvent) => void) {
     super(spawnReconstruct, onEvent);
   }
 
-  /** The surface last sent is on the screen: another may come. */
+  /** Tells the worker that the surface it sent last is on the screen, so that it may send another. */
   shown(): void {
     const message: ShownMessage = { kind: 'shown' };
     this.tell(message);

@@ -1,13 +1,13 @@
-/** Points that are computed: the same on every machine, from a seed. */
+/** Computed example point clouds: reproducible on every machine, by seeded random numbers. */
 import type { Vec3 } from '../protocol';
 import type { Cloud } from './protocol';
 
 export type PointShape = 'torus' | 'two balls' | 'cube corner' | 'uneven ball';
 
-/** How far points lie off their surface, as a standard deviation. */
+/** Standard deviation of the points' distance from their surface; some shapes use a fraction of it. */
 const NOISE = 0.02;
 
-/** Numbers from 0 to 1 that look random: mulberry32. */
+/** Returns a generator of pseudo-random numbers from 0 to 1 (mulberry32). */
 export function seeded(seed: number): () => number {
   let state = seed;
   return () => {
@@ -18,7 +18,7 @@ export function seeded(seed: number): () => number {
   };
 }
 
-/** Normally distributed, standard deviation 1 (Box and Muller). */
+/** Returns a normally distributed number of standard deviation 1 (Box and Muller). */
 function gauss(random: () => number): number {
   return Math.sqrt(-2 * Math.log(1 - random())) * Math.cos(2 * Math.PI * random());
 }
@@ -30,6 +30,7 @@ const SHAPES: Record<PointShape, { seed: number; count: number; point: (random: 
   'uneven ball': { seed: 4, count: 1200, point: onUnevenBall },
 };
 
+/** Returns the points of a computed shape. */
 export function computedCloud(shape: PointShape): Cloud {
   const { seed, count, point } = SHAPES[shape];
   const random = seeded(seed);
@@ -43,7 +44,10 @@ export function computedCloud(shape: PointShape): Cloud {
   return { points };
 }
 
-/** Radius 1, thickness 0.35 to each side; rejection makes it even over the area. */
+/**
+ * Samples a torus of radii 1 and 0.35; undefined for samples that are rejected to make the density uniform over the
+ * area.
+ */
 function onTorus(random: () => number): Vec3 | undefined {
   const [around, across] = [2 * Math.PI * random(), 2 * Math.PI * random()];
   const [big, small] = [1, 0.35];
@@ -53,12 +57,14 @@ function onTorus(random: () => number): Vec3 | undefined {
   return [out * Math.cos(around), out * Math.sin(around), thick * Math.sin(across)];
 }
 
+/** Samples one of two spheres of radius 0.6, apart from each other. */
 function onTwoBalls(random: () => number): Vec3 {
   const [x, y, z] = direction(random);
   const radius = 0.6 + 0.5 * NOISE * gauss(random);
   return [radius * x + (random() < 0.5 ? -0.8 : 0.8), radius * y, radius * z];
 }
 
+/** Returns a random unit vector, uniformly distributed. */
 function direction(random: () => number): Vec3 {
   const z = 2 * random() - 1;
   const angle = 2 * Math.PI * random();
@@ -66,7 +72,10 @@ function direction(random: () => number): Vec3 {
   return [flat * Math.cos(angle), flat * Math.sin(angle), z];
 }
 
-/** Three faces of a cube around one corner, as a scanner in front of that corner sees them, with noise along its rays. */
+/**
+ * Samples the three faces at one corner of a cube that a scanner in front of the corner sees, with noise along its
+ * rays.
+ */
 function onCorner(random: () => number): Vec3 {
   const [u, v, face] = [random(), random(), Math.floor(3 * random())];
   const at: Vec3 = [0, 0, 0];
@@ -77,7 +86,10 @@ function onCorner(random: () => number): Vec3 {
   return at.map((x) => x + along / Math.sqrt(3)) as Vec3;
 }
 
-/** Dense on one side, sparse on the other, and none at the top and the bottom. */
+/**
+ * Samples a sphere: densely on one side, sparsely on the other, not at all at the top and bottom. Undefined for
+ * rejected samples.
+ */
 function onUnevenBall(random: () => number): Vec3 | undefined {
   const [x, y, z] = direction(random);
   if (Math.abs(z) > 0.8 || random() > 0.12 + 0.88 * (0.5 + 0.5 * x) ** 2) return undefined;

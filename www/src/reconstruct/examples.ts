@@ -2,16 +2,16 @@ import type { SurfaceColor } from '../view/surface';
 import type { PointShape } from './clouds';
 import type { ParamValues } from './protocol';
 
-/** Points that come with the page, the settings that suit them, and whom to thank. */
+/** An example of the Reconstruct lab: points, suitable settings and credits. */
 export interface CloudExample {
   id: string;
   name: string;
-  /** A file beside the page, or points to compute. */
+  /** A file served with the page, or a computed shape. */
   source: { file: string } | { shape: PointShape };
-  /** A folder with the photographs that the points were made from, and their cameras. */
+  /** Folder with the photographs that the points were made from, and their cameras. */
   photographs?: string;
   up: 'y' | 'z';
-  /** −1 to look at it from behind at first; see the view. */
+  /** −1 to view it from behind at first; see `ReconstructionView.setCloud`. */
   front?: -1;
   maxPoints?: number;
   keepComponents?: number;
@@ -22,7 +22,7 @@ export interface CloudExample {
 
 const SPOT = 'Spot by Keenan Crane, public domain; rendered and turned into points for this page.';
 
-/** The first is shown when the lab opens. */
+/** The examples of the Reconstruct lab. The first one opens by default. */
 export const CLOUDS: [CloudExample, ...CloudExample[]] = [
   {
     id: 'spot-stereo',
@@ -77,7 +77,7 @@ export const CLOUDS: [CloudExample, ...CloudExample[]] = [
   },
 ];
 
-/** Where a file that comes with the page lies. */
+/** Returns the address of a data file served with the page. */
 export function dataUrl(file: string): string {
   return new URL(`data/${file}`, document.baseURI).href;
 }

@@ -1,4 +1,4 @@
-/** The radial functions, to draw them. The solver has its own. */
+/** The radial basis functions, for plotting. The solver has its own implementation. */
 import type { ParamValues } from '../protocol';
 
 export interface KernelParams {
@@ -8,9 +8,10 @@ export interface KernelParams {
   sigma: number;
 }
 
-/** Below this r the closed form loses its digits, and φ(0) is as good. */
+/** Share of τ: below r = NEAR τ the closed form loses its digits, and φ(0) is as accurate. */
 const NEAR = 1e-4;
 
+/** Returns the kernel and its constants from the method's parameters, with defaults for missing ones. */
 export function kernelParams(params: ParamValues): KernelParams {
   const number = (name: string, otherwise: number) => (typeof params[name] === 'number' ? params[name] : otherwise);
   return {
@@ -21,7 +22,7 @@ export function kernelParams(params: ParamValues): KernelParams {
   };
 }
 
-/** φ(r). */
+/** Returns φ(r) of the kernel in use. */
 export function phi({ kernel, delta, tau, sigma }: KernelParams, r: number): number {
   switch (kernel) {
     case 'thin-plate':
@@ -35,7 +36,7 @@ export function phi({ kernel, delta, tau, sigma }: KernelParams, r: number): num
   }
 }
 
-/** Equation 6 of the paper in real form, with δ and τ squared in the energy. */
+/** Returns φ(r) of the multi-order kernel: equation 6 of the paper in real form, with δ and τ squared in the energy. */
 function multiOrder(delta: number, tau: number, r: number): number {
   if (r < NEAR * tau) return 1 / (4 * Math.PI * delta * Math.sqrt(1 + 2 * delta * tau));
   const a = Math.sqrt(1 + 2 * delta * tau) / (2 * tau);
@@ -43,13 +44,13 @@ function multiOrder(delta: number, tau: number, r: number): number {
   return (1 - (even + (r * odd) / (4 * a * tau * tau))) / (4 * Math.PI * delta * delta * r);
 }
 
-/** e^(−ar) times cosh(br) and sinh(br)/(br), or cos and sin where b² is negative. */
+/** Returns e^(−ar) times cosh(br) and sinh(br)/(br), or times cos(br) and sin(br)/(br) if b² = `square` is negative. */
 function damped(square: number, a: number, r: number): [number, number] {
   const b = Math.sqrt(Math.abs(square));
   const fall = Math.exp(-a * r);
   if (b * r < 1e-6) return [fall, fall];
   if (square < 0) return [fall * Math.cos(b * r), (fall * Math.sin(b * r)) / (b * r)];
-  // Both together: cosh alone would overflow. a is larger than b.
+  // Combine the exponentials first: cosh alone would overflow. a is larger than b.
   const [slow, fast] = [Math.exp((b - a) * r), Math.exp(-(a + b) * r)];
   return [(slow + fast) / 2, (slow - fast) / (2 * b * r)];
 }

@@ -1,18 +1,19 @@
-/** Points and models as the page asks for them. Used by the worker only. */
+/** Builds point clouds and models for the page's requests. Used by the worker only. */
 import { type ImplicitOptions, ImplicitSurface, type PointEdits, parsePoints } from 'vesicle';
 import type { Vec3 } from '../protocol';
 import { computedCloud } from './clouds';
 import { distances, span } from './nearest';
 import type { CameraView, Cloud, CloudSource, Edits, Fit, PointShade, Setup } from './protocol';
 
-/** Voxels along the shortest side at least. */
+/** Least number of voxels along the shortest side of an exported grid. */
 const LEAST_DIM = 8;
 
+/** Returns the points of a source: computed, or read from a file. */
 export function cloudFrom(source: CloudSource): Cloud {
   return 'shape' in source ? computedCloud(source.shape) : parsePoints(source.file.bytes);
 }
 
-/** A model of the points, with the changes made by hand. */
+/** Builds a model of the points and applies the edits. */
 export function buildModel({ points, normals, colors }: Cloud, cameras: CameraView[], setup: Setup): ImplicitSurface {
   const { params, maxPoints, keepComponents, edits } = setup;
   const options: ImplicitOptions = { points, cameras, params };
@@ -30,7 +31,7 @@ export function buildModel({ points, normals, colors }: Cloud, cameras: CameraVi
   }
 }
 
-/** The changes as the model takes them. */
+/** Converts edits to the typed arrays that the model expects. */
 export function packed({ added, removed, outside }: Edits): Required<PointEdits> {
   return {
     added: Float32Array.from(added.flat()),
@@ -39,7 +40,7 @@ export function packed({ added, removed, outside }: Edits): Required<PointEdits>
   };
 }
 
-/** The points without those that were removed by hand, and with those that were added. */
+/** Returns the points in use: those loaded, without the removed and with the added ones. */
 export function edited(points: Float32Array, { added, removed }: Edits): Float32Array {
   if (added.length + removed.length === 0) return points;
   const gone = new Set(removed);
@@ -50,25 +51,27 @@ export function edited(points: Float32Array, { added, removed }: Edits): Float32
   return all;
 }
 
-/** One number a vertex for each shade, in the order of the mesh's arrays. */
+/** For each shade, a function that returns one value per vertex, in the order of the mesh's arrays. */
 const SHADES: Record<PointShade, (model: ImplicitSurface, points: Float32Array) => Float32Array> = {
   'mean curvature': ({ mesh }) => mesh.curvature('mean'),
   distance: ({ mesh }, points) => distances(mesh.arrays().positions, points),
 };
 
-/** `points` are those in force. */
+/** Returns the values of a shade at the vertices. `points` are the points in use, after edits. */
 export function valuesFor(model: ImplicitSurface, points: Float32Array, shade: PointShade): Float32Array {
   return SHADES[shade](model, points);
 }
 
-/** The value of f that the surface is taken at. */
+/** Returns the level of f that the surface is extracted at: 0, or the mean of f over the surface constraints. */
 export function levelOf(model: ImplicitSurface): number {
   if (model.params.level === 'zero') return 0;
   const values = model.evaluate(model.constraints().surface);
   return values.reduce((sum, value) => sum + value, 0) / values.length;
 }
 
-/** Sizes of a grid around the points whose voxels are nearly cubes, with so many along the longest side. */
+/**
+ * Returns the dimensions of a grid around the points with nearly cubic voxels, `size` of them along the longest side.
+ */
 export function cubicDims(points: Float32Array, size: number): Vec3 {
   const sides = [0, 1, 2].map((axis) => {
     const [low, high] = span(points, axis);
@@ -78,7 +81,7 @@ export function cubicDims(points: Float32Array, size: number): Vec3 {
   return sides.map((side) => Math.max(LEAST_DIM, Math.round((size * side) / longest))) as Vec3;
 }
 
-/** What there is to tell of the fit; `whole` where there is a surface to measure. */
+/** Collects the facts about the fit that the page displays; `whole` if there is a complete surface to measure. */
 export function fitOf(model: ImplicitSurface, residual: number, whole: boolean): Fit {
   const { surface, exterior } = model.constraints();
   const { cell, spacing, duplicates, strays, warning } = model;

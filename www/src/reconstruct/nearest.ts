@@ -1,17 +1,17 @@
-/** How far places lie from the nearest of many points. */
+/** Distances to the nearest point of a cloud, by a uniform grid. */
 
-/** Points a cell holds in the mean: fewer make empty cells, more make long searches. */
+/** Target mean number of points per occupied cell: with fewer many cells are empty, with more searches take longer. */
 const PER_CELL = 4;
-/** Cells along a side at most. */
+/** Most cells along a side of the grid. */
 const MOST_CELLS = 96;
 
-/** Points sorted into the cells of a grid. */
+/** Points sorted into the cells of a uniform grid. */
 class PointGrid {
   readonly #points: Float32Array;
   readonly #low = [0, 0, 0];
   readonly #dims = [1, 1, 1];
   readonly #cell: number;
-  /** Where the points of each cell begin in the list. */
+  /** Index in `list` at which the points of each cell begin. */
   readonly #begin: Uint32Array;
   readonly #list: Uint32Array;
 
@@ -39,10 +39,13 @@ class PointGrid {
     });
   }
 
-  /** Shell by shell around the cell of a place, until no nearer point can follow. */
+  /**
+   * Returns the distance from a position to its nearest point: searches shell by shell around its cell, until no nearer
+   * point can follow.
+   */
   distance(places: Float32Array, offset: number): number {
     const centre = [0, 1, 2].map((axis) => this.#index(places[offset + axis] ?? 0, axis));
-    // A place beyond the grid is farther from its nearest cell than shells tell.
+    // Outside the grid, the distance is larger than the number of shells implies.
     const beyond = this.#beyond(places, offset);
     let best = Number.POSITIVE_INFINITY;
     const last = Math.max(...this.#dims);
@@ -105,7 +108,7 @@ class PointGrid {
   }
 }
 
-/** Smallest and largest coordinate of packed points along an axis. */
+/** Returns the smallest and largest coordinate of packed points along an axis. */
 export function span(points: Float32Array, axis: number): [number, number] {
   let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
   for (let i = axis; i < points.length; i += 3) {
@@ -122,7 +125,7 @@ function squared(a: Float32Array, i: number, b: Float32Array, j: number): number
   return x * x + y * y + z * z;
 }
 
-/** Of each place the distance to the nearest point; both packed xyz. Infinite where there is no point. */
+/** Returns the distance of each position to the nearest point; both packed xyz. Infinite if there are no points. */
 export function distances(places: Float32Array, points: Float32Array): Float32Array {
   const out = new Float32Array(places.length / 3).fill(Number.POSITIVE_INFINITY);
   if (points.length === 0) return out;

@@ -1,22 +1,22 @@
-/** The paper's figures, on points that come with the page or are computed in it. */
+/** Presets of the Reconstruct lab: the paper's figures, on points that are served with the page or computed in it. */
 import type { CloudViewOptions } from '../view/reconstruction';
 import { CLOUDS, type CloudExample } from './examples';
 import type { ParamValues } from './protocol';
 
-/** A number, or the least and the most: how often a broken surface breaks hangs on the last bit. */
+/** An expected count, or its least and largest value: how often a broken surface breaks depends on the last bit. */
 export type Count = number | readonly [least: number, most: number];
 
-/** What came of a run, for the tests to hold the words against. */
+/** Result of a run; tests compare the texts of a variant with it. */
 export interface CloudOutcome {
   components: Count;
   genus: Count;
-  /** Mean curvature over the vertices; in tests within a tenth. */
+  /** Mean curvature over the vertices; tests allow a tenth. */
   meanCurvature?: number;
-  /** Mean distance of the points; in tests within a tenth. */
+  /** Mean distance of the points from the surface; tests allow a tenth. */
   fitness?: number;
 }
 
-/** One of several pictures of a figure. */
+/** One picture of a figure: the preset's points with other settings. */
 export interface CloudVariant {
   id: string;
   name: string;
@@ -26,20 +26,21 @@ export interface CloudVariant {
   outcome: CloudOutcome;
 }
 
+/** A figure of the paper, as an example of the Reconstruct lab. */
 export interface CloudPreset extends CloudExample {
   saw: string;
   variants: [CloudVariant, ...CloudVariant[]];
   hint?: string;
-  /** What the view shows beside the usual. */
+  /** View options that differ from the defaults. */
   view?: Partial<CloudViewOptions>;
-  /** The photograph that the view looks through, from 0. */
+  /** Index of the photograph whose camera the view uses, from 0. */
   photo?: number;
 }
 
 const CARVED =
   'Cow carved out of 24 silhouettes in place of the toy dinosaur, whose points cannot be passed on. Spot by Keenan Crane, public domain.';
 const STEREO = 'Cow as stereo sees it. Spot by Keenan Crane, public domain.';
-/** Points of the voxel grid, of which a subsample takes part, as in the paper. */
+/** Points on the voxel grid, of which a subsample is used, as in the paper. */
 const CARVED_COW = {
   source: { file: 'spot/carved.ply' },
   photographs: 'spot',
@@ -300,6 +301,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
   },
 ];
 
+/** Returns the example or preset with this id. */
 export function cloudById(id: string): CloudExample | undefined {
   return [...CLOUDS, ...CLOUD_PRESETS].find((one) => one.id === id);
 }
@@ -308,7 +310,10 @@ export function isCloudPreset(example: CloudExample | undefined): example is Clo
   return example !== undefined && 'variants' in example;
 }
 
-/** The picture of a figure whose settings are in force, if any is; what it does not say is as in `defaults`. */
+/**
+ * Returns the variant of a figure whose settings are all in force, if there is one; unset parameters count as in
+ * `defaults`.
+ */
 export function variantInForce(
   preset: CloudPreset,
   params: ParamValues,

@@ -1,7 +1,9 @@
 /**
- * The messages between page and worker in the Reconstruct lab. Both sides import this file and nothing else of each other.
+ * Messages between the page and the worker of the Reconstruct lab. Both sides import this file, and neither imports the
+ * other's code.
  *
- * As in the Extract lab: exactly one reply to each request, events of the worker's own, and a stop is no error.
+ * As in the Extract lab: each request gets exactly one reply, the worker sends events of its own accord, and a
+ * cancellation is not an error.
  */
 import type { Fitness } from 'vesicle';
 import type {
@@ -21,7 +23,7 @@ import type { PointShape } from './clouds';
 
 export type { Failure, Fitness, MeshFormat, NamedBytes, ParamSpec, ParamValues, StepReport, Surface, Vec3 };
 
-/** Points, packed xyz, and what is known of each. */
+/** A point cloud: positions, packed xyz, with normals and colours if known. */
 export interface Cloud {
   points: Float32Array;
   normals?: Float32Array;
@@ -29,39 +31,39 @@ export interface Cloud {
   colors?: Float32Array;
 }
 
-/** A camera the points were made from, with its picture where there is one. */
+/** A camera that the points were made from, with its photograph if there is one. */
 export interface CameraView {
-  /** 3 × 4, world to pixel, row-major. */
+  /** 3 × 4 projection from world to pixel coordinates, row-major. */
   projection: number[];
   width: number;
   height: number;
   image?: Uint8ClampedArray;
 }
 
-/** Where points come from: a file, or code. */
+/** Source of points: a file, or a computed shape. */
 export type CloudSource = { file: NamedBytes } | { shape: PointShape };
 
-/** What was changed by hand. */
+/** Points changed by hand. */
 export interface Edits {
   added: Vec3[];
-  /** Indices of points as they were loaded. */
+  /** Indices of removed points, in the order of loading. */
   removed: number[];
-  /** Points known to be outside. */
+  /** Points known to be outside the object; they become exterior constraints. */
   outside: Vec3[];
 }
 
-/** How a model is made. */
+/** All that a model is built from, besides the points and cameras. */
 export interface Setup {
-  /** What differs from the defaults. */
+  /** Parameters that differ from the defaults. */
   params: ParamValues;
-  /** A subsample is taken above this. */
+  /** Largest number of points used; larger clouds are subsampled. */
   maxPoints: number | undefined;
-  /** The largest clusters that are kept; all where undefined. */
+  /** Number of largest clusters of points to keep; all if undefined. */
   keepComponents: number | undefined;
   edits: Edits;
 }
 
-/** A model before its first step. */
+/** Reply about a newly built model, before its first step. */
 export interface Ready {
   params: ParamValues;
 }
@@ -70,17 +72,17 @@ export interface Loaded extends Ready {
   cloud: Cloud;
 }
 
-/** What the colours of the surface tell that has to be computed; the names are shown. */
+/** A quantity computed at each vertex to colour the surface by; the names appear in the interface. */
 export type PointShade = 'mean curvature' | 'distance';
 
-/** Facts about points and fit that no mesh tells. */
+/** Facts about the points and the fit, beyond the measures of the mesh. */
 export interface Fit {
   fitness?: Fitness;
   surfaceConstraints: number;
   exteriorConstraints: number;
-  /** Edge of an extraction cell, in the points' units; 0 until it is known. */
+  /** Edge length of an extraction cell, in the points' units; 0 until it is known. */
   cell: number;
-  /** In units of the box. */
+  /** Mean distance to the nearest other point in use, in units of the normalised box, which is 2 long. */
   spacing: number;
   duplicates: number;
   strays: number;
@@ -88,7 +90,7 @@ export interface Fit {
   warning?: string;
 }
 
-/** One solve of the timing curve. */
+/** One measurement of the plot of solve time against number of constraints. */
 export interface Timing {
   kernel: string;
   constraints: number;
@@ -97,39 +99,45 @@ export interface Timing {
 
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** When it fails, the former points and model stay. Removed points that there are not are passed over. */
+  /**
+   * Opens points and builds a model of them. On failure, the previous points and model stay. Removed indices out of
+   * range are ignored.
+   */
   load: { body: { source: CloudSource; cameras: CameraView[]; setup: Setup }; reply: Loaded };
-  /** A new model of the same points. When it fails, the former model stays. */
+  /** Builds a new model of the same points. On failure, the previous model stays. */
   rebuild: { body: Setup; reply: Ready };
   play: { body: undefined; reply: undefined };
   pause: { body: undefined; reply: undefined };
   step: { body: { count: number }; reply: undefined };
   setParams: { body: ParamValues; reply: ParamValues };
-  /** Live, in place of all edits before: a run goes on with them. When they are refused, all stays. */
+  /** Replaces all edits of the live model; a run continues with them. If they are rejected, nothing changes. */
   setEdits: { body: Edits; reply: undefined };
   export: { body: { format: MeshFormat }; reply: Uint8Array };
-  /** f on a grid with so many voxels along the longest side, as NIfTI, and the value that the surface is taken at. */
+  /**
+   * Samples f on a grid, `size` voxels along the longest side, as NIfTI; also replies with the level the surface is
+   * extracted at.
+   */
   volume: { body: { size: number }; reply: { bytes: Uint8Array; level: number } };
   shade: { body: PointShade | undefined; reply: undefined };
-  /** Solves the present points for growing numbers of them; undefined when cancelled. */
+  /** Times solves with subsamples of the present points of each size and kernel; undefined if cancelled. */
   timing: { body: { sizes: number[]; kernels: string[] }; reply: Timing[] | undefined };
   cancelTiming: { body: undefined; reply: undefined };
 }
 
 export type RequestKind = keyof Requests;
 export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
-/** The surface last sent is on the screen; has no reply. */
+/** Tells the worker that the surface it sent last is on the screen; has no reply. */
 export interface ShownMessage {
   kind: 'shown';
 }
 export type ToWorker = RequestMessage | ShownMessage;
 
-/** Steps since the last such event. */
+/** Reports of the steps since the last progress event. */
 export interface ProgressEvent {
   event: 'progress';
   reports: StepReport[];
 }
-/** A surface: complete, or as far as it has been followed. */
+/** A surface: complete, or a preview of the part extracted so far. */
 export interface SurfaceEvent {
   event: 'surface';
   surface: Surface;
@@ -140,7 +148,7 @@ export interface MeasuredEvent {
   measures?: Measures;
   fit: Fit;
 }
-/** The points that take part, and the exterior ones, packed. */
+/** The points in use as surface constraints, and the exterior constraints; both packed xyz. */
 export interface ConstraintsEvent {
   event: 'constraints';
   surface: Float32Array;

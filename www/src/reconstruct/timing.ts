@@ -1,13 +1,13 @@
-/** How long the solve takes for growing numbers of constraints (figure 4d of the paper). Used by the worker only. */
+/** Measures the solve time for growing numbers of constraints (figure 4d of the paper). Used by the worker only. */
 import { ImplicitSurface } from 'vesicle';
 import type { CameraView, Cloud, Requests, Setup, Timing } from './protocol';
 
-/** Milliseconds up to which a solve is timed twice, and the shorter counts. */
+/** Solves that take at most this many milliseconds are timed twice, and the shorter time counts. */
 const QUICK = 2000;
 
 type Asked = Requests['timing']['body'];
 
-/** Undefined when the signal aborts it. */
+/** Times one solve per size and kernel, and passes each timing to `tell`. Undefined if the signal aborts. */
 export async function timeSolves(
   cloud: Cloud,
   cameras: CameraView[],
@@ -43,7 +43,8 @@ async function timeOne(
   const model = new ImplicitSurface({ points, cameras: withoutImages, maxPoints, params });
   try {
     const first = await solveTime(model, signal);
-    // Again, as other work of the machine only ever adds; a change of tolerance is the least that makes a new solve.
+    // Time a quick solve again: other load on the machine only ever adds time. Changing the tolerance is the least
+    // change that triggers a new solve.
     model.setParams({ tolerance: 1.0001 * model.params.tolerance });
     const second = first === undefined || first > QUICK ? first : await solveTime(model, signal);
     const milliseconds = first !== undefined && second !== undefined ? Math.min(first, second) : undefined;
@@ -55,7 +56,7 @@ async function timeOne(
   }
 }
 
-/** Stops when the solve is through. */
+/** Runs the model until its solve has ended; returns the milliseconds spent in it. */
 async function solveTime(model: ImplicitSurface, signal: AbortSignal): Promise<number | undefined> {
   const solved = new AbortController();
   let milliseconds = 0;

@@ -1,4 +1,4 @@
-/** The worker of the Reconstruct lab: it holds points, cameras and one model of them, and does what the page asks. */
+/** Worker of the Reconstruct lab: holds points, cameras and one model of them, and serves the page's requests. */
 import init, { type ImplicitSurface, paramSpecs, type StepReport, version } from 'vesicle';
 import type { Surface } from '../protocol';
 import { Refusal, toFailure } from '../worker/refusal';
@@ -21,7 +21,7 @@ import type {
 } from './protocol';
 import { timeSolves } from './timing';
 
-/** Milliseconds between two looks at a surface that is being extracted, and between two lists of reports. */
+/** Least milliseconds between two previews of a surface being extracted, and between two progress events. */
 const PREVIEW_EVERY = 100;
 const TELL_EVERY = 50;
 
@@ -39,13 +39,13 @@ class Session {
   #setup: Setup | undefined;
   #model: ImplicitSurface | undefined;
   #shade: PointShade | undefined;
-  /** Steps the page has not heard of yet. */
+  /** Reports of steps that were not sent to the page yet. */
   #reports: StepReport[] = [];
   #toldAt = 0;
   #previewedAt = 0;
-  /** The page has drawn what it was sent. */
+  /** Whether the page has drawn the last surface it was sent. */
   #shown = true;
-  /** The mesh that was sent last, by its version. */
+  /** Version of the mesh that was sent last. */
   #sent = '';
   #constraintsSent = false;
   #last: StepReport | undefined;
@@ -101,7 +101,7 @@ class Session {
     return { params: { ...model.params } };
   }
 
-  /** Steps and constraints so far are those of other points. */
+  /** Forgets reports and constraints: they belong to other points or another model. */
   #startOver(): void {
     this.#reports = [];
     this.#last = undefined;
@@ -136,7 +136,7 @@ class Session {
     try {
       await model.run({ signal, onStep: (report) => this.#stepped(report) });
     } catch (error) {
-      // After the state: the page shows the failure on top of it.
+      // After the state event, so that the page shows the failure on top of that state.
       if (!signal.aborted) queueMicrotask(() => send({ event: 'failure', failure: toFailure(error) }));
     }
     this.#run = undefined;
@@ -196,7 +196,7 @@ class Session {
     return { ...model.params };
   }
 
-  /** A run that is under way goes on with them. */
+  /** Replaces the edits; a run continues with them. */
   #setEdits(edits: Edits): undefined {
     this.#current().setEdits(packed(edits));
     if (this.#setup) this.#setup = { ...this.#setup, edits };
@@ -209,7 +209,7 @@ class Session {
     if (!this.#run) this.#showSurface();
   }
 
-  /** Only as fast as the page draws. */
+  /** Sends a preview of the surface, unless the page has not drawn the last one yet. */
   #preview(): void {
     if (!this.#shown) return;
     const mesh = this.#current().preview();
@@ -221,7 +221,7 @@ class Session {
     }
   }
 
-  /** The surface as it stands, where the page does not have it yet. */
+  /** Sends the present surface, unless the page has it already. */
   #showSurface(): void {
     const model = this.#model;
     if (!model || model.mesh.vertexCount === 0) return;
@@ -273,7 +273,7 @@ class Session {
   }
 }
 
-// At once, and not when it is asked for: the page is still on its way. What goes wrong is told then.
+// Load the engine at once, while the page still loads. A failure is reported when the page asks for it (`hello`).
 const starting = init();
 starting.catch(() => undefined);
 

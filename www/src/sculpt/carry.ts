@@ -1,13 +1,19 @@
-/** How a surface goes along with ellipsoids at once, as the first thing that a step of the model does. */
+/**
+ * Immediate approximate deformation of a surface by its ellipsoids, the same as the first stage of a step of the model.
+ * Keeps the surface under a dragging pointer.
+ */
 import { lengthsOf } from './ellipsoids';
 import type { ControlEllipsoid, Pose, Vec3 } from './protocol';
 
-/** How much an ellipsoid that a point lies on counts: ten times as much as one that is its own size away. */
+/**
+ * Bounds the weight of an ellipsoid near its surface: there it is eleven times the weight at a distance of its shortest
+ * semi-axis.
+ */
 const SOFTNESS = 0.1;
 
 /**
- * Where points (x, y, z of each) go as the ellipsoids go from `before` to `after`: with each by its own map, near ones
- * counting more. Only the first `count` points; there is as much room behind them as before.
+ * Moves points, packed xyz, as the ellipsoids move from `before` to `after`: by the mean of the ellipsoids' affine
+ * maps, weighted by proximity. Moves only the first `count` points; the returned array is as long as `points`.
  */
 export function carried(points: Float32Array, before: Pose, after: Pose, count = points.length / 3): Float32Array {
   const maps = before.map((one, k) => mapBetween(one, after[k] ?? one));
@@ -16,12 +22,12 @@ export function carried(points: Float32Array, before: Pose, after: Pose, count =
   return out;
 }
 
-/** The map of one ellipsoid. */
+/** Affine map that takes one ellipsoid to another, with the data for its weight. */
 interface EllipsoidMap {
   center: Vec3;
-  /** Rows that take what is seen from the middle to the frame in which the ellipsoid is the unit ball. */
+  /** Rows of the matrix that maps offsets from the centre to the frame in which the ellipsoid is the unit ball. */
   toUnit: [Vec3, Vec3, Vec3];
-  /** The other middle, and the axes that take the unit ball to it. */
+  /** Centre of the other ellipsoid, and its semi-axes: they map the unit ball to it. */
   newCenter: Vec3;
   axes: [Vec3, Vec3, Vec3];
   thinnest: number;

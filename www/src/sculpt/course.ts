@@ -2,13 +2,14 @@ import type { MultiresolutionModel } from 'vesicle';
 import { type Film, glide, lastFrame, poseAt } from './film';
 import type { Pose } from './protocol';
 
-/** Where the ellipsoids go, frame by frame: along a film while it plays, else the way to where they were sent. */
+/** Sets the ellipsoids' target of each frame: along a film while it plays, else along a glide to the last pose sent. */
 export class Course {
+  /** The film that is loaded. */
   #film: Film | undefined;
-  /** The film's frame that the ellipsoids were sent to last. */
+  /** Frame of the film that the ellipsoids were sent to last. */
   #frame = 0;
   #playing = false;
-  /** The poses on the way to where the ellipsoids were sent. */
+  /** Remaining poses of the glide to the last pose sent. */
   #way: Pose[] = [];
 
   get film(): Film | undefined {
@@ -19,23 +20,24 @@ export class Course {
     return this.#frame;
   }
 
-  /** There are frames to come. */
+  /** Whether poses of a film or a glide remain. */
   get isUnderWay(): boolean {
     return this.#playing || this.#way.length > 0;
   }
 
-  /** Where the ellipsoids are to be in the end, as far as it is known. */
+  /** Returns the final pose of the glide, or else the model's present target. */
   goalOf(model: MultiresolutionModel): Pose {
     return this.#way.at(-1) ?? model.goals;
   }
 
+  /** Loads a film at a frame, without playing it. */
   setFilm(film: Film | undefined, frame: number): void {
     this.#film = film;
     this.#frame = film ? Math.min(frame, lastFrame(film)) : 0;
     this.#playing = false;
   }
 
-  /** From where the film is, from the start where it is at its end. */
+  /** Plays the film from its present frame, or from the start if it is at its end. */
   play(): void {
     if (!this.#film) return;
     if (this.#frame >= lastFrame(this.#film)) this.#frame = 0;
@@ -43,7 +45,7 @@ export class Course {
     this.#way = [];
   }
 
-  /** One frame of the film, where there is one left: for those who play it step by step. */
+  /** Arranges for one more frame of the film, if there is one, when the user steps through it. */
   playOne(): void {
     const film = this.#film;
     this.#playing = film !== undefined && (film.loop || this.#frame < lastFrame(film));
@@ -54,21 +56,21 @@ export class Course {
     this.#playing = false;
   }
 
-  /** The film is at another frame, and nobody is on the way. */
+  /** Sets the film to another frame, and ends playing and gliding. */
   rewind(frame: number): void {
     this.#frame = frame;
     this.#way = [];
     this.#playing = false;
   }
 
-  /** At once. */
+  /** Sets the target pose at once, as during a drag. */
   goTo(model: MultiresolutionModel, pose: Pose): void {
     model.setEllipsoids(pose);
     this.#way = [];
     this.#playing = false;
   }
 
-  /** Frame by frame. A pose that is refused is refused now. */
+  /** Starts a glide to a pose, frame by frame. If the model rejects the pose, it throws now. */
   glideTo(model: MultiresolutionModel, pose: Pose): void {
     const from = model.goals;
     model.setEllipsoids(pose);
@@ -77,7 +79,7 @@ export class Course {
     this.#playing = false;
   }
 
-  /** Sends the ellipsoids to where they are in the next frame. */
+  /** Sets the model's target to the pose of the next frame, if there is one. */
   next(model: MultiresolutionModel): void {
     const next = this.#playing ? this.#nextOfFilm() : this.#way.shift();
     if (next) model.setEllipsoids(next);

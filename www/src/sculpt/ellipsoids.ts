@@ -1,15 +1,16 @@
-/** Ellipsoids as numbers: moved, turned, made larger, and anything between two of them. */
+/** Arithmetic of ellipsoids: translation, rotation, scaling, interpolation, and conversion to plain numbers. */
 import type { ControlEllipsoid } from 'vesicle';
 import type { Vec3 } from '../protocol';
 
-/** An ellipsoid grows or shrinks at most to this share of what it was, at once; 0 would leave none. */
+/** Least factor of one scaling; 0 would make the ellipsoid degenerate. */
 const LEAST_FACTOR = 1e-3;
 
+/** Returns a ball as an ellipsoid. */
 export function ball(x: number, y: number, z: number, radius: number): ControlEllipsoid {
   return upright([x, y, z], [radius, radius, radius]);
 }
 
-/** With its axes along x, y and z. */
+/** Returns an ellipsoid with its axes along x, y and z. */
 export function upright(center: Vec3, [a, b, c]: Vec3): ControlEllipsoid {
   return {
     center,
@@ -21,40 +22,44 @@ export function upright(center: Vec3, [a, b, c]: Vec3): ControlEllipsoid {
   };
 }
 
-/** Lengths of the three semi-axes. */
+/** Returns the lengths of the three semi-axes. */
 export function lengthsOf({ axes }: ControlEllipsoid): Vec3 {
   return axes.map((axis) => Math.hypot(...axis)) as Vec3;
 }
 
+/** Returns the ellipsoid translated by a vector. */
 export function moved({ center, axes }: ControlEllipsoid, by: Vec3): ControlEllipsoid {
   return { center: added(center, by), axes };
 }
 
-/** Turned about its centre, by so many radians about a direction of length 1. */
+/** Returns the ellipsoid rotated about its centre by `angle`, in radians, about a unit vector. */
 export function turned({ center, axes }: ControlEllipsoid, about: Vec3, angle: number): ControlEllipsoid {
   return { center, axes: axes.map((axis) => rotated(axis, about, angle)) as ControlEllipsoid['axes'] };
 }
 
-/** Turned about a place. */
+/** Returns the ellipsoid rotated by `angle`, in radians, about the axis through a point along a unit vector. */
 export function turnedAbout(ellipsoid: ControlEllipsoid, place: Vec3, about: Vec3, angle: number): ControlEllipsoid {
   const { axes } = turned(ellipsoid, about, angle);
   const arm = added(ellipsoid.center, times(place, -1));
   return { center: added(place, rotated(arm, about, angle)), axes };
 }
 
-/** With each axis so many times as long. */
+/** Returns the ellipsoid with each semi-axis scaled by its factor. */
 export function scaled({ center, axes }: ControlEllipsoid, factors: Vec3): ControlEllipsoid {
   const longer = axes.map((axis, k) => times(axis, Math.max(LEAST_FACTOR, Math.abs(factors[k] ?? 1))));
   return { center, axes: longer as ControlEllipsoid['axes'] };
 }
 
-/** With semi-axes of these lengths, in the directions that they have. */
+/** Returns the ellipsoid with semi-axes of these lengths, in their present directions. */
 export function withLengths(ellipsoid: ControlEllipsoid, lengths: Vec3): ControlEllipsoid {
   const are = lengthsOf(ellipsoid);
   return scaled(ellipsoid, lengths.map((length, k) => length / (are[k] || 1)) as Vec3);
 }
 
-/** The part `t` of the way from one to another: the centre straight, the axes by a rotation, lengths in proportion. */
+/**
+ * Interpolates between two ellipsoids, `t` from 0 to 1: the centre linearly, the axes by a rotation, the lengths
+ * geometrically.
+ */
 export function between(from: ControlEllipsoid, to: ControlEllipsoid, t: number): ControlEllipsoid {
   if (t <= 0) return from;
   if (t >= 1) return to;
@@ -66,7 +71,7 @@ export function between(from: ControlEllipsoid, to: ControlEllipsoid, t: number)
   return scaled({ center, axes: whole.axes }, factors);
 }
 
-/** The rotation that takes the directions of one's axes to those of another. */
+/** Returns the rotation between the axis directions of two ellipsoids, as unit vector and angle. */
 function rotationFrom(from: ControlEllipsoid, to: ControlEllipsoid): { about: Vec3; angle: number } {
   const [a, b] = [unitAxes(from), unitAxes(to)];
   const entry = (i: number, j: number) => a.reduce((sum, axis, k) => sum + (b[k]?.[i] ?? 0) * (axis[j] ?? 0), 0);
@@ -74,7 +79,7 @@ function rotationFrom(from: ControlEllipsoid, to: ControlEllipsoid): { about: Ve
   const size = Math.hypot(...skew);
   const angle = Math.atan2(size, entry(0, 0) + entry(1, 1) + entry(2, 2) - 1);
   if (size > 1e-9) return { about: times(skew, 1 / size), angle };
-  // Not turned at all, or half about: then the matrix is 2 n nᵀ − 1.
+  // No rotation, or one by half a turn: then the matrix is 2 n nᵀ − 1.
   const diagonal = [0, 1, 2].map((i) => entry(i, i));
   const k = diagonal.indexOf(Math.max(...diagonal));
   const column: Vec3 = [0, 1, 2].map((i) => entry(i, k) + (i === k ? 1 : 0)) as Vec3;
@@ -85,10 +90,12 @@ function unitAxes({ axes }: ControlEllipsoid): Vec3[] {
   return axes.map((axis) => times(axis, 1 / (Math.hypot(...axis) || 1)));
 }
 
+/** Returns the sum of two vectors. */
 export function added(a: Vec3, b: Vec3): Vec3 {
   return [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 }
 
+/** Returns a vector times a number. */
 export function times(a: Vec3, factor: number): Vec3 {
   return [a[0] * factor, a[1] * factor, a[2] * factor];
 }
@@ -97,7 +104,7 @@ function cross(a: Vec3, b: Vec3): Vec3 {
   return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 }
 
-/** Rodrigues' formula. */
+/** Rotates a vector about a unit vector by Rodrigues' formula. */
 function rotated(vector: Vec3, about: Vec3, angle: number): Vec3 {
   const [cosine, sine] = [Math.cos(angle), Math.sin(angle)];
   const along = about[0] * vector[0] + about[1] * vector[1] + about[2] * vector[2];
@@ -105,31 +112,31 @@ function rotated(vector: Vec3, about: Vec3, angle: number): Vec3 {
   return added(sideways, times(about, along * (1 - cosine)));
 }
 
-/** Twelve numbers: centre and axes. */
+/** Returns an ellipsoid as twelve numbers: its centre and its semi-axes. */
 export function packed({ center, axes }: ControlEllipsoid): number[] {
   return [...center, ...axes.flat()];
 }
 
-/** Nothing where the numbers are no ellipsoid. */
+/** Converts twelve numbers back to an ellipsoid; undefined if they are too few, too many or not finite. */
 export function unpacked(numbers: number[]): ControlEllipsoid | undefined {
   if (numbers.length !== 12 || !numbers.every(Number.isFinite)) return undefined;
   const vector = (at: number) => numbers.slice(at, at + 3) as Vec3;
   return { center: vector(0), axes: [vector(3), vector(6), vector(9)] };
 }
 
-/** The box around all of them: least and largest corner. */
+/** Returns the bounding box of all ellipsoids: its least and largest corner. */
 export function boxOf(pose: readonly ControlEllipsoid[]): { min: Vec3; max: Vec3 } {
   const corner = (sign: number, choose: (...values: number[]) => number) =>
     [0, 1, 2].map((k) => choose(...pose.map((one) => (one.center[k] ?? 0) + sign * reach(one, k)))) as Vec3;
   return { min: corner(-1, Math.min), max: corner(1, Math.max) };
 }
 
-/** How far an ellipsoid goes from its centre along a coordinate. */
+/** Returns the half width of an ellipsoid along coordinate `k`. */
 function reach({ axes }: ControlEllipsoid, k: number): number {
   return Math.hypot(...axes.map((axis) => axis[k] ?? 0));
 }
 
-/** The same as far as anyone can see: the model keeps ellipsoids in another form, which rounds. */
+/** Tests whether two poses are the same up to rounding: the model stores ellipsoids in another form. */
 export function samePose(one: readonly ControlEllipsoid[], other: readonly ControlEllipsoid[]): boolean {
   return one.length === other.length && one.every((ellipsoid, k) => isSame(ellipsoid, other[k] ?? ellipsoid));
 }

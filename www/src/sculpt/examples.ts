@@ -5,21 +5,21 @@ import { type Film, poseAt } from './film';
 import type { Layout, ParamValues, Pose } from './protocol';
 import type { ComputedMesh } from './shapes';
 
-/** A mesh beside the page, or one to compute. */
+/** A mesh file served with the page, or a computed mesh. */
 export type ExampleMesh = { file: string } | { shape: ComputedMesh };
 
-/** What comes with the page: meshes, ellipsoids that fit them, what they do, and whom to thank. */
+/** An example of the Sculpt lab: meshes, ellipsoids that fit them, their motion, settings and credits. */
 export interface SculptExample {
   id: string;
   name: string;
   detail?: ExampleMesh;
   base?: ExampleMesh;
   up: 'y' | 'z';
-  /** Without, they are made to fit. */
+  /** Ellipsoids at the start; if undefined, they are fitted to the mesh. */
   start?: Pose;
-  /** What each ellipsoid is called. */
+  /** Names of the ellipsoids. */
   names?: string[];
-  /** Where they go when it is opened, where no film plays. */
+  /** Pose that the ellipsoids move to when the example opens, unless a film plays. */
   pose?: Pose;
   film?: Film;
   params: ParamValues;
@@ -28,10 +28,11 @@ export interface SculptExample {
   credit: string;
 }
 
+/** Credits of the bust. */
 export const NEFERTITI =
   'Bust of Nefertiti: scan by Nora Al-Badri and Jan Nikolai Nelles, public domain; 70,000 triangles, from odedstein-meshes.';
 
-/** Crown, head, neck and chest. */
+/** Ellipsoids of the bust: crown, head, neck and chest. */
 export const BUST: Pose = [
   {
     center: [0, 125, 0],
@@ -51,19 +52,20 @@ export const BUST_MESHES = { detail: { file: 'nefertiti.ply' }, base: { file: 'n
 /** Where head and neck meet. */
 const NAPE: Vec3 = [0, -40, 20];
 
-/** Crown and head together: turned about the nape, then lifted. */
+/** Returns the pose in which crown and head are rotated together about the nape, then moved by `by`. */
 function headTurned(about: Vec3, angle: number, by: Vec3): Pose {
   const [crown, head, ...others] = BUST;
   const turn = (one: Pose[number]) => moved(turnedAbout(one, NAPE, about, angle), by);
   return [...[crown, head].flatMap((one) => (one ? [turn(one)] : [])), ...others];
 }
 
-/** The head looks aside on a longer neck. */
+/** The bust with the head turned aside on a longer neck. */
 export const LOOKING_ASIDE: Pose = headTurned([0, 1, 0], 0.5, [8, 26, 0]);
 
+/** The film of the lava lamp. */
 export const LAVA: Film = { motion: 'lava', loop: false };
 
-/** The first is shown when the lab opens. */
+/** The examples of the Sculpt lab. The first one opens by default. */
 export const SCENES: [SculptExample, ...SculptExample[]] = [
   {
     id: 'bust',
@@ -95,7 +97,7 @@ export const SCENES: [SculptExample, ...SculptExample[]] = [
     name: 'Globe with longitudes and latitudes',
     base: { shape: 'globe' },
     up: 'y',
-    // Both in the same place: what parts from the other carries its half of the map along.
+    // Both in the same place: when they separate, each takes half of the map along.
     start: [ball(0, 0, 0, 0.98), ball(0, 0, 0, 0.97)],
     names: ['large', 'small'],
     pose: [ball(-0.6, 0, 0, 0.85), ball(0.75, 0.3, 0, 0.6)],

@@ -1,19 +1,20 @@
-/** Films: where the ellipsoids are at each frame, by keyframes or by a formula. */
+/** Films: poses of the ellipsoids at each frame, by keyframes or by a formula. */
 import type { ControlEllipsoid } from 'vesicle';
 import { ball, between, lengthsOf } from './ellipsoids';
 
-/** Keyframes with so many frames from each to the next, or motion that is computed. */
+/** Keyframes with `between` frames from each to the next, or a computed motion. */
 export type Film = { keys: ControlEllipsoid[][]; between: number; loop: boolean } | { motion: 'lava'; loop: boolean };
 
-/** Frames of the lava lamp until it is where it began. */
+/** Frames of one period of the lava lamp. */
 const LAVA_FRAMES = 300;
 
-/** The last frame; the first is 0. In a loop it is the first again. */
+/** Returns the number of the last frame; the first is 0. In a loop the last frame shows the same pose as the first. */
 export function lastFrame(film: Film): number {
   if ('motion' in film) return LAVA_FRAMES;
   return film.between * (film.loop ? film.keys.length : film.keys.length - 1);
 }
 
+/** Returns the pose at a frame of a film. */
 export function poseAt(film: Film, frame: number): ControlEllipsoid[] {
   return 'motion' in film ? lavaAt(frame) : keyedAt(film.keys, film.between, frame);
 }
@@ -27,14 +28,17 @@ function keyedAt(keys: ControlEllipsoid[][], step: number, frame: number): Contr
   return to.map((ellipsoid, k) => between(from[k] ?? ellipsoid, ellipsoid, eased));
 }
 
-/** A frame of a glide takes no ellipsoid farther than this share of its shortest semi-axis: the model's own steps are longer. */
+/**
+ * Largest displacement of an ellipsoid per frame of a glide, as a share of its shortest semi-axis, unless `MOST_GLIDES`
+ * limits the number of frames. The model's own steps are longer.
+ */
 const GLIDE = 0.4;
-/** With more, a small ellipsoid that goes far would keep all others waiting. */
+/** Most frames of a glide: one small ellipsoid that moves far should not delay all others. */
 const MOST_GLIDES = 40;
 
 /**
- * The poses on the way to another, all arriving together: what stays in one piece goes as one. Left to themselves, large
- * ellipsoids run ahead of small ones, and tear at the skin between.
+ * Returns the poses of a glide, in which all ellipsoids arrive together, so that the surface moves as a whole. Moved by
+ * the model alone, large ellipsoids run ahead of small ones and strain the membrane between them.
  */
 export function glide(from: ControlEllipsoid[], to: ControlEllipsoid[]): ControlEllipsoid[][] {
   const ways = to.map((one, k) => {
@@ -45,7 +49,7 @@ export function glide(from: ControlEllipsoid[], to: ControlEllipsoid[]): Control
   return Array.from({ length: frames }, (_, i) => to.map((one, k) => between(from[k] ?? one, one, (i + 1) / frames)));
 }
 
-/** Blobs that rise and sink past each other: how often in a whole film, from where, how far aside, and how large. */
+/** Blobs that rise and sink past each other: rounds per period, initial phase, sideways offset and radius. */
 const BLOBS = [
   { rounds: 1, phase: 0, aside: -0.35, radius: 0.62 },
   { rounds: 2, phase: 1.9, aside: 0.4, radius: 0.42 },
@@ -53,7 +57,10 @@ const BLOBS = [
   { rounds: 3, phase: 4.6, aside: -0.1, radius: 0.34 },
 ];
 
-/** A pool at the foot, and blobs that part from it and come back; stretched while they are fast. */
+/**
+ * Returns the pose of the lava lamp: a pool at the foot, and blobs that separate from it and rejoin, stretched while
+ * they are fast.
+ */
 function lavaAt(frame: number): ControlEllipsoid[] {
   const turn = (2 * Math.PI * frame) / LAVA_FRAMES;
   const pool = ball(0, -1.35, 0, 1);

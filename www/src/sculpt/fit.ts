@@ -1,16 +1,22 @@
-/** Ellipsoids for a mesh of which nothing is known: a row of them along its longest direction. */
+/** Fits ellipsoids to an unknown mesh: a row of them along its longest principal axis. */
 import type { ControlEllipsoid, Mesh } from 'vesicle';
 import type { Vec3 } from '../protocol';
 import { added, times } from './ellipsoids';
 
-/** Ellipsoids a row has at most. */
+/** Most ellipsoids in a row. */
 const MOST = 5;
-/** Of the width of a slice: with more, skin is pushed out where the mesh is hollow; with less, it hangs slack. */
+/**
+ * Semi-axes as a share of the width of a slice. If larger, the membrane bulges where the mesh is concave; if smaller,
+ * it is slack.
+ */
 const WITHIN = 0.9;
-/** Semi-axes below this share of the size of the mesh would be needles. */
+/** Least semi-axis as a share of the size of the mesh; shorter ones would make needles. */
 const LEAST = 0.03;
 
-/** From one end of the mesh to the other; as many as it is longer than wide, and a half. */
+/**
+ * Returns a row of ellipsoids from one end of the mesh to the other; their number is 1.5 times its length over its
+ * width, within 1 and `MOST`.
+ */
 export function fitted(mesh: Mesh): ControlEllipsoid[] {
   const { centroid, inertia } = mesh.info();
   const { positions } = mesh.arrays();
@@ -30,7 +36,7 @@ export function fitted(mesh: Mesh): ControlEllipsoid[] {
   }));
 }
 
-/** Middle and half widths of what lies between two planes. */
+/** Returns the centre and half widths of the vertices between two planes, `whole` if they are all of the mesh. */
 function ofSlice(local: Float32Array, [from, to]: [number, number], whole: boolean, least: number) {
   const sums = [0, 0, 0, 0, 0];
   for (let i = 0; i < local.length; i += 3) {
@@ -41,7 +47,7 @@ function ofSlice(local: Float32Array, [from, to]: [number, number], whole: boole
   const [n = 0, y = 0, z = 0, yy = 0, zz = 0] = sums;
   const count = Math.max(1, n);
   const [meanY, meanZ] = [y / count, z / count];
-  // Points on a ring of radius r are r/√2 from its middle in the root mean square; those of a ball r/√3.
+  // Along one coordinate, the points of a circle of radius r have a root mean square of r/√2, those of a sphere r/√3.
   const width = (squares: number, mean: number) =>
     Math.max(least, WITHIN * Math.sqrt((whole ? 3 : 2) * Math.max(0, squares / count - mean * mean)));
   const half = (WITHIN * (to - from)) / 2;
@@ -69,11 +75,14 @@ function spanOf(local: Float32Array, k: number): [number, number] {
   return [low, high];
 }
 
-/** Eigenvectors of a symmetric matrix given row by row, that of the largest eigenvalue first, by Jacobi's rotations. */
+/**
+ * Returns the eigenvectors of a symmetric 3 × 3 matrix, given row by row, by Jacobi rotations; that of the largest
+ * eigenvalue first.
+ */
 export function principalAxes(matrix: number[]): Vec3[] {
   const a = [matrix.slice(0, 3), matrix.slice(3, 6), matrix.slice(6, 9)];
   const v = [0, 1, 2].map((i) => [0, 1, 2].map((j) => (i === j ? 1 : 0)));
-  // Each sweep squares what is left off the diagonal: eight are more than enough.
+  // Each sweep squares the off-diagonal remainder: eight are more than enough.
   for (let sweep = 0; sweep < 8; sweep++)
     for (const [p, q] of [
       [0, 1],
@@ -86,7 +95,7 @@ export function principalAxes(matrix: number[]): Vec3[] {
   return [x, y, [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]];
 }
 
-/** Makes the entry at p, q of `a` zero, and turns `v` with it. */
+/** Applies the Jacobi rotation that makes entry (p, q) of `a` zero, and accumulates it in `v`. */
 function rotate(a: number[][], v: number[][], p: number, q: number): void {
   const get = (m: number[][], i: number, j: number) => m[i]?.[j] ?? 0;
   const put = (m: number[][], i: number, j: number, value: number) => {

@@ -1,11 +1,14 @@
-/** The picture on the globe: drawn here, with seas, lands and a grid of longitudes and latitudes. Used by the worker only. */
+/** Draws the texture of the globe: seas, lands and a grid of longitudes and latitudes. Used by the worker only. */
 
 const WIDTH = 1024;
 const HEIGHT = 512;
 /** Degrees between lines of the grid. */
 const GRID = 15;
 
-/** Lands as circles of longitude, latitude and radius, degrees: nobody's map, but one where each place is known again. */
+/**
+ * Lands of an invented map, on which each region can be recognised: discs by longitude, latitude and radius, in
+ * degrees.
+ */
 const LANDS: [number, number, number][] = [
   ...([
     [-100, 48, 24],
@@ -42,7 +45,7 @@ const LANDS: [number, number, number][] = [
   ] as [number, number, number][]),
 ];
 
-/** A PNG, longitude −180 to 180 from left to right, the north pole above. */
+/** Returns the map as PNG: longitudes −180 to 180 from left to right, north up. */
 export async function drawnMap(): Promise<Uint8Array> {
   const canvas = new OffscreenCanvas(WIDTH, HEIGHT);
   const context = canvas.getContext('2d');
@@ -71,7 +74,7 @@ function paint(context: OffscreenCanvasRenderingContext2D): void {
 const x = (longitude: number) => ((longitude + 180) / 360) * WIDTH;
 const y = (latitude: number) => ((90 - latitude) / 180) * HEIGHT;
 
-/** A circle on the globe is wider on the map the nearer it is to a pole. */
+/** Fills a disc on the globe, which is wider on the map the nearer it is to a pole. */
 function paintLand(
   context: OffscreenCanvasRenderingContext2D,
   [longitude, latitude, radius]: [number, number, number],
@@ -94,7 +97,7 @@ function paintGrid(context: OffscreenCanvasRenderingContext2D): void {
     context.lineTo(...to);
     context.stroke();
   };
-  // Heavier at the equator and at longitude 0: the eye finds its way by them.
+  // Thicker at the equator and at longitude 0, for orientation.
   for (let longitude = -180; longitude <= 180; longitude += GRID)
     line(longitude === 0 ? 4 : 1.6, [x(longitude), 0], [x(longitude), HEIGHT]);
   for (let latitude = -90 + GRID; latitude < 90; latitude += GRID)

@@ -1,4 +1,4 @@
-/** Meshes and models as the page asks for them. Used by the worker only. */
+/** Opens meshes and builds models for the page's requests. Used by the worker only. */
 
 import { Mesh, MultiresolutionModel, type MultiresParams } from 'vesicle';
 import type { Surface } from '../protocol';
@@ -8,7 +8,7 @@ import { fitted } from './fit';
 import type { Facts, MeshSource, Pose, SceneSource, SculptShade, Setup } from './protocol';
 import { computedMesh } from './shapes';
 
-/** Around nothing a bare skin needs something to be spanned over. */
+/** The ellipsoid of a model that has neither a mesh nor ellipsoids: the membrane needs at least one. */
 const ALONE: Pose = [
   {
     center: [0, 0, 0],
@@ -20,12 +20,13 @@ const ALONE: Pose = [
   },
 ];
 
-/** The meshes of a scene; whoever has them frees them. */
+/** The meshes of a scene, to be freed by its owner. */
 export interface Scene {
   detail: Mesh | undefined;
   base: Mesh | undefined;
 }
 
+/** Reads or computes the meshes of a scene. */
 export async function sceneFrom({ detail, base }: SceneSource): Promise<Scene> {
   const finest = detail && (await meshFrom(detail));
   try {
@@ -46,10 +47,10 @@ export function freeScene({ detail, base }: Scene): void {
   base?.free();
 }
 
-/** Sizes of fitted ellipsoids: the largest that a base can be made over holds the shape best. */
+/** Scales tried for fitted ellipsoids: the largest for which a base can be built preserves the shape best. */
 const SIZES = [1, 0.8, 0.6, 0.4];
 
-/** The first model of a scene, and the ellipsoids it begins with: those given, else some that fit. */
+/** Builds the first model of a scene; also returns the ellipsoids it starts with, given or fitted. */
 export function firstModel(scene: Scene, setup: Setup): { model: MultiresolutionModel; start: Pose } {
   const mesh = scene.detail ?? scene.base;
   if (setup.start || !mesh) {
@@ -69,7 +70,7 @@ export function firstModel(scene: Scene, setup: Setup): { model: Multiresolution
   throw refusal;
 }
 
-/** At its start; where its ellipsoids are to go is for later. */
+/** Builds a model in its start pose; the caller then sends the ellipsoids elsewhere. */
 export function buildModel({ detail, base }: Scene, start: Pose, { params }: Setup): MultiresolutionModel {
   return new MultiresolutionModel({
     ellipsoids: start,
@@ -79,14 +80,14 @@ export function buildModel({ detail, base }: Scene, start: Pose, { params }: Set
   });
 }
 
-/** A mesh as the page draws it, in arrays of its own. */
+/** Returns a copy of a mesh for the page to draw. */
 export function surfaceOf(mesh: Mesh, values?: Float32Array): Surface {
   const { uvs: _, ...surface } = surfaceIn(noArrays(), mesh);
-  // Numbers of other vertices would be nonsense.
+  // Values computed for another mesh do not belong to these vertices.
   return values && values.length === surface.vertices ? { ...surface, values: values.slice() } : surface;
 }
 
-/** A mesh as the page draws it with a picture on it: vertices on seams of the picture are there more than once. */
+/** Returns a copy of a mesh for the page to draw with its texture; vertices on texture seams are duplicated. */
 export function texturedSurfaceOf(mesh: Mesh): Surface {
   const split = mesh.splitAtSeams();
   try {
@@ -96,13 +97,17 @@ export function texturedSurfaceOf(mesh: Mesh): Surface {
   }
 }
 
-/** One number a vertex of the base, or of the result for curvature. Distortions as powers of two: 0 where there is none. */
+/**
+ * Returns one value per vertex: curvature of the result, or distortion of the base as a power of two, 0 where there is
+ * none.
+ */
 export function valuesFor(model: MultiresolutionModel, shade: SculptShade): Float32Array {
   if (shade === 'mean curvature') return model.mesh.curvature('mean');
   const { area, angle } = model.distortion();
   return (shade === 'area distortion' ? area : angle).map(Math.log2);
 }
 
+/** Collects the facts about the correspondence and the detail that the page displays. */
 export function factsOf(model: MultiresolutionModel): Facts {
   const { bands, folded, missed, held } = model;
   const { area, angle } = model.distortion();

@@ -1,11 +1,11 @@
-/** The paper's figures, on meshes that come with the page or are computed in it. */
+/** Presets of the Sculpt lab: the paper's figures, on meshes that are served with the page or computed in it. */
 import type { SculptViewOptions } from '../view/sculpture';
 import { ball, moved, samePose, scaled, turned, upright } from './ellipsoids';
 import { BUST, BUST_MESHES, BUST_NAMES, LAVA, LOOKING_ASIDE, NEFERTITI, SCENES, type SculptExample } from './examples';
 import { poseAt } from './film';
 import type { ParamValues, Pose, StageKind } from './protocol';
 
-/** What came of a pose, for the tests to hold the words against: at least and at most. */
+/** Result of a pose as ranges, each from least to largest; tests compare the texts of a variant with it. */
 export interface SculptOutcome {
   components: [number, number];
   folded: [number, number];
@@ -13,23 +13,24 @@ export interface SculptOutcome {
   areaHigh?: [number, number];
 }
 
-/** One of several pictures of a figure. */
+/** One picture of a figure: the preset's scene with another pose or other parameters. */
 export interface SculptVariant {
   id: string;
   name: string;
   params: ParamValues;
-  /** Where the ellipsoids go. */
+  /** Pose that the ellipsoids move to. */
   pose?: Pose;
   came: string;
   outcome?: SculptOutcome;
 }
 
+/** A figure of the paper, as an example of the Sculpt lab. */
 export interface SculptPreset extends SculptExample {
   saw: string;
   variants: [SculptVariant, ...SculptVariant[]];
   hint?: string;
   view?: Partial<SculptViewOptions>;
-  /** Meshes that no model is needed for. */
+  /** Meshes of restructuring stages to display; they need no model. */
   stages?: StageKind;
 }
 
@@ -43,7 +44,7 @@ const BUST_SCENE = {
   credit: NEFERTITI,
 } as const;
 
-/** The bust with each ellipsoid changed by its index. */
+/** Returns the bust's pose with each ellipsoid changed by a function of it and its index. */
 function bustWith(change: (ellipsoid: Pose[number], index: number) => Pose[number]): Pose {
   return BUST.map(change);
 }
@@ -57,7 +58,7 @@ const WIDE_CROWN = bustWith((one, index) => (index === 0 ? scaled(one, [1.45, 1,
 
 const BALL_SCENE = { up: 'y', color: 'plain', params: {} } as const;
 const ONE_BALL: Pose = [ball(0, 0, 0, 0.98)];
-/** All in the same place: each carries its part of the map along. */
+/** All in the same place: each takes its part of the map along. */
 const GLOBE_START: Pose = [ball(0, 0, 0, 0.98), ball(0, 0, 0, 0.97), ball(0, 0, 0, 0.96)];
 const APART: Pose = [ball(-0.6, 0, 0, 0.85), ball(0.1, 0.1, 0, 0.5), ball(0.8, 0.3, 0, 0.6)];
 const LENS: Pose = [0, 1, 2].map(() => upright([0, 0, 0], [1.5, 0.55, 1.2]));
@@ -248,6 +249,7 @@ export const SCULPT_PRESETS: SculptPreset[] = [
   },
 ];
 
+/** Returns the example or preset with this id. */
 export function sceneById(id: string): SculptExample | undefined {
   return [...SCENES, ...SCULPT_PRESETS].find((one) => one.id === id);
 }
@@ -256,7 +258,10 @@ export function isSculptPreset(example: SculptExample | undefined): example is S
   return example !== undefined && 'variants' in example;
 }
 
-/** Where the ellipsoids of an example go: in its film, and in each of its pictures. */
+/**
+ * Returns all poses that an example moves its ellipsoids to, in its film and its variants, so that the view can leave
+ * room for them.
+ */
 export function posesOf(example: SculptExample | undefined): Pose[] {
   const film = example?.film;
   const keys = film === undefined ? [] : 'keys' in film ? film.keys : [];
@@ -264,7 +269,10 @@ export function posesOf(example: SculptExample | undefined): Pose[] {
   return [...keys, ...variants.flatMap(({ pose }) => (pose ? [pose] : []))];
 }
 
-/** The picture of a figure whose settings are in force, if any is; what it does not say is as in `usual`. */
+/**
+ * Returns the variant of a figure whose settings are all in force, if there is one; unset parameters count as in
+ * `usual`.
+ */
 export function variantInForce(
   preset: SculptPreset,
   pose: Pose,

@@ -1,13 +1,16 @@
 import type { MultiresolutionModel, MultiresParams } from 'vesicle';
 
-/** Milliseconds a frame may take while a hand drags; beyond, the hand is ahead of what it sees. */
+/** Milliseconds that a frame may take during a drag; after a slower one the preview uses longer edges. */
 const SLOW = 60;
-/** Edges of the preview are so many times as long: a quarter of the triangles. */
+/** Factor of the edge lengths of the preview: 2 means a quarter of the triangles. */
 const COARSER = 2;
 
-/** Detail no finer than the skin while anything moves, longer edges while a hand drags and frames take too long; all as it was set at rest. */
+/**
+ * Reduces the model's resolution during motion: the result is no finer than the base surface and, during a drag with
+ * slow frames, edges are longer. Restores the set parameters at rest.
+ */
 export class Preview {
-  /** What was set, as far as it differs now. */
+  /** Set values of the parameters that the preview has changed. */
   #fine: MultiresParams | undefined;
   #coarse = false;
 
@@ -15,13 +18,14 @@ export class Preview {
     return this.#fine !== undefined;
   }
 
-  /** Before a step; `took`: milliseconds of the last. */
+  /** Adjusts the model before a step; `took` is the duration of the last step in milliseconds. */
   prepare(model: MultiresolutionModel, motion: 'none' | 'course' | 'hand', took: number): void {
     if (motion === 'none') this.end(model);
     else if (motion === 'hand' && !this.#coarse && took > SLOW) this.#coarsen(model);
     else if (!this.#fine && model.params.supersample > 0) this.#change(model, { supersample: 0 });
   }
 
+  /** Restores the set parameters. */
   end(model: MultiresolutionModel): void {
     if (this.#fine) model.setParams(this.#fine);
     this.#fine = undefined;

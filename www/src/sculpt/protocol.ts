@@ -1,8 +1,10 @@
 /**
- * The messages between page and worker in the Sculpt lab. Both sides import this file and nothing else of each other.
+ * Messages between the page and the worker of the Sculpt lab. Both sides import this file, and neither imports the
+ * other's code.
  *
- * As in the other labs: exactly one reply to each request, events of the worker's own, and a stop is no error. A pose
- * has no reply: while a hand drags, only the newest counts, and the frame that follows says which one it shows.
+ * As in the other labs: each request gets exactly one reply, the worker sends events of its own accord, and a
+ * cancellation is not an error. A pose has no reply: during a drag only the newest counts, and each frame reports the
+ * pose that it follows.
  */
 import type { ControlEllipsoid, MeshTexture } from 'vesicle';
 import type {
@@ -34,84 +36,88 @@ export type {
   Vec3,
 };
 
+/** The ellipsoids, in a fixed order. */
 export type Pose = ControlEllipsoid[];
 
-/** Where a mesh comes from: a file, or code. */
+/** Source of a mesh: a file, or a computed shape. */
 export type MeshSource = { file: NamedBytes; texture?: MeshTexture } | { shape: ComputedMesh };
 
-/** What a model is made of; neither detail nor base: a bare skin. */
+/** Meshes that a model is built from; with neither detail nor base it is a membrane over the ellipsoids alone. */
 export interface SceneSource {
   detail?: MeshSource;
   base?: MeshSource;
 }
 
-/** How a model is made. */
+/** All that a model is built from, besides the meshes. */
 export interface Setup {
-  /** The ellipsoids before the first step; without, some that fit the mesh. */
+  /** The ellipsoids before the first step; if undefined, they are fitted to the mesh. */
   start: Pose | undefined;
-  /** What differs from the defaults. */
+  /** Parameters that differ from the defaults. */
   params: ParamValues;
-  /** Where the ellipsoids go from there. */
+  /** Pose that the ellipsoids then move to. */
   pose: Pose | undefined;
 }
 
-/** A model before its first step. */
+/** Reply about a newly built model, before its first step. */
 export interface Ready {
   params: ParamValues;
-  /** What it started with, and where they go. */
+  /** The ellipsoids at the start, and the pose they move to. */
   start: Pose;
   pose: Pose;
 }
 
 export interface Opened extends Ready {
   box: { min: Vec3; max: Vec3 };
-  /** Triangles of the detailed surface; nothing for a bare skin. */
+  /** Number of triangles of the detailed surface; undefined if there is none. */
   detail: number | undefined;
   bands: number;
-  /** The picture on the surface, where it has one. */
+  /** The texture of the surface, if it has one. */
   texture: MeshTexture | undefined;
-  /** Milliseconds that making it took, most of them for the base. */
+  /** Milliseconds spent building the model, most of them for its base. */
   made: number;
 }
 
-/** Which meshes are shown beside each other. */
+/**
+ * The meshes displayed: the result, the base, both, all stages of figure 1, the solver's levels, or stages of
+ * restructuring.
+ */
 export type Layout = 'result' | 'base' | 'pair' | 'row' | 'levels' | 'stages';
 
-/** Pictures of how a mesh is restructured: as a whole (figure 3), or pass by pass (figure 6). */
+/** Series of restructuring stages to display: as a whole (figure 3), or pass by pass (figure 6). */
 export type StageKind = 'restructuring' | 'passes';
 
-/** One of several meshes beside each other. */
+/** A mesh with its caption, in a row of several. */
 export interface Stage {
   caption: string;
   surface: Surface;
 }
 
-/** What the colours of the surface tell that has to be computed; the names are shown. */
+/** A quantity computed at each vertex to colour the surface by; the names appear in the interface. */
 export type SculptShade = 'area distortion' | 'angle distortion' | 'mean curvature';
 
-/** What the page needs of each frame. */
+/** Data requested for each frame. */
 export interface Shown {
   layout: Layout;
   shade: SculptShade | undefined;
-  /** The surface is wanted with its places in the picture. */
+  /** Whether the surface is sent with texture coordinates. */
   textured: boolean;
 }
 
-/** Everything a run has, to come back to it. */
+/** A saved model, from which the worker can restore it; kept by the page for undo. */
 export interface SavedPose {
   state: Uint8Array;
   iteration: number;
-  /** Of the film. */
+  /** Frame of the film. */
   frame: number;
 }
 
-/** Facts that no mesh tells. */
+/** Facts about the correspondence and the detail, beyond the measures of the mesh. */
 export interface Facts {
   bands: number;
   folded: number;
   missed: number;
   held: number;
-  /** 5th and 95th percentile of the area on the base over that on the deformed one. */
+  /** 5th and 95th percentile of the area on the base over that on the deformed base. */
   areaLow: number;
   areaHigh: number;
   /** 95th percentile of the longest over the shortest stretch. */
@@ -120,15 +126,18 @@ export interface Facts {
 
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** When it fails, the former model stays. */
+  /** Opens meshes and builds a model of them. On failure, the previous model stays. */
   open: { body: { source: SceneSource; setup: Setup }; reply: Opened };
-  /** A new model of the same meshes. When it fails, the former model stays. */
+  /** Builds a new model of the same meshes. On failure, the previous model stays. */
   rebuild: { body: Setup; reply: Ready };
-  /** What is played, and the frame it is at. */
+  /** Loads a film at a frame, without playing it. */
   film: { body: { film: Film | undefined; frame: number }; reply: undefined };
-  /** Plays the film from where it is, from the start where it is at its end; without one, goes on to rest. */
+  /**
+   * Plays the film from its present frame, or from the start if it is at its end; without a film, runs until the model
+   * is at rest.
+   */
   play: { body: undefined; reply: undefined };
-  /** Goes on to rest, whatever film there is. */
+  /** Runs until the model is at rest, without playing the film. */
   settle: { body: undefined; reply: undefined };
   pause: { body: undefined; reply: undefined };
   step: { body: { count: number }; reply: undefined };
@@ -136,12 +145,12 @@ export interface Requests {
   show: { body: Shown; reply: undefined };
   /** The undeformed base and the detailed surface, as given. */
   originals: { body: undefined; reply: { base: Surface; detail: Surface | undefined } };
-  /** The model as it is at this moment, also while it goes on. */
+  /** Saves the present state of the model, also while it is running. */
   save: { body: undefined; reply: SavedPose };
-  /** Back to a saved model of the same meshes. */
+  /** Restores a saved model of the same meshes. */
   restore: { body: SavedPose; reply: Ready };
   stages: { body: StageKind; reply: Stage[] };
-  /** The film from its first frame as an animated GLB, and how long each frame is seen; nothing when it was cancelled. */
+  /** Records the film from its first frame as an animated GLB with `frameSeconds` per frame; undefined if cancelled. */
   record: { body: { frameSeconds: number }; reply: Uint8Array | undefined };
   cancelRecord: { body: undefined; reply: undefined };
   export: { body: { format: MeshFormat }; reply: Uint8Array };
@@ -149,17 +158,17 @@ export interface Requests {
 
 export type RequestKind = keyof Requests;
 export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
-/** The frame last sent is on the screen; has no reply. */
+/** Tells the worker that the frame it sent last is on the screen; has no reply. */
 export interface ShownMessage {
   kind: 'shown';
 }
-/** Where the ellipsoids are to be from now on; has no reply. */
+/** Sets the target pose of the ellipsoids; has no reply. */
 export interface PoseMessage {
   kind: 'pose';
   pose: Pose;
-  /** Counts poses; frames say which was the last that they follow. */
+  /** Number of the pose; frames report the number of the last one they follow. */
   turn: number;
-  /** The hand is still at it. */
+  /** Whether the pose is part of a drag that continues. */
   dragging: boolean;
 }
 export type ToWorker = RequestMessage | ShownMessage | PoseMessage;
@@ -168,38 +177,41 @@ export type ToWorker = RequestMessage | ShownMessage | PoseMessage;
 export interface FrameEvent {
   event: 'frame';
   result: Surface;
-  /** The deformed base, and the map T, where the layout shows them. */
+  /** The deformed base, and the link mesh T, if the layout includes them. */
   base?: Surface;
   link?: Surface;
-  /** The solver's meshes from coarse to fine, where the layout shows them. */
+  /** The solver's meshes from coarse to fine, if the layout includes them. */
   levels?: Stage[];
   reports: StepReport[];
-  /** Where the ellipsoids are now; some more may be vanishing. */
+  /** Present ellipsoids; removed ones that are still vanishing follow at the end. */
   ellipsoids: Pose;
-  /** Where they are to be. */
+  /** Target pose. */
   pose: Pose;
-  /** The last pose that came before this step. */
+  /** Number of the last pose received before this step. */
   turn: number;
-  /** Of the film. */
+  /** Frame of the film. */
   frame: number;
-  /** The frame's work, milliseconds. */
+  /** Duration of the step in milliseconds. */
   took: number;
-  /** Edges are twice as long as set, so that a drag is answered in time. */
+  /**
+   * Whether the frame is a preview: its detail is reduced and, after slow frames of a drag, its edges are twice as long
+   * as set.
+   */
   coarse: boolean;
 }
-/** At rest, or standing still. */
+/** Measures and facts, sent when the model is at rest or stopped. */
 export interface MeasuredEvent {
   event: 'measured';
   measures: Measures;
   facts: Facts;
 }
-/** A pose that was refused; the ellipsoids go on to where they were sent before. */
+/** A pose was rejected; the ellipsoids keep their previous target, `pose`. */
 export interface RefusedEvent {
   event: 'refused';
   failure: Failure;
   pose: Pose;
 }
-/** How far a recording is, 0 to 1. */
+/** Progress of a recording, 0 to 1. */
 export interface RecordedEvent {
   event: 'recorded';
   part: number;

@@ -1,13 +1,16 @@
-/** Films as animated GLB. Used by the worker only. */
+/** Records films as animated GLB. Used by the worker only. */
 import { animationGlb, type Mesh, type MultiresolutionModel } from 'vesicle';
 import { type Film, lastFrame, poseAt } from './film';
 
-/** Frames in which the surface may come to the first pose: longer ways than that are jumps, and are seen as such. */
+/**
+ * Most steps granted to the surface to reach the first pose before recording starts; motion that remains then is
+ * recorded.
+ */
 const MOST_TO_START = 60;
 
 /**
- * All frames from the first to the last as one file; in a loop the last is left out, as it is the first. Undefined when
- * the signal aborts it. The model ends in the last pose.
+ * Records all frames of a film as one file; in a loop the last frame is left out, as it equals the first. Undefined if
+ * the signal aborts. Leaves the model in the last pose.
  */
 export async function recorded(
   model: MultiresolutionModel,
@@ -34,7 +37,7 @@ export async function recorded(
   }
 }
 
-/** Gives messages their turn: a cancel is one. */
+/** Lets pending messages be handled first, since one of them may cancel; returns whether it has. */
 async function isCancelled(signal: AbortSignal): Promise<boolean> {
   await new Promise((resolve) => setTimeout(resolve, 0));
   return signal.aborted;

@@ -1,26 +1,27 @@
-/** Meshes that are computed. Used by the worker only. */
+/** Computed meshes. Used by the worker only. */
 import { Mesh } from 'vesicle';
 import { drawnMap } from './map';
 
 export type ComputedMesh = 'globe' | 'ball';
 
-/** Meridians of the globe, and circles of latitude between the poles. */
+/** Numbers of meridians of the globe, and of circles of latitude between the poles. */
 const MERIDIANS = 96;
 const CIRCLES = 47;
 
+/** Returns a computed mesh, with its texture if it has one. */
 export async function computedMesh(shape: ComputedMesh): Promise<Mesh> {
   if (shape === 'ball') return plainMesh(shape);
   return Mesh.parse(globeAsObj(), { texture: { type: 'image/png', bytes: await drawnMap() } });
 }
 
-/** Without a picture on it. */
+/** Returns a computed mesh without its texture. */
 export function plainMesh(shape: ComputedMesh): Mesh {
   return shape === 'ball' ? Mesh.icosphere([0, 0, 0], 1, 0.08) : Mesh.parse(globeAsObj());
 }
 
 /**
- * A ball of radius 1 with y up and texture coordinates by longitude and latitude, u from west to east, v from the south.
- * As a file, since only there a vertex on the seam can have two of them.
+ * Returns a ball of radius 1 as an OBJ file, with y up and texture coordinates by longitude and latitude: u from west
+ * to east, v from the south. Only in a file can a vertex on the seam have two texture coordinates.
  */
 function globeAsObj(): Uint8Array {
   const lines: string[] = [];

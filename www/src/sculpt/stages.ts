@@ -1,12 +1,12 @@
-/** Meshes beside each other: the levels of the solver, and what restructuring does. Used by the worker only. */
+/** Rows of meshes to compare: levels of the solver, and stages of restructuring. Used by the worker only. */
 import { Mesh, type MultiresolutionModel } from 'vesicle';
 import { surfaceOf } from './model';
 import type { Stage, StageKind, Surface } from './protocol';
 
-/** Most meshes that a row has room for. */
+/** Most meshes in a row. */
 const MOST = 5;
 
-/** The meshes that the skin was solved on, from coarse to fine; the finest ones where there are too many. */
+/** Returns the meshes that the membrane was solved on, from coarse to fine; the finest ones if there are too many. */
 export function levelsOf(model: MultiresolutionModel): Stage[] {
   const levels = model.levelMeshes();
   try {
@@ -21,7 +21,10 @@ function sizeOf(mesh: Mesh): string {
   return `${triangles} triangles, mean edge ${edge.mean.toPrecision(2)}`;
 }
 
-/** What stands under a mesh: how many triangles, and how bad the worst of them are; 1 is equilateral. */
+/**
+ * Returns a mesh with its caption: the number of triangles, and the quality that a share `WORST` of them falls below; 1
+ * is equilateral.
+ */
 function staged(mesh: Mesh, what: string): Stage {
   const surface = surfaceOf(mesh);
   const shapes = shapesOf(surface).sort();
@@ -29,10 +32,13 @@ function staged(mesh: Mesh, what: string): Stage {
   return { caption: `${what}: ${mesh.triangleCount} triangles, the worst below ${worst.toFixed(2)}`, surface };
 }
 
-/** The share of triangles that are called the worst. */
+/** Share of the triangles that are counted as the worst. */
 const WORST = 0.05;
 
-/** Of each triangle, its area over that of an equilateral one with the same mean square of its edges. */
+/**
+ * Returns the quality of each triangle: its area over that of an equilateral triangle with the same mean squared edge
+ * length.
+ */
 function shapesOf({ positions, indices, triangles }: Surface): Float32Array {
   return Float32Array.from({ length: triangles }, (_, triangle) => {
     const at = (corner: number) => 3 * (indices[3 * triangle + corner] ?? 0);
@@ -44,11 +50,12 @@ function shapesOf({ positions, indices, triangles }: Surface): Float32Array {
   });
 }
 
-/** Edge of the ball that is pulled. */
+/** Edge length of the ball that is deformed. */
 const EDGE = 0.16;
-/** Rounds until hardly an edge is out of bounds. */
+/** Rounds of restructuring after which hardly any edge is out of bounds. */
 const ROUNDS = 6;
 
+/** Returns the stages of restructuring a deformed ball: as a whole, or pass by pass. */
 export function stagesOf(kind: StageKind): Stage[] {
   const mesh = pulledBall();
   try {
@@ -58,7 +65,7 @@ export function stagesOf(kind: StageKind): Stage[] {
   }
 }
 
-/** A ball whose cap was pulled out and drawn together: its neck has long thin triangles, its tip short edges. */
+/** Returns a ball whose cap was pulled out and narrowed: its neck has long thin triangles, its tip short edges. */
 function pulledBall(): Mesh {
   const ball = Mesh.icosphere([0, 0, 0], 1, EDGE);
   const { positions, indices } = ball.arrays();
@@ -73,7 +80,7 @@ function pulledBall(): Mesh {
   return Mesh.fromArrays(positions, indices);
 }
 
-/** Figure 3: as pulled, refined everywhere, and restructured. */
+/** Returns the stages of figure 3: deformed, refined everywhere, and restructured. */
 function restructured(mesh: Mesh): Stage[] {
   const [refined, good] = [mesh.clone(), mesh.clone()];
   try {
@@ -86,9 +93,12 @@ function restructured(mesh: Mesh): Stage[] {
   }
 }
 
+/** Bounds of the edge lengths for restructuring. */
 const BOUNDS = { min: 0.6 * EDGE, max: 1.35 * EDGE };
 
-/** Figure 6: one pass after the other, then all of them until hardly an edge is out of bounds. */
+/**
+ * Returns the stages of figure 6: one pass after the other, then all of them until hardly any edge is out of bounds.
+ */
 function passes(mesh: Mesh): Stage[] {
   const at = mesh.clone();
   try {

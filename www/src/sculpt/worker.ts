@@ -1,4 +1,4 @@
-/** The worker of the Sculpt lab: it holds the meshes and one model of them, and does what the page asks. */
+/** Worker of the Sculpt lab: holds the meshes and one model of them, and serves the page's requests. */
 import init, { paramSpecs, type StepReport, version } from 'vesicle';
 import { Refusal, toFailure } from '../worker/refusal';
 import { transferOf } from '../worker/room';
@@ -52,15 +52,15 @@ class Session {
   readonly #course = new Course();
   #dragging = false;
   #turn = 0;
-  /** Steps the page has not heard of yet. */
+  /** Reports of steps that were not sent to the page yet. */
   #reports: StepReport[] = [];
   #last: StepReport | undefined;
   #took = 0;
-  /** The page has drawn what it was sent. */
+  /** Whether the page has drawn the last frame it was sent. */
   #shown = true;
   #run: Work | undefined;
   #recording: Work | undefined;
-  /** Lets a run go on that waits for the page. */
+  /** Resumes a run that waits for the page or for a new pose. */
   #wake: () => void = () => undefined;
 
   readonly handlers: Handlers = {
@@ -94,7 +94,7 @@ class Session {
     this.#wake();
   }
 
-  /** Only the newest pose is on the model when its next step begins. */
+  /** Takes a target pose at once, so that the next step uses the newest one; starts a run if none is active. */
   pose({ pose, turn, dragging }: PoseMessage): void {
     if (!this.#model) return;
     try {
@@ -148,7 +148,7 @@ class Session {
     return { params: { ...model.params }, start, pose: pose ?? start };
   }
 
-  /** The steps so far are those of another run. */
+  /** Forgets the reports: they belong to another run. */
   #forget(): void {
     this.#reports = [];
     this.#last = undefined;
@@ -185,7 +185,7 @@ class Session {
     try {
       await this.#frames(signal);
     } catch (error) {
-      // After the state: the page shows the failure on top of it.
+      // After the state event, so that the page shows the failure on top of that state.
       queueMicrotask(() => send({ event: 'failure', failure: toFailure(error) }));
     }
     this.#run = undefined;
@@ -193,7 +193,10 @@ class Session {
     this.#standStill();
   }
 
-  /** A frame after the other, each when the page has drawn the one before; while a hand holds still, none. */
+  /**
+   * Steps the model frame by frame, each after the page has drawn the previous one; pauses while a dragging pointer is
+   * still.
+   */
   async #frames(signal: AbortSignal): Promise<void> {
     while (!signal.aborted && (this.#dragging || !this.#isAtRest())) {
       if (this.#isAtRest()) await this.#until(() => !this.#isAtRest() || !this.#dragging, signal);
@@ -217,7 +220,7 @@ class Session {
     }
   }
 
-  /** One step of the model, and of the film while it plays. */
+  /** Does one step of the model, and of the film while it plays. */
   #next(): void {
     const model = this.#current();
     this.#course.next(model);
@@ -255,7 +258,7 @@ class Session {
     send({ event: 'state', state: this.#last?.done ? 'done' : 'paused' });
   }
 
-  /** The parameters as they are set, whatever a preview has made of them. */
+  /** Sets parameters, ends a preview first, and returns all set values. */
   #setParams(params: ParamValues): ParamValues {
     const model = this.#current();
     this.#preview.end(model);
@@ -303,7 +306,7 @@ class Session {
     }
   }
 
-  /** The model is afterwards as it was before. */
+  /** Records the film, then restores the model to its previous state. */
   async #record(frameSeconds: number): Promise<Requests['record']['reply']> {
     await stop(this.#run);
     await stop(this.#recording);
@@ -338,7 +341,7 @@ class Session {
   }
 }
 
-// At once, and not when it is asked for: the page is still on its way. What goes wrong is told then.
+// Load the engine at once, while the page still loads. A failure is reported when the page asks for it (`hello`).
 const starting = init();
 starting.catch(() => undefined);
 

@@ -1,21 +1,21 @@
-/** Cells as a confocal microscope shows them: one whose nucleus has its boundary marked, one that is bright inside. */
+/** Cells similar to confocal microscopy: a nucleus with a marked boundary, and a cell that is bright inside. */
 import { distance, noise, random, type ShapeVoxels, sample } from './sampling';
 
 type Point = [number, number, number];
 
 const NUCLEUS_SIZE = 72;
-/** The lobes of the nucleus: middle and radius, in voxels. */
+/** Lobes of the nucleus: centre and radius, voxels. */
 const LOBES: { middle: Point; radius: number }[] = [
   { middle: [26, 30, 34], radius: 13 },
   { middle: [44, 28, 38], radius: 13 },
   { middle: [38, 46, 34], radius: 12 },
 ];
-/** Voxels over which two lobes flow into each other. */
+/** Width of the blend between two lobes, voxels. */
 const BLEND = 5;
-/** Half the thickness of the marked boundary, in voxels. */
+/** Half the thickness of the marked boundary, voxels. */
 const MARK = 2.2;
 
-/** A nucleus of three lobes of which only the boundary is bright, with noise. */
+/** A nucleus of three lobes with only its boundary bright, and noise. */
 export function markedNucleus(): ShapeVoxels {
   const grain = noise(22, 14);
   return sample(NUCLEUS_SIZE, (i, j, k) => {
@@ -29,7 +29,7 @@ const CELL_SIZE = 80;
 const CELL_RADIUS = 24;
 const GRANULES = 7;
 
-/** A cell whose intensity falls from its middle to its ragged rim, with granules brighter than the rest. */
+/** A cell with intensity decreasing from its centre to an irregular border, and brighter granules. */
 export function cell(): ShapeVoxels {
   const next = random(24);
   const middle: Point = [39.5, 39.5, 39.5];

@@ -1,16 +1,16 @@
-/** Shapes whose topology is known. */
+/** Computed shapes with known topology. */
 import { type ShapeVoxels, sample } from './sampling';
 
 const RINGS_SIZE = 64;
-/** Of the linked rings, in voxels: from the middle of a ring to the middle of its tube, and the tube's radius. */
+/** Radii of the linked rings, voxels: of a ring's centre line, and of its tube. */
 const RING_RADIUS = 15;
 const TUBE_RADIUS = 5.5;
-/** Of the chain, in the same way. */
+/** The same radii for the chain. */
 const CHAIN = { size: [61, 45, 45] as [number, number, number], ring: 16, tube: 4.5 };
-/** Empty voxels around the sponge. */
+/** Number of empty voxels around the sponge. */
 const SPONGE_MARGIN = 4;
 
-/** Two rings that go through each other: two components of genus 1. */
+/** Two linked rings: two components of genus 1. */
 export function linkedRings(): ShapeVoxels {
   const middle = (RINGS_SIZE - 1) / 2;
   const shift = RING_RADIUS / 2;
@@ -18,14 +18,14 @@ export function linkedRings(): ShapeVoxels {
     const [x, y, z] = [i - middle, j - middle, k - middle];
     const flat = Math.hypot(Math.hypot(x + shift, y) - RING_RADIUS, z);
     const upright = Math.hypot(Math.hypot(x - shift, z) - RING_RADIUS, y);
-    // Half grey at the surface, one voxel and a half of transition to each side.
+    // Half grey at the surface, with a transition of one and a half voxels to each side.
     return 127.5 + 85 * (TUBE_RADIUS - Math.min(flat, upright));
   });
 }
 
 /**
- * Two linked rings as a potential that falls evenly with the distance from their middle lines: all of it up to half of
- * the tube's radius, half of it at the radius, none from one radius and a half.
+ * Two linked rings as a potential that decreases linearly with the distance from their centre lines: its maximum up to
+ * half of the tube's radius, half at the radius, zero from one and a half radii.
  */
 export function chain(): ShapeVoxels {
   const { size, ring, tube } = CHAIN;
@@ -38,7 +38,7 @@ export function chain(): ShapeVoxels {
   });
 }
 
-/** A Menger sponge of the given depth on 81³ voxels: a cube pierced by square tunnels on every scale. */
+/** A Menger sponge of the given depth on 81³ voxels: a cube with square tunnels at every scale. */
 export function spongeVoxels(depth: number): ShapeVoxels {
   const side = 81;
   return sample(side + 2 * SPONGE_MARGIN, (i, j, k) => {
@@ -48,7 +48,7 @@ export function spongeVoxels(depth: number): ShapeVoxels {
   });
 }
 
-/** Whether a voxel lies in a tunnel: on some scale, in the middle third along two axes or more. */
+/** Whether a voxel is inside a tunnel: at some scale, in the middle third along two axes or more. */
 function isPierced(at: number[], side: number, depth: number): boolean {
   for (let level = 1; level <= depth; level++) {
     const third = side / 3 ** level;

@@ -1,9 +1,9 @@
-/** A head as a CT would show it: skin around soft tissue, and in it a skull with openings around a brain. */
+/** A head phantom similar to a CT: skin around soft tissue, and in it a skull with openings around a brain. */
 import { noise, type ShapeVoxels, sample, soft } from './sampling';
 
 const SIZE = 112;
 const MIDDLE = (SIZE - 1) / 2;
-/** Half axes in voxels: of the skin, of the skull's outside, and its thickness. */
+/** Semi-axes of the skin and of the skull's outer surface, and the skull's thickness, voxels. */
 const SKIN = [43, 50, 48] as const;
 const SKULL = [35, 42, 40] as const;
 const THICKNESS = 9;
@@ -11,7 +11,7 @@ const SOFT_TISSUE = 75;
 const BONE = 220;
 const NOISE = 6;
 
-/** Openings of the skull as cylinders through its middle: direction and radius. Orbits, ears, nose, spinal cord. */
+/** Openings of the skull as cylinders through its centre, by direction and radius: orbits, ears, nose, spinal cord. */
 const OPENINGS: { direction: readonly [number, number, number]; radius: number }[] = [
   { direction: [0.42, 0.88, 0.22], radius: 7 },
   { direction: [-0.42, 0.88, 0.22], radius: 7 },
@@ -32,14 +32,14 @@ export function headPhantom(): ShapeVoxels {
   });
 }
 
-/** How deep a point lies in an ellipsoid, to first order at its surface. */
+/** Depth of a point in an ellipsoid; first-order approximation near its surface. */
 function depthInEllipsoid([x, y, z]: readonly [number, number, number], [a, b, c]: readonly [number, number, number]) {
   const level = Math.hypot(x / a, y / b, z / c);
   const slope = Math.hypot(x / (a * a), y / (b * b), z / (c * c)) / (level || 1);
   return slope > 0 ? (1 - level) / slope : a;
 }
 
-/** How deep a point lies in the nearest opening, negative outside of all. */
+/** Depth of a point in the nearest opening, negative outside all. */
 function depthInOpenings(at: readonly [number, number, number]): number {
   return OPENINGS.reduce((deepest, { direction, radius }) => {
     const along = at[0] * direction[0] + at[1] * direction[1] + at[2] * direction[2];

@@ -1,4 +1,7 @@
-/** Volumes that are computed instead of loaded. Intensities 0..255, x fastest, cubes as voxels; the same on every machine. */
+/**
+ * Computed volumes for examples and the paper's figures. Intensities 0..255, x fastest, cubic voxels; identical on
+ * every machine.
+ */
 import { cell, markedNucleus } from './cells';
 import { chain, linkedRings, spongeVoxels } from './geometric';
 import { headPhantom } from './head';

@@ -1,4 +1,4 @@
-/** What the computed volumes share: a grid of bytes, x fastest, cubes as voxels. */
+/** Sampling functions and noise shared by the computed volumes: a grid of bytes, x fastest, cubic voxels. */
 
 export interface ShapeVoxels {
   data: Uint8Array;
@@ -7,7 +7,7 @@ export interface ShapeVoxels {
 
 type Point = readonly [number, number, number];
 
-/** Intensities of a function of voxel indices, held to 0..255; a single number makes a cube. */
+/** Samples a function of voxel indices, clamped to 0..255; a single number as `size` gives a cube. */
 export function sample(
   size: number | [number, number, number],
   value: (i: number, j: number, k: number) => number,
@@ -23,7 +23,7 @@ export function sample(
   return { data, dims };
 }
 
-/** A small seeded generator (mulberry32) of numbers in 0..1: the same volume on every machine. */
+/** A seeded pseudo-random generator (mulberry32) of numbers in 0..1, identical on every machine. */
 export function random(seed: number): () => number {
   let state = seed;
   return () => {
@@ -34,7 +34,10 @@ export function random(seed: number): () => number {
   };
 }
 
-/** Noise around 0 with the given standard deviation, nearly normal: the sum of four even ones. */
+/**
+ * A generator of approximately normal noise with mean 0 and the given standard deviation: the sum of four uniform
+ * numbers.
+ */
 export function noise(seed: number, deviation: number): () => number {
   const next = random(seed);
   return () => deviation * Math.sqrt(3) * (next() + next() + next() + next() - 2);
@@ -44,7 +47,9 @@ export function distance(a: Point, b: Point): number {
   return Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
-/** 255 well inside, 0 well outside, half at the border; `depth` in voxels, positive inside, over three voxels. */
+/**
+ * Smooth step from 0 (outside) to 1 (inside), ½ at the border; `depth` in voxels, positive inside, over three voxels.
+ */
 export function soft(depth: number): number {
   return Math.min(1, Math.max(0, 0.5 + depth / 3));
 }

@@ -1,4 +1,4 @@
-/** Bright vessels in the dark, as an angiography shows them. */
+/** A tree of bright vessels on a dark background, similar to an angiography. */
 import { distance, noise, random, type ShapeVoxels, sample, soft } from './sampling';
 
 type Point = [number, number, number];
@@ -11,13 +11,15 @@ interface Segment {
 
 const SIZE = 112;
 const GENERATIONS = 6;
-/** Radius in voxels of the trunk, and of each child in its parent: the flow that comes in goes out (Murray's law). */
+/**
+ * Radius of the trunk in voxels, and ratio of a child's radius to its parent's, by conservation of flow (Murray's law).
+ */
 const TRUNK = 4;
 const THINNER = 0.5 ** (1 / 3);
 const SHORTER = 0.8;
-/** How far a child turns away from its parent, in radians. */
+/** Angle between a child and its parent, radians. */
 const TURN = 0.62;
-/** Pieces of vessel that nothing connects with the tree. */
+/** Vessel segments not connected to the tree. */
 const ISLANDS: Segment[] = [
   { from: [16, 88, 30], to: [24, 96, 34], radius: 1 },
   { from: [94, 20, 84], to: [97, 12, 92], radius: 1 },
@@ -32,7 +34,7 @@ export function vesselTree(): ShapeVoxels {
   return sample(SIZE, (i, j, k) => 250 * (strength[i + SIZE * (j + SIZE * k)] ?? 0) + grain());
 }
 
-/** A trunk from the floor upwards that divides in two again and again. */
+/** Generates a trunk that grows upwards from the floor and bifurcates repeatedly. */
 function tree(): Segment[] {
   const next = random(1999);
   const segments: Segment[] = [];
@@ -51,7 +53,7 @@ function tree(): Segment[] {
   return segments;
 }
 
-/** A unit vector at right angles to a unit vector, at an angle around it. */
+/** Returns a unit vector perpendicular to a given unit vector, at an angle around it. */
 function across([x, y, z]: Point, angle: number): Point {
   const other: Point = Math.abs(x) < 0.7 ? [1, 0, 0] : [0, 1, 0];
   const u = unit([y * other[2] - z * other[1], z * other[0] - x * other[2], x * other[1] - y * other[0]]);
@@ -64,7 +66,7 @@ function unit(v: Point): Point {
   return v.map((x) => x / length) as Point;
 }
 
-/** Writes a capsule over what is there, where it is brighter; touches only the voxels around it. */
+/** Draws a capsule into the volume, as the maximum of both; visits only the voxels around it. */
 function draw({ from, to, radius }: Segment, strength: Float32Array): void {
   const reach = radius + 2;
   const length = distance(from, to) ** 2;

@@ -1,10 +1,16 @@
-/** What interpolation makes of a slice's two neighbours in its place, linear and along the optical flow (figure 5). */
+/**
+ * Interpolates a measured slice from its two neighbours, linearly and along the optical flow, for comparison (figure
+ * 5).
+ */
 import { Volume } from 'vesicle';
 import { quantize } from '../quantize';
 import { Refusal } from '../worker/refusal';
 import type { Between } from './protocol';
 
-/** As if slice number `slice` across the last voxel axis had not been measured. */
+/**
+ * Interpolates slice number `slice` across the last voxel axis as if it had not been measured, and returns it with its
+ * neighbours and the errors.
+ */
 export function betweenSlices(volume: Volume, frame: number, slice: number, window: [number, number]): Between {
   const [width, height, slices] = volume.dims;
   if (slice < 1 || slice + 1 >= slices)
@@ -36,7 +42,7 @@ function between(
   const data = new Float32Array(2 * width * height);
   data.set(one);
   data.set(other, width * height);
-  // Far from each other, so that it is between these two that a slice is put.
+  // The spacing makes enrichSlices insert a slice between these two.
   const two = new Volume({ data, dims: [width, height, 2], spacing: [1, 1, 4] });
   const three = two.enrichSlices({ factor: 2, method });
   try {

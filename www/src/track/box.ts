@@ -1,19 +1,21 @@
-/** Boxes of voxels, as they are drawn on slices and as the tracker takes them, and their corners in the world, which stay where
- * voxels are made larger or smaller. */
+/**
+ * Conversions between the region of interest in voxels, used for drawing and by the tracker, and its corners in the
+ * world, which remain valid when the image is binned or enriched.
+ */
 import type { Vec3 } from '../protocol';
 import { toWorld } from '../view/anatomy';
 import type { Box } from './protocol';
 
-/** First and last voxel along each axis. */
+/** A box of voxels by its first and last voxel along each axis, both inclusive. */
 export interface VoxelBox {
   low: Vec3;
   high: Vec3;
 }
 
-/** So much beyond the centres of the outermost voxels, in voxels: they are in it, their neighbours are not. */
+/** Margin beyond the centres of the outermost voxels, in voxels: these are inside the box, their neighbours are not. */
 const RIM = 0.25;
 
-/** The voxels between two corners. */
+/** Returns the voxels whose centres lie in a world box, clamped to the image; at least one along each axis. */
 export function voxelsOf({ min, max }: Box, inverse: ArrayLike<number>, dims: Vec3): VoxelBox {
   const corners = [toWorld(inverse, min), toWorld(inverse, max)];
   const inside = (value: number, axis: number) => Math.min((dims[axis] ?? 1) - 1, Math.max(0, value));
@@ -23,7 +25,7 @@ export function voxelsOf({ min, max }: Box, inverse: ArrayLike<number>, dims: Ve
   return { low, high };
 }
 
-/** The corners of voxels. */
+/** Returns the corners in the world of a box of voxels. */
 export function boxOf({ low, high }: VoxelBox, affine: ArrayLike<number>): Box {
   return {
     min: toWorld(affine, low.map((at) => at - RIM) as Vec3),

@@ -1,20 +1,27 @@
-/** Canny's edge detector (1986), as the paper compares its boundary with: smoothing, slope, ridges, two thresholds. */
+/**
+ * Canny's edge detector (1986), which the paper compares its boundary with: Gaussian smoothing, gradient, non-maximum
+ * suppression, hysteresis thresholding.
+ */
 
 export interface CannySettings {
-  /** Standard deviation of the smoothing, pixels. */
+  /** Standard deviation of the Gaussian, in pixels. */
   deviation: number;
-  /** Ridges of a slope above `high` are edges, and those above `low` that hang together with them; intensity per pixel. */
+  /**
+   * Hysteresis thresholds of the gradient magnitude, in intensity per pixel: local maxima above `high` are edges, and
+   * so are those above `low` that are connected to them.
+   */
   low: number;
   high: number;
 }
 
+/** A greyscale image, row by row. */
 export interface Picture {
   width: number;
   height: number;
   values: ArrayLike<number>;
 }
 
-/** 1 where there is an edge. */
+/** Returns the edge map of a picture: 1 for each edge pixel, else 0. */
 export function canny(picture: Picture, { deviation, low, high }: CannySettings): Uint8Array {
   const { width, height } = picture;
   const smooth = smoothed(picture, deviation);
@@ -29,13 +36,15 @@ export function canny(picture: Picture, { deviation, low, high }: CannySettings)
       const [dx, dy] = slope(x, y);
       const here = slopes[y * width + x] ?? 0;
       const [ahead, behind] = [1, -1].map((way) => along(slopes, width, height, x, y, dx, dy, way));
-      // The one behind may be as steep: of two alike one is taken.
+      // Strict on one side only, so that one of two equal neighbours is kept.
       if (here > (ahead ?? 0) && here >= (behind ?? 0)) ridge[y * width + x] = 1;
     }
   return connected(width, height, ridge, slopes, low, high);
 }
 
-/** The slope one pixel on along the direction of the slope, between the two pixels there. */
+/**
+ * Returns the gradient magnitude one pixel ahead (`way` 1) or behind (−1) along the gradient, bilinearly interpolated.
+ */
 function along(
   slopes: Float32Array,
   width: number,
@@ -56,7 +65,7 @@ function along(
   );
 }
 
-/** Ridges above `high`, and what hangs together with them above `low`. */
+/** Hysteresis: returns the local maxima above `high` and those above `low` that are connected to them. */
 function connected(
   width: number,
   height: number,
@@ -83,7 +92,7 @@ function connected(
   return edges;
 }
 
-/** By a Gaussian, first along rows, then along columns; beyond the border its values go on. */
+/** Convolves with a Gaussian, first along rows, then along columns; the border is padded with the nearest values. */
 function smoothed({ width, height, values }: Picture, deviation: number): Float32Array {
   const reach = Math.ceil(3 * deviation);
   const kernel = Array.from({ length: 2 * reach + 1 }, (_, i) =>

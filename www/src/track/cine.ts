@@ -1,15 +1,15 @@
-/** A beating ventricle as cine MR would show it, computed: what is true is known. */
+/** A computed phantom: cine MR of a beating ventricle whose true volume and wall are known. */
 import type { Vec3 } from '../protocol';
 
 export interface CineSpec {
   dims: Vec3;
   spacing: Vec3;
   frames: number;
-  /** Standard deviation of the noise; the blood is 110 brighter than the muscle. */
+  /** Standard deviation of the noise; blood is 110 brighter than muscle. */
   noise: number;
-  /** Half the length of the long axis, mm; all else goes with it. */
+  /** Half the length of the long axis, mm; all other lengths scale with it. */
   size: number;
-  /** With two muscles in the cavity whose gaps to the wall close in systole. */
+  /** Adds two papillary muscles to the cavity; the gaps between them and the wall close in systole. */
   papillary: boolean;
 }
 
@@ -17,25 +17,26 @@ export interface CineSpec {
 const BLOOD = 200;
 const MUSCLE = 90;
 const LUNG = 45;
-/** The long half axis that the other lengths are told for. */
+/** Long half axis, mm, that the other lengths in this file refer to. */
 const UNIT = 42;
-/** Samples through the thickness of a slice. */
+/** Samples through the thickness of a slice, averaged for the partial volume effect. */
 const SAMPLES = 3;
-/** Edge of the cells that the true volume is counted in, mm of a heart of the unit's size. */
+/** Edge of the cells that the true volume is integrated over, mm for a heart of half axis `UNIT`. */
 const CELL = 1.5;
 
-/** 0 in diastole, 1 in systole. */
+/** Returns the contraction in a frame: 0 in diastole, 1 in systole. */
 export function contraction({ frames }: CineSpec, frame: number): number {
   const phase = (frame / frames) % 1;
   const rise = (x: number) => 0.5 - 0.5 * Math.cos(Math.PI * Math.min(1, Math.max(0, x)));
   return rise(phase / 0.35) - 0.92 * rise((phase - 0.35) / 0.3) - 0.08 * rise((phase - 0.65) / 0.35);
 }
 
+/** Returns the centre of the image in world coordinates, where the ventricle lies. */
 export function middleOf({ dims, spacing }: CineSpec): Vec3 {
   return dims.map((n, k) => ((n - 1) / 2) * (spacing[k] ?? 1)) as Vec3;
 }
 
-/** Signed distances, about, of the cavity and of the heart: negative inside. */
+/** Returns approximate signed distances of a point to the cavity and to the heart; negative inside. */
 function distances(spec: CineSpec, at: Vec3, contracted: number): [number, number] {
   const unit = spec.size / UNIT;
   const middle = middleOf(spec);
@@ -47,7 +48,7 @@ function distances(spec: CineSpec, at: Vec3, contracted: number): [number, numbe
   const outside: Vec3 = [wide + thick, wide + thick, long + thick - 3 * contracted];
   const heart = smoothMax(ellipsoid(p, outside), p[2] - base - 4, 3);
   for (const angle of spec.papillary ? [0.7, 3] : []) {
-    // Away from the wall but for its foot; the gap closes in systole.
+    // The papillary muscles are apart from the wall except at their foot; the gap closes in systole.
     const away = wide - 9 + 4.5 * contracted;
     const from: Vec3 = [p[0] - away * Math.cos(angle), p[1] - away * Math.sin(angle), p[2] + 12];
     cavity = smoothMax(cavity, -ellipsoid(from, [5, 5, 18]), 2);
@@ -61,13 +62,13 @@ function ellipsoid(p: Vec3, axes: Vec3): number {
   return slope > 0 ? (size * (size - 1)) / slope : -Math.min(...axes);
 }
 
-/** The larger of two, rounded where they meet. */
+/** Returns the maximum of two values, rounded where they are closer than `width`. */
 function smoothMax(a: number, b: number, width: number): number {
   const near = Math.max(0, width - Math.abs(a - b)) / width;
   return Math.max(a, b) + near * near * width * 0.25;
 }
 
-/** All frames, x fastest; the noise is that of magnitudes, and always the same. */
+/** Returns the voxels of all frames, x fastest; the noise is that of magnitude images, and always the same. */
 export function cineVoxels(spec: CineSpec): Uint8Array {
   const [nx, ny, nz] = spec.dims;
   const voxels = new Uint8Array(nx * ny * nz * spec.frames);
@@ -86,7 +87,7 @@ export function cineVoxels(spec: CineSpec): Uint8Array {
   return voxels;
 }
 
-/** Of a voxel before noise: thick slices show what is above and below, too. */
+/** Returns the intensity of a voxel before noise. In thick slices it averages through the slice. */
 function intensity(spec: CineSpec, index: Vec3, contracted: number): number {
   const { spacing } = spec;
   const at = (off: number): Vec3 => [index[0] * spacing[0], index[1] * spacing[1], (index[2] + off) * spacing[2]];
@@ -96,14 +97,14 @@ function intensity(spec: CineSpec, index: Vec3, contracted: number): number {
     return around + (BLOOD - around) * share(cavity);
   };
   const middle = distances(spec, at(0), contracted);
-  // Far from any wall all of the voxel is alike.
+  // Far from any wall the whole voxel has one intensity.
   if (Math.min(Math.abs(middle[0]), Math.abs(middle[1])) > Math.max(...spacing)) return shade(middle);
   let sum = 0;
   for (let k = 0; k < SAMPLES; k++) sum += shade(distances(spec, at((k + 0.5) / SAMPLES - 0.5), contracted));
   return sum / SAMPLES;
 }
 
-/** What the cavity holds in a frame, mm³. */
+/** Returns the true volume of the cavity in a frame, mm³. */
 export function trueVolume(spec: CineSpec, frame: number): number {
   const contracted = contraction(spec, frame);
   const step = (CELL * spec.size) / UNIT;
@@ -120,7 +121,7 @@ export function trueVolume(spec: CineSpec, frame: number): number {
   return cells * step ** 3;
 }
 
-/** Distances of points from the true wall of the cavity, packed xyz in; sorted. */
+/** Returns the distances of points, packed xyz, from the true wall of the cavity, sorted. */
 export function wallDistances(spec: CineSpec, frame: number, points: Float32Array): Float64Array {
   const contracted = contraction(spec, frame);
   const found = Float64Array.from({ length: points.length / 3 }, (_, i) => {
@@ -130,7 +131,7 @@ export function wallDistances(spec: CineSpec, frame: number, points: Float32Arra
   return found.sort();
 }
 
-/** Gaussian numbers of deviation 1, the same for the same seed. */
+/** Returns a generator of normally distributed numbers of standard deviation 1, reproducible by its seed. */
 function normals(seed: number): () => number {
   let state = seed;
   const uniform = () => {

@@ -1,10 +1,11 @@
 import { Channel } from '../channel';
 import type { Requests, WorkerEvent } from './protocol';
 
+/** Starts the Track lab's worker. */
 export const spawnTrack = () =>
   new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'vesicle track' });
 
-/** The Track lab's worker, from the page. */
+/** The page's client of the Track lab's worker. */
 export class TrackClient extends Channel<Requests, WorkerEvent> {
   constructor(onEvent: (event: WorkerEvent) => void) {
     super(spawnTrack, onEvent);

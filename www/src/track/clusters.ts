@@ -1,18 +1,23 @@
-/** The paper's boundary on one slice: windows sorted into bright and dark, and what they vote for (section 2.1). */
+/**
+ * The paper's boundary on one slice: 2-means clustering of windows into bright and dark, and the votes of the windows
+ * (section 2.1).
+ */
 import type { Picture } from './canny';
 
-/** Each of the two must hold more than this share of a window. */
+/** Least share of a window that each of its two clusters must hold. */
 const LEAST_SHARE = 0.1;
+/** Most iterations of 2-means. */
 const MOST_ROUNDS = 10;
 
+/** Result of 2-means on the values of a window. */
 export interface Clusters {
-  /** Mean of the dark, and of the bright. */
+  /** Mean of the dark cluster, and of the bright one. */
   means: [number, number];
-  /** 1 where a value is bright. */
+  /** 1 for each value in the bright cluster, else 0. */
   bright: Uint8Array;
 }
 
-/** Lloyd's iteration from the smallest and the largest value. */
+/** Clusters values in two by Lloyd's iteration, started from the smallest and the largest value. */
 export function twoMeans(values: ArrayLike<number>): Clusters {
   let means: [number, number] = [Math.min(...Array.from(values)), Math.max(...Array.from(values))];
   const bright = new Uint8Array(values.length);
@@ -35,15 +40,18 @@ export function twoMeans(values: ArrayLike<number>): Clusters {
   return { means, bright };
 }
 
-/** Whether a window holds a boundary: both kinds, and far enough apart. */
+/**
+ * Tests whether a window contains a boundary: both clusters are large enough, and their means differ by more than
+ * `threshold`.
+ */
 export function isSplit({ means, bright }: Clusters, threshold: number): boolean {
   const share = bright.reduce((sum, one) => sum + one, 0) / bright.length;
   return Math.min(share, 1 - share) > LEAST_SHARE && means[1] - means[0] > threshold;
 }
 
 /**
- * The faces between pixels that windows of one slice vote for, as the paper has it in 2D: to the right of and below each
- * pixel, with the share of the windows around that do.
+ * Returns the boundary votes of the windows of one slice, as in the paper's 2D version: for each face between two
+ * pixels, the share of the windows containing both pixels that separate them.
  */
 export function sliceVotes(
   { width, height, values }: Picture,
@@ -53,7 +61,7 @@ export function sliceVotes(
   const [right, below] = [new Float32Array(width * height), new Float32Array(width * height)];
   for (let y = reach; y + reach < height; y++)
     for (let x = reach; x + reach < width; x++) voteOf({ width, values }, x, y, reach, threshold, right, below);
-  // So many windows hold both pixels of a face.
+  // Number of windows that contain both pixels of a face.
   const most = 2 * reach * (2 * reach + 1);
   const out = [];
   for (let i = 0; i < width * height; i++) {
@@ -82,7 +90,7 @@ function voteOf(
       if (value < least) least = value;
       if (value > largest) largest = value;
     }
-  // Most windows end here.
+  // Quick test: most windows end here.
   if (largest - least <= threshold) return;
   const inside = Array.from({ length: side * side }, (_, k) => from + Math.floor(k / side) * width + (k % side));
   const found = twoMeans(inside.map((at) => values[at] ?? 0));
@@ -93,7 +101,7 @@ function voteOf(
   }
 }
 
-/** The pixels of the window around a place, row by row; less of them at the border. */
+/** Returns the pixels of the window around a pixel, row by row; clipped at the border. */
 export function windowAt({ width, height }: Picture, x: number, y: number, reach: number): number[] {
   const out: number[] = [];
   for (let j = Math.max(0, y - reach); j <= Math.min(height - 1, y + reach); j++)
@@ -102,8 +110,8 @@ export function windowAt({ width, height }: Picture, x: number, y: number, reach
 }
 
 /**
- * Votes on the faces of pixels, brought together on the pixels as the paper shows them: of each pixel the square roots of the
- * two shares to its right and below, so that slanted edges do not count twice.
+ * Sums votes on pixel faces into a picture, as in the paper's figures: each pixel gets the square roots of the votes on
+ * the faces to its left and above, so that slanted edges do not count twice.
  */
 export function boundaryPicture(
   { width, height }: Pick<Picture, 'width' | 'height'>,

@@ -1,4 +1,4 @@
-/** The whole run once more with something else. */
+/** Repeats the whole run with another setup, for the comparison panel. */
 import type { Volume } from 'vesicle';
 import type { CineSpec } from './cine';
 import { errorOf } from './frames';
@@ -7,7 +7,7 @@ import { buildTracker, prepared } from './source';
 
 type Tell = (part: number, phase: string) => void;
 
-/** Undefined when the signal aborts it. */
+/** Prepares the image, tracks all frames with `setup` and returns the results. Undefined if the signal aborts. */
 export async function compared(
   original: Volume,
   spec: CineSpec | undefined,

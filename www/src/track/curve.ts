@@ -1,18 +1,18 @@
-/** What the volumes of a heartbeat say. */
+/** Evaluates the volume curve of a heartbeat, and warns of suspicious frames. */
 import type { FrameFacts } from './protocol';
 
 export interface Beat {
-  /** Frame of the largest and of the smallest volume. */
+  /** Frames of the largest and of the smallest volume. */
   diastole: number;
   systole: number;
-  /** Volumes then. */
+  /** The largest and the smallest volume. */
   largest: number;
   smallest: number;
-  /** Share of the largest that is driven out. */
+  /** Ejection fraction: (largest − smallest) / largest. */
   ejection: number;
 }
 
-/** Nothing of fewer than two frames, which have no largest and smallest. */
+/** Evaluates the volumes of all frames. Undefined for fewer than two. */
 export function beatOf(volumes: readonly number[]): Beat | undefined {
   if (volumes.length < 2) return undefined;
   const [largest, smallest] = [Math.max(...volumes), Math.min(...volumes)];
@@ -20,9 +20,12 @@ export function beatOf(volumes: readonly number[]): Beat | undefined {
   return { diastole: volumes.indexOf(largest), systole: volumes.indexOf(smallest), largest, smallest, ejection };
 }
 
-/** Of the triangles, more than this share facing the other way is worth a warning. */
+/** Share of triangles facing the other way in a frame, above which a warning is shown. */
 export const FOLDED = 0.01;
-/** From one frame to the next the area of a body that only grows or shrinks goes with its volume to the power of 2/3; more than this share off is worth a warning. */
+/**
+ * Relative deviation of a frame's area from that expected from its volume, above which a warning is shown; a body that
+ * only grows or shrinks changes its area as its volume to the power of 2/3.
+ */
 export const AREA_JUMP = 0.15;
 
 export interface Warned {
@@ -33,7 +36,7 @@ export interface Warned {
 
 type Suspect = Pick<FrameFacts, 'folded' | 'triangles' | 'area' | 'volume'>;
 
-/** The frames that are suspect even where volume and error look well. */
+/** Returns the frames that are suspicious even if their volume and error are plausible. */
 export function warningsOf(facts: readonly Suspect[]): Warned[] {
   return facts.flatMap(({ folded, triangles, area, volume }, frame) => {
     const before = facts[frame - 1];

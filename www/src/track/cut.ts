@@ -1,7 +1,7 @@
-/** Where a surface is cut: by a plane, and by a line. */
+/** Intersections of a surface with a plane, and of the resulting segments with a line. */
 import type { Plane, Surface } from '../protocol';
 
-/** The cut of a surface with a plane, pairs of points packed xyz. */
+/** Returns the cross-section of a surface with a plane, as segments: pairs of points, packed xyz. */
 export function cutBy({ positions, indices, vertices, triangles }: Surface, { origin, normal }: Plane): Float32Array {
   const heights = new Float32Array(vertices);
   const offset = normal[0] * origin[0] + normal[1] * origin[1] + normal[2] * origin[2];
@@ -30,7 +30,7 @@ export function cutBy({ positions, indices, vertices, triangles }: Surface, { or
   return Float32Array.from(out);
 }
 
-/** Where segments in a picture (x y x y of each) cross the row at a height: their x, in order. */
+/** Returns the x coordinates, sorted, at which segments in a picture (x y x y each) cross the row at a height. */
 export function crossings(segments: Float32Array, height: number): number[] {
   const out: number[] = [];
   for (let i = 0; i + 3 < segments.length; i += 4) {

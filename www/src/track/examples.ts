@@ -3,7 +3,7 @@ import type { ParamValues, Vec3 } from '../protocol';
 import { type CineSpec, middleOf } from './cine';
 import type { Box, Preparation } from './protocol';
 
-/** A 4D image that comes with the page, and what suits it. */
+/** An example of the Track lab: a 4D image, suitable settings and credits. */
 export interface TrackExample {
   id: string;
   name: string;
@@ -12,19 +12,21 @@ export interface TrackExample {
   preparation: Preparation;
   box?: Box;
   at?: Vec3;
-  /** Where the slices meet at first; where the surface is nearest to, if nothing is said. */
+  /** Initial position of the crosshair; by default `at`. */
   crosshair?: Vec3;
   params: ParamValues;
   credit: string;
 }
 
+/** No preparation, for images with nearly cubic voxels. */
 const PLAIN: Preparation = { binning: 1, enrichment: 'none', factor: 0 };
 
-/** What is done to an image of the user's: in-between slices are made where slices are thick. */
+/** Preparation of the user's own images: in-between slices are inserted where slices are thick. */
 export const OWN_PREPARATION: Preparation = { binning: 1, enrichment: 'flow', factor: 0 };
 
-/** Amid the left ventricle's blood. */
+/** A point in the blood of the left ventricle. */
 const LEFT_VENTRICLE: Vec3 = [1.47, 37.05, -13.99];
+/** Returns the box with faces at the distance `reach` from a point. */
 const around = (middle: Vec3, reach: number): Box => ({
   min: middle.map((x) => x - reach) as Vec3,
   max: middle.map((x) => x + reach) as Vec3,
@@ -33,11 +35,12 @@ const around = (middle: Vec3, reach: number): Box => ({
 export const HEART_CREDIT =
   'Cine MR of a pig’s heart, short axis, 20 slices in 20 phases of one beat: WrightGroupSRI, ep-dataset, CC0. Pixels binned 2 × 2.';
 
+/** The measured heart, with its settings; also the image of all presets. */
 export const HEART = {
   source: { file: 'heart.nii.gz' },
   unit: 'mm',
   preparation: { binning: 1, enrichment: 'flow', factor: 0 },
-  // From the apex to below the valves, where signal is weak and blood goes on into the next chamber.
+  // From the apex to below the valves, where the signal is weak and the blood is connected to that of the next chamber.
   box: { min: [38.01, 78.55, -16.5], max: [-41.86, 5.87, -24.59] },
   at: LEFT_VENTRICLE,
   crosshair: LEFT_VENTRICLE,
@@ -55,7 +58,7 @@ const VENTRICLE: CineSpec = {
 };
 const THICK: CineSpec = { dims: [48, 48, 12], spacing: [1.6, 1.6, 5], frames: 12, noise: 8, size: 26, papillary: true };
 
-/** The first is shown when the lab opens. */
+/** The examples of the Track lab. The first one opens by default. */
 export const FILMS: [TrackExample, ...TrackExample[]] = [
   { id: 'heart', name: 'Beating heart, MR: left ventricle', ...HEART },
   {

@@ -1,9 +1,10 @@
-/** What the page is told of a tracked frame. */
+/** Collects what the page displays of a tracked frame. */
 import type { SurfaceTracker } from 'vesicle';
 import { noArrays, surfaceIn } from '../worker/room';
 import { type CineSpec, wallDistances } from './cine';
 import type { SurfaceError, TrackedFrame } from './protocol';
 
+/** Returns the surface of a frame with its facts and measures, and its error if `spec` gives the true wall. */
 export function trackedFrame(tracker: SurfaceTracker, index: number, spec: CineSpec | undefined): TrackedFrame {
   const mesh = tracker.meshAt(index);
   try {
@@ -17,6 +18,7 @@ export function trackedFrame(tracker: SurfaceTracker, index: number, spec: CineS
   }
 }
 
+/** Returns the distances of points from the true wall of a computed image. */
 export function errorOf(spec: CineSpec, frame: number, points: Float32Array): SurfaceError {
   const distances = wallDistances(spec, frame, points);
   const mean = distances.reduce((sum, distance) => sum + distance, 0) / (distances.length || 1);

@@ -1,18 +1,19 @@
-/** The paper's figures, on images that come with the page. */
+/** Presets of the Track lab: the paper's figures, on images that are served with the page. */
 import type { ParamValues } from '../protocol';
 import type { TrackViewOptions } from '../view/beating';
 import { FILMS, HEART, type TrackExample } from './examples';
 
-/** One of several pictures of a figure. */
+/** One picture of a figure: the same image with other parameters and view options. */
 export interface TrackVariant {
   id: string;
   name: string;
   came: string;
-  /** What differs from the figure's. */
+  /** Parameters that differ from the figure's. */
   params: ParamValues;
   view: Partial<TrackViewOptions>;
 }
 
+/** A figure of the paper, as an example of the Track lab. */
 export interface TrackPreset extends TrackExample {
   saw: string;
   variants: [TrackVariant, ...TrackVariant[]];
@@ -120,11 +121,12 @@ export const TRACK_PRESETS: TrackPreset[] = [
   },
 ];
 
-/** What the view shows where nothing is said. */
+/** Returns the view options that an example opens with. */
 export function viewOf(example: TrackExample | undefined): TrackViewOptions {
   return { ...PLAIN_VIEW, ...(isTrackPreset(example) && example.variants[0].view) };
 }
 
+/** Returns the example or preset with this id. */
 export function filmById(id: string): TrackExample | undefined {
   return [...FILMS, ...TRACK_PRESETS].find((one) => one.id === id);
 }
@@ -133,7 +135,10 @@ export function isTrackPreset(example: TrackExample | undefined): example is Tra
   return example !== undefined && 'variants' in example;
 }
 
-/** The picture of a figure whose parameters are in force, if any is; what it does not say is as in `usual`. */
+/**
+ * Returns the variant of a figure whose parameters are all in force, if there is one; unset parameters count as in
+ * `usual`.
+ */
 export function variantInForce(preset: TrackPreset, params: ParamValues, usual: ParamValues): TrackVariant | undefined {
   return preset.variants.find((one) =>
     Object.entries({ ...usual, ...one.params }).every(([name, value]) => Object.is(params[name], value)),

@@ -1,7 +1,8 @@
 /**
- * The messages between page and worker in the Track lab. Both sides import this file and nothing else of each other.
+ * Messages between the page and the worker of the Track lab. Both sides import this file.
  *
- * As in the other labs: exactly one reply to each request, events of the worker's own, and a stop is no error.
+ * As in the other labs: each request gets exactly one reply, the worker sends events of its own accord, and a
+ * cancellation is not an error.
  */
 import type { FrameFacts } from 'vesicle';
 import type {
@@ -35,68 +36,70 @@ export type {
   VolumeView,
 };
 
-/** A 4D image: one file, several that are its frames in the order of their names, or one to compute. */
+/**
+ * Source of a 4D image: one file, several files that are its frames in the order of their names, or a computed phantom.
+ */
 export type FilmSource = { files: NamedBytes[] } | { cine: CineSpec };
 
-/** In-between slices: none, means of their neighbours, or along the optical flow from one to the other. */
+/** Method of inserting slices between slices: none, linear interpolation, or interpolation along the optical flow. */
 export type Enrichment = 'none' | 'linear' | 'flow';
 
-/** What is done to the image before anything is tracked. */
+/** Preparation of the image before tracking. */
 export interface Preparation {
-  /** So many pixels of a slice become one, along both its sides. */
+  /** Binning factor within slices: this many pixels are averaged along both sides. */
   binning: 1 | 2;
   enrichment: Enrichment;
-  /** So many slices for one; 0: as many as bring the voxels nearest to cubes. */
+  /** Factor by which the number of slices grows; 0 chooses the one that makes voxels most nearly cubic. */
   factor: number;
 }
 
-/** Opposite corners of a box along the axes of the voxels, in the world. */
+/** A region of interest: opposite corners, in world coordinates, of a box along the voxel axes. */
 export interface Box {
   min: Vec3;
   max: Vec3;
 }
 
-/** How a tracker is made. */
+/** All that a tracker is built from, besides the image. */
 export interface Setup {
   preparation: Preparation;
-  /** All of the image where there is none. */
+  /** Region of interest; the whole image if undefined. */
   box: Box | undefined;
-  /** The surface nearest to this point is followed; the largest where there is none. */
+  /** The tracked surface is the one nearest to this point; the largest if undefined. */
   at: Vec3 | undefined;
-  /** What differs from what the method chooses. */
+  /** Parameters that differ from the method's own choice. */
   params: ParamValues;
 }
 
-/** How far a surface is from the true one, world units. */
+/** Distance of a surface from the true one, in world units. */
 export interface SurfaceError {
   mean: number;
-  /** 95 % of the vertices are nearer. */
+  /** 95th percentile of the distances of the vertices. */
   most: number;
 }
 
-/** A tracker before its first step. */
+/** Reply about a newly built tracker, before its first step. */
 export interface Ready {
   params: ParamValues;
-  /** The step height that the noise suggests. */
+  /** The edge threshold τ that the noise suggests. */
   suggested: number;
-  /** Standard deviation, intensity units. */
+  /** Standard deviation of the noise, in intensity units. */
   noise: number;
-  /** The image as it was prepared, with the pictures of all frames; left out where it is the one before. */
+  /** The image as prepared, with the voxels of all frames; undefined if unchanged. */
   volume: VolumeView | undefined;
 }
 
 export interface Opened extends Ready {
   volume: VolumeView;
-  /** Of the image as it was opened. */
+  /** Dimensions of the image before its preparation. */
   dims: Vec3;
   spacing: Vec3;
-  /** The true volumes, where the image is computed. */
+  /** The true volume of each frame, if the image is computed. */
   truth: number[] | undefined;
-  /** Milliseconds that preparing it took. */
+  /** Milliseconds spent opening and preparing the image. */
   prepared: number;
 }
 
-/** Everything a run has, to come back to it. */
+/** A saved run, from which the worker can restore it; kept by the page for undo. */
 export interface SavedTrack {
   state: Uint8Array;
   setup: Setup;
@@ -104,14 +107,17 @@ export interface SavedTrack {
   done: boolean;
 }
 
-/** Boundary of a frame: places, and the share of the windows that separate the two voxels there. */
+/**
+ * Boundary votes of a frame: the points, packed xyz, between two voxels, and the share of windows that separate the
+ * two.
+ */
 export interface Votes {
   frame: number;
   points: Float32Array;
   weights: Float32Array;
 }
 
-/** A slice with its neighbours, and what would be made of these two in its place; greys as in the volume's view. */
+/** A measured slice, its neighbours, and its interpolations from these; greys as in the volume's view. */
 export interface Between {
   width: number;
   height: number;
@@ -120,18 +126,18 @@ export interface Between {
   measured: Uint8Array;
   linear: Uint8Array;
   after: Uint8Array;
-  /** How far each is off the measured slice, root of the mean square, intensity units. */
+  /** Root mean square difference of each interpolation from the measured slice, in intensity units. */
   off: { linear: number; flow: number };
 }
 
-/** What a comparison leaves out or takes in. */
+/** The choice that a comparison changes: switches the prediction, or takes another enrichment. */
 export type Alternative = 'prediction' | Enrichment;
 
-/** What came of a run through all frames. */
+/** Result of a run through all frames, for comparison. */
 export interface ComparedTrack {
   facts: FrameFacts[];
   closing: number | undefined;
-  /** Mean of all frames, where the truth is known. */
+  /** Mean over all frames, if the true surface is known. */
   error: SurfaceError | undefined;
   /** Milliseconds, preparation included. */
   took: number;
@@ -140,28 +146,28 @@ export interface ComparedTrack {
 
 export interface Requests {
   hello: { body: undefined; reply: { version: string; specs: ParamSpec[] } };
-  /** When it fails, the former image and tracker stay. */
+  /** Opens an image and builds a tracker of it. On failure, the previous image and tracker stay. */
   open: { body: { name: string; source: FilmSource; setup: Setup }; reply: Opened };
-  /** A new tracker of the same image. When it fails, the former stays. */
+  /** Builds a new tracker of the same image. On failure, the previous one stays. */
   rebuild: { body: Setup; reply: Ready };
   play: { body: undefined; reply: undefined };
   pause: { body: undefined; reply: undefined };
   step: { body: { count: number }; reply: undefined };
-  /** Replies with all parameters, and from where on everything begins again. */
+  /** Changes parameters; replies with all parameters and with the iteration that the run was set back to. */
   setParams: { body: ParamValues; reply: { params: ParamValues; iteration: number } };
   votes: { body: { frame: number }; reply: Votes };
   between: { body: { frame: number; slice: number; window: [number, number] }; reply: Between };
   save: { body: undefined; reply: SavedTrack };
-  /** Back to a saved run of the same image; its state is told when it is asked for. */
+  /** Restores a saved run of the same image; the state is sent only in reply to `tell`. */
   restore: { body: SavedTrack; reply: Ready };
-  /** The image as it is prepared now. */
+  /** The image as it is prepared at present. */
   view: { body: undefined; reply: VolumeView };
-  /** Tells the state by an event. */
+  /** Makes the worker send a state event. */
   tell: { body: undefined; reply: undefined };
   export: { body: { frame: number; format: MeshFormat }; reply: Uint8Array };
-  /** All frames as one animated GLB. */
+  /** All tracked frames as one animated GLB. */
   animation: { body: undefined; reply: Uint8Array };
-  /** The whole run once more with something else; nothing when it was cancelled. */
+  /** Runs the whole tracking with another setup; undefined if cancelled. */
   compare: { body: { setup: Setup }; reply: ComparedTrack | undefined };
   cancelCompare: { body: undefined; reply: undefined };
 }
@@ -170,7 +176,7 @@ export type RequestKind = keyof Requests;
 export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
 export type ToWorker = RequestMessage;
 
-/** The surface of a frame, with what happened in it. */
+/** The surface of a frame, with its facts and measures. */
 export interface TrackedFrame {
   surface: Surface;
   facts: FrameFacts;
@@ -178,12 +184,12 @@ export interface TrackedFrame {
   error: SurfaceError | undefined;
 }
 
-/** What the image is being prepared by, in words. */
+/** Progress of the preparation, in words for the status line. */
 export interface PreparingEvent {
   event: 'preparing';
   what: string;
 }
-/** A step is done; with it the surface of one more frame, where it was one for that. */
+/** A step was done; `frame` is the surface of frame `index` if the step completed one. */
 export interface StepEvent {
   event: 'step';
   report: StepReport;
@@ -191,7 +197,7 @@ export interface StepEvent {
   frame: TrackedFrame | undefined;
   closing: number | undefined;
 }
-/** How far a comparison is, 0 to 1. */
+/** Progress of a comparison: its share, 0 to 1, and its phase. */
 export interface ComparingEvent {
   event: 'comparing';
   part: number;

@@ -1,4 +1,4 @@
-/** 4D images as the worker opens and prepares them. */
+/** Opens and prepares 4D images, and builds trackers of them. Used by the worker only. */
 import { SurfaceTracker, Volume } from 'vesicle';
 import { readForeign } from '../foreign';
 import { invert } from '../view/anatomy';
@@ -8,9 +8,10 @@ import { voxelsOf } from './box';
 import { cineVoxels } from './cine';
 import type { FilmSource, NamedBytes, Preparation, Setup } from './protocol';
 
-/** Seconds from one computed frame to the next. */
+/** Seconds between frames of a computed image. */
 const CINE_SECONDS = 0.04;
 
+/** Opens a 4D image from files or computes it. */
 export async function filmFrom(source: FilmSource): Promise<Volume> {
   if ('cine' in source) {
     const { dims, spacing, frames } = source.cine;
@@ -25,13 +26,13 @@ export async function filmFrom(source: FilmSource): Promise<Volume> {
   return foreign ? new Volume(foreign) : fromParts(framesOf(source.files));
 }
 
-/** The files of each frame, in the order of their names: a header together with its data. */
+/** Groups files by frame, in the order of their names: each header together with its data. */
 export function framesOf(files: NamedBytes[]): NamedBytes[][] {
   const byName = [...files].sort((a, b) => a.name.localeCompare(b.name, 'en', { numeric: true }));
   const isData = ({ name }: NamedBytes) => /\.(z?raw|img)(\.gz)?$/i.test(name);
   const stem = ({ name }: NamedBytes) => name.replace(/\..*$/, '');
   const heads = byName.filter((file) => !isData(file));
-  // One header takes any data; of several, each that of its name.
+  // A single header takes all data files; of several, each takes those of its name.
   const belongs = (head: NamedBytes) => (file: NamedBytes) =>
     isData(file) && (heads.length === 1 || stem(file) === stem(head));
   return heads.map((head) => [head, ...byName.filter(belongs(head))]);
@@ -50,7 +51,10 @@ function fromParts(parts: NamedBytes[][]): Volume {
   }
 }
 
-/** Another volume, or the same where nothing is to be done. `tell` hears what is being done. */
+/**
+ * Bins and enriches an image as asked; returns a new volume, or `film` itself if there is nothing to do. `tell`
+ * receives each step in words.
+ */
 export function prepared(film: Volume, preparation: Preparation, tell: (what: string) => void): Volume {
   const { binning, enrichment, factor } = preparation;
   let present = film;
@@ -75,13 +79,16 @@ export function prepared(film: Volume, preparation: Preparation, tell: (what: st
   }
 }
 
-/** Slices lie across the axis of the largest spacing, or the last where voxels are cubes; the other two are binned. */
+/**
+ * Returns binning factors within slices. Slices lie across the axis with the largest spacing, or the last axis if
+ * voxels are cubes.
+ */
 function factorsOf({ spacing }: Volume, binning: number): [number, number, number] {
   const across = spacing.lastIndexOf(Math.max(...spacing));
   return [0, 1, 2].map((axis) => (axis === across ? 1 : binning)) as [number, number, number];
 }
 
-/** A tracker as asked for, and the threshold that it would choose by itself. */
+/** Builds a tracker; also returns the threshold that it would choose by itself. */
 export function buildTracker(
   volume: Volume,
   { box, at, params }: Setup,

@@ -1,4 +1,4 @@
-/** The worker of the Track lab: it holds one 4D image and one tracker, and does what the page asks. */
+/** Worker of the Track lab: holds one 4D image and one tracker, and serves the page's requests. */
 import init, { paramSpecs, type StepReport, type SurfaceTracker, type Volume, version } from 'vesicle';
 import { Refusal, toFailure } from '../worker/refusal';
 import { transferOf } from '../worker/room';
@@ -29,14 +29,17 @@ type Handlers = {
   [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
 };
 
-/** Parameters that the boundary depends on; with the others it stays, and only the surfaces are found anew. */
+/**
+ * Parameters that the boundary depends on. A change of any other keeps the boundary, and only the surfaces are computed
+ * again.
+ */
 const OF_THE_BOUNDARY = ['threshold', 'window', 'windowFrames', 'cyclic'];
 
 function send(event: WorkerEvent, transfer: Transferable[] = []): void {
   self.postMessage(event, { transfer });
 }
 
-/** An image as it was opened, and as it was prepared. */
+/** An image as opened, and as prepared. */
 interface Film {
   name: string;
   original: Volume;
@@ -52,9 +55,9 @@ class Session {
   #suggested = 0;
   #iteration = 0;
   #done = false;
-  /** Frames whose surface the page has. */
+  /** Number of frames whose surfaces were sent to the page. */
   #sent = 0;
-  /** The tracker when the boundary of all frames was found, and no surface yet. */
+  /** Saved state of the tracker when the boundary of all frames was found, before the first surface. */
   #bounded: { state: Uint8Array; iteration: number } | undefined;
   #run: Work | undefined;
   #comparison: Work | undefined;
@@ -111,7 +114,7 @@ class Session {
     return this.#build(setup);
   }
 
-  /** A tracker of the present image, prepared anew where that is to be done in another way. */
+  /** Builds a tracker of the present image, which is prepared again if the preparation has changed. */
   #build(setup: Setup): Ready {
     const film = this.#image();
     if (same(film.preparation, setup.preparation)) return { ...this.#adopt(film.prepared, setup), volume: undefined };
@@ -177,7 +180,7 @@ class Session {
     const tracker = this.#current();
     if (this.#run || this.#done) return;
     const abort = new AbortController();
-    // Before the first step, which may be done at once.
+    // Before the run starts, since its first step may already end it.
     send({ event: 'state', state: 'running' });
     this.#run = { abort, ended: this.#runToEnd(tracker, abort.signal) };
   }
@@ -225,7 +228,7 @@ class Session {
     send({ event: 'state', state: this.#done ? 'done' : 'paused' });
   }
 
-  /** All frames with the same parameters: what depends on the change is found anew, from the first frame. */
+  /** Changes parameters; the results that depend on them are computed again, from the first frame. */
   async #setParams(values: ParamValues): Promise<Requests['setParams']['reply']> {
     await this.#pause();
     const tracker = this.#current();
@@ -309,7 +312,7 @@ function same(one: unknown, other: unknown): boolean {
   return JSON.stringify(one) === JSON.stringify(other);
 }
 
-// At once, and not when it is asked for: the page is still on its way. What goes wrong is told then.
+// Load the engine at once, while the page still loads. A failure is reported when the page asks for it (`hello`).
 const starting = init();
 starting.catch(() => undefined);
 

@@ -7,17 +7,23 @@ const PLACE = 'Click to place';
 const STRONGEST = 1000;
 
 export interface AttractorEvents {
-  /** The whole list after a change; `what` names it. `tuning`: the same again soon after belongs to it. */
+  /**
+   * Called with the whole list after a change; `what` names it. With `tuning`, repeated changes in quick succession are
+   * merged into one undo step.
+   */
   onChange: (attractors: Attractor[], what: string, tuning: boolean) => void;
-  /** Whether clicks in the views place attractors from now on. */
+  /** Called when placing attractors by clicks in the views is switched on or off. */
   onPlacing: (placing: boolean) => void;
-  /** Shows a place in the slices. */
+  /** Called to show a position in the slices. */
   onGoTo: (point: Vec3) => void;
-  /** Where the slices meet. */
+  /** Returns the point where the slices intersect. */
   crosshair: () => Vec3;
 }
 
-/** The user's points that pull the surface: placed by clicking or at the crosshair, each with strength and reach. */
+/**
+ * Controls for attractors, points that pull the surface: placed by clicking or at the crosshair, each with strength and
+ * radius.
+ */
 export class AttractorControls {
   readonly element: HTMLElement;
   readonly #events: AttractorEvents;
@@ -54,7 +60,7 @@ export class AttractorControls {
     );
   }
 
-  /** The reach of the next one, in world units. */
+  /** Radius of the next attractor, world units. */
   set radius(radius: number) {
     this.#radius = Number(radius.toPrecision(2));
   }
@@ -130,7 +136,7 @@ export class AttractorControls {
       this.#attractors.filter((_, i) => i !== index),
       `removal of attractor ${index + 1}`,
     );
-    // The button that had the focus is gone.
+    // The focused button was removed.
     this.#place.focus();
   }
 

@@ -5,16 +5,16 @@ import { h, onSchemeChange, token } from './dom';
 import { figure } from './format';
 
 const HEIGHT = 190;
-/** Above the plot, for the names of the marks. */
+/** Space above the plot for the names of the marks. */
 const MARK_ROOM = 18;
 
 export interface BeatCurves {
   volumes: number[];
-  /** Where the image is computed. */
+  /** True volumes, if the image is computed. */
   truth: number[] | undefined;
-  /** What a comparison gave, and how that differs. */
+  /** Result of a comparison, and its name. */
   other: { volumes: number[]; name: string } | undefined;
-  /** The frame that is shown. */
+  /** The frame shown in the view. */
   frame: number;
   frames: number;
   unit: string;
@@ -22,7 +22,10 @@ export interface BeatCurves {
 
 const EMPTY: BeatCurves = { volumes: [], truth: undefined, other: undefined, frame: 0, frames: 2, unit: 'mm' };
 
-/** The enclosed volume over the frames, with end-diastole, end-systole and the ejection fraction. A click shows the frame. */
+/**
+ * Plot of the enclosed volume over the frames, with end-diastole, end-systole and the ejection fraction. A click shows
+ * the frame.
+ */
 export class BeatCurve {
   readonly element: HTMLElement;
   readonly #plot: uPlot;
@@ -81,7 +84,7 @@ export class BeatCurve {
       beat && volumes.length === frames ? told(beat, this.#curves) : 'Not all frames are done.';
   }
 
-  /** Upright lines: the frame that is shown, and where the volume is largest and smallest. */
+  /** Draws vertical lines at the current frame, and at the largest and smallest volume. */
   #mark(plot: uPlot): void {
     const { ctx, bbox } = plot;
     const { volumes, frames, frame } = this.#curves;
@@ -110,7 +113,7 @@ export class BeatCurve {
   }
 }
 
-/** In words: the curve for those who do not see it. */
+/** Describes the curve in words, for screen readers. */
 function told(beat: Beat, { truth, other, unit }: BeatCurves): string {
   const size = (volume: number) => (unit === 'mm' ? `${(volume / 1000).toFixed(1)} ml` : figure(volume));
   const percent = (share: number) => `${(100 * share).toFixed(1)} %`;

@@ -3,7 +3,7 @@ import type { FrameFacts, SurfaceError } from '../track/protocol';
 import { h } from './dom';
 import { count, figure, plural } from './format';
 
-/** One column of the table of frames. */
+/** A column of the table of frames. */
 interface Column {
   head: string;
   help: string;
@@ -31,7 +31,9 @@ const COLUMNS: Column[] = [
 
 const round = (value: number) => Number(value.toPrecision(3));
 
-/** What happened in each frame, and what looks wrong about it. */
+/**
+ * Table of the Track lab with the statistics of each frame, and warnings about folded triangles and jumps of the area.
+ */
 export class BeatTable {
   readonly warnings = h('p', { class: 'warning', role: 'status', 'data-warnings': '0' });
   readonly element: HTMLElement;

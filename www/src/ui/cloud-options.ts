@@ -21,7 +21,7 @@ export const CLOUD_COLORS: { value: SurfaceColor; label: string }[] = [
   { value: 'distance', label: 'distance from the points' },
 ];
 
-/** What the view of the Reconstruct lab shows. */
+/** View options of the Reconstruct lab. */
 export class CloudOptionControls {
   readonly element: HTMLElement;
   readonly #boxes = new Map<Switch, HTMLInputElement>();
@@ -60,7 +60,7 @@ export class CloudOptionControls {
     return this.#value;
   }
 
-  /** Shows what is asked for and tells; a colour that is none counts as plain. */
+  /** Changes options and reports them; an unknown colouring counts as plain. */
   set(changed: Partial<CloudViewOptions>): void {
     Object.assign(this.#value, changed);
     if (!CLOUD_COLORS.some(({ value }) => value === this.#value.color)) this.#value.color = 'plain';

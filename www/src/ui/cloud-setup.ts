@@ -2,7 +2,7 @@ import { h, uniqueId } from './dom';
 
 const MOST = 20_000;
 
-/** What a model is made with beside its parameters. */
+/** Options of an implicit surface besides its parameters. */
 export interface CloudChoice {
   maxPoints: number | undefined;
   keepComponents: number | undefined;
@@ -14,7 +14,7 @@ interface Field {
   error: HTMLElement;
 }
 
-/** How many points take part, and which. */
+/** Fields for the number of points used and the number of clusters kept. */
 export class CloudSetup {
   readonly element: HTMLElement;
   readonly #most: Field;

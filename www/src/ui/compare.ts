@@ -12,7 +12,7 @@ export interface CompareEvents {
   onCancel: () => void;
 }
 
-/** The same extraction on the volume itself and coarse to fine, as the paper's tables 1 and 2 compare them. */
+/** Compares the same extraction on the volume itself and coarse to fine, as in the paper's tables 1 and 2. */
 export class ComparePanel {
   readonly element: HTMLElement;
   readonly #start: HTMLButtonElement;
@@ -42,7 +42,7 @@ export class ComparePanel {
     this.#start.disabled = !enabled;
   }
 
-  /** Nothing was compared yet. */
+  /** Removes the results of the last comparison. */
   clear(): void {
     this.#tables.replaceChildren();
     this.#tables.dataset.comparison = '{}';
@@ -59,7 +59,7 @@ export class ComparePanel {
     this.#status.textContent = 'Comparing.';
   }
 
-  /** Not spoken: the status keeps still while numbers run. */
+  /** Shows the progress, without announcing it to screen readers. */
   tell({ run, report }: ComparingEvent): void {
     this.#progress.value = (run === 'direct' ? 0 : 1) + (Number.isFinite(report.progress) ? report.progress : 0);
     this.#cancel.textContent = `Cancel (${NAMES[run]}, iteration ${count(report.iteration)})`;
@@ -124,7 +124,7 @@ function scrolling(label: string, table: HTMLTableElement): HTMLElement {
   return h('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': label }, table);
 }
 
-/** Rows T, N, F and their sum, a column a level, for both ways. */
+/** Creates the table of times: rows T, N, F and their sum, a column per level, for both runs. */
 function timeTable(coarseToFine: ComparedRun, direct: ComparedRun): HTMLTableElement {
   const levels = coarseToFine.byLevel.map(({ level }) => level);
   const head = ['Part', ...levels.map((level) => levelSymbol(level)), 'total'].map((title) =>

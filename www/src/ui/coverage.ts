@@ -2,7 +2,7 @@ import type { CoveringEvent, MeasuredCoverage, UncoveredPart, Vec3 } from '../pr
 import { h } from './dom';
 import { count, figure, plural } from './format';
 
-/** How many uncovered parts are listed and marked; the sentence above them counts all. */
+/** Largest number of uncovered regions listed and marked; the sentence above them counts all. */
 const MOST_PARTS = 20;
 
 const KINDS: Record<UncoveredPart['kind'], string> = { matter: 'Missing matter', hollow: 'Missing hollow' };
@@ -11,16 +11,16 @@ export interface CoverageEvents {
   onStart: () => void;
   onCancel: () => void;
   onSeed: () => void;
-  /** Shows a position in the slices and in the 3D view. */
+  /** Called to show a position in the slices and in the 3D view. */
   onGoTo: (point: Vec3) => void;
-  /** The parts to be marked in the views. */
+  /** Called with the regions to mark in the views. */
   onMark: (parts: readonly UncoveredPart[]) => void;
 }
 
-/** How much of the iso-surface the surface covers, and where it does not. */
+/** Shows how much of the iso-surface the surface covers, and lists the regions it does not cover. */
 export class CoveragePanel {
   readonly element: HTMLElement;
-  /** Of lengths in the volume's world. */
+  /** Unit of length in the volume's world space. */
   unit = '';
   readonly #events: CoverageEvents;
   readonly #start: HTMLButtonElement;
@@ -31,7 +31,7 @@ export class CoveragePanel {
   readonly #figures = h('dl', { class: 'facts', 'data-coverage': '{}' });
   readonly #list = h('ol', { class: 'uncovered', 'aria-label': 'Uncovered parts, largest first' });
 
-  /** `guide`: where the documentation explains it. */
+  /** `guide` is the address of the explanation in the documentation. */
   constructor(guide: string, events: CoverageEvents) {
     this.#events = events;
     this.#start = h(
@@ -73,7 +73,7 @@ export class CoveragePanel {
     this.#seed.disabled = !enabled;
   }
 
-  /** Nothing was measured yet. */
+  /** Removes the results of the last measurement. */
   clear(): void {
     this.#show(undefined);
     this.#end('');
@@ -94,7 +94,7 @@ export class CoveragePanel {
     this.#progress.value = share;
   }
 
-  /** Says something beside the buttons; figures that are shown stay. */
+  /** Shows a message beside the buttons, and keeps the results. */
   say(message: string): void {
     this.#end(message);
   }
@@ -154,7 +154,7 @@ export class CoveragePanel {
   }
 }
 
-/** Rounded down, so that 100 % is all of it. */
+/** Formats a fraction in percent, rounded down, so that 100 % means complete coverage. */
 function percent(share: number): string {
   return `${(Math.floor(share * 1000) / 10).toFixed(1)} %`;
 }

@@ -1,7 +1,10 @@
 type Listeners = { [K in keyof HTMLElementEventMap as `on${K}`]?: (event: HTMLElementEventMap[K]) => void };
 type Attributes = Listeners & { [name: string]: unknown };
 
-/** A new element. Attributes that are false or undefined are left out; `on…` are listeners. */
+/**
+ * Creates an element with attributes, listeners (`on…`) and children. Attributes that are false or undefined are
+ * omitted.
+ */
 export function h<K extends keyof HTMLElementTagNameMap>(
   tag: K,
   attributes: Attributes = {},
@@ -20,25 +23,28 @@ function setAttribute(element: HTMLElement, name: string, value: unknown): void 
 }
 
 /**
- * What draws on a small picture, by the processor. The browser would rather draw it with the graphics card and, after a few
- * pictures, wait for all that the view in 3D has asked of the card: up to half a second where there is none.
+ * Returns a 2D context that draws on the CPU, for small images. With an accelerated context, after a few images, the
+ * browser would wait until the GPU has completed all rendering of the 3D view: up to half a second without a GPU.
  */
 export function pen(canvas: HTMLCanvasElement): CanvasRenderingContext2D | null {
   return canvas.getContext('2d', { willReadFrequently: true });
 }
 
-/** A titled part of a column. */
+/** Creates a titled section of a column. */
 export function section(title: string, ...children: (Node | string)[]): HTMLElement {
   return h('section', { class: 'panel' }, h('h2', {}, title), ...children);
 }
 
-/** A letter of a formula; a Latin letter after a Greek one is its index, and so is what stands after a low line. */
+/**
+ * Formats a symbol of a formula; a Latin letter after a Greek one is its subscript, and so is the part after an
+ * underscore.
+ */
 export function symbol(text: string): HTMLElement {
   const [, base = text, index = ''] = /^([α-ω])([A-Za-z])$/.exec(text) ?? /^(\w)_(\w+)$/.exec(text) ?? [];
   return h('span', { class: 'symbol' }, base, ...(index ? [h('sub', {}, index)] : []));
 }
 
-/** A picture from a 24 by 24 path; decoration only, the text beside it says the same. */
+/** Creates an icon from a path on a 24 by 24 grid; decorative only, hidden from screen readers. */
 export function icon(path: string): SVGSVGElement {
   const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
   svg.setAttribute('viewBox', '0 0 24 24');
@@ -50,23 +56,23 @@ export function icon(path: string): SVGSVGElement {
   return svg;
 }
 
-/** The value of a colour (or other) token of the style sheet, in the scheme in force. */
+/** Returns the value of a custom property (design token) of the style sheet in the current colour scheme. */
 export function token(name: string): string {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
-/** Calls back when the reader's light or dark preference changes. */
+/** Calls back when the user's preference for a light or dark scheme changes. */
 export function onSchemeChange(callback: () => void): void {
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', callback);
 }
 
-/** Whether the reader asked for nothing to move that was not asked for. */
+/** Whether the user prefers reduced motion. */
 export function wantsStillness(): boolean {
   return matchMedia('(prefers-reduced-motion: reduce)').matches;
 }
 
 let ids = 0;
-/** An id that no other element has. */
+/** Returns an element id that is unique on the page. */
 export function uniqueId(prefix: string): string {
   return `${prefix}-${++ids}`;
 }

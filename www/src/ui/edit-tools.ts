@@ -1,7 +1,7 @@
 import { h, uniqueId } from './dom';
 import { plural } from './format';
 
-/** What a click in the view does to the points. */
+/** Effect of a click in the view on the points. */
 export type EditTool = 'none' | 'add' | 'remove' | 'outside';
 
 const TOOLS: { tool: EditTool; label: string; help: string }[] = [
@@ -23,10 +23,10 @@ const TOOLS: { tool: EditTool; label: string; help: string }[] = [
   },
 ];
 
-/** Of a click from the surface, in percent of the size of the points. */
+/** Default distance of a click from the surface, in percent of the size of the point set. */
 const DISTANCE = 5;
 
-/** Tools that change the points by clicking in the 3D view. */
+/** Tools that edit the points by clicking in the 3D view. */
 export class EditTools {
   readonly element: HTMLElement;
   readonly #help = h('p', { class: 'help' });
@@ -85,12 +85,12 @@ export class EditTools {
     return this.#tool;
   }
 
-  /** As a part of the size of the points; nothing that is no number. */
+  /** Distance as a fraction of the size of the point set; the default if the input is invalid. */
   get distance(): number {
     return (this.#distance.checkValidity() ? this.#distance.valueAsNumber : DISTANCE) / 100;
   }
 
-  /** Clicks do nothing again. */
+  /** Deselects the tool: clicks have no effect. */
   putAway(): void {
     const [first] = this.#radios;
     if (first) first.checked = true;

@@ -33,13 +33,13 @@ const DIRECTIONS: Vec3[] = [
 export interface EllipsoidEvents {
   onChoose: (index: number | undefined) => void;
   onMode: (mode: HandleMode) => void;
-  /** The chosen one in its new form; `what` names the change. */
+  /** Called with the changed ellipsoid; `what` names the change. */
   onChange: (ellipsoid: ControlEllipsoid, what: string) => void;
   onAdd: () => void;
   onRemove: () => void;
 }
 
-/** The ellipsoids by name, and the numbers of the chosen one. */
+/** List of the control ellipsoids, and fields for the selected one. */
 export class EllipsoidControls {
   readonly element: HTMLElement;
   readonly #events: EllipsoidEvents;
@@ -115,13 +115,13 @@ export class EllipsoidControls {
     this.#error.textContent = message;
   }
 
-  /** The button of an ellipsoid has the focus, as the one that was pressed may be gone. */
+  /** Focuses the button of the selected ellipsoid, because the one that was pressed may have been removed. */
   focus(): void {
     const button = this.#list.children[this.#chosen ?? 0];
     if (button instanceof HTMLElement) button.focus();
   }
 
-  /** Buttons that are there already stay, and with them the focus. */
+  /** Existing buttons are kept, so that the focus stays. */
   #showNames(names: string[]): void {
     if (names.length === this.#names.length && names.every((name, k) => name === this.#names[k])) return;
     this.#names = names;
@@ -235,7 +235,7 @@ export class EllipsoidControls {
   }
 }
 
-/** As many digits as a hand can place. */
+/** Formats a number with as many digits as can be set by dragging. */
 function short(value: number): string {
   return String(Number(value.toPrecision(4)));
 }

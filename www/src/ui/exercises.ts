@@ -2,14 +2,14 @@ import { h } from './dom';
 
 export interface Exercise {
   title: string;
-  /** The example or figure to begin with. */
+  /** The example or figure to start from. */
   example: string;
   steps: string[];
   look: string;
   handIn: string;
 }
 
-/** Of the Extract lab. */
+/** Exercises of the Extract lab. */
 export const EXTRACT_EXERCISES: Exercise[] = [
   {
     title: '1. What does rigidity cost?',
@@ -37,7 +37,7 @@ export const EXTRACT_EXERCISES: Exercise[] = [
   },
 ];
 
-/** Of the Reconstruct lab. */
+/** Exercises of the Reconstruct lab. */
 export const RECONSTRUCT_EXERCISES: Exercise[] = [
   {
     title: 'How much may a surface smooth?',
@@ -53,7 +53,7 @@ export const RECONSTRUCT_EXERCISES: Exercise[] = [
   },
 ];
 
-/** Of the Sculpt lab. */
+/** Exercises of the Sculpt lab. */
 export const SCULPT_EXERCISES: Exercise[] = [
   {
     title: 'How far may one pull?',
@@ -69,7 +69,7 @@ export const SCULPT_EXERCISES: Exercise[] = [
   },
 ];
 
-/** Of the Track lab. */
+/** Exercises of the Track lab. */
 export const TRACK_EXERCISES: Exercise[] = [
   {
     title: 'How sure is an ejection fraction?',
@@ -86,7 +86,7 @@ export const TRACK_EXERCISES: Exercise[] = [
   },
 ];
 
-/** Exercises for a lab course, each with a button that opens what it begins with. */
+/** Creates the list of exercises for a lab course, each with a button that opens its example. */
 export function exercises(list: Exercise[], onOpen: (example: string) => void): HTMLElement {
   return h('div', { class: 'exercises' }, ...list.map((exercise) => exerciseOf(exercise, onOpen)));
 }

@@ -14,7 +14,7 @@ const FORMATS: { format: MeshFormat; help: string; type: string }[] = [
   { format: 'mz3', help: 'MZ3: for Surfice and NiiVue', type: 'application/octet-stream' },
 ];
 
-/** Buttons that save the surface as it is now. */
+/** Buttons that save the current surface in each file format. */
 export class ExportButtons {
   readonly element: HTMLElement;
   readonly #buttons: HTMLButtonElement[];

@@ -1,23 +1,23 @@
 import { h } from './dom';
 
-/** One of several pictures of a figure. */
+/** One of several images of a figure. */
 interface Picture {
-  /** As on a button. */
+  /** Name on its button. */
   name: string;
-  /** What comes out here. */
+  /** The result here. */
   came: string;
 }
 
 /** A figure of a paper. */
 interface Figure<One extends Picture> {
-  /** What the paper saw. */
+  /** The result in the paper. */
   saw: string;
   variants: [One, ...One[]];
-  /** What to look at beside the surface. */
+  /** Hint at further details to observe. */
   hint?: string;
 }
 
-/** Which figure of the paper is open: what the paper saw, what comes out here, and its other pictures. */
+/** Describes the figure of the paper that is open: the paper's result, the result here, and its other images. */
 export class FigurePanel<Variant extends Picture, Preset extends Figure<Variant>> {
   readonly element = h('div', { class: 'figure', hidden: true });
   readonly #onVariant: (preset: Preset, variant: Variant) => void;
@@ -29,10 +29,10 @@ export class FigurePanel<Variant extends Picture, Preset extends Figure<Variant>
     this.#onVariant = onVariant;
   }
 
-  /** Shows a figure, with the variant that is in force, if one is; or nothing. */
+  /** Shows a figure and marks the current variant, if any; undefined hides the panel. */
   show(preset: Preset | undefined, variant?: Variant): void {
     this.element.hidden = preset === undefined;
-    // Buttons that are there already stay, and with them the focus.
+    // Existing buttons are kept, so that the focus stays.
     if (preset && preset !== this.#shown) this.#layOut(preset);
     this.#shown = preset;
     if (preset) this.#choose(variant);

@@ -3,20 +3,20 @@ import { h, uniqueId } from './dom';
 
 const ACCEPT = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw,.dcm,.tif,.tiff';
 
-/** A file chooser: one file, or several that belong together. */
+/** Creates a file chooser for one file, or several that belong together. */
 export function fileChooser(onFiles: (files: File[]) => void, accept = ACCEPT): HTMLElement {
   const id = uniqueId('file');
   const input = h('input', { type: 'file', id, multiple: true, accept, class: 'visually-hidden' });
   input.addEventListener('change', () => {
     const files = [...(input.files ?? [])];
-    // So that choosing the same file again is a change.
+    // Makes choosing the same file again a change.
     input.value = '';
     if (files.length > 0) onFiles(files);
   });
   return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, 'Open file…'));
 }
 
-/** Lets files be dropped anywhere on the page, until aborted, and shows that they can be. */
+/** Accepts files dropped anywhere on the page, until aborted, and shows an overlay during the drag. */
 export function acceptDrops(overlay: HTMLElement, onFiles: (files: File[]) => void, signal: AbortSignal): void {
   const hasFiles = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false;
   window.addEventListener(
@@ -47,7 +47,7 @@ export function acceptDrops(overlay: HTMLElement, onFiles: (files: File[]) => vo
   );
 }
 
-/** What files that belong together are called. */
+/** Returns a common name for files that belong together. */
 export function nameOf(files: File[]): string {
   const [first, second] = files.map(({ name }) => name);
   if (files.length === 2) return `${first} + ${second}`;
@@ -58,13 +58,13 @@ export async function readFiles(files: File[]): Promise<NamedBytes[]> {
   return Promise.all(files.map(async (file) => ({ name: file.name, bytes: new Uint8Array(await file.arrayBuffer()) })));
 }
 
-/** Offers bytes as a download. */
+/** Downloads bytes as a file with the given name and media type. */
 export function download(name: string, bytes: Uint8Array, type: string): void {
   const url = URL.createObjectURL(new Blob([bytes as Uint8Array<ArrayBuffer>], { type }));
   const link = h('a', { href: url, download: name });
   document.body.append(link);
   link.click();
   link.remove();
-  // The browser has taken the blob over once the click is handled; a moment later nothing else needs the address.
+  // The browser has read the blob once the click is handled; the delay is a safety margin.
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }

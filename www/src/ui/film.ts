@@ -2,24 +2,24 @@ import { type Film, lastFrame } from '../sculpt/film';
 import { h, uniqueId } from './dom';
 import { plural } from './format';
 
-/** Frames from one keyframe to the next at first, and at most. */
+/** Default and largest number of frames from one keyframe to the next. */
 export const FRAMES_BETWEEN = 24;
 const MOST_BETWEEN = 600;
 
 export interface FilmEvents {
-  /** The present pose as one more keyframe. */
+  /** Called to add the current pose as a keyframe. */
   onAddKey: () => void;
-  /** The keyframe is no more. */
+  /** Called to remove a keyframe. */
   onRemoveKey: (index: number) => void;
   onBetween: (frames: number) => void;
   onLoop: (loop: boolean) => void;
-  /** Goes to a frame, without playing. */
+  /** Called to seek to a frame without playing. */
   onSeek: (frame: number) => void;
   onRecord: () => void;
   onCancelRecord: () => void;
 }
 
-/** The keyframes of the film, and where it is. */
+/** Controls of the Sculpt lab's film: keyframes, position, playback options and recording. */
 export class FilmControls {
   readonly element: HTMLElement;
   readonly #events: FilmEvents;
@@ -100,7 +100,7 @@ export class FilmControls {
     this.#showKeys(film);
   }
 
-  /** How far a recording is, 0 to 1; undefined when there is none. */
+  /** Shows the progress of a recording, 0 to 1; undefined if there is none. */
   showRecording(part: number | undefined): void {
     const recording = part !== undefined;
     this.#progress.hidden = !recording;
@@ -126,7 +126,7 @@ export class FilmControls {
           : `${plural(keys, 'keyframe')}${keys === 1 ? '; a film needs two' : ''}.`;
   }
 
-  /** The keyframe that the film is at, if it is at one. */
+  /** Index of the keyframe at the current frame; undefined between keyframes. */
   get #present(): number | undefined {
     const film = this.#film;
     if (!film || !('keys' in film) || this.#frame % film.between !== 0) return undefined;

@@ -4,7 +4,7 @@ export function count(value: number): string {
   return COUNT.format(value);
 }
 
-/** Four significant digits, with thin powers of ten for the very large and very small. */
+/** Formats a number with four significant digits, and with powers of ten if it is very large or very small. */
 export function figure(value: number): string {
   if (!Number.isFinite(value)) return '–';
   const size = Math.abs(value);
@@ -20,7 +20,7 @@ export function plural(value: number, one: string, many = `${one}s`): string {
   return `${count(value)} ${value === 1 ? one : many}`;
 }
 
-/** The paper's name of the image on a pyramid level: I₀ is the volume itself. */
+/** Returns the paper's symbol of the image on a pyramid level: I₀ is the volume itself. */
 export function levelSymbol(level: number): string {
   return `I${[...String(level)].map((digit) => '₀₁₂₃₄₅₆₇₈₉'[Number(digit)]).join('')}`;
 }

@@ -5,10 +5,10 @@ const PLAY = 'M7 4.5v15l12-7.5z';
 const PAUSE = 'M6 5h4.5v14H6zM13.5 5H18v14h-4.5z';
 const BACK = 'M6 5h2.5v14H6zM18 5v14l-9-7z';
 const ON = 'M6 5v14l9-7zM16 5h2.5v14H16z';
-/** Milliseconds a frame is seen: slower than a heart, so that the eye can follow. */
+/** Duration of a frame in milliseconds: slower than a heartbeat, so that the eye can follow. */
 const FRAME_MS = 110;
 
-/** The frames that are done, one after the other: by hand, or beating in a loop. */
+/** Controls of the Track lab to step through the tracked frames, or play them in a loop. */
 export class FrameBar {
   readonly element: HTMLElement;
   readonly #onFrame: (frame: number) => void;
@@ -17,7 +17,7 @@ export class FrameBar {
   readonly #text = h('span');
   readonly #buttons: HTMLButtonElement[];
   readonly #slider: HTMLInputElement;
-  /** The slider speaks the number already. */
+  /** The slider announces its value already. */
   readonly #at = h('output', { 'aria-live': 'off', 'data-frames': '' });
   #frame = 0;
   #count = 1;
@@ -25,7 +25,7 @@ export class FrameBar {
   #pending = 0;
   #since = 0;
 
-  /** `onFrame`: another frame is to be shown. */
+  /** `onFrame` is called when another frame is to be shown. */
   constructor(onFrame: (frame: number) => void) {
     this.#onFrame = onFrame;
     const id = uniqueId('frame');
@@ -59,7 +59,7 @@ export class FrameBar {
     return this.#pending !== 0;
   }
 
-  /** `done`: so many frames have their surface. */
+  /** `done` is the number of frames that have a surface. */
   show(frame: number, frames: number, done: number): void {
     this.#frame = Math.min(frame, frames - 1);
     this.#count = frames;
@@ -75,7 +75,7 @@ export class FrameBar {
     this.#label();
   }
 
-  /** So many frames further, beyond the last the first again. */
+  /** Moves by `by` frames, cyclically. */
   go(by: number): void {
     this.#byHand((this.#frame + by + this.#count) % this.#count);
   }

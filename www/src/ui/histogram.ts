@@ -3,8 +3,8 @@ import { h, onSchemeChange, pen, symbol, token, uniqueId } from './dom';
 import { figure } from './format';
 
 /**
- * The intensities' histogram, counts on a logarithmic scale, with the iso value on it. The line is the thumb of a range
- * input that covers the picture, so dragging and the arrow keys come with it.
+ * Histogram of the intensities, with counts on a logarithmic scale, and the iso value as a line. The line is the thumb
+ * of a range input over the image, so it can be dragged and moved by arrow keys.
  */
 export class Histogram {
   readonly element: HTMLElement;
@@ -94,7 +94,7 @@ export class Histogram {
   }
 }
 
-/** The picture in words. */
+/** Describes the histogram in words, for screen readers. */
 function tellHistogram(
   { histogram, range: [low, high] }: Pick<VolumeView, 'histogram' | 'range'>,
   iso: number,
@@ -112,7 +112,7 @@ function tellHistogram(
   return `Histogram of intensities from ${figure(low)} to ${figure(high)}. Half of the voxels are below about ${figure(Math.round(middle))}; ${share.toFixed(1)} % are at the iso value or above.`;
 }
 
-/** A slider step that whole-number intensities fall on, and fine enough for any other range. */
+/** Returns a slider step that integral intensities are multiples of, and that is fine enough for any other range. */
 function stepOf(low: number, high: number): number {
   const span = high - low;
   return Number.isInteger(low) && Number.isInteger(high) && span >= 50 ? 1 : span / 1000;

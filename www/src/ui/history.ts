@@ -1,7 +1,7 @@
 import type { StepReport } from '../protocol';
 import { count, plural } from './format';
 
-/** Steps at which the topology changed. */
+/** Numbers of topology changes at one iteration. */
 export interface Change {
   iteration: number;
   axial: number;
@@ -10,20 +10,20 @@ export interface Change {
   seeds: number;
 }
 
-/** A place in a history to come back to. */
+/** A position in a history, for undo. */
 export interface HistoryMark {
   reports: readonly StepReport[];
-  /** The last iteration that counts. */
+  /** Iteration of the last report included. */
   iteration: number;
 }
 
-/** What happened since the model started: every report, and the moments worth marking. */
+/** Record of a run: all reports, phase changes and topology changes. */
 export class History {
   #reports: StepReport[] = [];
-  /** The first iteration of each phase ('level 2', 'level 1' ...). */
+  /** First iteration of each phase ('level 2', 'level 1' ...). */
   readonly phases: { iteration: number; phase: string }[] = [];
   readonly changes: Change[] = [];
-  /** Milliseconds by phase and part, all steps together. */
+  /** Accumulated milliseconds of all steps, by phase and part. */
   readonly times = new Map<string, Map<string, number>>();
 
   get reports(): readonly StepReport[] {
@@ -34,13 +34,13 @@ export class History {
     this.rewind({ reports: [], iteration: 0 });
   }
 
-  /** Marks this run at an iteration, which may be told only later. */
+  /** Returns a function that marks this run at an iteration that is known only later. */
   marker(): (iteration: number) => HistoryMark {
     const reports = this.#reports;
     return (iteration) => ({ reports, iteration });
   }
 
-  /** Everything as it was then. The list that was added to since stays as it is, for whoever marked it. */
+  /** Restores the state at a mark. The list of reports extended since stays unchanged for holders of later marks. */
   rewind({ reports, iteration }: HistoryMark): void {
     this.#reports = [];
     this.phases.length = 0;
@@ -49,7 +49,7 @@ export class History {
     this.add(reports.filter((report) => report.iteration <= iteration));
   }
 
-  /** Takes reports in, oldest first; returns whether there was any. */
+  /** Appends reports, oldest first; returns whether there were any. */
   add(reports: readonly StepReport[]): boolean {
     for (const report of reports) this.#addOne(report);
     return reports.length > 0;
@@ -58,7 +58,7 @@ export class History {
   #addOne(report: StepReport): void {
     this.#reports.push(report);
     const { iteration, phase } = report;
-    // Being done is no phase of its own.
+    // Being done is not a phase.
     if (!report.done && this.phases.at(-1)?.phase !== phase) this.phases.push({ iteration, phase });
     const { axial, annular, vanished, seeds } = report.events;
     if (axial + annular + vanished + seeds > 0) this.changes.push({ iteration, axial, annular, vanished, seeds });
@@ -69,7 +69,7 @@ export class History {
   }
 }
 
-/** How far a run is, for the status line. */
+/** Describes the progress of a run for the status line. */
 export function underWay({ reports }: History): string {
   const last = reports.at(-1);
   if (!last) return 'Running.';

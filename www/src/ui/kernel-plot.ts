@@ -5,11 +5,11 @@ import { h, onSchemeChange, token } from './dom';
 import { figure } from './format';
 
 const HEIGHT = 132;
-/** Of distances, up to the side of the box. */
+/** Number of sampled distances, from 0 to the side of the box. */
 const SAMPLES = 201;
 const FARTHEST = 2;
 
-/** The kernel in force as a curve, each to its own height, since only its shape matters. */
+/** Plots the current kernel, normalised to its own maximum, because only its shape matters. */
 export class KernelPlot {
   readonly element: HTMLElement;
   readonly #plot: uPlot;
@@ -46,7 +46,7 @@ function tell(kernel: string, value: (r: number) => number): string {
   return `Falls to half at r = ${figure(Number(half.toPrecision(2)))}; at 0.5, ${figure(Number((100 * left).toPrecision(2)))} % are left. ${unit}`;
 }
 
-/** Where a falling function passes 0. */
+/** Returns the zero of a decreasing function. */
 function bisect(f: (r: number) => number): number {
   let [low, high] = [0, 100];
   for (let i = 0; i < 60; i++) {

@@ -3,16 +3,16 @@ import { figure } from './format';
 
 const STEPS = 64;
 
-/** What a shade's colours mean, over the view. */
+/** Title and labels of a colour scale. */
 export interface LegendText {
   title: string;
   below: string;
   above: string;
-  /** From 0 on, in the upper half of the colours. */
+  /** Whether the scale starts at 0 and uses only the upper half of the colours. */
   positive?: boolean;
 }
 
-/** A bar of the colours in use with the numbers at its ends and middle. */
+/** Legend over the 3D view: a colour bar with the values at its ends and middle. */
 export class Legend {
   readonly #bar = h('canvas', { width: STEPS, height: 1, 'aria-hidden': 'true' });
   readonly #title = h('span', { class: 'title' });
@@ -28,7 +28,7 @@ export class Legend {
     h('span', { class: 'ends' }, ...this.#words),
   );
 
-  /** `color` gives sRGB for −1 to 1. */
+  /** `color` maps −1 to 1 to sRGB. */
   constructor(color: (t: number) => [number, number, number]) {
     this.#color = color;
   }
@@ -43,7 +43,7 @@ export class Legend {
     for (const [i, end] of this.#ends.entries()) if (end.textContent !== texts[i]) end.textContent = texts[i] ?? '';
   }
 
-  /** The colours from `low` to 1. */
+  /** Draws the colours from `low` to 1. */
   #draw(low: number): void {
     const context = pen(this.#bar);
     for (let i = 0; i < STEPS; i++) {

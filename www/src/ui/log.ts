@@ -2,10 +2,10 @@ import { h } from './dom';
 import { count, plural } from './format';
 import type { Change, History } from './history';
 
-/** How many entries are kept on the page; the totals above them count all. */
+/** Number of entries kept on the page; the totals above them count all. */
 const MOST_ENTRIES = 300;
 
-/** What happened, newest first: level changes, joins, cuts, parts that vanished or were seeded. */
+/** Log of events, newest first: level changes, joins, cuts, components that vanished or were seeded. */
 export class EventLog {
   readonly element: HTMLElement;
   readonly #summary = h('p', { class: 'help' });
@@ -25,7 +25,7 @@ export class EventLog {
     this.#summary.textContent = 'Nothing has happened yet.';
   }
 
-  /** Adds what is new in the history. */
+  /** Appends the new entries of the history. */
   update(history: History): void {
     const fresh = [
       ...history.phases.slice(this.#phases).map(({ iteration, phase }) => entry(iteration, 'level', `begins ${phase}`)),
@@ -61,7 +61,7 @@ export function describe({ axial, annular, vanished, seeds }: Change): string {
   return parts.join(', ');
 }
 
-/** All changes together in words. */
+/** Describes the totals of all topology changes. */
 export function totals(changes: Change[]): string {
   const sum = (of: (change: Change) => number) => changes.reduce((total, change) => total + of(change), 0);
   const joins = plural(

@@ -3,7 +3,7 @@ import type { Measures, StepReport } from '../protocol';
 import { h } from './dom';
 import { count, figure } from './format';
 
-/** Every measure, as it can be read by other programs from the element's `data-measures`. */
+/** All measures, also available to other programs as JSON in the element's `data-measures`. */
 export interface MeasureValues {
   vertices: number;
   triangles: number;
@@ -49,11 +49,11 @@ export interface MoreMeasure {
   label: string;
   help: string;
   text: (value: number) => string;
-  /** Left out where nothing is known. */
+  /** Whether the row is hidden while the value is unknown. */
   optional?: boolean;
 }
 
-/** The measures of the surface. */
+/** Table of the surface's measures: counts, topology, area, volume and validity. */
 export class MeasurePanel {
   readonly element: HTMLElement;
   readonly #cells = new Map<Name, HTMLElement>();
@@ -62,7 +62,7 @@ export class MeasurePanel {
   readonly #more: { measure: MoreMeasure; cell: HTMLElement }[];
   #moreValues: Record<string, unknown> = {};
 
-  /** `more` follow the measures that every surface has. */
+  /** `more` is listed after the measures that every surface has. */
   constructor(more: MoreMeasure[] = []) {
     this.element = h('dl', { class: 'measures', 'data-measures': '{}' });
     for (const row of ROWS) this.#cells.set(row.name, this.#addRow(row));
@@ -75,7 +75,7 @@ export class MeasurePanel {
     return cell;
   }
 
-  /** What goes with the measures of the surface; not every value has a row. */
+  /** Shows the lab's own values; not every value has a row. */
   showMore(values: Record<string, unknown>): void {
     this.#moreValues = values;
     for (const { measure, cell } of this.#more) {
@@ -86,7 +86,7 @@ export class MeasurePanel {
     this.#tell();
   }
 
-  /** Nothing is known. */
+  /** Resets all values to unknown. */
   clear(): void {
     this.#show({});
     this.showMore({});
@@ -96,13 +96,16 @@ export class MeasurePanel {
     this.element.dataset.measures = JSON.stringify({ ...this.#values, ...this.#moreValues });
   }
 
-  /** Of lengths, for volume and area. */
+  /** Unit of length, for volume and area. */
   set unit(unit: Unit) {
     this.#unit = unit;
     this.#show(this.#values);
   }
 
-  /** What every step reports anyway. What was found by a check no longer holds once the surface moves on. */
+  /**
+   * Shows the values that every step reports. Results of checks are reset, because they do not hold once the surface
+   * has moved.
+   */
   showReport({ vertices, triangles, components, euler }: StepReport): void {
     const { volume, area } = this.#values;
     const known: Partial<MeasureValues> = {
@@ -147,7 +150,10 @@ function textOf(name: Name, value: number | boolean, unit: Unit): string {
   return count(value);
 }
 
-/** An area (power 2) or volume (power 3) with its unit; millimetres become centimetres where that reads better. */
+/**
+ * Formats an area (power 2) or volume (power 3) with its unit; large values in millimetres are converted to
+ * centimetres.
+ */
 function sized(value: number, power: 2 | 3, unit: Unit): string {
   const raised = power === 2 ? '²' : '³';
   const inCentimetres = value / 10 ** power;

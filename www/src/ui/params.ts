@@ -2,14 +2,17 @@ import type { ParamSpec, ParamValues } from '../protocol';
 import { h, symbol, uniqueId } from './dom';
 import { figure } from './format';
 
-/** Slider positions of a parameter with a logarithmic scale. */
+/** Number of slider positions of a parameter with a logarithmic scale. */
 const LOG_STEPS = 200;
-/** A range up to here or beyond is none that a slider could show. */
+/** Upper bound from which a range counts as unbounded and has no slider. */
 const ENDLESS = 1e9;
-/** Where the usual value is below this share of the range, most of the slider is for small values: the power says how much. */
+/**
+ * If the default is below this fraction of the range, the slider is scaled by a power law with the exponent below, so
+ * that most of it is for small values.
+ */
 const SMALL_SHARE = 0.01;
 const SMALL_POWER = 4;
-/** What is chosen in the list of a parameter that takes a number as well as its named choices. */
+/** Value of the extra option in the list of a parameter that accepts a number as well as its named choices. */
 const NUMBER = 'number';
 
 interface Control {
@@ -18,13 +21,13 @@ interface Control {
   complain(message: string | undefined): void;
 }
 
-/** Controls for all parameters, generated from their specifications. */
+/** Controls for a method's parameters, generated from their specifications. */
 export class ParamControls {
   readonly element: HTMLElement;
   readonly #controls = new Map<string, Control>();
   readonly #specs: ParamSpec[];
 
-  /** `skip` are parameters that are set elsewhere. */
+  /** `skip` are parameters that have controls elsewhere. */
   constructor(specs: ParamSpec[], skip: string[], onChange: (name: string, value: unknown) => void) {
     this.#specs = specs;
     for (const spec of specs) {
@@ -37,12 +40,12 @@ export class ParamControls {
     this.element = h('div', { class: 'params' }, ...[...this.#controls.values()].map((control) => control.element));
   }
 
-  /** What a parameter is called on the page. */
+  /** Returns a parameter's label on the page, in lower case. */
   labelOf(name: string): string | undefined {
     return this.#specs.find((spec) => spec.name === name)?.label.toLowerCase();
   }
 
-  /** Shows the values in force, and takes complaints back. */
+  /** Shows the current values and clears error messages. */
   show(values: ParamValues): void {
     for (const [name, control] of this.#controls) {
       if (name in values) control.show(values[name]);
@@ -50,7 +53,7 @@ export class ParamControls {
     }
   }
 
-  /** Leaves out what has no meaning now. */
+  /** Hides the controls of parameters that currently have no effect. */
   hide(names: Record<string, boolean>): void {
     for (const [name, hidden] of Object.entries(names)) {
       const control = this.#controls.get(name);
@@ -58,7 +61,7 @@ export class ParamControls {
     }
   }
 
-  /** Says beside a control why its value was refused. */
+  /** Shows beside a control why its value was rejected. */
   complain(name: string, message: string): void {
     this.#controls.get(name)?.complain(message);
   }
@@ -126,7 +129,7 @@ function choice(spec: ParamSpec, id: string, onChange: (value: unknown) => void)
   return spec.min === undefined ? { main, extra: [], show } : withNumber({ main, extra: [], show }, spec, onChange);
 }
 
-/** Adds a number to a list of choices: one more choice, and a field that is there when it is chosen. */
+/** Adds a numeric option to a list of choices, with a number field that is shown while it is selected. */
 function withNumber({ main, show }: Input, spec: ParamSpec, onChange: (value: unknown) => void): Input {
   const { label, min, max, unit } = spec;
   const name = [label, unit].filter(Boolean).join(', ');
@@ -147,7 +150,7 @@ function withNumber({ main, show }: Input, spec: ParamSpec, onChange: (value: un
   return { main, extra: [row], show: showEither };
 }
 
-/** A number to type, and a slider beside it where the range is known. */
+/** Creates a number field, with a slider beside it if the range is bounded. */
 function numberInput(spec: ParamSpec, id: string, onChange: (value: unknown) => void): Input {
   const { min, max } = spec;
   const main = h('input', { type: 'number', ...describedBy(id), min, max, step: 'any', inputmode: 'decimal' });
@@ -156,7 +159,7 @@ function numberInput(spec: ParamSpec, id: string, onChange: (value: unknown) => 
     main.value = typeof value === 'number' ? typed(value) : String(value);
     if (typeof value === 'number') slider?.show(value);
   };
-  // Empty or unreadable goes on as NaN, so that the library itself says what is accepted.
+  // Empty or invalid input is passed on as NaN, so that the library itself reports what is accepted.
   main.addEventListener('change', () => onChange(main.valueAsNumber));
   slider?.element.addEventListener('input', () => {
     main.value = typed(slider.value);
@@ -165,13 +168,16 @@ function numberInput(spec: ParamSpec, id: string, onChange: (value: unknown) => 
   return { main, extra: slider ? [slider.element] : [], show };
 }
 
-/** A number as one would type it: 1e-6 rather than 0.000001. */
+/** Formats a number the way it is usually typed: 1e-6 rather than 0.000001. */
 function typed(value: number): string {
   const short = Number(value.toPrecision(6));
   return short !== 0 && Math.abs(short) < 1e-3 ? short.toExponential() : String(short);
 }
 
-/** A range input that can be logarithmic, or favour small values. The number input beside it carries the label. */
+/**
+ * A slider with a linear or logarithmic scale, or one that favours small values. The number field beside it carries the
+ * label.
+ */
 class Slider {
   readonly element: HTMLInputElement;
   readonly #scale: 'linear' | 'log' | 'small';
@@ -197,7 +203,7 @@ class Slider {
 
   show(value: number): void {
     this.element.value = String(this.#position(value));
-    // Where the position is no value it says nothing.
+    // The position is not the value on a nonlinear scale, so the value is announced instead.
     this.element.setAttribute('aria-valuetext', figure(value));
   }
 

@@ -3,7 +3,7 @@ import { h } from './dom';
 import { milliseconds } from './format';
 import type { History } from './history';
 
-/** The stages of the method, in the order they come. */
+/** The stages of the implicit surface method, in order. */
 const PHASES = [
   { name: 'subsample', text: 'Clean and thin out the points' },
   { name: 'constraints', text: 'Find points outside' },
@@ -12,7 +12,7 @@ const PHASES = [
   { name: 'colour', text: 'Take colours' },
 ] as const;
 
-/** The stages with how far each is and how long it took. */
+/** List of the stages, each with its progress and duration. */
 export class PhaseList {
   readonly element = h('ol', { class: 'phases' });
   readonly #rows: { item: HTMLElement; bar: HTMLProgressElement; time: HTMLElement }[];
@@ -27,7 +27,7 @@ export class PhaseList {
     this.element.append(...this.#rows.map(({ item }) => item));
   }
 
-  /** After each list of reports. `going`: the run is under way. */
+  /** Updates the list after new reports. `going`: whether the run is in progress. */
   update(history: History, going: boolean): void {
     const last = history.reports.at(-1);
     const at = last ? PHASES.findIndex(({ name }) => name === last.phase) : -1;
@@ -46,14 +46,14 @@ export class PhaseList {
   }
 }
 
-/** A bar without a value moves by itself; one that stands still should not. */
+/** Shows progress; unknown progress is animated only while the run is in progress. */
 function showBar(bar: HTMLProgressElement, part: number, going: boolean): void {
   if (Number.isFinite(part)) bar.value = part;
   else if (going) bar.removeAttribute('value');
   else bar.value = 0.5;
 }
 
-/** How far the whole run is, 0 to 1: each stage counts by the share of time it usually takes. */
+/** Returns the progress of the whole run, 0 to 1, with each stage weighted by its usual fraction of the time. */
 export function overallProgress({ phase, progress, done }: StepReport): number {
   if (done) return 1;
   const shares = [0.05, 0.1, 0.45, 0.35, 0.05];

@@ -3,10 +3,10 @@ import { h, pen } from './dom';
 
 const THUMBNAIL = 72;
 
-/** All photographs as small pictures to choose from; the chosen one stands large beside the view of the same camera. */
+/** Photographs as thumbnails to choose from; the selected one is shown large beside the view from the same camera. */
 export class PhotoStrip {
   readonly element = h('div', { class: 'photos', hidden: true });
-  /** Beside the view. */
+  /** The selected photograph, placed beside the view. */
   readonly large: HTMLElement;
   readonly #canvas = h('canvas', { role: 'img' });
   readonly #caption = h('figcaption');
@@ -70,7 +70,7 @@ export class PhotoStrip {
     if (changed) this.#onChoose(this.#chosen);
   }
 
-  /** Tab stops at one of them only; from there arrow keys go along. */
+  /** Makes one button the tab stop; arrow keys move between them. */
   #makeStop(index: number): void {
     for (const [i, button] of this.#buttons.entries()) button.tabIndex = i === index ? 0 : -1;
   }

@@ -3,10 +3,13 @@ import { h } from './dom';
 import { count, figure } from './format';
 import type { Curve } from './plots';
 
-/** Iterations that are listed: few enough to be read, or listened to. */
+/** Number of iterations listed: few enough to be read, or listened to. */
 const ROWS = 12;
 
-/** The curves of several plots as numbers, at a few iterations from the first to the last. */
+/**
+ * The curves of several plots as a table, at a few iterations from the first to the last; the accessible form of the
+ * plots.
+ */
 export class PlotTable {
   readonly element: HTMLDetailsElement;
   readonly #curves: Curve[];
@@ -34,7 +37,7 @@ export class PlotTable {
     if (this.element.open) this.#fill();
   }
 
-  /** Into the same cells: who reads in them is not thrown out. */
+  /** Refills the existing cells, so that screen readers keep their position. */
   #fill(): void {
     const chosen = spread(this.#reports);
     for (const [i, cells] of this.#cells.entries()) {
@@ -46,7 +49,7 @@ export class PlotTable {
   }
 }
 
-/** So many of them, evenly, with the first and the last. */
+/** Returns at most `ROWS` reports, evenly spaced, including the first and the last. */
 function spread(reports: readonly StepReport[]): StepReport[] {
   const { length } = reports;
   if (length <= ROWS) return [...reports];

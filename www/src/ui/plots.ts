@@ -8,9 +8,9 @@ import { totals } from './log';
 import { PlotTable } from './plot-table';
 
 const PLOT_HEIGHT = 144;
-/** Above a plot, for the names of the levels. */
+/** Space above a plot for the names of the levels. */
 const MARK_ROOM = 16;
-/** Height of the ticks of one kind of event. */
+/** Height of the tick marks of one kind of event. */
 const MARK_LANE = 6;
 
 export interface Curve {
@@ -24,11 +24,11 @@ export interface PlotKind {
   title: string;
   log: boolean;
   curves: Curve[];
-  /** What the plot says, for those who do not see it. */
+  /** Describes the plot in words, for screen readers. */
   tell: (history: History) => string;
 }
 
-/** Of the deformable model. */
+/** Plots of the deformable model. */
 export const ENERGY_PLOTS: PlotKind[] = [
   {
     title: 'Kinetic energy',
@@ -53,7 +53,7 @@ export const ENERGY_PLOTS: PlotKind[] = [
   },
 ];
 
-/** The live plots over the iterations, with level changes and topology events marked. */
+/** Live plots over the iterations, with level changes and topology events marked. */
 export class Plots {
   readonly element: HTMLElement;
   readonly #plots: Plot[];
@@ -63,7 +63,7 @@ export class Plots {
   readonly #stale = new Set<Plot>();
   #pending = 0;
 
-  /** `events`: topology may change, and what happened is told. */
+  /** `events`: whether topology events are marked and described. */
   constructor(history: History, kinds: PlotKind[], events: boolean) {
     this.#history = history;
     this.#plots = kinds.map((kind) => new Plot(kind, history));
@@ -88,7 +88,7 @@ export class Plots {
     );
   }
 
-  /** Redraws in the next animation frames, one plot in each: all at once, they hold up what else is to be drawn. */
+  /** Redraws in the next animation frames, one plot in each: all at once would delay other rendering. */
   update(): void {
     for (const plot of this.#plots) this.#stale.add(plot);
     this.#pending ||= requestAnimationFrame(() => this.#redrawOne());
@@ -98,7 +98,7 @@ export class Plots {
     this.#pending = 0;
     const [plot] = this.#stale;
     if (!plot) return;
-    // One that becomes stale again waits behind the others.
+    // A plot that becomes stale again is queued after the others.
     this.#stale.delete(plot);
     plot.update(this.#history);
     if (this.#stale.size > 0) {
@@ -115,7 +115,7 @@ class Plot {
   readonly #kind: PlotKind;
   readonly #plot: uPlot;
   readonly #caption = h('figcaption');
-  /** The iterations, and a list for each curve, of the reports of one run so far. */
+  /** Iterations, followed by the values of each curve, for the reports of the current run so far. */
   #columns: (number | null)[][] = [];
   #run: readonly StepReport[] | undefined;
 
@@ -137,7 +137,7 @@ class Plot {
     this.#caption.textContent = reports.length > 0 ? this.#kind.tell(history) : 'No step yet.';
   }
 
-  /** Only what is new is looked at: runs have thousands of steps. */
+  /** Appends only new reports: runs have thousands of steps. */
   #extend(reports: readonly StepReport[]): void {
     const { curves, log } = this.#kind;
     if (reports !== this.#run) this.#columns = [[], ...curves.map(() => [])];
@@ -154,7 +154,7 @@ function emptyData(kind: PlotKind): uPlot.AlignedData {
   return [[], ...kind.curves.map(() => [])] as uPlot.AlignedData;
 }
 
-/** A logarithmic axis has no place for zero and below. */
+/** Returns null for values that a logarithmic axis cannot show: zero and below. */
 function plottable(value: number, log: boolean): number | null {
   return Number.isFinite(value) && (!log || value > 0) ? value : null;
 }
@@ -182,7 +182,7 @@ function optionsFor(kind: PlotKind, mark: (plot: uPlot) => void): uPlot.Options 
         ...axis,
         size: 52,
         values: (_, ticks) => ticks.map((tick) => tickLabel(tick, kind.log)),
-        // uPlot would leave some powers of ten without their number.
+        // uPlot would omit the labels of some powers of ten.
         ...(kind.log && { splits: decades, filter: (_: uPlot, ticks: number[]) => ticks }),
       },
     ],
@@ -205,13 +205,13 @@ function valueRange(_: uPlot, low: number | null, high: number | null): uPlot.Ra
   return [low - room, high + room];
 }
 
-/** Whole powers of ten. */
+/** Rounds a range outwards to whole powers of ten. */
 function logRange(_: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax {
   if (!low || !high) return [1e-7, 1];
   return [10 ** Math.floor(Math.log10(low)), 10 ** Math.ceil(Math.log10(high) + 1e-9)];
 }
 
-/** Ticks at every power of ten, or at every other one where there are many. */
+/** Returns ticks at every power of ten, or at every n-th one if there are many. */
 function decades(_: uPlot, __: number, low: number, high: number): number[] {
   const [first, last] = [Math.round(Math.log10(low)), Math.round(Math.log10(high))];
   const step = Math.max(1, Math.ceil((last - first) / 4));
@@ -224,14 +224,14 @@ function tickLabel(tick: number | null, log: boolean): string {
   return Math.abs(tick) >= 10_000 ? `${count(tick / 1000)}k` : Number.isInteger(tick) ? count(tick) : '';
 }
 
-/** Level changes as upright lines with their names; joins, cuts and parts that vanish as ticks at the foot. */
+/** Draws level changes as vertical lines with their names, and topology events as tick marks at the bottom. */
 function drawMarks(plot: uPlot, history: History): void {
   const { ctx, bbox } = plot;
   ctx.save();
   ctx.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
   ctx.textAlign = 'left';
   ctx.textBaseline = 'alphabetic';
-  // Backwards: where names would lie on each other the later one is told.
+  // Backwards, so that of overlapping names the later one is drawn.
   let free = Number.POSITIVE_INFINITY;
   for (const { iteration, phase } of [...history.phases].reverse()) {
     const x = Math.round(plot.valToPos(iteration, 'x', true));
@@ -244,7 +244,7 @@ function drawMarks(plot: uPlot, history: History): void {
     free = at - 4 * devicePixelRatio;
   }
   const foot = bbox.top + bbox.height;
-  // A lane each, so that none hides another.
+  // One lane per kind, so that none hides another.
   const lane = MARK_LANE * devicePixelRatio;
   const [join, cut, vanish, seed] = ['--join', '--cut', '--vanished', '--seed'].map(token) as [
     string,
@@ -278,14 +278,14 @@ function tellEnergy({ reports }: History): string {
   return `After ${count(last.iteration)} iterations the energy is ${figure(last.residual)}, ${relation} the tolerance of ${figure(last.tolerance)}.`;
 }
 
-/** Where each level began, and all changes of topology. */
+/** Describes where each level began, and all topology changes. */
 function tellEvents({ phases, changes, reports }: History): string {
   if (reports.length === 0) return '';
   const levels = phases.map(({ phase, iteration }) => `${phase} from iteration ${count(iteration)}`).join(', ');
   return `${levels[0]?.toUpperCase()}${levels.slice(1)}. ${totals(changes)}`;
 }
 
-/** How many vertices the surface had when it left each level. */
+/** Describes the number of vertices at the end of each level. */
 function tellByLevel({ phases, reports }: History): string {
   const left = phases.slice(1).map(({ iteration }, i) => {
     const last = lastBefore(reports, iteration);

@@ -6,10 +6,10 @@ const KINDS: { value: Enrichment; label: string }[] = [
   { value: 'linear', label: 'linear' },
   { value: 'flow', label: 'by optical flow' },
 ];
-/** More slices for one than this the library does not make. */
+/** Largest factor for in-between slices that the library supports. */
 const MOST = 16;
 
-/** What is done to the image before tracking. */
+/** Controls for the preprocessing of the image before tracking: binning and in-between slices. */
 export class PreparationControls {
   readonly element: HTMLElement;
   readonly #binning: HTMLSelectElement;

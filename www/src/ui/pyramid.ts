@@ -4,7 +4,7 @@ import { levelSymbol } from './format';
 
 const VOLUME = 'level 0, the volume itself';
 
-/** The levels of the image pyramid as small pictures of the present slice; the one the model works on is marked. */
+/** The levels of the image pyramid as thumbnails of the current slice, with the level of the model marked. */
 export class PyramidPanel {
   readonly #list = h('div', { class: 'pyramid', role: 'group', 'aria-label': 'Levels of the pyramid, axial slice' });
   readonly #follow = h('input', { type: 'checkbox', 'data-pyramid': 'follow' });
@@ -23,13 +23,13 @@ export class PyramidPanel {
   readonly #picture: (level: LevelView | undefined) => HTMLCanvasElement | undefined;
   #buttons: HTMLButtonElement[] = [];
   #dims: string[] = [];
-  /** Coarser copies, the finest first. */
+  /** Coarser levels, finest first. */
   #levels: LevelView[] = [];
   #inUse: number | undefined;
   #shown = 0;
   #pending = 0;
 
-  /** `picture` draws the present slice of a level; `onShow` shows a level in the slices. */
+  /** `picture` renders the current slice of a level; `onShow` shows a level in the slices. */
   constructor(
     picture: (level: LevelView | undefined) => HTMLCanvasElement | undefined,
     onShow: (level: LevelView | undefined) => void,
@@ -39,22 +39,22 @@ export class PyramidPanel {
     this.#follow.addEventListener('change', () => this.#choose(this.#follow.checked ? (this.#inUse ?? 0) : 0));
   }
 
-  /** `volume` are the sizes of the volume itself, `levels` its coarser copies, the finest first. */
+  /** `volume` are the dimensions of the volume itself, `levels` its coarser levels, finest first. */
   setLevels(volume: readonly number[], levels: LevelView[], inUse: number): void {
     this.#levels = levels;
     const dims = [volume, ...levels.map((level) => level.dims)].map((sizes) => sizes.join(' × '));
-    // On the same volume the choice stays, where there is still such a level.
+    // On the same volume the selection stays if that level still exists.
     const shown = dims[0] === this.#dims[0] ? this.#shown : 0;
     this.#dims = dims;
     this.#buttons = this.#dims.map((_, level) => this.#button(level));
-    // Coarse to fine, as the model goes.
+    // Coarse to fine, in the order of the model.
     this.#list.replaceChildren(...[...this.#buttons].reverse());
     this.#inUse = inUse;
     this.#choose(this.#follow.checked ? inUse : shown);
     this.redraw();
   }
 
-  /** Marks the level the model works on. */
+  /** Marks the level of the model. */
   setInUse(level: number): void {
     if (level === this.#inUse) return;
     this.#inUse = level;
@@ -62,7 +62,7 @@ export class PyramidPanel {
     if (this.#follow.checked) this.#choose(level);
   }
 
-  /** Draws the pictures again, at the next animation frame: the slice has moved. */
+  /** Redraws the thumbnails at the next animation frame, after the slice has moved. */
   redraw(): void {
     this.#pending ||= requestAnimationFrame(() => {
       this.#pending = 0;
@@ -94,7 +94,7 @@ export class PyramidPanel {
       button.setAttribute('aria-pressed', String(level === this.#shown));
       button.classList.toggle('in-use', inUse);
       const name = level === 0 ? VOLUME : `level ${level}`;
-      // With the letter that is seen: who speaks to the page says it.
+      // Includes the visible symbol, which users of voice control say.
       const label = `${levelSymbol(level)}: ${name}, ${this.#dims[level]} voxels${inUse ? ', the model is here' : ''}`;
       button.setAttribute('aria-label', label);
       button.title = level === 0 ? label : `${label}. On it the surface rests a little outside πI.`;

@@ -4,11 +4,11 @@ import { h } from './dom';
 
 export interface RegionEvents {
   onRegion: (region: VoxelBox | undefined) => void;
-  /** The surface nearest to the crosshair is followed, or the largest. */
+  /** Called when the component to track is chosen: the one nearest to the crosshair, or the largest. */
   onComponent: (which: 'here' | 'largest') => void;
 }
 
-/** The box that is looked at, in slices, and the surface in it that is followed. */
+/** Controls of the Track lab for the region of interest, in slices, and for the component to track. */
 export class RegionControls {
   readonly element: HTMLElement;
   readonly #inputs: HTMLInputElement[] = [];
@@ -41,7 +41,7 @@ export class RegionControls {
     );
   }
 
-  /** `names` of the slices across each axis. */
+  /** `names` are the names of the slices across each axis. */
   show(region: VoxelBox, dims: Vec3, names: string[], nearest: Vec3 | undefined, whole: boolean): void {
     this.#dims = dims;
     this.#region = region;

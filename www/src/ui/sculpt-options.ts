@@ -27,7 +27,7 @@ export const SCULPT_COLORS: { value: SurfaceColor; label: string }[] = [
   { value: 'mean curvature', label: 'mean curvature' },
 ];
 
-/** What the view of the Sculpt lab shows. */
+/** View options of the Sculpt lab. */
 export class SculptOptionControls {
   readonly element: HTMLElement;
   readonly #boxes = new Map<string, HTMLInputElement>();
@@ -75,7 +75,7 @@ export class SculptOptionControls {
     if (!textured && this.#value.color === 'texture') this.set({ color: 'plain' });
   }
 
-  /** Shows what is asked for and tells; a colour or a layout that is none counts as the first. */
+  /** Changes options and reports them; an unknown colouring or layout is replaced by the first. */
   set(changed: Partial<SculptViewOptions>): void {
     Object.assign(this.#value, changed);
     if (!SCULPT_COLORS.some(({ value }) => value === this.#value.color)) this.#value.color = 'plain';

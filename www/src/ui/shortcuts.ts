@@ -3,7 +3,7 @@ import { h } from './dom';
 
 export interface Shortcut {
   key: string;
-  /** With Ctrl, or ⌘. */
+  /** Whether Ctrl, or ⌘, has to be pressed. */
   ctrl?: boolean;
   shown: string;
   text: string;
@@ -17,7 +17,10 @@ const VIEW_KEYS: [string, string][] = [
   ['Tab', 'to the next control; arrow keys move sliders'],
 ];
 
-/** Acts on keys and lists them when asked, by `?` or by a button, with a way to further help, until aborted. */
+/**
+ * Installs keyboard shortcuts and a dialog that lists them, opened by `?` or by a button, with links to further help;
+ * removed when aborted.
+ */
 export function offerShortcuts(shortcuts: Shortcut[], opener: HTMLElement, guide: string, signal: AbortSignal): void {
   const list: Shortcut = { key: '?', shown: '?', text: 'this list', act: () => dialog.showModal() };
   const dialog = shortcutDialog([...shortcuts, list], opener, guide, signal);
@@ -25,7 +28,7 @@ export function offerShortcuts(shortcuts: Shortcut[], opener: HTMLElement, guide
   listenForShortcuts([...shortcuts, list], signal);
 }
 
-/** Acts on keys anywhere on the page, until aborted, except where the key already means something. */
+/** Handles keys anywhere on the page, until aborted, unless the focused element uses the key. */
 function listenForShortcuts(shortcuts: Shortcut[], signal: AbortSignal): void {
   const typing = new Typing(signal);
   const onKey = (event: KeyboardEvent) => {
@@ -40,7 +43,7 @@ function listenForShortcuts(shortcuts: Shortcut[], signal: AbortSignal): void {
   window.addEventListener('keydown', onKey, { signal });
 }
 
-/** Knows the field in which something was typed and not taken yet: there Ctrl+Z undoes the typing. */
+/** Tracks the field with uncommitted typing: there Ctrl+Z undoes the typing. */
 class Typing {
   #field: EventTarget | null = null;
 
@@ -64,7 +67,10 @@ class Typing {
 
 const UNTYPED = ['range', 'checkbox', 'radio'];
 
-/** Whether the focused element uses the key itself: space presses buttons, letters go into fields and choose in lists. */
+/**
+ * Whether the focused element uses the key itself: space presses buttons, letters are typed into fields and select in
+ * lists.
+ */
 function isTakenBy({ target, key }: KeyboardEvent): boolean {
   if (!(target instanceof HTMLElement)) return false;
   if (target.closest('dialog, select, textarea, [contenteditable]')) return true;
@@ -73,7 +79,7 @@ function isTakenBy({ target, key }: KeyboardEvent): boolean {
   return key === ' ' && target.closest('button, summary, a, label.button') !== null;
 }
 
-/** The list of shortcuts, opened by a button or by `?`; gone when aborted. */
+/** Creates the dialog that lists the shortcuts, opened by a button or by `?`; removed when aborted. */
 function shortcutDialog(
   shortcuts: Shortcut[],
   opener: HTMLElement,
@@ -100,7 +106,7 @@ function shortcutDialog(
   return dialog;
 }
 
-/** In tabs of their own: the model stays open. */
+/** Links open in new tabs, so that the model stays open. */
 function furtherHelp(guide: string): HTMLElement {
   const link = (href: string, text: string) => h('li', {}, h('a', { class: 'link', href, target: '_blank' }, text));
   return h(

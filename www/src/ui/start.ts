@@ -35,11 +35,13 @@ export interface StartChoice {
   kind: Kind;
   bubbles: number;
   levels: number;
-  /** Mean edge in world units; chosen by the model where undefined. */
+  /** Mean edge length in world units; undefined lets the model choose. */
   edge: number | undefined;
 }
 
-/** What the model starts from. A change starts it over; when that is refused, what was in force comes back. */
+/**
+ * Controls for the initial surface. A change restarts the model; if it is rejected, the previous values are restored.
+ */
 export class StartControls {
   readonly element: HTMLElement;
   readonly #shape = new Field('Shape', h('select', {}, ...SHAPES.map(optionFor)), '', '');
@@ -62,7 +64,7 @@ export class StartControls {
     'A number above 0 is needed, or nothing.',
   );
   readonly #fields = [this.#shape, this.#bubbles, this.#levels, this.#edge];
-  /** The field changed last: it is to blame when the model cannot be built. */
+  /** The field changed last, which shows the error if the model cannot be created. */
   #changed: Field = this.#shape;
   #inForce: StartChoice;
 
@@ -83,12 +85,12 @@ export class StartControls {
     };
   }
 
-  /** What the model was started from; while another start is being tried, {@link value} is ahead of it. */
+  /** The initial surface of the current model; while another one is being tried, {@link value} is ahead of it. */
   get inForce(): StartChoice {
     return this.#inForce;
   }
 
-  /** Shows what is now in force, and takes complaints back; no change is reported. */
+  /** Shows the current values and clears error messages, without reporting a change. */
   show(choice: StartChoice): void {
     this.#inForce = choice;
     this.#shape.control.value = choice.kind;
@@ -99,7 +101,7 @@ export class StartControls {
     this.#explain();
   }
 
-  /** Says beside the field changed last why that cannot be, and shows again what is in force. */
+  /** Shows an error beside the field changed last, and restores the current values. */
   refuse(message: string): void {
     this.show(this.#inForce);
     this.#changed.complain(message);
@@ -120,11 +122,11 @@ export class StartControls {
   }
 }
 
-/** A control with its label, what it means, and what was wrong with its last value. */
+/** A control with its label, help text and error message. */
 class Field<Control extends HTMLInputElement | HTMLSelectElement = HTMLInputElement | HTMLSelectElement> {
   readonly element: HTMLElement;
   readonly control: Control;
-  /** What to say of a value that is none. */
+  /** Error message for an invalid value. */
   readonly need: string;
   readonly #help: HTMLElement;
   readonly #error: HTMLElement;

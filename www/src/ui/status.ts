@@ -1,9 +1,12 @@
 import { h } from './dom';
 
-/** Milliseconds between two reports of something that goes on: they can be listened to, and leave time for the rest of the page. */
+/** Milliseconds between two progress reports: rarely enough for screen readers, and for the rest of the page. */
 const REPORT_EVERY = 10_000;
 
-/** One line that screen readers speak politely: what the lab is doing. Set when that changes, and now and then while it goes on. */
+/**
+ * Status line of a lab, announced politely by screen readers. Set when the state changes, and occasionally during a
+ * run.
+ */
 export class StatusLine {
   readonly element = h('p', { class: 'status', role: 'status', 'aria-live': 'polite' });
   #saidAt = 0;
@@ -13,13 +16,13 @@ export class StatusLine {
     if (this.element.textContent !== text) this.element.textContent = text;
   }
 
-  /** How far something is that goes on, called as often as it likes; `text` only when it is time for it. */
+  /** Reports progress. May be called at any rate; `text` is evaluated only when a report is due. */
   report(text: () => string): void {
     if (performance.now() - this.#saidAt >= REPORT_EVERY) this.say(text());
   }
 }
 
-/** What went wrong, in plain words, over the view. The result that was there stays visible under it. */
+/** Error message over the view, in plain words. The previous result stays visible below it. */
 export class ErrorBanner {
   readonly element: HTMLElement;
   readonly #title = h('strong');

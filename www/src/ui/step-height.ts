@@ -2,10 +2,10 @@ import type { ParamSpec } from '../protocol';
 import { h, symbol, uniqueId } from './dom';
 import { figure } from './format';
 
-/** Below so many times the noise, noise makes boundaries. */
+/** Multiple of the noise below which noise alone is detected as boundary. */
 const SAFE = 2.5;
 
-/** The step height τ, with the noise it has to stand out from. */
+/** Control for the edge threshold τ, with the noise level it must exceed. */
 export class StepHeight {
   readonly element: HTMLElement;
   readonly #number: HTMLInputElement;
@@ -16,7 +16,7 @@ export class StepHeight {
   readonly #error = h('p', { class: 'field-error', role: 'alert' });
   #suggested = 0;
 
-  /** `onTry`: what is being dragged to, before it is taken; nothing when that is over. */
+  /** `onTry` is called with the value during a drag, and with undefined at its end. */
   constructor(
     { label, symbol: letter, help }: ParamSpec,
     onChange: (threshold: number) => void,
@@ -33,7 +33,7 @@ export class StepHeight {
     });
     this.#slider = h('input', { type: 'range', min: 0, max: 1, step: 'any', 'aria-label': `${label}, slider` });
     this.#number.addEventListener('change', () => onChange(this.#number.valueAsNumber));
-    // Everything begins again with it: only where the slider is let go.
+    // A change restarts the tracker, so it is applied only when the slider is released.
     this.#slider.addEventListener('input', () => {
       this.#number.value = String(rounded(this.#slider.valueAsNumber));
       onTry(rounded(this.#slider.valueAsNumber));
@@ -61,7 +61,7 @@ export class StepHeight {
     );
   }
 
-  /** `most`: the largest difference that there can be. */
+  /** `most`: the largest possible difference of intensities. */
   show(threshold: number, noise: number, suggested: number, most: number): void {
     this.#suggested = suggested;
     const top = rounded(Math.max(most / 2, threshold));

@@ -14,7 +14,7 @@ import {
 } from '../view/pictures';
 import { h, uniqueId } from './dom';
 
-/** For greys of 0 to 255; the paper found 1.5, 10 and 20 for its image. */
+/** Default settings of Canny's detector for greys of 0 to 255; the paper used 1.5, 10 and 20 for its image. */
 const CANNY: CannySettings = { deviation: 1, low: 6, high: 14 };
 const CANNY_FIELDS = [
   { name: 'deviation', label: 'σ', min: 0.1 },
@@ -22,21 +22,21 @@ const CANNY_FIELDS = [
   { name: 'high', label: 'high', min: 0 },
 ] as const;
 
-/** What the pictures show, as far as it is known. */
+/** Data for the figures, as far as it is available. */
 export interface StillsOf {
   subject: Subject;
-  /** k, and τ. */
+  /** Window size k, and edge threshold τ. */
   window: number;
   threshold: number;
   votes: Votes | undefined;
   between: Between | undefined;
-  /** The slice that `between` is in the place of, and how many there are. */
+  /** The slice that `between` replaces, and the number of slices. */
   pair: [number, number];
-  /** Outline in the slice by frame; asked for only where it is shown. */
+  /** Returns the outline in the slice for each frame; called only while it is shown. */
   outlines: () => readonly (Float32Array | undefined)[];
 }
 
-/** One of the paper's rows of pictures in place of the slices. */
+/** One of the paper's rows of figures, shown in place of the slices. */
 export class Stills {
   readonly element: HTMLElement;
   readonly #rows: Record<Exclude<Below, 'slices'>, HTMLElement>;
@@ -55,7 +55,7 @@ export class Stills {
   #below: Below = 'slices';
   #of: StillsOf | undefined;
 
-  /** `onVoxel`, `onFrame`: what was clicked on. */
+  /** `onVoxel` and `onFrame` are called with the voxel or frame that was clicked. */
   constructor(onVoxel: (voxel: Vec3) => void, onFrame: (frame: number) => void) {
     this.#rows = {
       boundary: h(

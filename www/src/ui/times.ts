@@ -1,7 +1,7 @@
 import { h } from './dom';
 import type { History } from './history';
 
-/** The rows of the paper's tables 1 and 2: its letter, our word, and the parts of a step it is made of. */
+/** Rows of the paper's tables 1 and 2: the paper's letter, the name here, and the parts of a step that are summed. */
 export const TIME_ROWS = [
   { letter: 'T', name: 'topology', parts: ['topology', 'embedding'] },
   { letter: 'N', name: 'normals', parts: ['normals'] },
@@ -11,10 +11,10 @@ const DETAILS = ['topology', 'embedding', 'forces', 'motion'];
 export const TIME_NOTE =
   'Seconds. T: finding and resolving topology, and looking for triangles that would cross (embedding); N: normals; F: dynamics, that is forces and motion.';
 
-/** Milliseconds by part. */
+/** Milliseconds by part of a step. */
 export type PartTimes = ReadonlyMap<string, number>;
 
-/** Milliseconds of some parts together, or of all. */
+/** Returns the sum of some parts, or of all, in milliseconds. */
 export function timeOf(times: PartTimes, parts?: readonly string[]): number {
   return [...times].reduce((sum, [part, ms]) => sum + (!parts || parts.includes(part) ? ms : 0), 0);
 }
@@ -29,7 +29,7 @@ export function seconds(ms: number): string {
   return (ms / 1000).toFixed(ms < 9950 ? 2 : 1);
 }
 
-/** Where the time went, part by part and level by level, laid out as the paper's tables 1 and 2. */
+/** Table of the time spent by part and level, in the layout of the paper's tables 1 and 2. */
 export class TimeTable {
   readonly element: HTMLElement;
   readonly #table = h('table', { class: 'times' });

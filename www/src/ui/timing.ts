@@ -9,7 +9,9 @@ const KERNELS = ['multi-order', 'thin-plate'] as const;
 const COLORS = { 'multi-order': '--curve', 'thin-plate': '--cut' } as const;
 const HEIGHT = 160;
 
-/** Time of the solve against the number of constraints, measured here and now (figure 4d of the paper). */
+/**
+ * Plots the duration of the solve against the number of constraints, measured on this machine (figure 4d of the paper).
+ */
 export class TimingPanel {
   readonly element: HTMLElement;
   readonly #client: ReconstructClient;
@@ -133,7 +135,7 @@ export class TimingPanel {
   }
 }
 
-/** How the time grows from the smallest to the largest. */
+/** Describes how the duration grows from the smallest to the largest number of constraints. */
 function tellGrowth(timings: Timing[]): string {
   const parts = KERNELS.map((kernel) => {
     const [first, ...rest] = timings.filter((one) => one.kernel === kernel);

@@ -3,7 +3,7 @@ import type { ComparedTrack, FrameFacts, Preparation, SurfaceError } from '../tr
 import { h, uniqueId } from './dom';
 import { count, figure, milliseconds } from './format';
 
-/** What the present run is compared with. */
+/** The alternative with which the current run is compared. */
 export type Other = 'prediction' | 'none' | 'linear' | 'flow';
 
 const OTHERS: { value: Other; label: string }[] = [
@@ -13,13 +13,13 @@ const OTHERS: { value: Other; label: string }[] = [
   { value: 'flow', label: 'in-between slices by flow' },
 ];
 
-/** One of the two runs. */
+/** One of the two runs of a comparison. */
 export interface ComparedRun {
   name: string;
   facts: readonly FrameFacts[];
   closing: number | undefined;
   error: SurfaceError | undefined;
-  /** Milliseconds, where it is known. */
+  /** Duration in milliseconds, if known. */
   took: number | undefined;
 }
 
@@ -28,7 +28,7 @@ export interface TrackCompareEvents {
   onCancel: () => void;
 }
 
-/** The same image tracked once more, with something else: both curves, and both measures. */
+/** Tracks the same image again with one alternative setting, and compares the volume curves and measures. */
 export class TrackComparePanel {
   readonly element: HTMLElement;
   readonly #select: HTMLSelectElement;
@@ -63,12 +63,12 @@ export class TrackComparePanel {
     );
   }
 
-  /** A run that is done can be compared with what it was not done by. */
+  /** Whether the current run is finished, so that it can be compared. */
   set enabled(enabled: boolean) {
     this.#start.disabled = !enabled;
   }
 
-  /** What is in force is no alternative to itself. */
+  /** Updates the alternatives; the current setting is not offered. */
   show(prediction: boolean, { enrichment }: Preparation): void {
     for (const option of this.#select.options) {
       if (option.value === 'prediction') option.textContent = prediction ? 'without prediction' : 'with prediction';
@@ -93,7 +93,7 @@ export class TrackComparePanel {
     this.#status.textContent = 'Comparing.';
   }
 
-  /** Not spoken: the status keeps still while numbers run. */
+  /** Shows the progress, without announcing it to screen readers. */
   tell(part: number, phase: string): void {
     this.#progress.value = Number.isFinite(part) ? part : 0;
     this.#cancel.textContent = `Cancel (${phase})`;
@@ -120,7 +120,7 @@ export class TrackComparePanel {
   }
 }
 
-/** As the table has it, also for other programs. */
+/** Returns the figures of the table, also for other programs. */
 function summary({ name, facts, closing, error, took }: ComparedRun) {
   const mean = (of: (one: FrameFacts) => number) => facts.reduce((sum, one) => sum + of(one), 0) / (facts.length || 1);
   const later = facts.slice(1);
@@ -180,7 +180,7 @@ function tableOf(runs: [ComparedRun, ComparedRun]): HTMLElement {
   return h('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': label }, table);
 }
 
-/** What a run gave, as a comparison has it. */
+/** Converts a tracked run to an entry of a comparison. */
 export function comparedRun(name: string, { facts, closing, error, took }: ComparedTrack): ComparedRun {
   return { name, facts, closing, error, took };
 }

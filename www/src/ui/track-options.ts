@@ -21,7 +21,7 @@ const BELOW: { value: Below; label: string }[] = [
   { value: 'between', label: 'in-between slices' },
 ];
 
-/** What the view of the Track lab shows, and what stands below it. */
+/** View options of the Track lab, and the content below the view. */
 export class TrackOptionControls {
   readonly element: HTMLElement;
   readonly #boxes = new Map<string, HTMLInputElement>();
@@ -60,7 +60,7 @@ export class TrackOptionControls {
     return this.#value;
   }
 
-  /** Shows what is asked for and tells; what is no choice counts as the first. */
+  /** Changes options and reports them; an unknown value is replaced by the first. */
   set(changed: Partial<TrackViewOptions>): void {
     Object.assign(this.#value, changed);
     if (!BELOW.some(({ value }) => value === this.#value.below)) this.#value.below = 'slices';

@@ -19,7 +19,7 @@ export interface TransportEvents {
   onRedo: () => void;
 }
 
-/** Play, pause, step and reset, and how far the model has come. */
+/** Controls of a run (play, pause, step, reset, undo, redo), and its progress. */
 export class Transport {
   readonly element: HTMLElement;
   readonly #play: HTMLButtonElement;
@@ -55,7 +55,7 @@ export class Transport {
     this.showUndo(undefined, undefined);
   }
 
-  /** What can be undone and done again, in words. */
+  /** Sets the descriptions of the actions that can be undone and redone. */
   showUndo(undoable: string | undefined, redoable: string | undefined): void {
     for (const [button, verb, what] of [
       [this.#undo, 'Undo', undoable],
@@ -68,7 +68,7 @@ export class Transport {
     }
   }
 
-  /** `ready`: there is a model to run. */
+  /** `ready`: whether there is a model to run. */
   showState(state: LabState, ready: boolean): void {
     const running = state === 'running';
     this.#playIcon.replaceChildren(icon(running ? PAUSE : PLAY));
@@ -89,14 +89,14 @@ export class Transport {
   }
 
   #showBusy(state: LabState): void {
-    // A bar without a value moves by itself: something is going on, and nobody knows how long.
+    // A progress bar without a value is animated: the duration is unknown.
     if (state === 'loading' && !wantsStillness()) this.#progress.removeAttribute('value');
     else if (!this.#progress.hasAttribute('value')) this.#progress.value = 0;
     if (state === 'done') this.#progress.value = 1;
   }
 }
 
-/** Shown where there is room. */
+/** Creates a label that is hidden where space is limited. */
 function word(text: string): HTMLElement {
   return h('span', { class: 'word' }, text);
 }

@@ -1,10 +1,10 @@
 import type { Shade } from '../protocol';
 import { h, uniqueId } from './dom';
 
-/** Where the slices stand in the 3D view: on the walls behind the surface, where they lie, or nowhere. */
+/** Placement of the slices in the 3D view: on the walls behind the surface, in place, or hidden. */
 export type SlicePlacement = 'walls' | 'in place' | 'hidden';
 
-/** What the colour of the surface tells. */
+/** Colouring of the surface in the Extract lab. */
 export type ColorMode = 'plain' | 'component' | Shade;
 
 export interface ViewOptions {
@@ -32,7 +32,7 @@ export const COLOR_MODES: { value: ColorMode; label: string }[] = [
   { value: 'gaussian curvature', label: 'Gaussian curvature' },
 ];
 
-/** What the 3D view shows. */
+/** View options of the Extract lab. */
 export class ViewOptionControls {
   readonly element: HTMLElement;
   readonly #color: HTMLSelectElement;
@@ -63,7 +63,7 @@ export class ViewOptionControls {
     return this.#value;
   }
 
-  /** A name that is none counts as plain. */
+  /** Sets the colouring; an unknown name counts as plain. */
   set color(color: ColorMode) {
     const known = COLOR_MODES.some(({ value }) => value === color) ? color : 'plain';
     this.#color.value = known;
@@ -75,7 +75,7 @@ export class ViewOptionControls {
   }
 }
 
-/** A labelled list to choose from. */
+/** Creates a labelled selection list. */
 export function choice<Value extends string>(
   label: string,
   name: string,

@@ -3,19 +3,22 @@ import type { Plane, Vec3, VolumeView } from '../protocol';
 export type Axis = 0 | 1 | 2;
 export type Grid = Pick<VolumeView, 'dims' | 'spacing' | 'affine' | 'space'>;
 
-/** One side of a slice picture: the voxel axis that runs along it, and whether its index falls instead of rising. */
+/** One side of a slice image: the voxel axis along it, and whether its index decreases instead of increasing. */
 export interface Side {
   axis: Axis;
   flip: boolean;
 }
 
-/** How slices across one voxel axis are shown: as radiologists do, the patient's right on the left, head or face up. */
+/**
+ * Display of the slices across one voxel axis in radiological convention: the patient's right on the left, head or face
+ * up.
+ */
 export interface SliceFrame {
   axis: Axis;
   name: 'Sagittal' | 'Coronal' | 'Axial';
-  /** Left to right. */
+  /** The side that runs from left to right. */
   horizontal: Side;
-  /** Top to bottom. */
+  /** The side that runs from top to bottom. */
   vertical: Side;
   labels: { left: string; right: string; top: string; bottom: string };
 }
@@ -36,23 +39,26 @@ const ORDERS: [Axis, Axis, Axis][] = [
   [2, 1, 0],
 ];
 
-/** +1 where a world axis points to the positive anatomical end (R, A, S), -1 where it points away, as x and y of LPS do. */
+/**
+ * Returns +1 for each world axis that points to the positive anatomical end (R, A, S), -1 for one that points away, as
+ * x and y of LPS do.
+ */
 export function anatomicalSigns(space: 'RAS' | 'LPS'): Vec3 {
   return space === 'LPS' ? [-1, -1, 1] : [1, 1, 1];
 }
 
-/** For each voxel axis: the anatomical axis it runs along most, and in which direction. */
+/** Returns for each voxel axis the anatomical axis it is most nearly parallel to, and its direction. */
 export function anatomyOf(grid: Grid): { anatomical: Axis; positive: boolean }[] {
   const signs = anatomicalSigns(grid.space);
   const along = (voxel: number, world: number) =>
     ((grid.affine[4 * voxel + world] ?? 0) * (signs[world] ?? 1)) / (grid.spacing[voxel] || 1);
   const score = (order: Axis[]) => order.reduce<number>((sum, world, voxel) => sum + Math.abs(along(voxel, world)), 0);
-  // The margin settles ties, in a volume turned by 45 degrees, for the first order.
+  // The margin resolves ties, in a volume rotated by 45 degrees, in favour of the first order.
   const best = ORDERS.reduce((a, b) => (score(b) > score(a) + 1e-9 ? b : a));
   return best.map((anatomical, voxel) => ({ anatomical, positive: along(voxel, anatomical) >= 0 }));
 }
 
-/** The three slice directions of a volume, one per voxel axis. */
+/** Returns the display of slices for each of the three voxel axes of a volume. */
 export function sliceFrames(grid: Grid): SliceFrame[] {
   const anatomy = anatomyOf(grid);
   const at = (axis: Axis) => anatomy[axis] ?? { anatomical: axis, positive: true };
@@ -71,7 +77,7 @@ export function sliceFrames(grid: Grid): SliceFrame[] {
   });
 }
 
-/** Voxel index (centres at integers) to world. */
+/** Transforms a voxel index (centres at integers) to world space. */
 export function toWorld(affine: ArrayLike<number>, index: Vec3): Vec3 {
   const row = (r: number) =>
     (affine[r] ?? 0) * index[0] +
@@ -81,7 +87,7 @@ export function toWorld(affine: ArrayLike<number>, index: Vec3): Vec3 {
   return [row(0), row(1), row(2)];
 }
 
-/** The inverse of an affine map, column-major like the map itself. */
+/** Inverts an affine map, column-major like the map itself. */
 export function invert(affine: ArrayLike<number>): Float64Array {
   const a = (column: number, row: number) => affine[4 * column + row] ?? 0;
   const cofactor = (c: number, r: number) => {
@@ -102,7 +108,7 @@ export function invert(affine: ArrayLike<number>): Float64Array {
   return inverse;
 }
 
-/** The world plane of the slice with the given index across a voxel axis. */
+/** Returns the world plane of the slice with the given index across a voxel axis. */
 export function slicePlane(affine: ArrayLike<number>, inverse: ArrayLike<number>, axis: Axis, index: number): Plane {
   const at: Vec3 = [0, 0, 0];
   at[axis] = index;

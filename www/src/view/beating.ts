@@ -18,10 +18,10 @@ import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
 import { drawFaces, drawVotes, voteColors, votesNear } from './votes';
 
-/** What is shown under the view: the slices, or one of the paper's pictures. */
+/** Content below the 3D view: the slices, or one of the paper's figures. */
 export type Below = 'slices' | 'boundary' | 'time' | 'between';
 
-/** Which points of the boundary are shown: those about the surface, or all in the box. */
+/** Boundary votes that are shown: those near the surface, or all in the box. */
 export type ShownVotes = 'none' | 'near' | 'all';
 
 export interface TrackViewOptions {
@@ -41,16 +41,16 @@ interface Scene {
   frame: VolumeFrame;
 }
 
-/** Diameter of a point of the boundary as a part of the shortest side of a voxel. */
+/** Diameter of a boundary vote, as a fraction of the voxel's shortest side. */
 const DISC = 1.1;
-/** Points that are so many of the shortest sides from a vertex are near the surface. */
+/** Distance from a vertex within which votes are near the surface, in shortest voxel sides. */
 const NEAR = 2;
-/** The box that is looked at has room around what is in it. */
+/** Scale of the box to which the view is fitted, because the object leaves a margin in it. */
 const CLOSER = 0.44;
 
-/** The 3D view and the slices of one frame after the other, kept in step with each other. */
+/** The 3D view and the slices of the Track lab for one frame at a time, synchronised by a common crosshair. */
 export class BeatingView {
-  /** Called when the box was dragged to other voxels. */
+  /** Called when the region of interest was dragged to other voxels. */
   onRegion: (region: VoxelBox) => void = () => undefined;
   /** Called whenever the slices have moved. */
   onMoved: () => void = () => undefined;
@@ -68,7 +68,7 @@ export class BeatingView {
   #shown: Surface | undefined;
   #votes: Votes | undefined;
   #frame = 0;
-  /** By voxel axis. */
+  /** Previewed votes by voxel axis. */
   #preview: ReturnType<typeof sliceVotes>[] = [];
   #crosshair: Vec3 = [0, 0, 0];
 
@@ -82,7 +82,10 @@ export class BeatingView {
     onSchemeChange(() => this.#recolor());
   }
 
-  /** Another image, or the same prepared in another way: `keep` leaves slices and camera where they are in the world. */
+  /**
+   * Shows another image, or the same with other preprocessing: `keep` leaves slices and camera unchanged in world
+   * space.
+   */
   setVolume(volume: VolumeView, keep: boolean): void {
     const at = keep && this.#scene ? toWorld(this.#scene.volume.affine, this.#crosshair) : undefined;
     this.#clear();
@@ -114,7 +117,7 @@ export class BeatingView {
     if (at) this.goTo(at);
   }
 
-  /** Looks from so near that a box fills the view. */
+  /** Fits a box of voxels closely into the view. */
   look(region: VoxelBox): void {
     if (!this.#scene) return;
     const { space, affine } = this.#scene.volume;
@@ -123,7 +126,7 @@ export class BeatingView {
     this.#viewport.frameBox(new Box3().setFromCenterAndSize(middle, size), space === 'LPS' ? 1 : -1, 0.5);
   }
 
-  /** The slices of a frame, and its surface where it has one. */
+  /** Shows the slices of a frame, and its surface if it has one. */
   showFrame(frame: number, surface: Surface | undefined): void {
     this.#frame = frame;
     this.#shown = surface;
@@ -135,7 +138,7 @@ export class BeatingView {
     this.#apply();
   }
 
-  /** The boundary of a frame, or none. */
+  /** Shows the boundary votes of a frame, or none. */
   showVotes(votes: Votes | undefined): void {
     this.#votes = votes;
     this.#showCloud();
@@ -152,8 +155,8 @@ export class BeatingView {
   }
 
   /**
-   * While a step height is being chosen: what it would find in each slice by itself, windows so many pixels to each side;
-   * undefined takes it away.
+   * Previews the boundary for an edge threshold, found in each slice separately with windows that reach `reach` pixels
+   * to each side; undefined removes the preview.
    */
   preview(threshold: number | undefined, reach: number): void {
     const level = this.#level;
@@ -168,7 +171,7 @@ export class BeatingView {
     this.#redraw();
   }
 
-  /** The voxels that are looked at. */
+  /** Shows the region of interest. */
   showRegion(region: VoxelBox): void {
     this.#grips.region = region;
     this.#redraw();
@@ -192,18 +195,20 @@ export class BeatingView {
     this.#moveTo(voxel);
   }
 
-  /** Where the slices meet: in the world, and as a voxel. */
+  /** The crosshair, in world space and as a voxel. */
   get crosshair(): { point: Vec3; voxel: Vec3 } {
     const voxel: Vec3 = [...this.#crosshair];
     return { point: this.#scene ? toWorld(this.#scene.volume.affine, voxel) : [0, 0, 0], voxel };
   }
 
-  /** Redraws what is over the slices. */
+  /** Redraws the overlays of the slices. */
   refresh(): void {
     this.#redraw();
   }
 
-  /** The cut of a surface with the slice across the last voxel axis, in pixels of the slice's picture. */
+  /**
+   * Returns the cross-section of a surface with the slice across the given voxel axis, in pixels of the slice's image.
+   */
   outlineIn(surface: Surface, axis: 0 | 1 | 2): Float32Array {
     const scene = this.#scene;
     const panel = scene?.panels[axis];
@@ -218,7 +223,7 @@ export class BeatingView {
     this.#viewport.dispose();
   }
 
-  /** The voxels of the frame that is shown. */
+  /** The voxels of the current frame. */
   get #level(): LevelView | undefined {
     const volume = this.#scene?.volume;
     return volume && { dims: volume.dims, voxels: voxelsOfFrame(volume, this.#frame) };
@@ -243,7 +248,7 @@ export class BeatingView {
     this.#viewport.invalidate();
   }
 
-  /** The surface's outlines on the slices. */
+  /** Updates the surface's outlines on the slices. */
   #cut(): void {
     const scene = this.#scene;
     if (!scene) return;
@@ -312,7 +317,7 @@ export class BeatingView {
   }
 }
 
-/** The greys of one frame. */
+/** Returns the grey values of one frame. */
 export function voxelsOfFrame({ dims, voxels }: VolumeView, frame: number): Uint8Array {
   const size = dims[0] * dims[1] * dims[2];
   return voxels.subarray(frame * size, (frame + 1) * size);

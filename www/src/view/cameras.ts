@@ -2,7 +2,10 @@ import { Vector3 } from 'three';
 import { type PinholeCamera, poseOf } from './eye';
 import { Lines } from './lines';
 
-/** Cameras as small pyramids: the tip is where the camera stands, the base its picture, the mark on it its upper side. */
+/**
+ * Cameras in the 3D view as small pyramids: the apex is the camera centre, the base its image, with a mark at the upper
+ * side.
+ */
 export class CameraMarks {
   readonly #all = new Lines('#888');
   readonly #chosen = new Lines('#888');
@@ -17,7 +20,7 @@ export class CameraMarks {
     this.#chosen.object.material.color.set(chosen);
   }
 
-  /** `depth`: how long the pyramids are, world units. */
+  /** Shows the cameras as pyramids of height `depth`, world units. */
   show(cameras: readonly PinholeCamera[], depth: number): void {
     this.#cameras = cameras;
     this.#depth = depth;
@@ -36,7 +39,7 @@ export class CameraMarks {
     this.#chosen.show(new Float32Array(camera && this.#visible ? pyramid(camera, this.#depth) : []));
   }
 
-  /** Where the cameras stand. */
+  /** Camera centres in world space. */
   get centres(): Vector3[] {
     return this.#cameras.map((camera) => poseOf(camera).centre);
   }
@@ -47,7 +50,7 @@ export class CameraMarks {
   }
 }
 
-/** Its edges as pairs of points, packed. */
+/** Returns the edges of a camera's pyramid as pairs of points, packed. */
 function pyramid(camera: PinholeCamera, depth: number): number[] {
   const { centre, right, down, forward, focal, middle } = poseOf(camera);
   const at = (x: number, y: number) =>

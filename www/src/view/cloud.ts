@@ -1,7 +1,7 @@
 import { BufferAttribute, BufferGeometry, CanvasTexture, Points, PointsMaterial } from 'three';
 import { linearColors } from './shading';
 
-/** Points as small discs that face the viewer, in one colour or each in its own. */
+/** A point cloud drawn as small discs that face the viewer, in one colour or with a colour per point. */
 export class PointCloud {
   readonly #material = new PointsMaterial({ map: disc(), alphaTest: 0.5, sizeAttenuation: true });
   readonly object = new Points(new BufferGeometry(), this.#material);
@@ -16,12 +16,12 @@ export class PointCloud {
     this.#paint();
   }
 
-  /** Diameter in world units where the view is 90° wide; a narrower view shows them smaller. */
+  /** Diameter in world units for a field of view of 90°; a narrower view shows smaller discs. */
   set size(size: number) {
     this.#material.size = size;
   }
 
-  /** Packed points; `colors` are rgb, 0..1. */
+  /** Shows packed points; `colors` are rgb, 0..1. */
   show(points: Float32Array, colors?: Float32Array): void {
     this.object.geometry.dispose();
     const geometry = new BufferGeometry();

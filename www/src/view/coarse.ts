@@ -1,10 +1,13 @@
-/** A rougher surface on the same vertices, for while it moves: by vertex clustering (Rossignac and Borrel 1993). */
+/**
+ * Simplified surface on the same vertices, drawn while the view is rotated in software: by vertex clustering (Rossignac
+ * and Borrel 1993).
+ */
 
-/** Edges looked at to find how long they are. */
+/** Number of edges sampled for the mean edge length. */
 const SAMPLES = 1000;
-/** Triangles that are left for each area of a cell, so that their number comes near what was asked for. */
+/** Number of triangles that remain per cell area, so that their total is close to the target. */
 const FILL = 1.5;
-/** Triangles for each that was asked for, beyond which larger cells are tried. */
+/** Ratio of triangles to the target above which larger cells are tried. */
 const MOST_EXCESS = 1.5;
 
 export interface Fine {
@@ -12,18 +15,18 @@ export interface Fine {
   normals: Float32Array;
   indices: Uint32Array;
   vertices: number;
-  /** How much of `indices` is in use. */
+  /** Number of `indices` in use. */
   corners: number;
 }
 
 /**
- * Corners of about so many triangles. The vertices in a cell of a grid become one of them; those of the two sides of a
- * thin sheet stay apart by where their normals point.
+ * Returns the corners of about `triangles` triangles. The vertices in a grid cell are merged into one of them; the two
+ * sides of a thin sheet stay separate, by the directions of their normals.
  */
 export function coarseCorners(fine: Fine, triangles: number): Uint32Array {
   const cell = meanEdge(fine) * Math.sqrt((FILL * fine.corners) / 3 / triangles);
   const list = clusteredCorners(fine, cell);
-  // Where sheets are thin and parts small, more is left: each has cells of its own.
+  // Thin sheets and small components keep more triangles, because each has cells of its own.
   const excess = list.length / 3 / triangles;
   return excess > MOST_EXCESS ? clusteredCorners(fine, cell * Math.sqrt(excess)) : list;
 }
@@ -57,7 +60,7 @@ function meanEdge({ positions, indices, corners }: Fine): number {
   return sum / Math.max(1, count) || 1;
 }
 
-/** For each vertex the first one in its cell. */
+/** Returns for each vertex the first one in its cell. */
 function leadersOf({ positions, normals, vertices }: Fine, cell: number): Uint32Array {
   const [low, wide] = extent(positions, vertices);
   const side = Math.floor(wide / cell) + 1;
@@ -74,7 +77,7 @@ function leadersOf({ positions, normals, vertices }: Fine, cell: number): Uint32
   return leaders;
 }
 
-/** The lowest corner of the box around the points, and its longest side. */
+/** Returns the lowest corner of the bounding box of the points, and its longest side. */
 function extent(positions: Float32Array, vertices: number): [number[], number] {
   const [low, high] = [Array(3).fill(Number.POSITIVE_INFINITY), Array(3).fill(Number.NEGATIVE_INFINITY)];
   for (let i = 0; i < 3 * vertices; i++) {
@@ -85,7 +88,7 @@ function extent(positions: Float32Array, vertices: number): [number[], number] {
   return [low, Math.max(0, ...low.map((value, axis) => high[axis] - value))];
 }
 
-/** The side of a cube that the normal goes through, 0 to 5. */
+/** Returns the face of a cube that the normal intersects, 0 to 5. */
 function facing(normals: Float32Array, i: number): number {
   const [x, y, z] = [normals[i] ?? 0, normals[i + 1] ?? 0, normals[i + 2] ?? 0];
   const [ax, ay, az] = [Math.abs(x), Math.abs(y), Math.abs(z)];

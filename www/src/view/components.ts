@@ -1,4 +1,4 @@
-/** Colours that stay apart for the common kinds of colour blindness (Okabe and Ito 2008), as linear rgb. */
+/** Colours that are distinguishable with the common kinds of colour blindness (Okabe and Ito 2008), as linear rgb. */
 const PALETTE: [number, number, number][] = [
   [0.902, 0.624, 0],
   [0.337, 0.706, 0.914],
@@ -9,7 +9,7 @@ const PALETTE: [number, number, number][] = [
   [0.835, 0.369, 0],
 ].map((rgb) => rgb.map((c) => c ** 2.2) as [number, number, number]);
 
-/** For each vertex, the smallest vertex that it is connected with. */
+/** Returns for each vertex the smallest vertex of its connected component. */
 export function componentRoots(indices: Uint32Array, length: number, vertices: number): Uint32Array {
   const parent = Uint32Array.from({ length: vertices }, (_, i) => i);
   const find = (start: number) => {
@@ -31,7 +31,10 @@ export function componentRoots(indices: Uint32Array, length: number, vertices: n
   return parent.map((_, vertex) => find(vertex));
 }
 
-/** A colour per vertex, rgb, into `out`: the largest component gets the first colour, so that colours keep still as it grows. */
+/**
+ * Writes a colour per vertex, rgb, into `out`, one for each connected component. Components are ranked by size, so that
+ * colours stay the same as the largest grows.
+ */
 export function componentColors(indices: Uint32Array, length: number, vertices: number, out: Float32Array): void {
   const roots = componentRoots(indices, length, vertices);
   const sizes = new Map<number, number>();

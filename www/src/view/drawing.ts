@@ -6,16 +6,16 @@ const NONE =
 const LOST =
   'The graphics card has taken the 3D view away. It comes back by itself as soon as it can; the model is not touched by it, and runs on.';
 
-/** What makes pictures on a canvas: WebGL 2, which may not be there, and may be taken away and come back. */
+/** WebGL 2 rendering on a canvas; handles a missing context, and one that is lost and restored. */
 export class Drawing {
   readonly #canvas: HTMLCanvasElement;
   readonly #renderer: WebGLRenderer | undefined;
-  /** In place of the picture. */
+  /** Message shown in place of the rendering. */
   readonly #note = h('p', { class: 'view-note', role: 'alert' });
   #inSoftware: boolean | undefined;
   #disposed = false;
 
-  /** `onBack`: what was drawn is gone, and can be drawn again. */
+  /** `onBack` is called when the context has been restored and the scene must be rendered again. */
   constructor(canvas: HTMLCanvasElement, onBack: () => void) {
     this.#canvas = canvas;
     this.#renderer = rendererFor(canvas);
@@ -36,14 +36,14 @@ export class Drawing {
     else this.#say(NONE);
   }
 
-  /** Asked only when it matters: the page has to wait for the answer. */
+  /** Whether rendering is done by the processor. Queried on first use only, because it blocks the page. */
   get inSoftware(): boolean {
     if (!this.#renderer) return false;
     this.#inSoftware ??= isSoftware(this.#renderer.getContext());
     return this.#inSoftware;
   }
 
-  /** Gives the GPU's memory back; browsers allow a page only so many contexts. */
+  /** Frees the GPU memory; browsers limit the number of contexts of a page. */
   dispose(): void {
     this.#disposed = true;
     this.#renderer?.dispose();
@@ -57,17 +57,20 @@ export class Drawing {
   }
 }
 
-/** Asked for here and not by three, which complains to the console where there is none. */
+/**
+ * Creates the renderer, or returns undefined without WebGL 2. The context is requested here because three.js logs an
+ * error if there is none.
+ */
 function rendererFor(canvas: HTMLCanvasElement): WebGLRenderer | undefined {
   const context = canvas.getContext('webgl2', { alpha: true, antialias: true, depth: true, stencil: false });
   if (!context) return undefined;
   const renderer = new WebGLRenderer({ canvas, context, antialias: true, alpha: true });
-  // Who asks whether a shader has errors waits until it is compiled.
+  // Checking a shader for errors blocks until it is compiled.
   renderer.debug.checkShaderErrors = false;
   return renderer;
 }
 
-/** Whether pictures are made by the processor: SwiftShader in Chromium, llvmpipe in Mesa, WARP in Windows. */
+/** Whether rendering is done by the processor: SwiftShader in Chromium, llvmpipe in Mesa, WARP in Windows. */
 function isSoftware(context: WebGLRenderingContext | WebGL2RenderingContext): boolean {
   const info = context.getExtension('WEBGL_debug_renderer_info');
   const renderer = context.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : context.RENDERER);

@@ -1,8 +1,8 @@
-/** Cameras as photogrammetry knows them, and three's camera that sees the same. */
+/** Pinhole cameras of photogrammetry, and conversion to an equivalent camera of three.js. */
 import { Matrix4, type PerspectiveCamera, Vector3 } from 'three';
 import type { Vec3 } from '../protocol';
 
-/** A 3 × 4 projection and the size of its picture. */
+/** A pinhole camera: a 3 × 4 projection matrix and the size of its image. */
 export interface PinholeCamera {
   /** World to pixel, row-major; x to the right, y down, the centre of the first pixel at (0, 0). */
   projection: ArrayLike<number>;
@@ -10,18 +10,18 @@ export interface PinholeCamera {
   height: number;
 }
 
-/** What a projection is made of: where the camera stands, how it is turned, and its lens. */
+/** Decomposition of a projection matrix: camera centre, orientation and intrinsic parameters. */
 export interface Pose {
   centre: Vector3;
   right: Vector3;
   down: Vector3;
   forward: Vector3;
-  /** Pixels a unit at distance 1 is wide and high, and the pixel straight ahead. */
+  /** Focal lengths along x and y, and the principal point, pixels. */
   focal: [number, number];
   middle: [number, number];
 }
 
-/** Takes a projection apart: its left 3 × 3 part is an upper triangular matrix times a rotation. */
+/** Decomposes a projection matrix: its left 3 × 3 part is an upper triangular matrix times a rotation. */
 export function poseOf({ projection }: PinholeCamera): Pose {
   const row = (i: number) => new Vector3(...([0, 1, 2].map((j) => projection[4 * i + j] ?? 0) as Vec3));
   const [m1, m2, m3] = [row(0), row(1), row(2)];
@@ -39,7 +39,7 @@ export function poseOf({ projection }: PinholeCamera): Pose {
   return { centre: centreOf(projection), right, down, forward, focal: [focalX, focalY], middle: [middleX, middleY] };
 }
 
-/** The point that is seen nowhere: the projection of it is 0. */
+/** Returns the camera centre: the point whose projection is 0. */
 function centreOf(p: ArrayLike<number>): Vector3 {
   const at = (i: number) => p[i] ?? 0;
   const left = new Matrix4();
@@ -47,7 +47,10 @@ function centreOf(p: ArrayLike<number>): Vector3 {
   return new Vector3(-at(3), -at(7), -at(11)).applyMatrix4(left.invert());
 }
 
-/** Makes `eye` see what the camera saw, in a view of another shape as much more to both sides as it is wider. */
+/**
+ * Gives `eye` the pose and projection of `camera`. If the view has another aspect ratio than the image, it shows more
+ * on both sides.
+ */
 export function placeEye(
   eye: PerspectiveCamera,
   camera: PinholeCamera,

@@ -19,12 +19,12 @@ const LETTERS = [
   ['A', 'P'],
   ['S', 'I'],
 ] as const;
-/** How far outside the box the letters stand, as a part of the box. */
+/** Distance of the letters from the box, as a fraction of the box. */
 const STAND_OFF = 0.06;
-/** Height of a letter as a part of the view's height. */
+/** Height of a letter as a fraction of the view's height. */
 const LETTER_SIZE = 0.045;
 
-/** The volume's box, with the anatomical directions written on its six sides. */
+/** The bounding box of a volume in the 3D view, with anatomical directions at its six faces. */
 export class VolumeFrame {
   readonly object = new Group();
   readonly #box: LineSegments<EdgesGeometry, LineBasicMaterial>;
@@ -68,14 +68,17 @@ function boxOf(grid: Grid, color: ColorRepresentation): LineSegments<EdgesGeomet
   return new LineSegments(edges, new LineBasicMaterial({ color, transparent: true, opacity: 0.35 }));
 }
 
-/** World position at the middle of the box, except along one axis, where it is the given part of the way through. */
+/**
+ * Returns the world position of the middle of the box, except along one axis, where it is the given fraction of the way
+ * through.
+ */
 function sideCentre(grid: Grid, axis: number, part: number): Vec3 {
   const at = grid.dims.map((n) => (n - 1) / 2) as Vec3;
   at[axis] = part * (grid.dims[axis] ?? 1) - 0.5;
   return toWorld(grid.affine, at);
 }
 
-/** White with a dark rim, so that it reads on any background. */
+/** Renders a letter in white with a dark outline, legible on any background. */
 function letterTexture(letter: string): CanvasTexture {
   const canvas = document.createElement('canvas');
   canvas.width = 64;

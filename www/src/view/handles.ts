@@ -15,23 +15,26 @@ import {
 import type { TransformControls } from 'three/addons/controls/TransformControls.js';
 import type { ControlEllipsoid } from '../sculpt/protocol';
 
-/** What dragging a handle does. */
+/** The transformation that dragging a handle applies. */
 export type HandleMode = 'move' | 'turn' | 'size';
 
 const MODES = { move: 'translate', turn: 'rotate', size: 'scale' } as const;
-/** Opacities: enough to find them by, little enough to see the surface through them. */
+/** Opacities: high enough to find the ellipsoids, low enough to see the surface through them. */
 const GHOST = 0.05;
 const CHOSEN = 0.16;
 const NET = 0.13;
 
-/** Ellipsoids as ghosts that are seen through the surface, and handles on the one that is chosen. */
+/**
+ * Control ellipsoids in the 3D view, transparent and visible through the surface, with transform handles on the
+ * selected one.
+ */
 export class EllipsoidHandles {
   readonly object = new Group();
-  /** Called while a handle is dragged, and once more when it is let go. */
+  /** Called while a handle is dragged, and once more when it is released. */
   onDrag: (ellipsoid: ControlEllipsoid, dragging: boolean) => void = () => undefined;
   /** Called before the first move of a drag. */
   onGrab: () => void = () => undefined;
-  /** Called when the pointer comes upon a handle, or leaves it. */
+  /** Called when the pointer enters or leaves a handle. */
   onHover: (hovered: boolean) => void = () => undefined;
   readonly #handles: TransformControls;
   readonly #ball = new SphereGeometry(1, 32, 20);
@@ -39,7 +42,7 @@ export class EllipsoidHandles {
   readonly #ghost = ghostMaterial(GHOST);
   readonly #bright = ghostMaterial(CHOSEN);
   readonly #lines = new LineBasicMaterial({ transparent: true, opacity: NET, depthTest: false });
-  /** What the handles are on: it is given the place, the turn and the size of the chosen one. */
+  /** The object the handles are attached to: it receives position, rotation and scale of the selected ellipsoid. */
   readonly #proxy = new Object3D();
   readonly #marks = new Group();
   #ellipsoids: ControlEllipsoid[] = [];
@@ -58,7 +61,7 @@ export class EllipsoidHandles {
 
   set mode(mode: HandleMode) {
     this.#handles.setMode(MODES[mode]);
-    // Along the axes of the view's world an ellipsoid that was turned is easier to move.
+    // Along the world axes a rotated ellipsoid is easier to move.
     this.#handles.setSpace(mode === 'move' ? 'world' : 'local');
   }
 
@@ -66,12 +69,12 @@ export class EllipsoidHandles {
     for (const material of [this.#ghost, this.#bright, this.#lines]) material.color.set(color);
   }
 
-  /** A drag is under way. */
+  /** Whether a handle is being dragged. */
   get dragging(): boolean {
     return this.#handles.dragging;
   }
 
-  /** Whether the pointer is on a handle: a click there chooses nothing. */
+  /** Whether the pointer is over a handle: a click there selects nothing. */
   get hovered(): boolean {
     return this.#handles.axis !== null;
   }
@@ -81,7 +84,7 @@ export class EllipsoidHandles {
     this.#placeHandles();
   }
 
-  /** Shows ellipsoids where they are; the handles stay on the chosen one. */
+  /** Shows the ellipsoids; the handles are attached to the selected one. */
   show(ellipsoids: ControlEllipsoid[], chosen: number | undefined): void {
     this.#ellipsoids = ellipsoids;
     this.#chosen = chosen !== undefined && chosen < ellipsoids.length ? chosen : undefined;
@@ -98,7 +101,7 @@ export class EllipsoidHandles {
     if (!this.dragging) this.#placeHandles();
   }
 
-  /** The first that a ray meets. */
+  /** Returns the index of the first ellipsoid that a ray intersects. */
   pick(ray: Raycaster): number | undefined {
     if (!this.object.visible) return undefined;
     const solids = this.#marks.children.flatMap(({ children: [solid] }) => (solid ? [solid] : []));
@@ -118,7 +121,7 @@ export class EllipsoidHandles {
     mark.matrixAutoUpdate = false;
     const solid = new Mesh(this.#ball, this.#ghost);
     const net = new LineSegments(this.#net, this.#lines);
-    // After the surface, which does not hide them.
+    // Rendered after the surface, which does not hide them.
     solid.renderOrder = 1;
     net.renderOrder = 2;
     mark.add(solid, net);
@@ -137,7 +140,7 @@ export class EllipsoidHandles {
 
   #moved(dragging: boolean): void {
     if (this.#chosen === undefined) return;
-    // Scaled through the centre it would be inside out.
+    // Negative factors, from scaling through the centre, would turn the ellipsoid inside out.
     const { scale } = this.#proxy;
     scale.set(Math.abs(scale.x), Math.abs(scale.y), Math.abs(scale.z)).max(TINY);
     this.onDrag(ellipsoidOf(this.#proxy), dragging);

@@ -1,6 +1,6 @@
 import { BufferAttribute, BufferGeometry, type ColorRepresentation, LineBasicMaterial, LineSegments } from 'three';
 
-/** Line segments that change every frame, in a GPU buffer with room to spare. */
+/** Line segments that change every frame, in a GPU buffer with spare capacity. */
 export class Lines {
   readonly object: LineSegments<BufferGeometry, LineBasicMaterial>;
 
@@ -10,7 +10,7 @@ export class Lines {
     this.object.visible = false;
   }
 
-  /** Copies pairs of points, packed xyz. */
+  /** Shows segments given as pairs of points, packed xyz; they are copied. */
   show(points: Float32Array): void {
     const count = points.length / 3;
     const position = this.#reserve(count);

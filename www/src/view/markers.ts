@@ -9,13 +9,16 @@ import {
 } from 'three';
 import type { Attractor, UncoveredPart } from '../protocol';
 
-/** Of the point itself, as a part of the reach. */
+/** Radius of an attractor's point, as a fraction of its radius of influence. */
 const POINT = 0.12;
 
-/** Least and largest radius of the mark of an uncovered part, as a share of the volume's smallest side. */
+/** Smallest and largest radius of the mark of an uncovered region, as a fraction of the volume's smallest side. */
 const MARK_RADII = [0.008, 0.04] as const;
 
-/** Uncovered parts in the 3D view, seen through everything: a ball where matter is missing, a net where a hollow is. */
+/**
+ * Marks of uncovered regions in the 3D view, drawn over everything: a ball where matter is missing, a wireframe at a
+ * cavity.
+ */
 export class UncoveredMarks {
   readonly object = new Group();
   readonly #ball = new SphereGeometry(1, 16, 10);
@@ -28,7 +31,7 @@ export class UncoveredMarks {
     this.#hollow.color.set(hollow);
   }
 
-  /** Sizes go by the area of each part, within bounds that `side`, the volume's smallest, gives. */
+  /** Shows a mark for each region, sized by its area, within bounds relative to `side`, the volume's smallest side. */
   show(parts: readonly UncoveredPart[], side: number): void {
     this.object.clear();
     const [least, most] = MARK_RADII;
@@ -42,7 +45,10 @@ export class UncoveredMarks {
   }
 }
 
-/** Attractors in the 3D view: a ball at the point, seen through everything, and a net at its reach. */
+/**
+ * Attractors in the 3D view: a ball at the point, drawn over everything, and a wireframe sphere of its radius of
+ * influence.
+ */
 export class AttractorMarks {
   readonly object = new Group();
   readonly #ball = new SphereGeometry(1, 16, 10);
@@ -60,7 +66,7 @@ export class AttractorMarks {
     for (const { point, radius } of attractors) {
       const ball = new Mesh(this.#ball, this.#points);
       ball.scale.setScalar(POINT * radius);
-      // After everything else, as it is not hidden by it.
+      // Rendered last, because nothing hides it.
       ball.renderOrder = 1;
       const net = new LineSegments(this.#net, this.#lines);
       net.scale.setScalar(radius);

@@ -3,37 +3,43 @@ import { h, pen, token, uniqueId } from '../ui/dom';
 import type { SliceFrame } from './anatomy';
 import { discOf, paintLevel, paintSlice, pictureSize, projectSegments } from './slicing';
 
-/** Colours of the three slice directions, by voxel axis, as style tokens. */
+/** Style tokens of the colours of the three slice directions, by voxel axis. */
 export const AXIS_TOKENS = ['--axis-x', '--axis-y', '--axis-z'] as const;
 
 export interface PanelEvents {
-  /** The slider moved to another slice. */
+  /** Called when the slider moves to another slice. */
   onIndex: (index: number) => void;
-  /** The picture was clicked or dragged on, at a voxel index. `pressed`: this is where it began. */
+  /**
+   * Called when the image is clicked or dragged on, with the voxel index. `pressed`: whether the pointer was just
+   * pressed.
+   */
   onPoint: (index: Vec3, pressed: boolean) => void;
-  /** Asked first, with the place and how many voxels a finger is wide: what follows the pointer instead until it is let go. */
+  /**
+   * Called first with the position and the tolerance of the pointer in voxels; a returned grip follows the pointer
+   * until it is released.
+   */
   grab?: (index: Vec3, slack: Vec3) => Grip | undefined;
 }
 
-/** Something on a slice that is being dragged; places in voxels, also between and beyond them. */
+/** An object on a slice that is being dragged; positions in voxels, also between and outside them. */
 export interface Grip {
   move: (index: Vec3) => void;
   drop: () => void;
 }
 
-/** Draws over the picture, in its pixels times the scales. */
+/** Draws over a slice image, in its pixels times the scales. */
 export type Overlay = (context: CanvasRenderingContext2D, scaleX: number, scaleY: number) => void;
 
-/** Pixels of the screen from which an edge can still be grabbed. */
+/** Distance within which an edge can be grabbed, pixels of the screen. */
 const SLACK = 7;
 
-/** One slice as a picture with the surface's outline over it, its crosshair, and a slider. */
+/** A slice as an image with the surface's outline over it, its crosshair, and a slider. */
 export class SlicePanel {
   readonly element: HTMLElement;
-  /** The bare slice in voxels, also the texture of the plane in the 3D view. */
+  /** The slice image alone, one pixel a voxel; also the texture of the plane in the 3D view. */
   readonly picture = document.createElement('canvas');
   readonly frame: SliceFrame;
-  /** What else is to be seen on the slice. */
+  /** Draws additional content over the slice. */
   overlay: Overlay = () => undefined;
   readonly #volume: VolumeView;
   readonly #inverse: Float64Array;
@@ -45,7 +51,7 @@ export class SlicePanel {
   #outline: Float32Array = new Float32Array(0);
   #attractors: Attractor[] = [];
   #uncovered: readonly UncoveredPart[] = [];
-  /** The coarser copy that is shown instead of the volume. */
+  /** The coarser level that is shown instead of the volume. */
   #level: LevelView | undefined;
   #crosshair: Vec3 = [0, 0, 0];
   #color = '#f80';
@@ -63,14 +69,14 @@ export class SlicePanel {
     this.#canvas = h('canvas', { role: 'img' });
     this.#slider = h('input', { type: 'range', id, min: 0, max: last, step: 1, value: last >> 1 });
     this.#slider.addEventListener('input', () => events.onIndex(this.#slider.valueAsNumber));
-    // The slider speaks the number already.
+    // The slider announces its value already.
     this.#output = h('output', { for: id, 'aria-live': 'off' });
     this.element = this.#build(id);
     this.#followPointer(events);
     this.#observer.observe(this.#canvas);
   }
 
-  /** Repaints for the slice the crosshair is in, whatever its other two coordinates. */
+  /** Moves the crosshair, and repaints the image if it moves to another slice. */
   setCrosshair(index: Vec3): void {
     const { axis } = this.frame;
     const moved = this.#crosshair[axis] !== index[axis] || this.#output.value === '';
@@ -79,14 +85,14 @@ export class SlicePanel {
     this.draw();
   }
 
-  /** The surface's cut with this slice, as pairs of world points. */
+  /** Sets the cross-section of the surface with this slice, as pairs of world points. */
   setOutline(segments: Float32Array): void {
     this.#outline = projectSegments(segments, this.#inverse, this.#volume, this.frame);
     this.draw();
     this.#describe();
   }
 
-  /** Shows a coarser copy of the volume, voxel by voxel, or the volume itself. */
+  /** Shows a coarser level voxel by voxel, or the volume itself. */
   setLevel(level: LevelView | undefined): void {
     this.#level = level;
     this.#paint(this.#crosshair[this.frame.axis]);
@@ -103,7 +109,7 @@ export class SlicePanel {
     this.draw();
   }
 
-  /** Brings everything together on the visible canvas, in its own resolution. */
+  /** Draws the image and all overlays on the visible canvas, in its own resolution. */
   draw(): void {
     const { clientWidth, clientHeight } = this.#canvas;
     const context = pen(this.#canvas);
@@ -159,14 +165,14 @@ export class SlicePanel {
     this.#describe();
   }
 
-  /** What is to be seen, in words. */
+  /** Describes the visible content in the canvas's label, for screen readers. */
   #describe(): void {
     const { name, axis } = this.frame;
     const where = `${name} slice ${this.#crosshair[axis]} of 0 to ${this.#volume.dims[axis] - 1}`;
     this.#canvas.setAttribute('aria-label', `${where}, ${tellOutline(this.#outline, this.picture)}`);
   }
 
-  /** The picture fitted into the canvas, voxels in their true proportions. */
+  /** Returns position and scale of the image in the canvas, with voxels in their true proportions. */
   #placement(): { x: number; y: number; scaleX: number; scaleY: number } {
     const { width, height } = this.picture;
     const { spacing } = this.#volume;
@@ -206,7 +212,10 @@ export class SlicePanel {
     context.stroke();
   }
 
-  /** Where the reach of each attractor meets this slice; a dot where the point itself is near. */
+  /**
+   * Draws the circle in which each attractor's ball of influence intersects this slice, and a dot that is larger if the
+   * point itself is near.
+   */
   #drawAttractors(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
     context.lineWidth = 1.5;
     context.strokeStyle = token('--attractor');
@@ -224,7 +233,7 @@ export class SlicePanel {
     }
   }
 
-  /** A dot where matter is missing near this slice, a ring where a hollow is. */
+  /** Marks uncovered regions near this slice: a dot where matter is missing, a ring at a cavity. */
   #drawUncovered(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
     context.lineWidth = 1.5;
     for (const { position, kind } of this.#uncovered) {
@@ -259,7 +268,7 @@ export class SlicePanel {
       });
   }
 
-  /** In voxels along the two sides of the picture; 0 across it. */
+  /** Returns the tolerance for grabbing, in voxels along the two sides of the image; 0 across it. */
   #slack(): Vec3 {
     const { scaleX, scaleY } = this.#placement();
     const slack: Vec3 = [0, 0, 0];
@@ -268,7 +277,7 @@ export class SlicePanel {
     return slack;
   }
 
-  /** Of a place on the canvas, also beyond the picture; the centre of the first voxel is at 0. */
+  /** Converts a canvas position, also outside the image, to voxels; the centre of the first voxel is at 0. */
   #placeAt(canvasX: number, canvasY: number): Vec3 {
     const { x, y, scaleX, scaleY } = this.#placement();
     const place: Vec3 = [...this.#crosshair];
@@ -280,14 +289,14 @@ export class SlicePanel {
     return place;
   }
 
-  /** The voxel of the picture that is nearest to a place on the canvas. */
+  /** Returns the voxel of the image nearest to a canvas position. */
   #voxelAt(canvasX: number, canvasY: number): Vec3 {
     const place = this.#placeAt(canvasX, canvasY);
     return place.map((at, axis) => Math.min((this.#volume.dims[axis] ?? 1) - 1, Math.max(0, Math.round(at)))) as Vec3;
   }
 }
 
-/** How large the surface's cut is. Points as in {@link projectSegments}. */
+/** Describes the size of the surface's cross-section. Points as in {@link projectSegments}. */
 function tellOutline(points: Float32Array, { width, height }: HTMLCanvasElement): string {
   if (points.length === 0) return 'which does not cut the surface';
   const side = (first: 0 | 1) => {

@@ -1,7 +1,7 @@
 import { RepeatWrapping, SRGBColorSpace, Texture } from 'three';
 import type { MeshTexture } from '../sculpt/protocol';
 
-/** The picture on a mesh, decoded; v counts from above, as in glTF. */
+/** Decodes the texture of a mesh for three.js; v points downwards, as in glTF. */
 export async function pictureOf({ type, bytes }: MeshTexture): Promise<Texture> {
   const blob = new Blob([bytes as Uint8Array<ArrayBuffer>], { type });
   const texture = new Texture(await createImageBitmap(blob));

@@ -1,4 +1,4 @@
-/** The paper's pictures of one slice, or of one line through time, beside each other under the view. */
+/** The paper's figures of one slice, or of one line through time, side by side under the view of the Track lab. */
 import type { Vec3, VolumeView } from '../protocol';
 import { type CannySettings, canny } from '../track/canny';
 import { boundaryPicture, isSplit, twoMeans, windowAt } from '../track/clusters';
@@ -10,10 +10,10 @@ import { voxelsOfFrame } from './beating';
 import { greysOf, slicePicture } from './slicing';
 import { votesIn } from './votes';
 
-/** Pixels of a picture's longer side: sharp on fine screens, too. */
+/** Size of an image's longer side in pixels; sharp on high-resolution screens, too. */
 const FINE = 560;
 
-/** A picture with what stands under it. */
+/** An image with a caption. */
 export class Picture {
   readonly element: HTMLElement;
   readonly canvas: HTMLCanvasElement;
@@ -28,7 +28,10 @@ export class Picture {
     if (this.#caption.textContent !== text) this.#caption.textContent = text;
   }
 
-  /** How far across and down the picture, 0 to 1, something happened: it may not fill its canvas. */
+  /**
+   * Returns the position of a mouse event as fractions of the image's width and height, 0 to 1; the image may not fill
+   * its canvas.
+   */
   partsAt({ offsetX, offsetY }: MouseEvent): [number, number] {
     const { width, height, clientWidth, clientHeight } = this.canvas;
     const fit = Math.min(clientWidth / width, clientHeight / height);
@@ -37,7 +40,10 @@ export class Picture {
     return [part(offsetX, clientWidth, width), part(offsetY, clientHeight, height)];
   }
 
-  /** Draws a small picture pixel by pixel, each so wide and high; `over` draws in its pixels. */
+  /**
+   * Draws a small image magnified, with pixels of the given width and height; `over` draws on top, in its pixels times
+   * the scales.
+   */
   paint(
     small: HTMLCanvasElement,
     [wide, high]: [number, number],
@@ -54,19 +60,22 @@ export class Picture {
   }
 }
 
-/** What the pictures are of. */
+/** The voxel and frame that the figures show. */
 export interface Subject {
   volume: VolumeView;
   frame: number;
   voxel: Vec3;
 }
 
-/** The voxel axis that slices lie across, as scanners number them. */
+/** The voxel axis across the slices, in the scanner's order. */
 const ACROSS = 2;
-/** Pixels across and down of the part of a slice that shows a window. */
+/** Width and height of the section of a slice that shows a window, pixels. */
 const CUT = 28;
 
-/** The part of the slice about the crosshair, the window there sorted into bright and dark: green and red, as in figure 4 a. */
+/**
+ * Paints the section of the slice around the crosshair, with the voxels of the window there classified as bright and
+ * dark: green and red, as in figure 4 a. Returns whether the two clusters differ by the threshold.
+ */
 export function paintWindow(
   picture: Picture,
   { volume, frame, voxel }: Subject,
@@ -101,13 +110,14 @@ export function paintWindow(
   return split;
 }
 
-/** Votes of the windows, brought together on pixels: figure 4 b. */
+/** Paints the accumulated votes of all windows: figure 4 b. */
 export function paintBoundary(picture: Picture, { volume, voxel }: Subject, votes: Votes): void {
   const side = sliceSide(volume);
   const [width, height] = [volume.dims[side.horizontal.axis], volume.dims[side.vertical.axis]];
   const inverse = invert(volume.affine);
   const faces = votesIn(votes, { volume, inverse, frame: side, slice: voxel[ACROSS] });
-  // A face to the right lies on a whole number across and at a half down; less than a pixel back both are in theirs.
+  // Votes lie on pixel faces: x is an integer for a face to the right, and y a half. Subtracting less than a pixel
+  // assigns both kinds to their pixel.
   const sum = boundaryPicture(
     { width, height },
     faces.map(({ x, y, weight }) => ({ x: x - 0.25, y: y - 0.25, weight })),
@@ -118,7 +128,7 @@ export function paintBoundary(picture: Picture, { volume, voxel }: Subject, vote
   );
 }
 
-/** Canny's edges of the same slice: figure 4 c. */
+/** Paints Canny's edges of the same slice: figure 4 c. */
 export function paintCanny(picture: Picture, { volume, frame, voxel }: Subject, settings: CannySettings): void {
   const side = sliceSide(volume);
   const shown = { dims: volume.dims, voxels: voxelsOfFrame(volume, frame) };
@@ -130,7 +140,10 @@ export function paintCanny(picture: Picture, { volume, frame, voxel }: Subject, 
   );
 }
 
-/** One line of the slice in all frames, time to the right, with where the surfaces cross it: `outlines` by frame. */
+/**
+ * Paints one line of the slice in all frames, time to the right, and its intersections with the surfaces: `outlines` by
+ * frame. Returns their number.
+ */
 export function paintTime(
   picture: Picture,
   { volume, frame, voxel }: Subject,
@@ -162,7 +175,7 @@ export function paintTime(
   return count;
 }
 
-/** Figure 5: a slice, its neighbours, and what is made of them in its place. */
+/** Paints figure 5: a slice, its neighbours, and the interpolations in its place. */
 export function paintBetween(
   pictures: readonly Picture[],
   volume: VolumeView,
@@ -174,7 +187,7 @@ export function paintBetween(
     pictures[i]?.paint(slicePicture({ dims: [width, height, 1], voxels }, side, 0), pixel);
 }
 
-/** What a click on the part of the slice means, 0 to 1 across and down: the voxel there. */
+/** Returns the voxel at a position in the section of the slice, given as fractions from 0 to 1 across and down. */
 export function voxelIn(volume: VolumeView, voxel: Vec3, across: number, down: number): Vec3 {
   const side = sliceSide(volume);
   const out: Vec3 = [...voxel];
@@ -190,7 +203,7 @@ export function voxelIn(volume: VolumeView, voxel: Vec3, across: number, down: n
   return out;
 }
 
-/** Where the part of the slice begins that the crosshair is in the middle of. */
+/** Returns the upper left corner of the section of the slice centred on the crosshair. */
 function cornerOf({ dims }: VolumeView, { horizontal, vertical }: Side, voxel: Vec3): [number, number] {
   const from = (side: Side['horizontal']) =>
     Math.max(0, Math.min(dims[side.axis] - CUT, placeIn(side, voxel, dims) - (CUT >> 1)));

@@ -22,7 +22,10 @@ export interface PlaneColors {
   section: ColorRepresentation;
 }
 
-/** A slice as a textured rectangle with a coloured frame and the surface's outline: where it lies, or on a wall behind. */
+/**
+ * A slice in the 3D view: a textured rectangle with a coloured frame and the surface's outline, either at its position
+ * in the volume or on a wall behind it.
+ */
 export class SlicePlane {
   readonly object = new Group();
   readonly #grid: Grid;
@@ -35,7 +38,7 @@ export class SlicePlane {
   readonly #section: Lines;
   #index = 0;
 
-  /** `picture` shows the slice in reading order, turned as `frame` says. */
+  /** `picture` shows the slice in reading order, oriented as specified by `frame`. */
   constructor(grid: Grid, frame: SliceFrame, picture: HTMLCanvasElement, colors: PlaneColors) {
     this.#grid = grid;
     this.#frame = frame;
@@ -46,7 +49,7 @@ export class SlicePlane {
     this.#material = new MeshBasicMaterial({
       map: this.#texture,
       side: DoubleSide,
-      // The outline lies in the same plane and has to win.
+      // The outline in the same plane has to be drawn over it.
       polygonOffset: true,
       polygonOffsetFactor: 1,
       polygonOffsetUnits: 1,
@@ -61,7 +64,7 @@ export class SlicePlane {
     this.object.add(rectangle, new LineLoop(this.#outline, this.#line), this.#section.object);
   }
 
-  /** Moves to the slice with the given index; the picture has been repainted. */
+  /** Moves the rectangle to the slice with the given index, after its image was repainted. */
   moveTo(index: number): void {
     this.#index = index;
     const position = this.#geometry.getAttribute('position') as BufferAttribute;
@@ -78,12 +81,12 @@ export class SlicePlane {
     this.#texture.needsUpdate = true;
   }
 
-  /** The surface's cut with this slice, pairs of world points. */
+  /** Shows the cross-section of the surface with this slice, pairs of world points. */
   showSection(segments: Float32Array): void {
     this.#section.show(segments);
   }
 
-  /** Stands where the slice lies, or on the side of the volume that is farther from the viewer. */
+  /** Places the slice at its position in the volume, or on the wall of the volume farther from the viewer. */
   stand(place: 'in place' | 'walls', viewer: Vector3): void {
     this.object.position.set(0, 0, 0);
     if (place === 'in place') return;
@@ -104,7 +107,7 @@ export class SlicePlane {
     this.#line.dispose();
   }
 
-  /** World position of a corner of the picture: u, v = 0 or 1 from its left and top. */
+  /** Returns the world position of a corner of the image: u, v = 0 or 1 from its left and top. */
   #corner(index: number, u: 0 | 1, v: 0 | 1): Vec3 {
     const at: Vec3 = [0, 0, 0];
     at[this.#frame.axis] = index;

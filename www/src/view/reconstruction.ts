@@ -9,11 +9,14 @@ import { diverging, isShade, SHADES, shadeTitle } from './shading';
 import { type SurfaceColor, SurfaceObject } from './surface';
 import { Viewport } from './viewport';
 
-/** Points that lie farther out than this share of them on each side do not count for what the view shows. */
+/** Fraction of the points ignored at either end of each axis when the view is fitted, so that outliers do not count. */
 const STRAY = 0.02;
-/** Of a point's disc, as a part of the diagonal of the box: two to three pixels. Smaller ones are hard to see, larger ones hide the surface. */
+/**
+ * Diameter of a point's disc, as a fraction of the box diagonal: two to three pixels. Smaller ones are hard to see,
+ * larger ones hide the surface.
+ */
 const DISC = 0.014;
-/** With more points than this the discs get smaller, so that they do not cover everything. */
+/** With more points than this the discs are smaller, so that they do not cover everything. */
 const MANY = 10_000;
 const CAMERA_LENGTH = 0.12;
 
@@ -26,21 +29,21 @@ export interface CloudViewOptions {
   color: SurfaceColor;
 }
 
-/** Points to show, and how they stand. */
+/** Points to show, and their orientation. */
 export interface ShownCloud {
   points: Float32Array;
-  /** rgb of each, 0..1. */
+  /** rgb of each point, 0..1. */
   colors?: Float32Array | undefined;
   cameras: readonly PinholeCamera[];
   up: 'y' | 'z';
-  /** The side to look at: 1 where things face along −y, or along z where y is up; −1 from behind. */
+  /** The visible side: 1 where objects face along −y, or along z where y is up; −1 from behind. */
   front: 1 | -1;
 }
 
-/** What a click has hit. */
+/** Result of a click in the view. */
 export interface Hit {
   point: Vec3;
-  /** Outwards, where it is on the surface. */
+  /** Outward normal, if the point is on the surface. */
   normal?: Vec3;
 }
 
@@ -55,7 +58,7 @@ export class ReconstructionView {
   readonly #outsideByHand = new PointCloud();
   readonly #cameras = new CameraMarks();
   readonly legend = new Legend(diverging);
-  /** Called with the place that was clicked. */
+  /** Called with the point that was clicked. */
   onPick: ((hit: Hit) => void) | undefined;
   #options: CloudViewOptions;
   #box = new Box3();
@@ -75,12 +78,12 @@ export class ReconstructionView {
     onSchemeChange(() => this.#recolor());
   }
 
-  /** Called when the view is no longer that of a photograph. */
+  /** Called when the view leaves the pose of a photograph. */
   set onLeave(callback: () => void) {
     this.#viewport.onLeave = callback;
   }
 
-  /** Other points: everything of the former is gone. */
+  /** Shows other points and discards everything that belonged to the previous ones. */
   setCloud({ points, colors, cameras, up, front }: ShownCloud): void {
     this.#box = middleBox(points);
     const length = this.#box.getSize(new Vector3()).length();
@@ -103,7 +106,7 @@ export class ReconstructionView {
     this.#viewport.invalidate();
   }
 
-  /** Points added by hand stand out, and so do those said to be outside. */
+  /** Shows manual edits, emphasised: points added, and points marked as outside. */
   showByHand(added: Float32Array, outside: Float32Array): void {
     this.#addedByHand.show(added);
     this.#outsideByHand.show(outside);
@@ -133,7 +136,7 @@ export class ReconstructionView {
     this.#surface.solid = options.surface && this.#hasSurface;
     this.#surface.edges = options.edges && this.#hasSurface;
     this.#surface.color = options.color;
-    // Constraints tell apart what colours of the points' own would hide.
+    // The points' own colours would hide the kinds of constraints.
     this.#points.object.visible = options.points && !options.constraints;
     this.#inside.object.visible = options.constraints;
     this.#outside.object.visible = options.constraints;
@@ -145,16 +148,16 @@ export class ReconstructionView {
     this.#viewport.invalidate();
   }
 
-  /** Looks through a camera, or freely again. */
+  /** Sets the view to the pose of a camera, or back to free rotation. */
   lookThrough(camera: PinholeCamera | undefined, index: number | undefined): void {
     this.#cameras.choose(index);
-    // Light is in the photographs already: beside one, colours are shown as they are.
+    // Photographs contain shading already: next to one, colours are shown unlit.
     this.#surface.lit = camera === undefined;
     this.#viewport.lookThrough(camera);
     this.#viewport.invalidate();
   }
 
-  /** Diagonal of the box that most points lie in. */
+  /** Diagonal of the box that contains most points. */
   get size(): number {
     return this.#box.getSize(new Vector3()).length();
   }
@@ -174,7 +177,10 @@ export class ReconstructionView {
     if (!box.isEmpty()) this.#viewport.frameBox(box, this.#front);
   }
 
-  /** The surface where the ray meets it; else the plane through the middle that faces the viewer. */
+  /**
+   * Reports the intersection of a ray with the surface, or else with the plane through the middle that faces the
+   * viewer.
+   */
   #pick(ray: Raycaster): void {
     if (!this.onPick) return;
     const [hit] = this.#hasSurface ? ray.intersectObject(this.#surface.target, false) : [];
@@ -209,7 +215,7 @@ export class ReconstructionView {
   }
 }
 
-/** The box of all but the outermost points. */
+/** Returns the bounding box of all points but the outermost. */
 function middleBox(points: Float32Array): Box3 {
   const box = new Box3();
   const count = points.length / 3;
@@ -221,6 +227,6 @@ function middleBox(points: Float32Array): Box3 {
     high.setComponent(axis, sorted[last] ?? 0);
   }
   box.set(low, high);
-  // What was left out at the ends of a clean set of points.
+  // Compensates for the points cut off at the ends of a set without outliers.
   return box.expandByScalar(0.03 * box.getSize(new Vector3()).length());
 }

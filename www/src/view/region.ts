@@ -1,11 +1,13 @@
-/** The box of voxels that is looked at: over the slices, where its sides can be dragged, and in the 3D view. */
+/**
+ * The region of interest as a box of voxels: drawn over the slices, where its sides can be dragged, and in the 3D view.
+ */
 import type { Vec3 } from '../protocol';
 import type { VoxelBox } from '../track/box';
 import { token } from '../ui/dom';
 import { type Axis, type SliceFrame, toWorld } from './anatomy';
 import type { Grip } from './panel';
 
-/** Fewer voxels than this along an axis hold no window with a boundary in it. */
+/** Smallest size of the region along an axis, voxels; a smaller one contains no window with a boundary. */
 const LEAST = 4;
 
 export class RegionGrips {
@@ -18,7 +20,10 @@ export class RegionGrips {
     this.#onDrop = onDrop;
   }
 
-  /** Takes hold of the sides that are near the place, on a slice across an axis. */
+  /**
+   * Returns a grip on the sides of the box near `place` (voxels), on a slice across the axis `across`; undefined if
+   * none is within `slack`.
+   */
   grab(place: Vec3, slack: Vec3, across: Axis, dims: Vec3): Grip | undefined {
     const start = this.region;
     if (!start) return undefined;
@@ -48,7 +53,7 @@ export class RegionGrips {
     };
   }
 
-  /** The box where it meets a slice, in pixels of the slice times the scales. */
+  /** Draws the intersection of the box with a slice, in pixels of the slice times the scales. */
   draw(context: CanvasRenderingContext2D, frame: SliceFrame, dims: Vec3, scaleX: number, scaleY: number): void {
     const { region } = this;
     if (!region) return;
@@ -73,7 +78,7 @@ function moved(box: VoxelBox, axis: Axis, side: 'low' | 'high', to: number, dims
   return ends;
 }
 
-/** The twelve edges around the voxels, pairs of world points. */
+/** Returns the twelve edges of the box around the voxels, as pairs of world points. */
 export function regionEdges({ low, high }: VoxelBox, affine: ArrayLike<number>): Float32Array {
   const corner = (i: number) =>
     toWorld(affine, low.map((from, k) => ((i >> k) & 1 ? (high[k] ?? 0) + 0.5 : from - 0.5)) as Vec3);

@@ -9,9 +9,9 @@ import { diverging, isShade, SHADES, shadeTitle } from './shading';
 import { type SurfaceColor, SurfaceObject } from './surface';
 import { Viewport } from './viewport';
 
-/** From middle to middle of meshes beside each other, in their width. */
+/** Distance between the centres of adjacent meshes in a row, relative to their width. */
 const APART = 1.25;
-/** Turned so far to the side at first: a face is seen from before. */
+/** Initial rotation to the side, so that a face is seen almost from the front. */
 const ASIDE = 0.35;
 
 export interface SculptViewOptions {
@@ -21,11 +21,14 @@ export interface SculptViewOptions {
   color: SurfaceColor;
 }
 
-/** The meshes that can be shown: as in the paper, with a dash for those that are deformed; and up to five stages of something. */
+/**
+ * Names of the meshes that can be shown: as in the paper, with a dash for the deformed ones, and up to five stages of a
+ * computation.
+ */
 const MESHES = ['S1', 'S0', 'T', 'S0dash', 'S1dash', 'A', 'B', 'C', 'D', 'E'] as const;
 type MeshName = (typeof MESHES)[number];
 
-/** From left to right. */
+/** Meshes of the stages, from left to right. */
 const STAGES: readonly MeshName[] = ['A', 'B', 'C', 'D', 'E'];
 const ROWS: Record<Exclude<Layout, 'stages' | 'levels'>, readonly MeshName[]> = {
   result: ['S1dash'],
@@ -34,7 +37,7 @@ const ROWS: Record<Exclude<Layout, 'stages' | 'levels'>, readonly MeshName[]> = 
   row: ['S1', 'S0', 'T', 'S0dash', 'S1dash'],
 };
 
-/** What stands under each mesh. */
+/** Caption under each mesh. */
 const CAPTIONS: Partial<Record<MeshName, string>> = {
   S1: 'S₁ original',
   S0: 'S₀ its base',
@@ -43,20 +46,22 @@ const CAPTIONS: Partial<Record<MeshName, string>> = {
   S1dash: 'S₁′ result',
 };
 
-/** The 3D view of the Sculpt lab: the surface with its ellipsoids, or the meshes it is made of, beside each other. */
+/**
+ * The 3D view of the Sculpt lab: the surface with its control ellipsoids, or a row of the meshes it is computed from.
+ */
 export class SculptureView {
   readonly legend = new Legend(diverging);
   readonly handles: EllipsoidHandles;
-  /** Called with the ellipsoid that was clicked, or with nothing. */
+  /** Called with the index of the ellipsoid that was clicked, or with undefined. */
   onPick: (index: number | undefined) => void = () => undefined;
-  /** Called when the view has other meshes beside each other, with what stands under them. */
+  /** Called when other meshes are in the row, with their captions. */
   onCaptions: (captions: string[]) => void = () => undefined;
   readonly #viewport: Viewport;
   readonly #meshes = new Map<MeshName, { holder: Group; surface: SurfaceObject; has: boolean }>();
   #options: SculptViewOptions;
-  /** What stands under the stages. */
+  /** Captions of the stages. */
   #stages: string[] = [];
-  /** y points upwards. */
+  /** Whether y points upwards. */
   #upright = false;
   #box = new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1));
 
@@ -81,7 +86,7 @@ export class SculptureView {
     onSchemeChange(() => this.#recolor());
   }
 
-  /** Asked about keys first, with the directions to the right, upwards and towards the viewer. */
+  /** Handler called first for key events, with the directions to the right, upwards and towards the viewer. */
   set takesKey(takes: (event: KeyboardEvent, directions: Vec3[]) => boolean) {
     this.#viewport.takesKey = (event) =>
       takes(
@@ -90,7 +95,9 @@ export class SculptureView {
       );
   }
 
-  /** Another scene: everything of the former is gone. There is room for the surface in all of `poses`, too. */
+  /**
+   * Opens another scene and discards everything of the previous one. The view is fitted to the surface in all `poses`.
+   */
   setScene(box: { min: Vec3; max: Vec3 }, up: 'y' | 'z', start: Pose, poses: Pose[]): void {
     this.#box = roomFor(box, start, poses);
     this.#viewport.up = up;
@@ -101,7 +108,7 @@ export class SculptureView {
     this.#frame();
   }
 
-  /** Keeps a surface's arrays until the next one is shown. */
+  /** Shows a surface; its arrays are kept until the next one is shown. */
   show(name: MeshName, surface: Surface | undefined): void {
     const mesh = this.#meshes.get(name);
     if (!mesh || !surface) return;
@@ -114,13 +121,13 @@ export class SculptureView {
     this.#viewport.invalidate();
   }
 
-  /** Other places for the vertices of a surface that is shown. */
+  /** Moves the vertices of a surface that is shown to other positions. */
   move(name: MeshName, positions: Float32Array): void {
     this.#meshes.get(name)?.surface.move(positions);
     this.#viewport.invalidate();
   }
 
-  /** Stages of something beside each other, with what stands under each. */
+  /** Shows stages of a computation in a row, with their captions. */
   showStages(stages: { caption: string; surface: Surface }[]): void {
     const reframe = stages.length !== this.#stages.length;
     this.#stages = stages.map(({ caption }) => caption);
@@ -133,12 +140,12 @@ export class SculptureView {
     if (reframe) this.#frame();
   }
 
-  /** At the next animation frame, which then shows what was changed. */
+  /** Calls `change` at the next animation frame, which then shows its effect. */
   change(change: () => void): void {
     this.#viewport.changeAndDraw(change);
   }
 
-  /** The picture on the result, or none. */
+  /** The texture of the result, or null. */
   set texture(texture: Texture | null) {
     for (const { surface } of this.#meshes.values()) surface.texture = texture;
     this.#viewport.invalidate();
@@ -161,12 +168,12 @@ export class SculptureView {
     if (reframe) this.#frame();
   }
 
-  /** Diagonal of the box of the scene as it was opened. */
+  /** Diagonal of the scene's bounding box as it was opened. */
   get size(): number {
     return this.#box.getSize(new Vector3()).length();
   }
 
-  /** Of that box. */
+  /** Centre of the scene's bounding box as it was opened. */
   get middle(): Vec3 {
     return this.#box.getCenter(new Vector3()).toArray();
   }
@@ -183,7 +190,7 @@ export class SculptureView {
     const staged = layout === 'stages' || layout === 'levels';
     for (const [name, { surface, has }] of this.#meshes) {
       const on = has && row.includes(name);
-      // The base in all its forms is for its triangles to be seen.
+      // The base meshes are always shown with their edges.
       const isBase = name === 'S0' || name === 'T' || name === 'S0dash' || staged;
       surface.solid = on;
       surface.edges = on && (edges || (isBase && layout !== 'result'));
@@ -195,7 +202,7 @@ export class SculptureView {
     this.#viewport.invalidate();
   }
 
-  /** Meshes beside each other run across the view, however it is turned. */
+  /** Places the meshes of the row along the view's horizontal direction. */
   #placeInRow(): void {
     const row = this.#row;
     const [right] = this.#viewport.directions();
@@ -218,7 +225,7 @@ export class SculptureView {
 
   get #width(): number {
     const size = this.#box.getSize(new Vector3());
-    // As an ellipse seen a little from the side.
+    // Width of an ellipse seen at this angle.
     const turn = Math.atan(ASIDE);
     return Math.hypot(size.x * Math.cos(turn), (this.#upright ? size.z : size.y) * Math.sin(turn));
   }
@@ -227,7 +234,7 @@ export class SculptureView {
     const { length } = this.#row;
     const box = this.#box.clone();
     const { aspect } = this.#viewport;
-    // A row is as much wider as the view is; what is left has to be stood off from.
+    // A row is wider than one mesh by the aspect of the view; the rest is compensated by distance.
     const wider = Math.max(1, (APART * length * this.#width) / (this.size * Math.max(1, aspect)));
     const [middle, half] = [box.getCenter(new Vector3()), box.getSize(new Vector3()).multiplyScalar(wider / 2)];
     box.set(middle.clone().sub(half), middle.clone().add(half));
@@ -253,7 +260,7 @@ export class SculptureView {
   }
 }
 
-/** The box of a surface, and of where it goes: as far beyond its ellipsoids as it is at the start. */
+/** Returns a box for the surface in all poses: with the same margin around the ellipsoids as at the start. */
 function roomFor(box: { min: Vec3; max: Vec3 }, start: Pose, poses: Pose[]): Box3 {
   const room = new Box3(new Vector3(...box.min), new Vector3(...box.max));
   const first = boxOf(start);

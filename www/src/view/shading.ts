@@ -1,12 +1,12 @@
-/** Colours for numbers on the surface: a diverging map, blue below zero, red above, light at zero (ColorBrewer RdBu). */
+/** Colour map for values on the surface: diverging, blue below zero, red above, light at zero (ColorBrewer RdBu). */
 import type { Shade } from '../protocol';
 
-/** Numbers at the vertices that have colours of their own. */
+/** Values at the vertices that can be shown as colours. */
 export type ValueShade = Shade | 'distance' | 'area distortion' | 'angle distortion';
 
 type Rgb = readonly [number, number, number];
 
-/** At −1, −½, 0, ½ and 1. */
+/** Colours at −1, −½, 0, ½ and 1, sRGB 0..255. */
 const STOPS: readonly Rgb[] = [
   [33, 102, 172],
   [103, 169, 207],
@@ -15,14 +15,16 @@ const STOPS: readonly Rgb[] = [
   [178, 24, 43],
 ];
 
-/** Of the values, so many lie within the range shown: a few extreme vertices must not make all others pale. */
+/**
+ * Quantile of the magnitudes that bounds the range shown, so that a few extreme vertices do not make all others pale.
+ */
 const WITHIN = 0.98;
-/** Values looked at to find the range. */
+/** Number of values sampled to find the range. */
 const SAMPLES = 4096;
-/** Entries of the table that colours are taken from. */
+/** Number of steps of the colour table. */
 const TABLE = 256;
 
-/** What the legend says of each shade. */
+/** Title, labels and smallest range of the legend for each kind of value. */
 export const SHADES: Record<ValueShade, ShadeText> = {
   speed: { title: 'Speed along the normal, δ per iteration', below: 'inwards', above: 'outwards', least: 1e-4 },
   'mean curvature': { title: 'Mean curvature', power: 1, below: 'hollow', above: 'bulging', least: 1e-6 },
@@ -52,22 +54,22 @@ export const SHADES: Record<ValueShade, ShadeText> = {
 
 interface ShadeText {
   title: string;
-  /** Of the length it is one over; −1 for a length. */
+  /** Power of inverse length in the unit; −1 for a length. */
   power?: 1 | 2 | -1;
   below: string;
   above: string;
-  /** Smaller ranges than this are not shown. */
+  /** Smallest range shown. */
   least: number;
-  /** Never below 0: only the upper half of the colours is used. */
+  /** Whether values are never negative: only the upper half of the colours is used. */
   positive?: boolean;
 }
 
-/** Whether colours tell numbers. */
+/** Whether a colouring represents values. */
 export function isShade(color: string): color is ValueShade {
   return color in SHADES;
 }
 
-/** The title with the unit that goes with lengths in `unit`. */
+/** Returns the legend's title with the unit, for lengths in `unit`. */
 export function shadeTitle(shade: ValueShade, unit: string): string {
   const { title, power } = SHADES[shade];
   if (!power) return title;
@@ -75,7 +77,7 @@ export function shadeTitle(shade: ValueShade, unit: string): string {
   return `${title}, 1/${unit || 'unit'}${power === 2 ? '²' : ''}`;
 }
 
-/** sRGB, 0..255, for t in −1..1. */
+/** Returns the colour for t in −1..1, sRGB 0..255. */
 export function diverging(t: number): [number, number, number] {
   const at = (Math.min(1, Math.max(-1, t)) + 1) * 2;
   const i = Math.min(STOPS.length - 2, Math.floor(at));
@@ -88,7 +90,10 @@ const LINEAR = Float32Array.from({ length: 3 * (TABLE + 1) }, (_, i) => {
   return ((diverging(t)[i % 3] ?? 0) / 255) ** 2.2;
 });
 
-/** The largest size worth showing: nearly all values lie within it, rounded up to 1, 2 or 5 times a power of ten. */
+/**
+ * Returns the range of the colour scale: a magnitude that bounds nearly all values, rounded up to 1, 2 or 5 times a
+ * power of ten.
+ */
 export function robustRange(values: Float32Array, least: number): number {
   const stride = Math.max(1, Math.floor(values.length / SAMPLES));
   const sizes: number[] = [];
@@ -106,10 +111,10 @@ function roundUp(value: number): number {
   return Number((step * power).toPrecision(1));
 }
 
-/** Linear rgb of each vertex, three numbers each, into `out`. */
+/** Writes the colour of each value into `out`, linear rgb, three numbers each. */
 export function shadeColors(values: Float32Array, range: number, out: Float32Array): void {
   for (let vertex = 0; vertex < values.length; vertex++) {
-    // What is no number is drawn as zero.
+    // NaN is drawn as zero.
     const t = Math.min(1, Math.max(-1, (values[vertex] || 0) / range));
     const entry = 3 * Math.round(((t + 1) * TABLE) / 2);
     out[3 * vertex] = LINEAR[entry] ?? 1;
@@ -118,7 +123,7 @@ export function shadeColors(values: Float32Array, range: number, out: Float32Arr
   }
 }
 
-/** sRGB of each vertex, 0..1, as linear rgb into `out`. */
+/** Converts sRGB colours, 0..1, to linear rgb in `out`. */
 export function linearColors(colors: Float32Array, out: Float32Array): void {
   for (let i = 0; i < colors.length; i++) out[i] = Math.max(0, colors[i] ?? 0) ** 2.2;
 }

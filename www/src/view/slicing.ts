@@ -4,12 +4,15 @@ import type { SliceFrame } from './anatomy';
 
 type Voxels = Pick<VolumeView, 'dims' | 'voxels'>;
 
-/** How many voxels wide and high the pictures of a slice direction are. */
+/** Returns the size of slice images in this direction, voxels. */
 export function pictureSize(volume: Voxels, frame: SliceFrame): { width: number; height: number } {
   return { width: volume.dims[frame.horizontal.axis], height: volume.dims[frame.vertical.axis] };
 }
 
-/** One slice as grey RGBA pixels in reading order, turned the way its frame says. `out` holds 4 × width × height bytes. */
+/**
+ * Paints a slice as grey RGBA pixels in reading order, oriented as specified by `frame`. `out` holds 4 × width × height
+ * bytes.
+ */
 export function paintSlice(volume: Voxels, frame: SliceFrame, index: number, out: Uint8ClampedArray): void {
   const { width, height } = pictureSize(volume, frame);
   const strides = [1, volume.dims[0], volume.dims[0] * volume.dims[1]] as const;
@@ -30,7 +33,7 @@ export function paintSlice(volume: Voxels, frame: SliceFrame, index: number, out
   }
 }
 
-/** Greys of a slice in reading order. */
+/** Returns the grey values of a slice in reading order. */
 export function greysOf(volume: Voxels, frame: SliceFrame, index: number): Uint8Array {
   const { width, height } = pictureSize(volume, frame);
   const rgba = new Uint8ClampedArray(4 * width * height);
@@ -38,13 +41,13 @@ export function greysOf(volume: Voxels, frame: SliceFrame, index: number): Uint8
   return Uint8Array.from({ length: width * height }, (_, i) => rgba[4 * i] ?? 0);
 }
 
-/** The slice of a coarser copy that lies where the volume's slice with that index lies. */
+/** Returns the index of the slice of a coarser level at the position of the volume's slice with the given index. */
 export function levelIndex(volume: Voxels, level: LevelView, frame: SliceFrame, index: number): number {
   const last = level.dims[frame.axis] - 1;
   return Math.min(last, Math.floor(((index + 0.5) * level.dims[frame.axis]) / volume.dims[frame.axis]));
 }
 
-/** One slice of a coarser copy, stretched over a picture of the volume's own size so that its voxels are seen. */
+/** Paints a slice of a coarser level, stretched to the size of the volume's slices so that its voxels are visible. */
 export function paintLevel(
   volume: Voxels,
   level: LevelView,
@@ -59,7 +62,7 @@ export function paintLevel(
   context.drawImage(small, 0, 0, picture.width, picture.height);
 }
 
-/** One slice as a picture of its own. */
+/** Renders a slice as an image on a new canvas. */
 export function slicePicture(volume: Voxels, frame: SliceFrame, index: number): HTMLCanvasElement {
   const { width, height } = pictureSize(volume, frame);
   const canvas = document.createElement('canvas');
@@ -72,8 +75,9 @@ export function slicePicture(volume: Voxels, frame: SliceFrame, index: number): 
 }
 
 /**
- * Where the ball of an attractor's reach meets a slice, in the coordinates of {@link projectSegments}; nothing where it
- * does not. `near`: the point itself lies within half a voxel of the slice.
+ * Returns the intersection of an attractor's ball of influence with a slice, in the coordinates of
+ * {@link projectSegments}, or undefined if there is none. `near`: the point itself lies within half a voxel of the
+ * slice.
  */
 export function discOf(
   { point, radius }: Pick<Attractor, 'point' | 'radius'>,
@@ -95,8 +99,8 @@ export function discOf(
 }
 
 /**
- * World segments (pairs of points) as picture coordinates in voxels, x y x y per segment; (0, 0) is the picture's top
- * left corner, so that the first voxel's centre is at (½, ½).
+ * Projects world segments (pairs of points) onto a slice: image coordinates in voxels, x y x y per segment; (0, 0) is
+ * the image's top left corner, so that the first voxel's centre is at (½, ½).
  */
 export function projectSegments(
   segments: Float32Array,

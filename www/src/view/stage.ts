@@ -13,7 +13,7 @@ import { levelIndex, slicePicture } from './slicing';
 import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
 
-/** All that belongs to one volume on the screen. */
+/** The objects on screen that belong to one volume. */
 interface Scene {
   volume: VolumeView;
   inverse: Float64Array;
@@ -22,18 +22,18 @@ interface Scene {
   frame: VolumeFrame;
 }
 
-/** The 3D view and the three slices, kept in step with each other. */
+/** The 3D view and the three slices of a volume, synchronised by a common crosshair. */
 export class Stage {
   readonly #viewport: Viewport;
   readonly #slices: HTMLElement;
   readonly #surface = new SurfaceObject();
   readonly #marks = new AttractorMarks();
   readonly #uncoveredMarks = new UncoveredMarks();
-  /** What the colours of the surface mean. */
+  /** Legend of the surface's colours. */
   readonly legend = new Legend(diverging);
-  /** Takes the place that is clicked, in a slice or on the surface, instead of the crosshair going there. */
+  /** If set, receives the point clicked in a slice or on the surface; used for placing attractors. */
   onPlace: ((point: Vec3) => void) | undefined;
-  /** Of lengths in the volume's world. */
+  /** Unit of length in the volume's world space, for the legend. */
   unit = '';
   /** Called whenever the slices have moved. */
   onMoved: () => void = () => undefined;
@@ -41,10 +41,10 @@ export class Stage {
   #options: ViewOptions;
   #scene: Scene | undefined;
   #attractors: Attractor[] = [];
-  /** Voxel index where the three slices meet. */
+  /** Voxel index where the three slices intersect. */
   #crosshair: Vec3 = [0, 0, 0];
 
-  /** `onPlanes` hears of the slices' planes whenever they move. */
+  /** `onPlanes` is called with the planes of the slices whenever they move. */
   constructor(
     canvas: HTMLCanvasElement,
     slices: HTMLElement,
@@ -84,7 +84,7 @@ export class Stage {
     const frame = new VolumeFrame(volume, token('--muted'));
     this.#scene = { volume, inverse, panels, planes, frame };
     for (const { object } of [...planes, frame]) this.#viewport.add(object);
-    // Axial first, as in a reading room.
+    // Axial first, as in radiology.
     this.#slices.append(
       ...[...panels].sort((a, b) => a.frame.name.localeCompare(b.frame.name)).map((panel) => panel.element),
     );
@@ -94,14 +94,14 @@ export class Stage {
     this.#moveTo(volume.dims.map((n) => (n - 1) >> 1) as Vec3);
   }
 
-  /** Keeps the surface's arrays until the next one is shown. */
+  /** Shows a surface; its arrays are kept until the next one is shown. */
   showSurface(surface: Surface): void {
     this.#surface.show(surface);
     this.#showLegend();
     this.#viewport.invalidate();
   }
 
-  /** The surface's cuts with the planes last told, in their order. */
+  /** Shows the cross-sections of the surface with the slice planes last reported, in the same order. */
   showSections(sections: Float32Array[]): void {
     sections.forEach((section, axis) => {
       this.#scene?.panels[axis]?.setOutline(section);
@@ -126,7 +126,7 @@ export class Stage {
     this.#viewport.invalidate();
   }
 
-  /** Marks what the surface leaves out. */
+  /** Marks the regions of the iso-surface that the surface does not cover. */
   showUncovered(parts: readonly UncoveredPart[]): void {
     const { dims = [1, 1, 1], spacing = [1, 1, 1] } = this.#scene?.volume ?? {};
     this.#uncoveredMarks.show(parts, Math.min(...dims.map((n, axis) => n * (spacing[axis] ?? 1))));
@@ -134,20 +134,20 @@ export class Stage {
     this.#viewport.invalidate();
   }
 
-  /** Moves the slices to a world point, and the 3D view so that it is in its middle. */
+  /** Moves the crosshair to a world point, and centres the 3D view on it. */
   lookAt(point: Vec3): void {
     this.goTo(point);
     this.#viewport.lookAt(point);
   }
 
-  /** Shows a coarser copy of the volume in the slices, or the volume itself. */
+  /** Shows a coarser pyramid level in the slices, or the volume itself. */
   showLevel(level: LevelView | undefined): void {
     for (const panel of this.#scene?.panels ?? []) panel.setLevel(level);
     for (const [axis, plane] of this.#scene?.planes.entries() ?? []) plane.moveTo(this.#crosshair[axis] ?? 0);
     this.#viewport.invalidate();
   }
 
-  /** The axial slice through the crosshair as a picture, of the volume or of a coarser copy. */
+  /** Renders the axial slice through the crosshair as a small image, of the volume or of a coarser level. */
   thumbnail(level: LevelView | undefined): HTMLCanvasElement | undefined {
     const scene = this.#scene;
     const frame = scene?.panels.find((panel) => panel.frame.name === 'Axial')?.frame;
@@ -157,7 +157,7 @@ export class Stage {
     return slicePicture(level, frame, levelIndex(scene.volume, level, frame, index));
   }
 
-  /** Moves the three slices to where they meet in a world point, as far as the volume goes. */
+  /** Moves the crosshair to a world point, clamped to the volume. */
   goTo(point: Vec3): void {
     const scene = this.#scene;
     if (!scene) return;
@@ -167,12 +167,12 @@ export class Stage {
     );
   }
 
-  /** The world point where the three slices meet. */
+  /** The crosshair in world space. */
   get crosshair(): Vec3 {
     return this.#scene ? toWorld(this.#scene.volume.affine, this.#crosshair) : [0, 0, 0];
   }
 
-  /** Gives everything back; the stage is not used again. */
+  /** Releases all resources; the stage cannot be used afterwards. */
   dispose(): void {
     this.#clear();
     this.#surface.dispose();
@@ -197,7 +197,7 @@ export class Stage {
     this.#viewport.invalidate();
   }
 
-  /** The crosshair follows the pointer; while something is being placed, only where it was pressed counts. */
+  /** The crosshair follows the pointer; while an object is being placed, only the press counts. */
   #point(index: Vec3, pressed: boolean): void {
     if (this.onPlace && !pressed) return;
     this.#moveTo(index);

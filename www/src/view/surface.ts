@@ -20,18 +20,24 @@ import { componentColors } from './components';
 import { isShade, linearColors, robustRange, SHADES, shadeColors, type ValueShade } from './shading';
 
 const BONE: ColorRepresentation = '#e9dcc3';
-/** Colours from photographs hold their light already: lit once more as they are, white comes out grey. */
+/**
+ * Gain of a surface's own colours under lighting. Colours from photographs already contain shading; lit again, white
+ * would appear grey.
+ */
 const OWN_GAIN = 1.6;
 
-/** Triangles that a software renderer still turns smoothly; of more, about so many are drawn meanwhile. */
+/**
+ * Largest number of triangles that a software renderer still rotates smoothly; larger surfaces are simplified to about
+ * this number during the rotation.
+ */
 const SMOOTH = 10_000;
 
-/** What the colour of a surface tells; 'own' are the colours that its vertices came with, 'texture' a picture on it. */
+/** Colouring of a surface: 'own' are the vertex colours it came with, 'texture' an image. */
 export type SurfaceColor = ColorMode | ValueShade | 'own' | 'texture';
 
 /**
- * A surface whose vertices and triangles change every frame. The arrays it is shown are what the GPU's buffers are filled
- * from, with no copy in between; arrays with as much room as the ones before go into the same buffers.
+ * A surface in the 3D view whose vertices and triangles change every frame. Its arrays are uploaded to the GPU without
+ * a copy in between; arrays of the same capacity as the previous ones reuse the buffers.
  */
 export class SurfaceObject {
   readonly object = new Group();
@@ -43,39 +49,39 @@ export class SurfaceObject {
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
   });
-  /** Colours as they are, whatever the light. */
+  /** Shows vertex colours unlit. */
   readonly #plainMaterial = new MeshBasicMaterial({ vertexColors: true });
   #lit = true;
   readonly #edgeMaterial = new LineBasicMaterial({ transparent: true, opacity: 0.4 });
-  /** With normals from the start: a shader that is made for a surface without them draws flat triangles for ever. */
+  /** Has normals from the start: a shader compiled for a surface without them would always draw flat triangles. */
   #fine = emptyGeometry();
-  /** Drawn instead of the fine one, while there is one. */
+  /** Simplified geometry, drawn in place of the fine one while it exists. */
   #coarse: BufferGeometry | undefined;
   readonly #mesh: Mesh<BufferGeometry, Material> = new Mesh(this.#fine, this.#material);
   readonly #edges = new LineSegments(new BufferGeometry(), this.#edgeMaterial);
-  /** How much of the buffers is in use: vertices, and corners of triangles. */
+  /** Numbers of vertices and of triangle corners in use in the buffers. */
   #vertices = 0;
   #corners = 0;
   #color: SurfaceColor = 'plain';
   #texture: Texture | null = null;
-  /** The surface shown has places in the picture. */
+  /** Whether the current surface has texture coordinates. */
   #hasUvs = false;
-  /** The numbers at the vertices, where the surface came with some. */
+  /** Values at the vertices that are shown as colours; empty if there are none. */
   #values: Float32Array = new Float32Array(0);
-  /** rgb of the vertices, where the surface came with them. */
+  /** rgb of the vertices; empty if the surface has no colours. */
   #colors: Float32Array = new Float32Array(0);
-  /** The number at the ends of the colours; 0 where no numbers are shown. */
+  /** The value at the ends of the colour scale; 0 if no values are shown. */
   #range = 0;
 
   constructor() {
-    // The bounding sphere is kept by hand; the surface nearly always fills the view.
+    // No culling: the surface nearly always fills the view, and bounding spheres are infinite.
     this.#mesh.frustumCulled = false;
     this.#edges.frustumCulled = false;
     this.#edges.visible = false;
     this.object.add(this.#mesh, this.#edges);
   }
 
-  /** Keeps the surface's arrays until the next one is shown. */
+  /** Shows a surface; its arrays are kept until the next one is shown. */
   show(surface: Surface): void {
     this.#dropCoarse();
     this.#vertices = surface.vertices;
@@ -89,23 +95,26 @@ export class SurfaceObject {
     this.#fillColors();
   }
 
-  /** Other places for the vertices that are shown, in an array of the same length. What light they had they keep: it is for a moment. */
+  /**
+   * Moves the vertices to other positions, in an array of the same length. Normals stay unchanged: this is only for a
+   * short time.
+   */
   move(positions: Float32Array): void {
     refill(this.#fine.getAttribute('position') as BufferAttribute, positions, 3 * this.#vertices);
   }
 
-  /** Fewer triangles, for a moment: where they are drawn in software, a large surface could not be turned. */
+  /** Whether a simplified surface is drawn, for rotating a large surface in a software renderer. */
   set coarse(on: boolean) {
     if (!on) this.#dropCoarse();
     else if (this.#corners > 3 * SMOOTH && !this.#coarse) this.#makeCoarse();
   }
 
-  /** The number that the strongest colours stand for; 0 where colours stand for no number. */
+  /** The value of the strongest colours; 0 if colours represent no values. */
   get range(): number {
     return this.#range;
   }
 
-  /** What a ray can hit. */
+  /** The mesh to test for intersections with a ray. */
   get target(): Mesh {
     this.#dropCoarse();
     return this.#mesh;
@@ -120,13 +129,13 @@ export class SurfaceObject {
     this.#edgeMaterial.color.set(color);
   }
 
-  /** The picture on the surface; it belongs to whoever gives it. */
+  /** The texture of the surface; owned and disposed of by the caller. */
   set texture(texture: Texture | null) {
     this.#texture = texture;
     this.#fillColors();
   }
 
-  /** Whether colours of the surface's own are lit. */
+  /** Whether the surface's own colours are lit. */
   set lit(lit: boolean) {
     this.#lit = lit;
     this.#fillColors();
@@ -152,7 +161,10 @@ export class SurfaceObject {
     this.#edgeMaterial.dispose();
   }
 
-  /** GPU buffers cannot grow: where the arrays have other lengths than those before, new ones take their place. */
+  /**
+   * Uploads the surface's arrays. GPU buffers cannot grow: if the capacities differ from those before, new ones are
+   * created.
+   */
   #takeOver({ positions, normals, indices, uvs }: Surface): void {
     const geometry = this.#fine;
     const parts: Part[] = [
@@ -189,7 +201,7 @@ export class SurfaceObject {
     if (!coarse) return;
     this.#coarse = undefined;
     this.#mesh.geometry = this.#fine;
-    // What it shares stays on the GPU.
+    // The shared attributes stay on the GPU.
     for (const name of Object.keys(coarse.attributes)) coarse.deleteAttribute(name);
     coarse.dispose();
   }
@@ -213,7 +225,7 @@ export class SurfaceObject {
     geometry.setDrawRange(0, count);
   }
 
-  /** A shade whose numbers have not come yet is plain. */
+  /** Fills the colour buffer. A shade whose values have not arrived yet is drawn plain. */
   #fillColors(): void {
     const mode = this.#color;
     const shaded = isShade(mode) && this.#values.length === this.#vertices;
@@ -239,7 +251,7 @@ export class SurfaceObject {
   }
 }
 
-/** Numbers at the vertices, so many each. */
+/** A vertex attribute: its name in three.js, its array, and the numbers per vertex. */
 interface Part {
   name: string;
   array: Float32Array;
@@ -251,7 +263,7 @@ function emptyGeometry(): BufferGeometry {
   return geometryOf(parts, new Uint32Array(3));
 }
 
-/** A geometry on these arrays themselves. */
+/** Creates a geometry that uses these arrays without copying. */
 function geometryOf(parts: Part[], indices: Uint32Array): BufferGeometry {
   const geometry = new BufferGeometry();
   for (const { name, array, size } of parts) geometry.setAttribute(name, new BufferAttribute(array, size));
@@ -261,7 +273,7 @@ function geometryOf(parts: Part[], indices: Uint32Array): BufferGeometry {
   return geometry;
 }
 
-/** Made when they are first wanted: most surfaces are plain. */
+/** Returns the colour attribute of a geometry, created on first use: most surfaces are plain. */
 function colorsOf(geometry: BufferGeometry): BufferAttribute {
   const there = geometry.getAttribute('color') as BufferAttribute | undefined;
   if (there) return there;
@@ -270,7 +282,10 @@ function colorsOf(geometry: BufferGeometry): BufferAttribute {
   return colors;
 }
 
-/** The same vertices, drawn as lines. A closed surface has as many edges as half its triangles' corners. */
+/**
+ * Creates a geometry that draws the surface's edges from the same vertices. A closed surface has half as many edges as
+ * triangle corners.
+ */
 function edgeGeometry(surface: BufferGeometry): BufferGeometry {
   const geometry = new BufferGeometry();
   geometry.setAttribute('position', surface.getAttribute('position'));
@@ -279,7 +294,10 @@ function edgeGeometry(surface: BufferGeometry): BufferGeometry {
   return geometry;
 }
 
-/** Each edge of a closed surface once: of the two triangles on it, the one that runs along it upwards lists it. */
+/**
+ * Lists each edge of a closed surface once: by the one of its two triangles that traverses it from the smaller to the
+ * larger index. Returns the number of indices written.
+ */
 function listEdges(indices: Uint32Array, length: number, out: Uint32Array): number {
   let count = 0;
   for (let i = 0; i < length; i += 3) {
@@ -294,7 +312,7 @@ function listEdges(indices: Uint32Array, length: number, out: Uint32Array): numb
   return count;
 }
 
-/** Fills a buffer from an array that is as long as the one before. Only the part in use goes up. */
+/** Assigns an array of the same length to a buffer attribute; only the part in use is uploaded. */
 function refill(buffer: BufferAttribute, array: Float32Array | Uint32Array, length: number): void {
   buffer.array = array;
   buffer.clearUpdateRanges();

@@ -20,46 +20,49 @@ import { Drawing } from './drawing';
 import { type PinholeCamera, placeEye } from './eye';
 
 const FIELD_OF_VIEW = 30;
-/** Radians the arrow keys turn the view, and the factor + and - zoom it by. */
+/** Rotation of the view by an arrow key, radians, and zoom factor of + and -. */
 const KEY_TURN = 0.12;
 const KEY_ZOOM = 1.12;
-/** Pixels a pointer may travel between down and up and still be a click, and not a turn of the view. */
+/** Largest distance in pixels between pointer down and up for a click; beyond it the pointer rotates the view. */
 const CLICK_SLACK = 4;
 
-/** The 3D view: a canvas, a camera that orbits by mouse, touch and keyboard, and light that comes with the camera. */
+/** A 3D view: a canvas, an orbit camera for mouse, touch and keyboard, and lights attached to the camera. */
 export class Viewport {
   readonly canvas: HTMLCanvasElement;
   readonly #drawing: Drawing;
   readonly #scene = new Scene();
-  /** All that is shown, turned so that its upward axis is the scene's z. */
+  /** Parent of all objects shown, rotated so that their upward axis is the scene's z. */
   readonly #world = new Group();
   readonly #camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 1, 1000);
-  /** Stands where a photograph was taken from. */
+  /** Camera with the pose of a photograph. */
   readonly #eye = new PerspectiveCamera();
-  /** Light that comes with whoever looks. */
+  /** Lights attached to the viewer. */
   readonly #lamp = new Group();
   readonly #controls: OrbitControls;
   readonly #observer = new ResizeObserver(() => this.#resize());
   readonly #spherical = new Spherical();
-  /** Called before each drawing, with the camera's place. `hurried`: a hand turns the view, and there is no GPU to keep up with it. */
+  /**
+   * Called before each rendering, with the camera position. `hurried`: whether the view is being rotated without a GPU,
+   * so that simplified objects are preferable.
+   */
   onDraw: (viewer: Vector3, hurried: boolean) => void = () => undefined;
-  /** Called with the ray through the place that was clicked. */
+  /** Called with the ray through the point that was clicked. */
   onClick: (ray: Raycaster) => void = () => undefined;
-  /** Asked about a key first; true where it was meant for something else than the view. */
+  /** Handler called first for key events; returns true for keys that are not for the view. */
   takesKey: (event: KeyboardEvent) => boolean = () => false;
-  /** Called when the view is no longer that of a photograph. */
+  /** Called when the view leaves the pose of a photograph. */
   onLeave: () => void = () => undefined;
   #through: PinholeCamera | undefined;
-  /** Pointer or wheel is at it: what moves now was meant to. */
+  /** Whether a pointer or the wheel is in use: camera motion is then the user's. */
   #dragged = false;
-  /** It has moved, and was not only touched. */
+  /** Whether the camera has moved during the current drag. */
   #turning = false;
   #disposed = false;
   #pending = 0;
-  /** To be done before the next drawing. */
+  /** Changes to be made before the next rendering. */
   readonly #changes: (() => void)[] = [];
   #home = { position: new Vector3(), target: new Vector3() };
-  /** Width by height of the view, at most 1: in a narrow view the camera stands farther off. */
+  /** Aspect ratio of the view, at most 1: in a narrow view the camera is farther away. */
   #narrowness = 1;
 
   constructor(canvas: HTMLCanvasElement) {
@@ -87,7 +90,7 @@ export class Viewport {
     this.#world.remove(object);
   }
 
-  /** Handles to move, turn and scale something that is shown; the view stands still while one is dragged. */
+  /** Creates handles to move, rotate and scale an object; the view does not rotate while one is dragged. */
   addHandles(): TransformControls {
     const handles = new TransformControls(this.#camera, this.canvas);
     handles.addEventListener('change', () => this.invalidate());
@@ -98,7 +101,7 @@ export class Viewport {
     return handles;
   }
 
-  /** The camera's own directions in the coordinates of what is shown: to the right, upwards, towards the viewer. */
+  /** Returns the camera's axes in the coordinates of the objects shown: to the right, upwards, towards the viewer. */
   directions(): [Vector3, Vector3, Vector3] {
     this.#camera.updateMatrixWorld();
     const inverse = this.#world.matrixWorld.clone().invert();
@@ -107,23 +110,23 @@ export class Viewport {
     return [axis(0), axis(1), axis(2)];
   }
 
-  /** Which axis of what is shown points upwards. */
+  /** The axis of the objects shown that points upwards. */
   set up(axis: 'y' | 'z') {
     this.#world.rotation.x = axis === 'y' ? Math.PI / 2 : 0;
     this.#world.updateMatrixWorld();
   }
 
-  /** A place a ray has hit, in the coordinates of what is shown. */
+  /** Transforms a point hit by a ray from the scene to the coordinates of the objects shown. */
   toWorld(point: Vector3): Vector3 {
     return this.#world.worldToLocal(point.clone());
   }
 
-  /** Where a place in the coordinates of what is shown lies in the scene. */
+  /** Transforms a point from the coordinates of the objects shown to the scene. */
   fromWorld(point: Vector3): Vector3 {
     return this.#world.localToWorld(point.clone());
   }
 
-  /** Looks exactly as a camera did, until the view is turned. */
+  /** Uses pose and projection of a camera until the view is rotated; undefined returns to the orbit camera. */
   lookThrough(camera: PinholeCamera | undefined): void {
     if (camera === this.#through) return;
     this.#through = camera;
@@ -131,38 +134,38 @@ export class Viewport {
     this.invalidate();
   }
 
-  /** Draws at the next animation frame; calling it more often costs nothing. */
+  /** Requests a rendering at the next animation frame; repeated calls cost nothing. */
   invalidate(): void {
     if (this.#disposed) return;
     this.#pending ||= requestAnimationFrame(() => {
-      // Still pending: what they change is drawn in this frame.
+      // Still marked as pending, because the changes are rendered in this frame.
       for (const change of this.#changes.splice(0)) change();
       this.#pending = 0;
       this.#draw();
     });
   }
 
-  /** Draws at the next animation frame, after what is called then. Asked for in that frame, a drawing would be in the one after. */
+  /** Calls `change` at the next animation frame and renders in the same frame, not in the one after. */
   changeAndDraw(change: () => void): void {
     this.#changes.push(change);
     this.invalidate();
   }
 
-  /** Looks at the whole of a volume, from before and a little to the patient's left and above. */
+  /** Fits a whole volume into the view, from the front and a little from the patient's left and above. */
   frame(grid: Grid): void {
     const [x, y, z] = anatomicalSigns(grid.space);
     this.#frame(worldBox(grid), new Vector3(-0.55 * x, 1 * y, 0.32 * z));
   }
 
   /**
-   * Looks at the whole of a box in the coordinates of what is shown, a little from above and from the side. `front`: the
-   * side that is seen, along the horizontal axis towards the viewer.
+   * Fits a box in the coordinates of the objects shown into the view, a little from above and from the side. `front`:
+   * the visible side, along the horizontal axis towards the viewer.
    */
   frameBox(box: Box3, front: 1 | -1, aside = 0.7): void {
     this.#frame(box.clone().applyMatrix4(this.#world.matrixWorld), new Vector3(-aside * front, -front, 0.32));
   }
 
-  /** Width by height. */
+  /** Aspect ratio of the view, width by height. */
   get aspect(): number {
     return this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
   }
@@ -179,7 +182,7 @@ export class Viewport {
     this.goHome();
   }
 
-  /** Turns and zooms around another point from now on, seen from the same side. */
+  /** Moves the centre of rotation and zoom to another point, keeping the viewing direction. */
   lookAt(point: Vec3): void {
     const target = new Vector3(...point).applyMatrix4(this.#world.matrixWorld);
     this.#camera.position.sub(this.#controls.target).add(target);
@@ -196,7 +199,7 @@ export class Viewport {
     this.invalidate();
   }
 
-  /** Gives the GPU's memory back; browsers allow a page only so many contexts. */
+  /** Frees the GPU memory; browsers limit the number of contexts of a page. */
   dispose(): void {
     this.#disposed = true;
     cancelAnimationFrame(this.#pending);
@@ -220,7 +223,7 @@ export class Viewport {
     this.#dragged = dragged;
     if (dragged || !this.#turning) return;
     this.#turning = false;
-    // What was drawn in a hurry is drawn as it is.
+    // Objects simplified during the rotation are rendered in full.
     this.invalidate();
   }
 
@@ -242,16 +245,16 @@ export class Viewport {
     });
   }
 
-  /** At a place of the view, −1 to 1 each way. */
+  /** Handles a click at a position of the view, −1 to 1 each way. */
   #click(x: number, y: number): void {
-    // What was moved since the last drawing, or before the first.
+    // Includes changes since the last rendering, or before the first.
     this.#scene.updateMatrixWorld();
     const ray = new Raycaster();
     ray.setFromCamera(new Vector2(x, y), this.#viewer());
     this.onClick(ray);
   }
 
-  /** The camera in use. */
+  /** Returns the active camera: orbit camera, or pose of a photograph. */
   #viewer(): PerspectiveCamera {
     const { clientWidth, clientHeight } = this.canvas;
     if (!this.#through || clientHeight === 0) return this.#camera;
@@ -268,11 +271,11 @@ export class Viewport {
     this.#camera.aspect = width / height;
     this.#standOff(Math.min(1, this.#camera.aspect));
     this.#camera.updateProjectionMatrix();
-    // Setting the size clears the canvas: draw at once, or it flashes.
+    // Resizing clears the canvas: it is rendered at once to avoid flashing.
     this.#draw();
   }
 
-  /** Keeps in sight what was in sight, when a window or a phone is turned. */
+  /** Changes the camera distance so that the same objects stay visible when the window becomes narrower or wider. */
   #standOff(narrowness: number): void {
     const factor = this.#narrowness / narrowness;
     this.#narrowness = narrowness;
@@ -285,7 +288,7 @@ export class Viewport {
   #draw(): void {
     this.onDraw(this.#camera.position, this.#turning && this.#drawing.inSoftware);
     const viewer = this.#viewer();
-    // The eye's is up to date; the other's is brought so before its light is placed.
+    // The eye's matrix is up to date; that of the orbit camera is updated before the lights are placed.
     if (viewer === this.#camera) viewer.updateMatrixWorld();
     this.#lamp.matrix.copy(viewer.matrixWorld);
     this.#drawing.render(this.#scene, viewer);
@@ -330,7 +333,9 @@ export class Viewport {
     });
   }
 
-  /** Changes the camera's place around its target. three's Spherical has y up, our world z. */
+  /**
+   * Changes the camera position in spherical coordinates around its target. three's Spherical has y up, our world z.
+   */
   #orbit(change: (spherical: Spherical) => void): void {
     const offset = this.#camera.position.clone().sub(this.#controls.target);
     this.#spherical.setFromCartesianCoords(offset.x, offset.z, -offset.y);

@@ -1,12 +1,12 @@
-/** The points of the boundary: coloured by how many windows voted for them, in space and on slices. */
+/** Boundary votes as points, coloured by the number of windows that voted for them, in space and on slices. */
 import type { Surface, Vec3, VolumeView } from '../protocol';
 import type { Votes } from '../track/protocol';
 import { type SliceFrame, toWorld } from './anatomy';
 
-/** From few votes to all, sRGB 0..1. */
+/** Colours of the fewest and of the most votes, sRGB 0..1. */
 const FEW: Vec3 = [0.99, 0.82, 0.38];
 const MANY: Vec3 = [0.78, 0.1, 0.24];
-/** Shades on slices. */
+/** Number of colour steps of votes on slices. */
 const SHADES = 6;
 
 export function voteColors(weights: Float32Array): Float32Array {
@@ -18,10 +18,10 @@ export function voteColors(weights: Float32Array): Float32Array {
   return out;
 }
 
-/** Those within reach of a vertex of the surface, about. */
+/** Returns the votes within about `reach` (world units) of a vertex of the surface. */
 export function votesNear({ frame, points, weights }: Votes, { positions, vertices }: Surface, reach: number): Votes {
   const cell = (p: Float32Array, i: number, k: number, off = 0) => Math.floor((p[3 * i + k] ?? 0) / reach) + off;
-  // Two cells may share a key: then a point far off is shown as well.
+  // Hash collisions are harmless: a distant point is shown as well.
   const key = (x: number, y: number, z: number) =>
     Math.imul(x, 73856093) ^ Math.imul(y, 19349663) ^ Math.imul(z, 83492791);
   const taken = new Set<number>();
@@ -47,7 +47,7 @@ interface OnSlice {
   scaleY: number;
 }
 
-/** The points that lie in a slice: in its plane, in pixels of its picture. */
+/** Returns the votes that lie in a slice, in pixels of its image. */
 export function votesIn(
   { points, weights }: Votes,
   { volume, inverse, frame, slice }: Omit<OnSlice, 'scaleX' | 'scaleY'>,
@@ -58,7 +58,7 @@ export function votesIn(
   for (let i = 0; i < weights.length; i++) {
     const point: Vec3 = [points[3 * i] ?? 0, points[3 * i + 1] ?? 0, points[3 * i + 2] ?? 0];
     const index = toWorld(inverse, point);
-    // Faces to the slices before and after lie half a voxel off.
+    // Votes for faces between slices lie half a voxel off.
     if (Math.abs(index[frame.axis] - slice) > 0.25) continue;
     out.push({ x: place(frame.horizontal, index), y: place(frame.vertical, index), weight: weights[i] ?? 0 });
   }
@@ -69,7 +69,7 @@ export function drawVotes(context: CanvasRenderingContext2D, votes: Votes, on: O
   drawFaces(context, votesIn(votes, on), on.scaleX, on.scaleY);
 }
 
-/** Faces in pixels of a slice's picture, as small squares. */
+/** Draws votes, given in pixels of a slice's image, as small squares. */
 export function drawFaces(
   context: CanvasRenderingContext2D,
   faces: readonly { x: number; y: number; weight: number }[],

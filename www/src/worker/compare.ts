@@ -1,16 +1,16 @@
-/** The same extraction twice: on the volume itself, and coarse to fine (section 5.2 of the paper). */
+/** Runs the same extraction twice: on the volume itself, and coarse to fine (section 5.2 of the paper). */
 import type { StepReport, Volume } from 'vesicle';
 import type { ComparedRun, ComparingEvent, Requests, Setup } from '../protocol';
 import { buildModel } from './models';
 
-/** Iterations after which a run that does not come to rest is taken as it is. */
+/** Largest number of iterations of a run; one that has not converged by then is compared in its present state. */
 const MOST_ITERATIONS = 4000;
 /** Milliseconds between two reports to the page. */
 const TELL_EVERY = 150;
 
 type Tell = (run: ComparingEvent['run'], report: StepReport) => void;
 
-/** Undefined when the signal aborts it. */
+/** Compares the two runs; resolves with undefined when the signal aborts. */
 export async function compare(
   volume: Volume,
   setup: Setup,
@@ -41,7 +41,7 @@ async function once(
       times: {} as Record<string, number>,
     }));
     let toldAt = 0;
-    // A step belongs to the level it began on: the last one of a level ends with the way down to the next.
+    // A step belongs to the level on which it began: the last one of a level includes the change to the next.
     let level = model.level;
     const onStep = (report: StepReport) => {
       const entry = byLevel[setup.levels - level];

@@ -1,4 +1,4 @@
-/** Models as the page asks for them. */
+/** Creates deformable models from the page's settings, and computes the values shown on their surfaces. */
 import { DeformableModel, type Volume } from 'vesicle';
 import type { Setup, Shade } from '../protocol';
 import { otsu } from '../threshold';
@@ -39,9 +39,12 @@ export function buildModel(volume: Volume, setup: Setup): DeformableModel {
   return model;
 }
 
-/** One number a vertex for each shade, in the order of the mesh's arrays. A new shade needs a line here and one in `view/shading`. */
+/**
+ * Computes one value per vertex for each shade, in the order of the mesh's arrays. A new shade needs an entry here and
+ * one in `view/shading`.
+ */
 const SHADES: Record<Shade, (model: DeformableModel) => Float32Array> = {
-  /** In δ per iteration. */
+  /** Speed along the normal, δ per iteration. */
   speed: (model) => {
     const factor = model.params.timeStep / model.delta;
     return model.speeds().map((speed) => speed * factor);

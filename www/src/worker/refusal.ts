@@ -1,7 +1,7 @@
 import { VesicleError } from 'vesicle';
 import type { Failure } from '../protocol';
 
-/** A request that makes no sense now; the library was not even asked. */
+/** Error for a request that is invalid in the current state and was rejected before the library was called. */
 export class Refusal extends Error {
   readonly code: string;
 
@@ -11,7 +11,7 @@ export class Refusal extends Error {
   }
 }
 
-/** What was wrong, for the page. Any other error means that the engine itself broke. */
+/** Converts an error to a message for the page. Errors other than the library's and refusals are internal failures. */
 export function toFailure(error: unknown): Failure {
   if (error instanceof VesicleError || error instanceof Refusal) return { code: error.code, message: error.message };
   return { code: 'internal', message: error instanceof Error ? error.message : String(error) };

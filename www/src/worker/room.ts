@@ -1,12 +1,17 @@
-/** Arrays for a mesh on its way to the page. */
+/** Arrays with spare capacity in which a mesh is sent to the page. */
 import type { Mesh } from 'vesicle';
 import type { Surface } from '../protocol';
 import { buffersOf } from './serving';
 
-/** From one length to the next. Shorter steps need new buffers more often, longer ones leave more of them empty. */
+/**
+ * Ratio of consecutive capacities. A smaller one needs new buffers more often, a larger one leaves more of them unused.
+ */
 const STEP = 1.25;
 
-/** The next of a few lengths, so that the buffers of a surface that grows fit for a while, here and on the GPU. */
+/**
+ * Rounds a count up to the next capacity of a geometric sequence, so that the buffers of a growing surface fit for a
+ * while, here and on the GPU.
+ */
 export function roomFor(count: number): number {
   return Math.ceil(STEP ** Math.ceil(Math.log(Math.max(1, count)) / Math.log(STEP)));
 }
@@ -18,8 +23,8 @@ export function noArrays(): Arrays {
 }
 
 /**
- * A mesh in arrays with some room to spare, which go to the page as they are, and from there to the GPU. In the arrays
- * given where they are as long as new ones would be.
+ * Copies a mesh into arrays with spare capacity, which are transferred to the page and uploaded to the GPU unchanged.
+ * The given arrays are reused if their lengths match.
  */
 export function surfaceIn({ positions, normals, indices }: Arrays, mesh: Mesh): Surface {
   const [numbers, corners] = [3 * roomFor(mesh.vertexCount), 3 * roomFor(mesh.triangleCount)];
@@ -32,7 +37,7 @@ export function surfaceIn({ positions, normals, indices }: Arrays, mesh: Mesh): 
   return { ...arrays, ...counts };
 }
 
-/** With places in a picture, which have as much room. */
+/** Copies a mesh with its texture coordinates into arrays with the same spare capacity. */
 export function texturedSurface(mesh: Mesh): Surface {
   const room = roomFor(mesh.vertexCount);
   const surface = surfaceIn(noArrays(), mesh);
@@ -42,7 +47,7 @@ export function texturedSurface(mesh: Mesh): Surface {
   return { ...surface, uvs };
 }
 
-/** What of a surface is handed over instead of copied. */
+/** Returns the buffers of a surface that are transferred instead of copied. */
 export function transferOf({ positions, normals, indices, values, colors, uvs }: Surface): Transferable[] {
   return buffersOf([positions, normals, indices, values, colors, uvs].filter((array) => array !== undefined));
 }

@@ -1,13 +1,13 @@
-/** What every worker does alike: answers, and stops what is under way. */
+/** Common parts of the app's workers: replies to requests, and cancellation of running work. */
 import { toFailure } from './refusal';
 
-/** Work that can be stopped. */
+/** Work that can be aborted. */
 export interface Work {
   abort: AbortController;
   ended: Promise<unknown>;
 }
 
-/** Ends what is under way, where something is; how it ends is for whoever started it. */
+/** Aborts running work, if any, and waits for its end; its result or error is left to the caller who started it. */
 export async function stop(work: Work | undefined): Promise<undefined> {
   work?.abort.abort();
   await work?.ended.catch(() => undefined);
@@ -17,16 +17,16 @@ export function buffersOf(arrays: ArrayBufferView[]): Transferable[] {
   return arrays.map((array) => array.buffer as ArrayBuffer);
 }
 
-/** What goes along with a reply. */
+/** Buffers to transfer with a reply. */
 const along = new WeakMap<object, Transferable[]>();
 
-/** A reply whose large arrays are handed over to the page instead of being copied; nobody here may need them any more. */
+/** Marks arrays of a reply to be transferred to the page instead of copied; they become unusable in the worker. */
 export function givingAway<Reply extends object>(reply: Reply, arrays: ArrayBufferView[]): Reply {
   along.set(reply, buffersOf(arrays));
   return reply;
 }
 
-/** Replies with what the handler gives, or with what was wrong. */
+/** Replies to a request with the handler's result, or with its failure. */
 export async function answer(
   handlers: Record<string, (body: never) => unknown>,
   { id, kind, body }: { id: number; kind: string; body: unknown },

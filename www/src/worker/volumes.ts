@@ -1,4 +1,4 @@
-/** Volumes as the worker opens them, and as the page sees them. */
+/** Opens volumes in the worker, and reduces them to what the page shows. */
 import { VesicleError, Volume } from 'vesicle';
 import { readForeign } from '../foreign';
 import type { LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
@@ -13,7 +13,7 @@ function isHeader({ name }: NamedBytes): boolean {
   return /\.(nhdr|mhd)$/i.test(name);
 }
 
-/** A volume from one file; a header whose data is missing asks for it. */
+/** Parses a volume from one file; for a header without its data, the error message requests the data file. */
 function parseFile(file: NamedBytes): Volume {
   try {
     return Volume.parse(file.bytes);
@@ -23,7 +23,7 @@ function parseFile(file: NamedBytes): Volume {
   }
 }
 
-/** A volume from one file, or from a header and its data in either order. */
+/** Parses a volume from one file, or from a header and its data in either order. */
 export function parseFiles(files: NamedBytes[]): Volume {
   const [first, second] = files;
   if (!first) throw new Refusal('bad-file', 'no file was given');
@@ -37,18 +37,20 @@ export function parseFiles(files: NamedBytes[]): Volume {
   return Volume.parse(header.bytes, { data: data.bytes });
 }
 
-/** A computed volume, or one from files of any format that is read here, one's own or that of others. */
+/**
+ * Computes a volume, or reads it from files in any supported format, the library's own or one read by other libraries.
+ */
 export async function volumeFrom(source: VolumeSource): Promise<Volume> {
   if (!('files' in source)) return new Volume(shapeVoxels(source.shape));
   const foreign = await readForeign(source.files);
   return foreign ? new Volume(foreign) : parseFiles(source.files);
 }
 
-/** The volume reduced to what the page shows: its first frame, or so many of them after each other. */
+/** Reduces a volume to what the page shows: grey values of its first `pictures` frames, and metadata. */
 export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
   const { range } = volume;
   const histogram = volume.histogram(HISTOGRAM_BINS);
-  // A few extreme voxels (metal, noise) must not make everything else grey.
+  // Quantiles, because a few extreme voxels (metal, noise) must not make all others grey.
   const [low = range[0], high = range[1]] = quantiles(histogram, range, [0.001, 0.999]);
   const window: [number, number] = high > low ? [low, high] : range;
   const { dims, frames, spacing, affine, space } = volume;
@@ -66,7 +68,7 @@ export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
   };
 }
 
-/** The coarser copies that a model with so many levels works on, shown with the greys of the volume itself. */
+/** Returns the coarser pyramid levels for a model with `levels` levels, with the grey scale of the volume itself. */
 export function levelsOf(volume: Volume, levels: number, window: [number, number]): LevelView[] {
   const [, ...coarser] = volume.pyramid(levels + 1);
   return coarser.map((level) => {
@@ -78,7 +80,7 @@ export function levelsOf(volume: Volume, levels: number, window: [number, number
   });
 }
 
-/** Slice by slice, so that no second full copy in floats is made. */
+/** Converts frames to grey values, slice by slice to avoid a second full copy in floats. */
 function greys(volume: Volume, window: [number, number], frames = 1): Uint8Array {
   const [nx, ny, nz] = volume.dims;
   const voxels = new Uint8Array(nx * ny * nz * frames);

@@ -1,28 +1,29 @@
-//! Interpolation on the Chebyshev nodes of a cube.
+//! Chebyshev interpolation on a cube, for the fast multipole method.
 
 use crate::math::DVec3;
 use std::f64::consts::PI;
 
-/// Nodes along an axis. 4 leave errors of a tenth of a cell, 6 take twice as long.
+/// Number of Chebyshev nodes along an axis. With 4, errors reach a tenth of a cell; with 6, evaluation takes twice as
+/// long.
 pub const NODES: usize = 5;
-/// Nodes of a cube, x fastest.
+/// Number of nodes of a cube, ordered x fastest.
 pub const CUBE: usize = NODES * NODES * NODES;
 
-/// Numbers at the nodes of a cube.
+/// Values at the nodes of a cube.
 pub type Nodal = [f32; CUBE];
 
-/// The nodes of [−1, 1], and what interpolation between them needs.
+/// The Chebyshev nodes of [−1, 1], with tables for interpolation between them.
 #[derive(Clone, Debug)]
 pub struct Chebyshev {
     nodes: [f64; NODES],
-    /// Tₘ at node k, row by row of k.
+    /// The Chebyshev polynomials at the nodes: Tₘ at node k is in row k.
     polynomials: [[f64; NODES]; NODES],
-    /// Weights of a cube's nodes, along an axis, at the nodes of its lower and its upper half.
+    /// Weights of a cube's nodes, along an axis, in interpolation at the nodes of its lower and of its upper half.
     halves: [[[f64; NODES]; NODES]; 2],
 }
 
 impl Chebyshev {
-    /// The tables.
+    /// Computes the tables.
     pub fn new() -> Self {
         let angle = |k: usize| PI * (2 * k + 1) as f64 / (2 * NODES) as f64;
         let mut tables = Self {
@@ -38,13 +39,13 @@ impl Chebyshev {
         tables
     }
 
-    /// Where node `index` of the cube [−1, 1]³ is.
+    /// Returns the position of node `index` in the cube [−1, 1]³.
     pub fn node(&self, index: usize) -> DVec3 {
         let [i, j, k] = split(index);
         DVec3::new(self.nodes[i], self.nodes[j], self.nodes[k])
     }
 
-    /// The weight of each node at `x` in [−1, 1].
+    /// Returns the interpolation weight of each node at `x` in [−1, 1].
     pub fn weights(&self, x: f64) -> [f64; NODES] {
         let mut t = [1.0; NODES];
         t[1] = x;
@@ -54,7 +55,7 @@ impl Chebyshev {
         self.combined(&t)
     }
 
-    /// The derivative of each weight at `x`.
+    /// Returns the derivative of each interpolation weight at `x`.
     pub fn slopes(&self, x: f64) -> [f64; NODES] {
         // Tₘ′ = m Uₘ₋₁
         let mut u = [1.0; NODES];
@@ -69,7 +70,7 @@ impl Chebyshev {
         self.combined(&derivatives)
     }
 
-    /// (1/n)(t₀ + 2 Σ Tₘ(node) tₘ) for each node.
+    /// Returns (1/n)(t₀ + 2 Σ Tₘ(node) tₘ) for each node.
     fn combined(&self, t: &[f64; NODES]) -> [f64; NODES] {
         std::array::from_fn(|k| {
             let sum: f64 = (1..NODES).map(|m| self.polynomials[k][m] * t[m]).sum();
@@ -77,7 +78,8 @@ impl Chebyshev {
         })
     }
 
-    /// What the nodes of the half on side `half` of each axis take from those of the whole cube: its values there.
+    /// Interpolates values at the nodes of a cube at the nodes of one of its octants (the local-to-local translation);
+    /// `half` is the side of the octant, 0 or 1, along each axis.
     pub fn to_half(&self, whole: &Nodal, half: [usize; 3]) -> Nodal {
         let mut values = whole.map(f64::from);
         for (axis, side) in half.into_iter().enumerate() {
@@ -86,7 +88,8 @@ impl Chebyshev {
         values.map(|x| x as f32)
     }
 
-    /// What the nodes of the whole cube take from those of a half: sources at the half's nodes, moved.
+    /// Moves sources at the nodes of an octant to the nodes of the whole cube (the multipole-to-multipole translation),
+    /// by the transpose of [`Self::to_half`].
     pub fn to_whole(&self, part: &Nodal, half: [usize; 3]) -> Nodal {
         let mut values = part.map(f64::from);
         for (axis, side) in half.into_iter().enumerate() {
@@ -95,13 +98,13 @@ impl Chebyshev {
         values.map(|x| x as f32)
     }
 
-    /// The interpolated value at a place in [−1, 1]³.
+    /// Returns the interpolated value at a point in [−1, 1]³.
     pub fn value(&self, nodal: &Nodal, at: DVec3) -> f64 {
         let [x, y, z] = at.to_array().map(|t| self.weights(t));
         contracted(nodal, &x, &y, &z)
     }
 
-    /// The interpolated value and its gradient.
+    /// Returns the interpolated value at a point in [−1, 1]³, and its gradient there.
     pub fn value_and_gradient(&self, nodal: &Nodal, at: DVec3) -> (f64, DVec3) {
         let [x, y, z] = at.to_array().map(|t| self.weights(t));
         let [dx, dy, dz] = at.to_array().map(|t| self.slopes(t));
@@ -113,7 +116,7 @@ impl Chebyshev {
         (contracted(nodal, &x, &y, &z), gradient)
     }
 
-    /// Adds a source of strength `weight` at a place in [−1, 1]³ to the nodes.
+    /// Spreads a source of strength `weight`, at a point in [−1, 1]³, to the nodes.
     pub fn spread(&self, nodal: &mut Nodal, at: DVec3, weight: f64) {
         let [x, y, z] = at.to_array().map(|t| self.weights(t));
         for (index, value) in nodal.iter_mut().enumerate() {
@@ -123,17 +126,17 @@ impl Chebyshev {
     }
 }
 
-/// The place of a node along each axis.
+/// Returns the index of a node along each axis.
 pub fn split(index: usize) -> [usize; 3] {
     [index % NODES, index / NODES % NODES, index / (NODES * NODES)]
 }
 
-/// The node at a place along each axis.
+/// Returns the number of the node with the given index along each axis.
 pub fn joined([i, j, k]: [usize; 3]) -> usize {
     (k * NODES + j) * NODES + i
 }
 
-/// A matrix applied along one axis.
+/// Applies a matrix to nodal values along one axis.
 fn along(values: &[f64; CUBE], axis: usize, entry: impl Fn(usize, usize) -> f64) -> [f64; CUBE] {
     std::array::from_fn(|index| {
         let place = split(index);

@@ -1,11 +1,11 @@
-//! The function at very many places: a fast multipole method with Chebyshev interpolation (Fong & Darve, *The black-box
-//! fast multipole method*, 2009).
+//! Fast evaluation of the implicit function at many points, by a fast multipole method with Chebyshev interpolation
+//! (Fong & Darve, *The black-box fast multipole method*, 2009).
 //!
-//! Near terms are summed one by one. What all others add up to is smooth within a cube, and is interpolated there: the
-//! smaller the cube, the nearer terms are. Cubes are filled when first asked about, so small ones are around the surface
-//! only. Off by about a thousandth of what f changes
-//! by from one point of the surface to the next; sums that must be right to rounding are [`Field`]'s. Kernels that grow
-//! with the distance are summed one by one here, too: what is large in them cancels.
+//! Near terms are summed directly. The sum of all other terms is smooth within a cube, and is interpolated there; in
+//! smaller cubes, fewer terms are near. Cubes are computed at the first evaluation in them, so small ones exist only
+//! around the surface. The error is about a thousandth of the change of f from one point of the surface to the next;
+//! [`Field`] is accurate to rounding. Kernels that grow with the distance are summed directly here, too, as their large
+//! values cancel.
 
 mod chebyshev;
 mod translate;
@@ -15,36 +15,37 @@ use crate::math::DVec3;
 use chebyshev::{CUBE, Chebyshev, Nodal};
 use translate::{Translations, Turns};
 
-/// Terms in a finest cube, about. More, and near terms take longer; fewer, and there are more cubes.
+/// Approximate number of terms in a finest cube. With more, sums of near terms take longer; with fewer, there are more
+/// cubes.
 const TERMS_A_CUBE: usize = 24;
-/// Levels of cubes at most: tables of the finest have 8^this entries.
+/// Maximum depth of the octree of cubes: tables of the finest level have 8^this entries.
 const MOST_LEVELS: usize = 6;
-/// No cube, or none yet.
+/// Marks a cube that does not exist or is not computed yet, in place of its number.
 const NONE: u32 = u32::MAX;
-/// No place: those outside of all cubes are nearer.
+/// Cube coordinates outside the range of all points, for a cache that is still empty.
 const NOWHERE: Place = [i32::MIN; 3];
 
-/// A function with a fast way to many of its values.
+/// An implicit function prepared for fast evaluation at many points; used to extract the surface and to sample volumes.
 #[derive(Clone, Debug)]
 pub struct FastField {
     field: Field,
     chebyshev: Chebyshev,
     turns: Turns,
-    /// The lowest corner and the edge of the cube that holds everything.
+    /// Lowest corner and edge length of the root cube, in box units.
     origin: DVec3,
     edge: f64,
     levels: Vec<Level>,
-    /// The terms by finest cube, those of one together.
+    /// The terms (centre and weight), grouped by finest cube.
     terms: Vec<(DVec3, f64)>,
-    /// For each finest cube with terms, where they begin and end.
+    /// For each finest cube with terms, the start and the end of its range in `terms`.
     ranges: Vec<[usize; 2]>,
-    /// Whether all is summed term by term.
+    /// Whether all terms are summed directly.
     direct: bool,
-    /// The cube that was asked about last, and where the terms near it are: places often come in a row.
+    /// The cube of the last evaluation, with its near terms: consecutive points often share a cube.
     near: Near,
 }
 
-/// The terms around a cube.
+/// A cube, and the ranges of the terms near it.
 #[derive(Clone, Debug)]
 struct Near {
     level: usize,
@@ -53,15 +54,15 @@ struct Near {
     ranges: Vec<[usize; 2]>,
 }
 
-/// The cubes of one size.
+/// One level of the octree: the cubes of one size.
 #[derive(Clone, Debug)]
 struct Level {
-    /// Cubes along a side.
+    /// Number of cubes along a side.
     side: i32,
-    /// By place, the number of a cube with sources.
+    /// Index in `sources` of each cube, or [`NONE`] if it contains no terms.
     with_sources: Vec<u32>,
     sources: Vec<Nodal>,
-    /// By place, the number of a cube that was asked about.
+    /// Index in `places` of each cube, or [`NONE`] until it is computed.
     with_places: Vec<u32>,
     places: Vec<Nodal>,
     translations: Option<Translations>,
@@ -94,7 +95,8 @@ impl Level {
 }
 
 impl FastField {
-    /// `field`, fast in a box between two corners.
+    /// Prepares `field` for fast evaluation in the box between the corners `low` and `high`, extended to all centres;
+    /// outside it, evaluation is direct.
     pub fn new(field: Field, low: DVec3, high: DVec3) -> Self {
         let terms = field.terms();
         let low = terms.iter().fold(low, |low, (c, _)| low.min(*c));
@@ -120,7 +122,7 @@ impl FastField {
         fast
     }
 
-    /// f at each place.
+    /// Writes f at each of `places` to `out`.
     pub fn values(&mut self, places: &[DVec3], out: &mut [f64]) {
         for (p, value) in places.iter().zip(out) {
             *value = self.value(*p);
@@ -138,7 +140,7 @@ impl FastField {
         sum + self.field.polynomial(p)
     }
 
-    /// f and ∇f at `p`.
+    /// Returns f and ∇f at `p`.
     pub fn value_and_gradient(&mut self, p: DVec3) -> (f64, DVec3) {
         let Some(at) = self.local(p) else { return self.field.value_and_gradient(p) };
         let (mut sum, slope) = self.chebyshev.value_and_gradient(self.nodal(), at);
@@ -153,7 +155,7 @@ impl FastField {
         (sum + self.field.polynomial(p), gradient + self.field.slopes())
     }
 
-    /// What all far terms add up to in the near cube.
+    /// Returns the sum of all far terms at the nodes of the cached cube.
     fn nodal(&self) -> &Nodal {
         &self.levels[self.near.level].places[self.near.number]
     }
@@ -166,13 +168,13 @@ impl FastField {
         ((p - self.origin) / self.cube_edge(level)).floor().to_array().map(|x| x as i32)
     }
 
-    /// A place within a cube as [−1, 1]³.
+    /// Returns the position of `p` in the cube at `place`, as coordinates in [−1, 1]³.
     fn within(&self, p: DVec3, place: Place, level: usize) -> DVec3 {
         let middle = DVec3::from_array(place.map(|k| f64::from(k) + 0.5));
         ((p - self.origin) / self.cube_edge(level) - middle) * 2.0
     }
 
-    /// Deep enough that the cubes with terms hold few each.
+    /// Adds levels until the finest cubes that contain terms contain few each.
     fn choose_levels(&mut self) {
         for depth in 0..=MOST_LEVELS {
             self.levels.push(Level::new(1 << depth));
@@ -185,7 +187,8 @@ impl FastField {
         }
     }
 
-    /// Sorts the terms into the finest cubes, and carries them up to the larger ones.
+    /// Upward pass: sorts the terms into the finest cubes, spreads them to the nodes, and moves these sources to the
+    /// larger cubes. Also computes the translations of all levels.
     fn gather_sources(&mut self) {
         let finest = self.levels.len() - 1;
         let index =
@@ -233,8 +236,8 @@ impl FastField {
         }
     }
 
-    /// Where `p` is in the largest cube with no terms near it, or else in its finest one, which becomes the near one; `None`
-    /// outside of all.
+    /// Finds the largest cube around `p` with no terms near it, or else its finest cube, and caches it. Returns the
+    /// position of `p` in it; `None` outside the root cube and with direct sums.
     fn local(&mut self, p: DVec3) -> Option<DVec3> {
         if self.direct {
             return None;
@@ -248,7 +251,7 @@ impl FastField {
             let level = (2..finest).find(is_far).unwrap_or(finest);
             let cube = self.place_of(p, level);
             let number = self.fill(level, cube);
-            // The sources of larger cubes are none.
+            // In cubes larger than the finest, this finds none.
             let sources = around(cube).filter_map(|place| self.levels[level].sources_at(place));
             let ranges = sources.map(|source| self.ranges[source]).collect();
             self.near = Near { level, cube, number, ranges };
@@ -256,7 +259,8 @@ impl FastField {
         Some(self.within(p, self.near.cube, self.near.level))
     }
 
-    /// Makes what all far terms add up to in a cube, if it is not there yet. Returns its number.
+    /// Downward pass: computes the sum of all far terms at the nodes of a cube, unless it exists. Returns the cube's
+    /// index in `places`.
     fn fill(&mut self, level: usize, place: Place) -> usize {
         let Some(slot) = self.levels[level].index(place) else { return 0 };
         let number = self.levels[level].with_places[slot];
@@ -284,14 +288,15 @@ impl FastField {
     }
 }
 
-/// The cube and the 26 that touch it.
+/// Returns the cube and its 26 neighbours.
 fn around(cube: Place) -> impl Iterator<Item = Place> {
     (0..27).map(move |k| [cube[0] + k % 3 - 1, cube[1] + k / 3 % 3 - 1, cube[2] + k / 9 - 1])
 }
 
-/// Where cubes lie that do not touch this one while those they are part of do.
+/// Returns the offsets to the cubes in the interaction list of the cube at `place`: they do not touch it, but their
+/// parents touch its parent.
 fn far_offsets(place: Place) -> impl Iterator<Item = Place> {
-    // Those next to the cube this one is part of span two cubes on its far sides and three on the others.
+    // The children of the parent's neighbours extend two cubes to one side, and three to the other.
     let lowest = place.map(|k| -2 - k.rem_euclid(2));
     let all = (0..216).map(move |k| [lowest[0] + k % 6, lowest[1] + k / 6 % 6, lowest[2] + k / 36]);
     all.filter(|offset| offset.iter().any(|d| d.abs() > 1))
@@ -314,7 +319,7 @@ mod tests {
         DVec3::new(unit(random), unit(random), unit(random)).normalize_or(DVec3::X)
     }
 
-    /// Terms around a ball, of both signs, that cancel as those of a solution do.
+    /// Returns a function with terms of both signs around a sphere, which cancel as those of a solution do.
     fn field(kernel: Kernel) -> Field {
         let mut random = Random::new(1);
         let mut centres: Vec<Vec3> = (0..2000).map(|_| direction(&mut random).as_vec3()).collect();
@@ -326,7 +331,7 @@ mod tests {
         Field::new(KernelTable::new(kernel), &centres, &Solution { weights, coefficients })
     }
 
-    /// On the surface, near it, within, at the rim, and beyond the box.
+    /// Returns points on the surface, near it, inside, at the rim of the box, and beyond it.
     fn places(count: usize) -> Vec<DVec3> {
         let mut random = Random::new(2);
         (0..count)
@@ -346,7 +351,7 @@ mod tests {
             Kernel::Biharmonic { radius: 2.0 },
         ] {
             let exact = field(kernel);
-            // What grows with the distance cancels far away.
+            // Kernels that grow with the distance cancel far away.
             let rounding = if kernel.is_conditional() { 1e-6 } else { 1e-12 };
             let mut fast = FastField::new(exact.clone(), DVec3::splat(-1.5), DVec3::splat(1.5));
             let at = places(700);

@@ -1,26 +1,28 @@
-//! From the nodes of a cube of sources to the nodes of a cube of places, by a matrix for each way that one can lie from
-//! the other, as a product of thin ones.
+//! Multipole-to-local translations: from the sources at the nodes of one cube to the values at the nodes of another, by
+//! a low-rank matrix for each relative position.
 
 use super::chebyshev::{CUBE, Chebyshev, NODES, Nodal, joined, split};
 use crate::math::DVec3;
 use crate::methods::implicit::kernel::KernelTable;
 use crate::methods::implicit::low_rank::{LowRank, cross_approximation};
 
-/// Relative error of a matrix: below that of the interpolation.
+/// Relative error of a translation matrix: below that of the interpolation.
 const TOLERANCE: f64 = 1e-5;
 
-/// Cubes of one size, up to three apart along an axis and at least two along some. Mirroring and swapping axes leave 16 ways.
+/// Translation matrices between cubes of one size that are up to three apart along each axis, and at least two along
+/// one. Reflections and permutations of the axes leave 16 of them.
 #[derive(Clone, Debug)]
 pub struct Translations {
-    /// By what is left of the offset then; `None` where cubes would touch.
+    /// By canonical offset, with descending components of at least 0; `None` for other offsets, and where cubes would
+    /// touch.
     matrices: Vec<Option<LowRank<f32>>>,
 }
 
-/// Where a cube of sources lies, in edges of a cube, from the cube of places.
+/// Offset from a target cube to a source cube, in cube edges.
 pub type Offset = [i32; 3];
 
 impl Translations {
-    /// For cubes of edge `edge`.
+    /// Computes the matrices for cubes with edges of length `edge`, in box units.
     pub fn new(table: &KernelTable, chebyshev: &Chebyshev, edge: f64) -> Self {
         let matrices = (0..4 * 4 * 4).map(|way| {
             let offset = [way / 16, way / 4 % 4, way % 4];
@@ -43,7 +45,7 @@ impl Translations {
         Self { matrices: matrices.collect() }
     }
 
-    /// Adds to `places` what `sources`, so far away, make there.
+    /// Adds the values that `sources`, in a cube at `offset`, produce at the nodes of the target cube to `places`.
     pub fn add(&self, turns: &Turns, offset: Offset, sources: &Nodal, places: &mut Nodal) {
         let (turn, canonical) = turns.find(offset);
         let way = (canonical[0] * 16 + canonical[1] * 4 + canonical[2]) as usize;
@@ -64,7 +66,7 @@ impl Translations {
     }
 }
 
-/// Σ aᵢbᵢ as eight sums side by side.
+/// Returns the dot product Σ aᵢbᵢ, accumulated in eight independent partial sums that the compiler can vectorise.
 fn dot(a: &Nodal, b: &Nodal) -> f32 {
     let mut sums = [0.0; 8];
     let (eights, rest) = a.as_chunks::<8>();
@@ -78,18 +80,19 @@ fn dot(a: &Nodal, b: &Nodal) -> f32 {
     sums.iter().sum::<f32>() + tail
 }
 
-/// How nodes change places when axes are mirrored and swapped.
+/// Permutations of a cube's nodes under reflections and permutations of the axes; they reduce the number of translation
+/// matrices.
 #[derive(Clone, Debug)]
 pub struct Turns {
-    /// By signs (three bits) and order of the axes (six): where each node goes.
+    /// By signs (three bits) and order of the axes (six): the new number of each node.
     nodes: Vec<[u8; CUBE]>,
 }
 
-/// The orders of three axes.
+/// The permutations of three axes.
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
 impl Turns {
-    /// All 48.
+    /// Computes all 48 permutations.
     pub fn new() -> Self {
         let turn = |number: usize| {
             let (signs, order) = (number / 6, ORDERS[number % 6]);
@@ -106,7 +109,8 @@ impl Turns {
         Self { nodes: (0..48).map(turn).collect() }
     }
 
-    /// The turn that makes an offset positive and descending, and the offset it becomes.
+    /// Returns the permutation that makes the components of an offset non-negative and descending, and the resulting
+    /// offset.
     fn find(&self, offset: Offset) -> (&[u8; CUBE], Offset) {
         let signs = (0..3).map(|axis| usize::from(offset[axis] < 0) << axis).sum::<usize>();
         let size = offset.map(i32::abs);

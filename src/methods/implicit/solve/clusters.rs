@@ -1,45 +1,46 @@
-//! Centres grouped by place, in a binary tree.
+//! Binary cluster tree of the centres, for the hierarchical matrix.
 
 use crate::math::order::{by_both, rank};
 use crate::math::{Bounds, Vec3};
 
-/// Centres in a leaf at most. 32 doubles the blocks, 128 the numbers that are stored in full.
+/// Maximum number of centres in a leaf of the cluster tree. 32 doubles the number of blocks, 128 the numbers that are
+/// stored in full.
 const LEAF: usize = 64;
 
 /// A binary tree over points: each cluster is a range of [`ClusterTree::order`], each child about half of it.
 #[derive(Clone, Debug)]
 pub struct ClusterTree {
-    /// The points' indices, so that those of a cluster stand together.
+    /// Indices of the points, ordered such that each cluster is contiguous.
     pub order: Vec<u32>,
-    /// All clusters; the first is that of all points.
+    /// All clusters; the first contains all points.
     pub clusters: Vec<Cluster>,
 }
 
-/// Points that are near each other.
+/// A cluster of points that are near each other.
 #[derive(Clone, Debug)]
 pub struct Cluster {
-    /// First of its places in the order.
+    /// Start of its range in the order.
     pub start: usize,
-    /// One beyond the last.
+    /// End of its range, exclusive.
     pub end: usize,
-    /// The smallest box around its points.
+    /// Bounding box of its points.
     pub bounds: Bounds,
-    /// Its two halves; `None` for a leaf.
+    /// Its two children; `None` for a leaf.
     pub halves: Option<[usize; 2]>,
 }
 
 impl Cluster {
-    /// The number of points.
+    /// Returns the number of points.
     pub fn len(&self) -> usize {
         self.end - self.start
     }
 
-    /// Diagonal of the box.
+    /// Returns the diagonal of the bounding box.
     pub fn diameter(&self) -> f32 {
         self.bounds.min.distance(self.bounds.max)
     }
 
-    /// Distance between the boxes.
+    /// Returns the distance between the bounding boxes of two clusters.
     pub fn distance(&self, other: &Self) -> f32 {
         let gap = (self.bounds.min - other.bounds.max).max(other.bounds.min - self.bounds.max);
         gap.max(Vec3::ZERO).length()
@@ -47,7 +48,7 @@ impl Cluster {
 }
 
 impl ClusterTree {
-    /// The tree of `points`.
+    /// Builds the tree of `points`, by halving clusters along their widest axis.
     pub fn new(points: &[Vec3]) -> Self {
         let mut tree = Self { order: (0..points.len() as u32).collect(), clusters: Vec::new() };
         let mut order = std::mem::take(&mut tree.order);

@@ -1,10 +1,12 @@
-//! Conjugate gradients for [Φ+Λ B; Bᵀ 0] [w; p] = [y; 0], within the weights that are orthogonal to the polynomials B (Gould,
-//! Hribar & Nocedal, *On the solution of equality constrained quadratic programming problems*, 2001, algorithm 2.1).
+//! Projected conjugate gradients for [Φ+Λ B; Bᵀ 0] [w; p] = [y; 0], within the weights that are orthogonal to the
+//! polynomials B (Gould, Hribar & Nocedal, *On the solution of equality constrained quadratic programming problems*,
+//! 2001, algorithm 2.1). M is the preconditioner, an approximate inverse of Φ+Λ.
 
 use super::precondition::SparseInverse;
 use crate::methods::implicit::vectors::{add, dot};
 
-/// The polynomials at the centres, column by column, and the approximate inverse times each.
+/// The polynomials B at the centres, column by column, with MB: what is needed to project onto the weights orthogonal
+/// to B.
 #[derive(Clone, Debug)]
 pub struct Polynomials {
     columns: Vec<Vec<f64>>,
@@ -14,7 +16,7 @@ pub struct Polynomials {
 }
 
 impl Polynomials {
-    /// `None` where the columns depend on each other.
+    /// Prepares the projection for the columns of B; `None` if they are linearly dependent.
     pub fn new(columns: Vec<Vec<f64>>, inverse: &SparseInverse) -> Option<Self> {
         let images: Vec<Vec<f64>> = columns.iter().map(|column| inverse.product(column)).collect();
         let gram = columns.iter().flat_map(|a| images.iter().map(|b| dot(a, b))).collect();
@@ -22,7 +24,7 @@ impl Polynomials {
         Some(Self { columns, images, inverse })
     }
 
-    /// `weights` with as little taken away, as the inverse measures it, as makes them orthogonal to the polynomials.
+    /// Projects `weights` onto those orthogonal to the polynomials, by the smallest change in the norm of M⁻¹.
     pub fn orthogonal(&self, mut weights: Vec<f64>) -> Vec<f64> {
         let moments: Vec<f64> = self.columns.iter().map(|column| dot(column, &weights)).collect();
         for (row, image) in self.inverse.chunks_exact(moments.len()).zip(&self.images) {
@@ -31,34 +33,34 @@ impl Polynomials {
         weights
     }
 
-    /// The polynomial of these coefficients at a centre.
+    /// Returns the value at a centre of the polynomial with these coefficients.
     pub fn value(&self, centre: usize, coefficients: &[f64]) -> f64 {
         self.columns.iter().zip(coefficients).map(|(column, c)| c * column[centre]).sum()
     }
 
-    /// The coefficients c for which r − Bc is least as the approximate inverse measures it; `image` is that inverse times r.
+    /// Returns the coefficients c that minimise r − Bc in the norm of M; `image` is Mr.
     fn coefficients(&self, image: &[f64]) -> Vec<f64> {
         let moments: Vec<f64> = self.columns.iter().map(|column| dot(column, image)).collect();
         self.inverse.chunks_exact(moments.len()).map(|row| dot(row, &moments)).collect()
     }
 }
 
-/// A solution on its way.
+/// The state of the conjugate gradient iteration.
 #[derive(Clone, Debug)]
 pub struct ConjugateGradients {
-    /// w, one weight a centre.
+    /// w, one weight per centre.
     pub weights: Vec<f64>,
-    /// p, one coefficient a polynomial.
+    /// p, one coefficient per polynomial.
     pub coefficients: Vec<f64>,
     /// y − (Φ+Λ)w − Bp.
     pub residual: Vec<f64>,
     direction: Vec<f64>,
-    /// The residual as the approximate inverse measures it, squared.
+    /// Squared norm of the residual r in the norm of M, rᵀMr.
     energy: f64,
 }
 
 impl ConjugateGradients {
-    /// Starts from `weights`, orthogonal to the polynomials, for which `residual` is y − (Φ+Λ)w.
+    /// Starts from `weights`, which must be orthogonal to the polynomials; `residual` is y − (Φ+Λ)w for them.
     pub fn new(
         weights: Vec<f64>,
         residual: Vec<f64>,
@@ -73,7 +75,7 @@ impl ConjugateGradients {
         start
     }
 
-    /// One iteration; `product` multiplies by Φ+Λ. False where rounding lets it go no further.
+    /// Does one iteration; `product` multiplies by Φ+Λ. Returns false if rounding prevents further progress.
     pub fn iterate(
         &mut self,
         product: impl Fn(&[f64]) -> Vec<f64>,
@@ -96,8 +98,8 @@ impl ConjugateGradients {
         true
     }
 
-    /// Moves what polynomials can explain of the residual to their coefficients. Returns the approximate inverse times what
-    /// is left, which is orthogonal to them.
+    /// Moves the part of the residual that polynomials explain to their coefficients. Returns M times the rest, which
+    /// is orthogonal to the polynomials.
     fn take_out_polynomials(&mut self, polynomials: &Polynomials, inverse: &SparseInverse) -> Vec<f64> {
         let mut image = inverse.product(&self.residual);
         let more = polynomials.coefficients(&image);
@@ -111,7 +113,8 @@ impl ConjugateGradients {
     }
 }
 
-/// The inverse of a symmetric positive definite `n` by `n` matrix by Gauss–Jordan elimination; `None` where it has none.
+/// Returns the inverse of a symmetric positive definite `n` by `n` matrix by Gauss–Jordan elimination; `None` if it is
+/// singular.
 fn inverted(mut a: Vec<f64>, n: usize) -> Option<Vec<f64>> {
     let mut out: Vec<f64> = (0..n * n).map(|k| if k / n == k % n { 1.0 } else { 0.0 }).collect();
     let largest = (0..n).map(|i| a[i * n + i]).fold(0.0, f64::max);

@@ -1,26 +1,27 @@
-//! What the function has to be where.
+//! Constraints on the implicit function: centres, values and regularisation.
 
 use super::Solution;
 use crate::math::{Bounds, Vec3};
 use crate::methods::implicit::cloud::Cloud;
 
-/// What the function has to be where.
+/// The constraints on the implicit function: its values at some centres, and how much each may be missed.
 #[derive(Clone, Debug, Default)]
 pub struct Constraints {
-    /// Where, in units of the box; no two are equal.
+    /// Centres, in box units, all distinct; those on the surface come first.
     pub centres: Vec<Vec3>,
-    /// Wanted values: 0 on the surface, −1 outside.
+    /// Prescribed values: 0 on the surface, −1 outside.
     pub values: Vec<f64>,
-    /// λ of each, at least 0.
+    /// Regularisation λ of each constraint, at least 0.
     pub lambda: Vec<f64>,
-    /// How many of them, the first ones, are on the surface.
+    /// Number of surface constraints, which come first.
     pub surface: usize,
-    /// Of those on the surface, where it is known.
+    /// Confidence of the surface constraints, in (0, 1], if known.
     pub confidence: Option<Vec<f32>>,
 }
 
 impl Constraints {
-    /// 0 at the points of `surface`, −1 at those `outside`; λ is 0 until [`Self::regularize`].
+    /// Creates constraints of value 0 at the points of `surface` and −1 at those `outside`; λ is 0 until
+    /// [`Self::regularize`].
     pub fn new(surface: &Cloud, outside: &[Vec3]) -> Self {
         let count = surface.len() + outside.len();
         let value = |i: usize| if i < surface.len() { 0.0 } else { -1.0 };
@@ -33,8 +34,9 @@ impl Constraints {
         }
     }
 
-    /// Sets λ: of surface constraints by their confidence, and from 3,000 on by their number, so that more points
-    /// mean a better surface and not a rougher one.
+    /// Sets λ: `outside` for exterior constraints, `surface` divided by the confidence for surface constraints. From 3,000
+    /// surface constraints on, their λ grows in proportion to their number, so that more points give a better surface and
+    /// not a rougher one.
     pub fn regularize(&mut self, surface: f64, outside: f64) {
         let crowd = self.surface as f64 / USUAL_POINTS;
         let surface = if crowd > 1.0 { surface * crowd } else { surface };
@@ -44,48 +46,48 @@ impl Constraints {
         }
     }
 
-    /// A centre that two constraints share, if any do.
+    /// Returns a centre that two constraints share, if any.
     pub fn shared_centre(&self) -> Option<Vec3> {
         let found = ByPlace::new(&self.centres).0;
         let shared = found.windows(2).find(|pair| pair[0].0 == pair[1].0);
         shared.map(|pair| self.centres[pair[0].1 as usize])
     }
 
-    /// Radius of a ball that holds all centres.
+    /// Returns the radius of a ball that contains all centres.
     pub fn radius(&self) -> f64 {
         let bounds = Bounds::of(&self.centres);
         0.5 * f64::from(bounds.max.distance(bounds.min))
     }
 
-    /// The mean of the function over the surface constraints: at each it is y − λw.
+    /// Returns the mean of f over the surface constraints, where f = y − λw; one of the choices for the iso-value.
     pub fn mean_on_surface(&self, solution: &Solution) -> f64 {
         let terms = self.lambda.iter().zip(&solution.weights).take(self.surface);
         -terms.map(|(lambda, w)| lambda * w).sum::<f64>() / self.surface as f64
     }
 }
 
-/// Surface constraints that the usual values of λ are for (paper, section VI-B).
+/// Number of surface constraints for which the usual values of λ are meant (paper, section VI-B).
 const USUAL_POINTS: f64 = 3000.0;
 
-/// Points by where they are, to find them again.
+/// Points sorted by position, to find equal ones.
 pub struct ByPlace(Vec<([u32; 3], u32)>);
 
 impl ByPlace {
-    /// All of `points`.
+    /// Sorts `points` for [`Self::find`].
     pub fn new(points: &[Vec3]) -> Self {
         let mut all: Vec<([u32; 3], u32)> = points.iter().map(|&p| bits(p)).zip(0..).collect();
         all.sort_unstable();
         Self(all)
     }
 
-    /// The first of the points that is equal to `p`.
+    /// Returns the index of the first of the points that equals `p`.
     pub fn find(&self, p: Vec3) -> Option<usize> {
         let at = self.0.partition_point(|(place, _)| *place < bits(p));
         self.0.get(at).filter(|(place, _)| *place == bits(p)).map(|&(_, i)| i as usize)
     }
 }
 
-/// The same for equal points; −0 is 0.
+/// Returns a key that is the same for equal points; −0 equals 0.
 fn bits(p: Vec3) -> [u32; 3] {
     p.to_array().map(|x| (x + 0.0).to_bits())
 }

@@ -1,5 +1,5 @@
-//! The matrix Φ of the kernel between all centres, near blocks in full and far ones as low-rank products: its size and
-//! the time of a product grow like n log n.
+//! Hierarchical matrix: Φ, the kernel between all centres, with near blocks stored in full and far ones as low-rank
+//! products. Its size and the time of a product grow as n log n.
 
 use super::clusters::{Cluster, ClusterTree};
 use crate::math::DVec3;
@@ -8,11 +8,11 @@ use crate::methods::implicit::low_rank::{LowRank, cross_approximation};
 use crate::methods::implicit::vectors::{Number, add, dot};
 use std::ops::Range;
 
-/// Two clusters are far when the smaller one's diameter is at most so many times their distance. Above 2 ranks grow,
-/// below 1 more is stored in full.
+/// Admissibility: two clusters are far if the smaller one's diameter is at most this many times their distance. Above 2
+/// ranks grow, below 1 more is stored in full.
 const SEPARATION: f32 = 3.0;
 
-/// A part of the matrix above the diagonal, which stands for its mirror image, too.
+/// A block on or above the diagonal, which also represents its mirror image.
 #[derive(Clone, Debug)]
 struct Block {
     /// Cluster of the rows.
@@ -24,32 +24,32 @@ struct Block {
 
 #[derive(Clone, Debug)]
 enum Content {
-    /// Row by row.
+    /// All entries, row by row.
     Full(Span),
     /// Columns and rows of a low-rank product.
     Far(Span, Span),
 }
 
-/// Where numbers are in the store.
+/// Location of numbers in a [`Store`].
 #[derive(Clone, Debug)]
 struct Span {
     chunk: usize,
     range: Range<usize>,
 }
 
-/// Numbers in a few large pieces. Thousands of small ones would let the memory of a wasm module grow page by page, which took
-/// longer than all the computing.
+/// Storage for the entries of all blocks, in a few large chunks. With thousands of small allocations, the memory of a
+/// wasm module grows page by page, which took longer than all the computation.
 #[derive(Clone, Debug)]
 struct Store<T> {
     chunk_size: usize,
     chunks: Vec<Vec<T>>,
 }
 
-/// Numbers in a chunk at most, but for longer spans.
+/// Maximum number of entries in a chunk of the store; a longer span gets a chunk of its own.
 const CHUNK: usize = 1 << 20;
 
 impl<T: Copy> Store<T> {
-    /// For a matrix between `count` centres.
+    /// Creates an empty store for a matrix between `count` centres.
     fn new(count: usize) -> Self {
         let all = count.saturating_mul(count);
         Self { chunk_size: if all < CHUNK { all } else { CHUNK }, chunks: Vec::new() }
@@ -71,21 +71,21 @@ impl<T: Copy> Store<T> {
     }
 }
 
-/// A symmetric kernel matrix, in the order of its cluster tree, its numbers stored as `T`.
+/// A symmetric kernel matrix in the order of its cluster tree, with entries stored as `T`.
 #[derive(Clone, Debug)]
 pub struct HierarchicalMatrix<T> {
     centres: Vec<DVec3>,
     tree: ClusterTree,
     tolerance: f64,
-    /// Pairs of clusters whose blocks are still to be made, the next one last.
+    /// Pairs of clusters whose blocks are still to be computed, and whether they are far; the next pair is last.
     waiting: Vec<(usize, usize, bool)>,
     blocks: Vec<Block>,
     store: Store<T>,
 }
 
 impl<T: Number> HierarchicalMatrix<T> {
-    /// The matrix between `centres`, which are in the order of `tree`; empty until [`Self::build`] has made all blocks, far
-    /// ones to a relative error of `tolerance`.
+    /// Creates the matrix between `centres`, which are in the order of `tree`. It is empty until [`Self::build`] has
+    /// computed all blocks, far ones to a relative error of `tolerance`.
     pub fn new(tree: ClusterTree, centres: Vec<DVec3>, tolerance: f64) -> Self {
         let mut waiting = Vec::new();
         divide(&tree.clusters, 0, 0, &mut waiting);
@@ -93,7 +93,8 @@ impl<T: Number> HierarchicalMatrix<T> {
         Self { store: Store::new(centres.len()), centres, tree, tolerance, waiting, blocks: Vec::new() }
     }
 
-    /// Makes blocks until about `work` values of the kernel were asked for. Returns the share of blocks made, 1 at the end.
+    /// Computes blocks until about `work` values of the kernel have been evaluated. Returns the share of blocks
+    /// computed, 1 at the end.
     pub fn build(&mut self, table: &KernelTable, work: usize) -> f64 {
         let mut done = 0;
         while done < work
@@ -114,13 +115,13 @@ impl<T: Number> HierarchicalMatrix<T> {
         self.progress()
     }
 
-    /// The share of blocks made.
+    /// Returns the share of blocks computed.
     pub fn progress(&self) -> f64 {
         let made = self.blocks.len();
         made as f64 / (made + self.waiting.len()) as f64
     }
 
-    /// Bytes of all blocks.
+    /// Returns the size of all blocks, in bytes.
     pub fn bytes(&self) -> usize {
         size_of::<T>() * self.store.chunks.iter().map(Vec::len).sum::<usize>()
     }
@@ -144,7 +145,7 @@ impl<T: Number> HierarchicalMatrix<T> {
         )
     }
 
-    /// Φx.
+    /// Returns Φx.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
         for block in &self.blocks {
@@ -161,7 +162,8 @@ impl<T: Number> HierarchicalMatrix<T> {
     }
 }
 
-/// Finds the blocks between two clusters, the one of the lower index for the rows.
+/// Divides the matrix block between two clusters, and appends its parts to `out`: the clusters of rows and columns, and
+/// whether they are far. The cluster of the lower index has the rows.
 fn divide(clusters: &[Cluster], a: usize, b: usize, out: &mut Vec<(usize, usize, bool)>) {
     let [first, second] = [a, b].map(|c| &clusters[c]);
     let [size, other] = [first, second].map(Cluster::diameter);

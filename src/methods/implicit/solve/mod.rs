@@ -1,11 +1,11 @@
 //! The linear system of the weights (paper, section IV; equation 3 with λ on the diagonal), for tens of thousands of
-//! constraints: conjugate gradients (`conjugate`) on a hierarchical matrix (`system`, `hierarchical`) with a sparse
-//! approximate inverse (`precondition`).
+//! constraints: conjugate gradients (`conjugate`) on a hierarchical matrix (`system`, `hierarchical`), preconditioned
+//! by a sparse approximate inverse (`precondition`).
 //!
-//! Work comes in slices of some milliseconds, always the same, so that a caller can show progress and stop. At the end
-//! the residual is computed anew from the kernel itself, not from the approximated matrix; where it is not small enough,
-//! iterations go on from that. A few constraints may be added or taken away afterwards: what was made for the others serves
-//! again, and iterations start from their weights.
+//! Work is done in slices of some milliseconds, always the same ones, so that a caller can show progress and stop. At
+//! the end the residual is recomputed from the kernel itself, not from the approximated matrix; if it is not small
+//! enough, iterations continue from it. Afterwards a few constraints may be added or removed: matrix and preconditioner
+//! of the others are reused, and iterations start from their weights.
 
 mod clusters;
 mod conjugate;
@@ -22,44 +22,45 @@ use conjugate::{ConjugateGradients, Polynomials};
 use serde::{Deserialize, Serialize};
 use system::{System, WORK};
 
-/// The function that came out: f(x) = Σ wᵢ φ(|x − cᵢ|) + p(x).
+/// The solution of the system: weights and polynomial of f(x) = Σ wᵢ φ(|x − cᵢ|) + p(x).
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Solution {
     /// w, in the order of the constraints.
     pub weights: Vec<f64>,
-    /// p: its constant, and with a thin plate its slopes along x, y and z.
+    /// Coefficients of p: the constant, and with a thin plate those of x, y and z.
     pub coefficients: Vec<f64>,
 }
 
-/// The system cannot be solved to the tolerance.
+/// Error of a solver whose system cannot be solved to the tolerance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Singular;
 
-/// Iterations stop at this share of the tolerance, since the true residual is a little larger than theirs.
+/// Share of the tolerance at which iterations stop, since the true residual is a little larger than theirs.
 const ITERATE_TO: f64 = 0.5;
-/// Iterations in a round. With a system that can be solved, a few dozen do.
+/// Maximum number of iterations in a round. A system that can be solved needs a few dozen.
 const MOST_ITERATIONS: u32 = 500;
-/// A round that leaves more of the residual than this share has met rounding.
+/// Share of the residual that a round of iterations may leave; if it leaves more, rounding limits it, and the solve
+/// fails.
 const LEAST_GAIN: f64 = 0.7;
-/// Rounds of iterations from a residual computed anew.
+/// Maximum number of rounds of iterations, each from a recomputed residual.
 const MOST_ROUNDS: u32 = 6;
-/// Rows that the true residual is taken from; all, where there are no more. Of a thousand, it is known to some 3 %.
+/// Maximum number of rows from which the true residual is estimated. From a thousand, it is known to some 3 %.
 const CHECKED_ROWS: usize = 1024;
 
-/// A system on its way to its solution. Vectors are in the order of the system's places.
+/// Solver of a linear system, slice by slice. Its vectors are in the order of the rows of [`System`].
 #[derive(Clone, Debug)]
 pub struct Solver {
     system: System,
     tolerance: f64,
-    /// What the system is to be changed to before it is solved, and the weights to start from, in that order.
+    /// Constraints to which the system is to be revised before it is solved, and the initial weights, in their order.
     revision: Option<(Constraints, Vec<f64>)>,
     stage: Stage,
-    /// Slices since the present system was there, or since the first one was begun.
+    /// Slices of work since the system was complete, or, before that, since its start.
     slices: u32,
     iterations: u32,
     rounds: u32,
     residual: f64,
-    /// The true residual of the round before.
+    /// The true residual after the round before.
     reached: f64,
 }
 
@@ -67,15 +68,15 @@ pub struct Solver {
 enum Stage {
     Build,
     Iterate(Box<Polynomials>, ConjugateGradients),
-    /// Computing the residual of some rows anew: of those done so far.
+    /// Recomputing the residual of some rows; holds those done so far.
     Check(Box<Polynomials>, ConjugateGradients, Vec<f64>),
-    /// Computing all of y − (Φ+Λ)w anew.
+    /// Recomputing all of y − (Φ+Λ)w; holds the rows done so far.
     Renew(Box<Polynomials>, ConjugateGradients, Vec<f64>),
     Done(ConjugateGradients),
 }
 
 impl Solver {
-    /// The system of `constraints`, to be solved to a relative residual of `tolerance`.
+    /// Creates a solver for the system of `constraints`, to a relative residual of `tolerance`.
     pub fn new(constraints: &Constraints, kernel: Kernel, tolerance: f64, seed: u64) -> Self {
         Self {
             system: System::new(constraints, kernel, tolerance, seed),
@@ -90,9 +91,9 @@ impl Solver {
         }
     }
 
-    /// Turns to other constraints, of which most are the same: keeps what was made for the first ones, and starts from
-    /// `weights`, in the order of the new ones. The result depends on the first constraints, these and the weights, not on
-    /// others in between. Returns false, and does nothing, where too many differ.
+    /// Switches to other constraints, most of which are the same: keeps what was computed for the first ones, and
+    /// starts from `weights`, in the order of the new ones. The result depends on the first constraints, these and the
+    /// weights, not on others in between. Returns false, and does nothing, if too many differ.
     pub fn revise(&mut self, constraints: &Constraints, weights: Vec<f64>) -> bool {
         if !self.system.is_near(constraints) {
             return false;
@@ -104,10 +105,10 @@ impl Solver {
         true
     }
 
-    /// A slice of work. Returns whether the solution is there.
+    /// Does a slice of work. Returns whether the solution is complete.
     ///
     /// # Errors
-    /// [`Singular`] where the tolerance cannot be reached.
+    /// [`Singular`] if the tolerance cannot be reached.
     pub fn advance(&mut self) -> Result<bool, Singular> {
         let stage = std::mem::replace(&mut self.stage, Stage::Build);
         self.slices += 1;
@@ -121,17 +122,17 @@ impl Solver {
         Ok(matches!(self.stage, Stage::Done(_)))
     }
 
-    /// Whether it turned to other constraints than its first ones.
+    /// Returns whether the constraints differ from the first ones, by [`Self::revise`].
     pub fn is_revised(&self) -> bool {
         self.revision.is_some() || self.system.is_revised()
     }
 
-    /// How far it is, for [`Self::advance_to`].
+    /// Returns the progress as a position for [`Self::advance_to`], to be saved with a run.
     pub fn position(&self) -> Position {
         Position { built: !matches!(self.stage, Stage::Build), slices: self.slices }
     }
 
-    /// Does the slices up to a position again.
+    /// Repeats the slices of work up to a position, to restore a saved run.
     ///
     /// # Errors
     /// As [`Self::advance`].
@@ -143,24 +144,24 @@ impl Solver {
         Ok(())
     }
 
-    /// The solution, once [`Self::advance`] said that it is there.
+    /// Returns the solution, once [`Self::advance`] has returned true.
     pub fn solution(&self) -> Option<Solution> {
         let Stage::Done(gradients) = &self.stage else { return None };
         let weights = self.system.by_constraint(&gradients.weights);
         Some(Solution { weights, coefficients: gradients.coefficients.clone() })
     }
 
-    /// The radial function.
+    /// Returns the kernel of the system.
     pub fn kernel(&self) -> Kernel {
         self.system.kernel()
     }
 
-    /// The relative residual: while iterating that of the iteration, at the end the true one.
+    /// Returns the relative residual: during iterations the one they compute, at the end the true one.
     pub fn residual(&self) -> f64 {
         self.residual
     }
 
-    /// About how much of the work is done, 0 to 1.
+    /// Returns the approximate share of the work that is done, 0 to 1, for progress bars.
     pub fn progress(&self) -> f64 {
         match &self.stage {
             Stage::Build => 0.7 * self.system.progress(),
@@ -173,7 +174,7 @@ impl Solver {
         }
     }
 
-    /// Bytes of the matrix, which is most of it.
+    /// Returns the size of the matrix in bytes, most of what the solver occupies.
     pub fn matrix_bytes(&self) -> usize {
         self.system.matrix_bytes()
     }
@@ -245,7 +246,7 @@ impl Solver {
             return Ok(Stage::Done(gradients));
         }
         self.rounds += 1;
-        // Not a number counts as no gain.
+        // NaN counts as no gain.
         let gained = self.residual <= LEAST_GAIN * self.reached;
         if self.rounds >= MOST_ROUNDS || !gained {
             return Err(Singular);
@@ -272,12 +273,12 @@ impl Solver {
     }
 }
 
-/// How far a solver is.
+/// Progress of a solver, in slices of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Position {
-    /// Whether matrix and inverse are there.
+    /// Whether matrix and preconditioner are complete.
     built: bool,
-    /// Slices since then, or since the beginning.
+    /// Slices since then, or, before that, since the start.
     slices: u32,
 }
 
@@ -298,7 +299,7 @@ mod tests {
         }
     }
 
-    /// Points of a bumpy ball, some outside, and 16 around.
+    /// Returns constraints at points of a bumpy ball, some outside, and 16 around it.
     fn system(count: usize, [surface, outside]: [f64; 2], confidence: bool) -> Constraints {
         let mut random = Random::new(5);
         let mut place = |size: f64| {
@@ -336,7 +337,7 @@ mod tests {
         panic!("no end")
     }
 
-    /// |y − (Φ+Λ)w − Bp| / |y| from the kernel, every row of it.
+    /// Returns |y − (Φ+Λ)w − Bp| / |y|, with all rows computed from the kernel.
     fn true_residual(constraints: &Constraints, kernel: Kernel, solution: &Solution) -> f64 {
         let centres: Vec<DVec3> = constraints.centres.iter().map(|p| p.as_dvec3()).collect();
         let row = |i: usize| {
@@ -350,7 +351,7 @@ mod tests {
         squared.sqrt() / norm(&constraints.values)
     }
 
-    /// The whole system by elimination with pivots.
+    /// Solves the whole system by Gaussian elimination with pivoting. Returns the weights, then the coefficients.
     fn by_elimination(constraints: &Constraints, kernel: Kernel) -> Vec<f64> {
         let centres: Vec<DVec3> = constraints.centres.iter().map(|p| p.as_dvec3()).collect();
         let (n, columns) = (centres.len(), polynomial_columns(kernel, &centres));
@@ -383,7 +384,7 @@ mod tests {
         x
     }
 
-    /// 1, and with a thin plate x, y and z, at the centres.
+    /// Returns the columns of B: 1, and with a thin plate x, y and z, at the centres.
     fn polynomial_columns(kernel: Kernel, centres: &[DVec3]) -> Vec<Vec<f64>> {
         let constant = std::iter::once(vec![1.0; centres.len()]);
         let linear = (0..kernel.polynomials() - 1).map(|axis| centres.iter().map(|p| p[axis]).collect());
@@ -443,14 +444,14 @@ mod tests {
                     let (solution, told) = solved(&constraints, kernel, tolerance);
                     let found = true_residual(&constraints, kernel, &solution);
                     println!("{tolerance:e} λ {} {kernel:?}: told {told:e}, true {found:e}", lambda[0]);
-                    // It is told with the kernel's table, which without regularization is off by a few 1e-7 of it.
+                    // The solver uses the kernel's table, which without regularization is off by a few 1e-7 of it.
                     assert!(told <= tolerance && found <= 1.1 * tolerance + 1e-6);
                 }
             }
         }
     }
 
-    /// Stored in single precision, with iterations begun anew from the true residual.
+    /// The matrix is stored in single precision, and iterations restart from the true residual.
     #[cfg(not(target_arch = "wasm32"))]
     #[test]
     fn eight_thousand_constraints_to_many_digits() {
@@ -491,7 +492,7 @@ mod tests {
         let bits =
             || solved(&constraints, kernel, 1e-6).0.weights.iter().map(|w| w.to_bits()).collect::<Vec<_>>();
         assert!(bits() == bits());
-        // Also when a solver is copied on its way.
+        // The same for a solver that is copied while it runs.
         let mut solver = Solver::new(&constraints, kernel, 1e-6, 1);
         (0..3).for_each(|_| assert!(!solver.advance().unwrap()));
         let mut copy = solver.clone();
@@ -500,7 +501,7 @@ mod tests {
         assert!(solver.solution().unwrap().weights == copy.solution().unwrap().weights);
     }
 
-    /// `base` with some of its points and of those outside taken away, and others added.
+    /// Returns `base` with some of its surface and exterior constraints removed, and others added.
     fn changed(base: &Constraints) -> Constraints {
         let mut random = Random::new(11);
         let (surface, outside) = base.centres.split_at(base.surface);
@@ -513,7 +514,7 @@ mod tests {
         changed
     }
 
-    /// The weights of `solution` at those centres that are in `to`, too.
+    /// Returns the weights of `solution` at those centres that are also in `to`, and 0 at others.
     fn carried(from: &Constraints, solution: &Solution, to: &Constraints) -> Vec<f64> {
         let known = ByPlace::new(&from.centres);
         to.centres.iter().map(|&c| known.find(c).map_or(0.0, |i| solution.weights[i])).collect()
@@ -548,9 +549,9 @@ mod tests {
                 );
                 let residual = true_residual(&changed, kernel, &found);
                 println!("true residual {residual:e}");
-                // That of the kernel's table for weights that without regularization are huge.
+                // The error of the kernel's table, for weights that are huge without regularization.
                 assert!(residual <= if lambda[0] == 0.0 { 1e-5 } else { 2e-7 });
-                // The others take most of their time for iterations.
+                // Conditional kernels spend most of the time on iterations.
                 assert!(again < whole || kernel.is_conditional());
                 let mut random = Random::new(8);
                 for _ in 0..50 {
@@ -566,7 +567,7 @@ mod tests {
         }
     }
 
-    /// So that a restored run, which has to make the matrix again, goes on as the saved one would have.
+    /// A restored run, which has to rebuild the matrix, must continue as the saved one would have.
     #[test]
     fn what_was_solved_in_between_does_not_matter() {
         let base = system(900, [0.001, 2.0], false);
@@ -575,7 +576,7 @@ mod tests {
         let mut kept = Solver::new(&base, kernel, 1e-6, 1);
         run(&mut kept);
         let weights = carried(&base, &kept.solution().unwrap(), &changed);
-        // There and back, and there again; and on a solver that has made nothing yet.
+        // There and back, and there again; and on a solver that has computed nothing yet.
         for constraints in [&changed, &base, &changed] {
             let start = if constraints.centres == changed.centres {
                 weights.clone()
@@ -590,7 +591,7 @@ mod tests {
         run(&mut fresh);
         assert!(kept.solution().unwrap().weights == fresh.solution().unwrap().weights);
         assert_eq!(kept.position(), fresh.position());
-        // To the same place again, slice by slice.
+        // To the same position again, slice by slice.
         let (mut one, mut other) = (Solver::new(&base, kernel, 1e-6, 1), Solver::new(&base, kernel, 1e-6, 1));
         while !one.advance().unwrap() {
             let mut copy = other.clone();

@@ -1,33 +1,35 @@
-//! A sparse approximate inverse of Φ + Λ: each centre is predicted from the nearest ones before it, in an order from
-//! coarse to fine (Vecchia's approximation; Schäfer, Katzfuss & Owhadi, *Sparse Cholesky factorization by Kullback–Leibler
-//! minimization*, 2021).
+//! Preconditioner: a sparse approximate inverse Cholesky factor of Φ + Λ. Each centre is predicted from its nearest
+//! predecessors, in an order from coarse to fine (Vecchia's approximation; Schäfer, Katzfuss & Owhadi, *Sparse Cholesky
+//! factorization by Kullback–Leibler minimization*, 2021).
 
 use crate::math::order::rank_f64;
 use crate::math::{DVec3, Vec3};
 use crate::methods::implicit::kernel::KernelTable;
 use crate::spatial::PointGrid;
 
-/// Earlier centres that each is predicted from. 16 take half as many iterations again; 32 take twice as long to make.
+/// Number of predecessors from which each centre is predicted. With 16, half as many iterations again are needed; 32
+/// take twice as long to compute.
 const NEIGHBOURS: usize = 24;
 
-/// (Φ + Λ)⁻¹ ≈ Σ gᵢ gᵢᵀ with a sparse gᵢ for each centre.
+/// A sparse approximate inverse of the system's matrix: (Φ + Λ)⁻¹ ≈ Σ gᵢ gᵢᵀ, with a sparse gᵢ for each centre. It
+/// preconditions conjugate gradients.
 #[derive(Clone, Debug)]
 pub struct SparseInverse {
-    /// In which order centres are predicted, and from which earlier ones.
+    /// The order of the centres, with the predecessors of each.
     rows: Rows,
-    /// What is still to be planned.
+    /// The part of the ordering that is still to be done.
     plan: Plan,
-    /// Rows that are made.
+    /// Number of rows computed.
     made: usize,
-    /// Of each row made, one after the other, the weights of gᵢ: of the centre itself, then of its neighbours.
+    /// Entries of gᵢ for each row computed, one row after the other: for the centre itself, then for its neighbours.
     weights: Vec<f64>,
 }
 
-/// Centres in order, each with some of those before it.
+/// The centres in their order, each with some of its predecessors, called its neighbours.
 #[derive(Clone, Debug, Default)]
 struct Rows {
     centres: Vec<u32>,
-    /// Their neighbours, one row after the other, and where each row ends.
+    /// Neighbours of all centres, one row after the other; `ends` holds the end of each row.
     neighbours: Vec<u32>,
     ends: Vec<usize>,
 }
@@ -47,16 +49,16 @@ impl Rows {
 }
 
 impl SparseInverse {
-    /// The inverse for `centres`, all of which are named once in `first` and `last`, which come in that order; nothing is
-    /// made yet.
+    /// Starts the inverse for `centres`. Those with indices in `first` come before those in `last`; together these
+    /// lists name each centre once. Nothing is computed yet.
     pub fn new(centres: &[Vec3], first: Vec<u32>, last: Vec<u32>) -> Self {
         let plan = Plan::new(centres, first, last);
         Self { rows: Rows::default(), plan, made: 0, weights: Vec::new() }
     }
 
-    /// Plans or makes up to `count` more rows. Returns whether all are made.
+    /// Orders or computes up to `count` more rows. Returns whether all are computed.
     ///
-    /// Where a local system is singular to rounding, its diagonal is raised: that costs iterations, never accuracy.
+    /// If a local system is singular to rounding, its diagonal is raised: that costs iterations, never accuracy.
     pub fn build(&mut self, centres: &[DVec3], lambda: &[f64], table: &KernelTable, count: usize) -> bool {
         if self.plan.extend(count, &mut self.rows) {
             for (centre, near) in self.rows.iter().skip(self.made).take(count) {
@@ -67,13 +69,13 @@ impl SparseInverse {
         self.made == centres.len()
     }
 
-    /// The share of rows planned and made.
+    /// Returns the share of the work that is done: of rows ordered and computed.
     pub fn progress(&self) -> f64 {
         0.5 * (self.rows.centres.len() + self.made) as f64 / self.plan.centres.len() as f64
     }
 
-    /// The inverse, once made, without the centres that are `gone` and with those that follow its own in `centres`, each
-    /// predicted from the nearest ones of all others.
+    /// Returns the inverse for edited centres, from one that is complete: without those flagged in `gone`, and with
+    /// those appended to `centres`, each predicted from the nearest of all before it that remain.
     pub fn revised(&self, gone: &[bool], centres: &[DVec3], lambda: &[f64], table: &KernelTable) -> Self {
         let mut revised = Self { rows: Rows::default(), plan: Plan::default(), made: 0, weights: Vec::new() };
         let mut rest = &self.weights[..];
@@ -105,7 +107,7 @@ impl SparseInverse {
         row(centre, near, centres, lambda, table, &mut self.weights);
     }
 
-    /// The approximate inverse times `x`.
+    /// Returns the approximate inverse times `x`.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
         let mut rest = &self.weights[..];
@@ -122,7 +124,7 @@ impl SparseInverse {
     }
 }
 
-/// The [`NEIGHBOURS`] of the points `among` that are nearest to `p`, nearest first.
+/// Returns the indices of the [`NEIGHBOURS`] points nearest to `p` among those that `among` accepts, nearest first.
 fn nearest(points: &[DVec3], p: DVec3, among: impl Fn(usize) -> bool) -> Vec<u32> {
     let with_distance = |i: usize| (rank_f64(points[i].distance_squared(p)), i as u32);
     let mut found: Vec<(u64, u32)> = (0..points.len()).filter(|&i| among(i)).map(with_distance).collect();
@@ -134,8 +136,8 @@ fn nearest(points: &[DVec3], p: DVec3, among: impl Fn(usize) -> bool) -> Vec<u32
     found.into_iter().map(|(_, i)| i).collect()
 }
 
-/// The row of one centre: with A its neighbours' system and b its own entries there, c = A⁻¹b, the row is
-/// (1, −c)/√(φ(0) + λ − bᵀc), added to `out`.
+/// Appends the row of one centre to `out`: with A the matrix of its neighbours' system, b its own entries there, and c
+/// = A⁻¹b, the row is (1, −c)/√(φ(0) + λ − bᵀc).
 fn row(
     centre: u32,
     neighbours: &[u32],
@@ -166,10 +168,10 @@ fn row(
     out.extend(b.iter().map(|x| -x * scale));
 }
 
-/// A pivot below this share of its diagonal is rounding.
+/// Smallest pivot of a Cholesky factorisation, as a share of its diagonal entry: anything less is rounding.
 const LEAST_PIVOT: f64 = 1e-12;
 
-/// The lower triangle of a positive definite matrix becomes its Cholesky factor.
+/// Replaces the lower triangle of a positive definite `n` by `n` matrix by its Cholesky factor.
 fn cholesky(a: &mut [f64], n: usize) {
     for i in 0..n {
         let (done, rest) = a.split_at_mut(i * n);
@@ -203,34 +205,35 @@ fn backward(factor: &[f64], b: &mut [f64]) {
     }
 }
 
-/// The larger one; a comparison, as the platform's function is a call in wasm.
+/// Returns the larger number, by a comparison: `f64::max` is a function call in wasm.
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// Distance between the first centres, in units of the box.
+/// Minimum distance between the centres taken in the first round of the ordering, in box units.
 const FIRST_SPACING: f32 = 2.0;
-/// Ratio of one round's distance to the one before.
+/// Ratio of the minimum distance of one round of the ordering to that of the round before.
 const RATIO: f32 = std::f32::consts::FRAC_1_SQRT_2;
-/// Distance below which centres are taken as they come.
+/// Minimum distance of a round below which centres are taken in their given order.
 const LEAST_SPACING: f32 = 1e-6;
-/// Cells of the grid, and where neighbours are looked for first, in distances of the round.
+/// Edge length of the cells of the grid of taken centres, in minimum distances of the round.
 const CELL: f32 = 3.6;
+/// Radius in which predecessors are searched first, in minimum distances of the round.
 const REACH: f32 = 3.6;
 
-/// An order from coarse to fine, each centre with its nearest ones before it: each is as far from those before it as those
-/// that follow let it, within a factor of √2. In rounds: each takes the centres that are farther than some distance from
-/// all taken.
+/// An ordering of centres from coarse to fine (approximately maximin), in progress, each with its nearest predecessors.
+/// Each centre is as far from its predecessors as any of its successors is, within a factor of √2: every round takes
+/// the centres that are farther than some distance from all taken before, and the distance falls from round to round.
 #[derive(Clone, Debug, Default)]
 struct Plan {
     centres: Vec<Vec3>,
-    /// What was taken, in order.
+    /// The centres taken so far, in order.
     grid: PointGrid,
     spacing: f32,
-    /// Centres to be looked at in this round, the next one last, and those left for the next round.
+    /// Centres to be tested in this round, the next one last, and those left for the next round.
     waiting: Vec<u32>,
     others: Vec<u32>,
-    /// Centres whose rounds come after those of all others.
+    /// Centres that are ordered after all others.
     last: Vec<u32>,
 }
 
@@ -247,7 +250,7 @@ impl Plan {
         }
     }
 
-    /// Looks at up to `count` centres. Returns whether all are taken.
+    /// Tests up to `count` centres for the rounds of the ordering. Returns whether all are ordered.
     fn extend(&mut self, count: usize, rows: &mut Rows) -> bool {
         for _ in 0..count {
             while self.waiting.is_empty() {

@@ -1,4 +1,4 @@
-//! The matrix of a system and its approximate inverse, and what a few other constraints change in them.
+//! The matrix of the linear system and its preconditioner, and their revision for a few changed constraints.
 
 use super::clusters::ClusterTree;
 use super::constraints::{ByPlace, Constraints};
@@ -8,47 +8,50 @@ use crate::math::{DVec3, Random, Vec3};
 use crate::methods::implicit::kernel::{Kernel, KernelTable};
 use crate::methods::implicit::vectors::{add, dot};
 
-/// Values of the kernel, or as much work of another kind, in a slice: about ten milliseconds.
+/// Work in a slice, in kernel evaluations or the equivalent: about ten milliseconds.
 pub const WORK: usize = 2_000_000;
-/// Values of the kernel that take as long as one row of the sparse inverse.
+/// Cost of a row of the sparse inverse, in kernel evaluations.
 const ROW_WORK: usize = 4_000;
-/// Error of far blocks, of the tolerance: with it the residual found at the end is seldom above the tolerance.
+/// Relative error of far blocks, as a share of the tolerance: with it, the final residual is seldom above the
+/// tolerance.
 const FAR_ERROR: f64 = 0.1;
-/// Constraints from which on far blocks are the more exact the more of them there are: errors add up, and a residual that is
-/// too large is paid for with one from all pairs of constraints.
+/// Number of constraints above which far blocks are more accurate, in proportion to the number: errors add up, and a
+/// residual that is too large has to be recomputed from all pairs of constraints.
 const USUAL_CONSTRAINTS: f64 = 25_000.0;
-/// Error of far blocks where kernels are only conditionally positive definite: what is large in them cancels.
+/// Relative error of far blocks for kernels that are only conditionally positive definite, whose large values cancel.
 const CONDITIONAL_ERROR: f64 = 1e-11;
-/// Constraints up to which the matrix is stored in double precision; beyond, memory matters more.
+/// Maximum number of constraints whose matrix is stored in double precision; beyond, memory matters more.
 const DOUBLE_BELOW: usize = 6000;
-/// Constraints that may be added, and as many taken away, without making all anew. Each costs a row of the full matrix.
+/// Maximum number of constraints added, and of constraints removed, for which the system is revised and not rebuilt.
+/// Each added one costs a row of the full matrix.
 const MOST_CHANGES: usize = 256;
-/// The constraint of a place that has none any more.
+/// Marks a row whose constraint was removed, in place of the constraint's index.
 const GONE: u32 = u32::MAX;
 
-/// Φ + Λ of some constraints, with B and y: [Φ+Λ B; Bᵀ 0] [w; p] = [y; 0].
+/// The linear system of some constraints, [Φ+Λ B; Bᵀ 0] [w; p] = [y; 0].
 ///
-/// Each constraint has a place in all vectors: first those that the matrix was made for, in the order of its cluster tree,
-/// then those added since. Places of constraints that were taken away stay; nothing but 0 ever stands there.
+/// Each constraint has a row, which is also its index in all vectors: first those for which the matrix was computed, in
+/// the order of its cluster tree, then those added since. Rows of removed constraints are kept, and are 0 in all
+/// vectors.
 #[derive(Clone, Debug)]
 pub struct System {
     table: KernelTable,
     centres: Vec<DVec3>,
     values: Vec<f64>,
     lambda: Vec<f64>,
-    /// For each place, the constraint.
+    /// For each row, the index of its constraint, or [`GONE`].
     order: Vec<u32>,
     matrix: Matrix,
     inverse: SparseInverse,
     revision: Option<Revision>,
 }
 
-/// What differs from the constraints that the matrix was made for.
+/// Differences from the constraints for which the matrix was computed.
 #[derive(Clone, Debug)]
 struct Revision {
-    /// Of the matrix's places, those whose constraint was taken away.
+    /// For each row of the matrix, whether its constraint was removed.
     gone: Vec<bool>,
-    /// For each place added, Φ between it and all places up to itself.
+    /// For each added row, its entries of Φ, up to the diagonal.
     rows: Vec<Vec<f64>>,
     inverse: SparseInverse,
 }
@@ -60,8 +63,8 @@ enum Matrix {
 }
 
 impl System {
-    /// The system of `constraints`; nothing is made yet. Far parts of the matrix will be as exact as residuals of `tolerance`
-    /// need it.
+    /// Creates the system of `constraints`; nothing is computed yet. Far blocks of the matrix will be as accurate as a
+    /// residual of `tolerance` requires.
     pub fn new(constraints: &Constraints, kernel: Kernel, tolerance: f64, seed: u64) -> Self {
         let tree = ClusterTree::new(&constraints.centres);
         let order = tree.order.clone();
@@ -83,7 +86,7 @@ impl System {
         }
     }
 
-    /// A slice of making matrix and inverse. Returns whether both are there.
+    /// Does a slice of work on preconditioner and matrix. Returns whether both are complete.
     pub fn build(&mut self) -> bool {
         if self.revision.is_some() || self.matrix.progress() == 1.0 {
             return true;
@@ -95,7 +98,7 @@ impl System {
         self.matrix.build(&self.table)
     }
 
-    /// The share of [`Self::build`] that is done.
+    /// Returns the share of [`Self::build`] that is done, 0 to 1.
     pub fn progress(&self) -> f64 {
         if self.revision.is_some() {
             1.0
@@ -104,7 +107,8 @@ impl System {
         }
     }
 
-    /// Whether [`Self::revise`] is worth while: few of the constraints differ from those the matrix was made for.
+    /// Returns whether [`Self::revise`] is worthwhile: only a few of the constraints differ from those for which the
+    /// matrix was computed.
     pub fn is_near(&self, constraints: &Constraints) -> bool {
         let known = ByPlace::new(&constraints.centres);
         let own = self.own_centres();
@@ -112,7 +116,7 @@ impl System {
         own.len() - kept <= MOST_CHANGES && constraints.centres.len() - kept <= MOST_CHANGES
     }
 
-    /// Turns to other constraints, once the matrix is there.
+    /// Revises the system to other constraints, reusing the matrix, which must be complete.
     pub fn revise(&mut self, constraints: &Constraints) {
         let own = self.own_centres().len();
         self.centres.truncate(own);
@@ -136,32 +140,32 @@ impl System {
         self.revision = Some(Revision { gone, rows, inverse });
     }
 
-    /// Whether it was.
+    /// Returns whether the system was revised.
     pub fn is_revised(&self) -> bool {
         self.revision.is_some()
     }
 
-    /// Centres of the matrix.
+    /// Returns the centres for which the matrix was computed.
     fn own_centres(&self) -> &[DVec3] {
         &self.centres[..self.revision.as_ref().map_or(self.centres.len(), |revision| revision.gone.len())]
     }
 
-    /// Φ between a place and the first `count` places.
+    /// Returns the entries of Φ between row `i` and the first `count` rows.
     fn row(&self, i: usize, count: usize) -> impl Iterator<Item = f64> {
         self.centres[..count].iter().map(move |c| self.table.value(self.centres[i].distance_squared(*c)))
     }
 
-    /// The radial function.
+    /// Returns the kernel.
     pub fn kernel(&self) -> Kernel {
         self.table.kernel()
     }
 
-    /// The number of places.
+    /// Returns the number of rows, with those of removed constraints.
     pub fn len(&self) -> usize {
         self.centres.len()
     }
 
-    /// Bytes of the matrix.
+    /// Returns the size of the matrix, in bytes.
     pub fn matrix_bytes(&self) -> usize {
         match &self.matrix {
             Matrix::Single(matrix) => matrix.bytes(),
@@ -169,22 +173,22 @@ impl System {
         }
     }
 
-    /// y.
+    /// Returns the right-hand side y, by row.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// The approximate inverse of Φ + Λ.
+    /// Returns the approximate inverse of Φ + Λ, the preconditioner.
     pub fn inverse(&self) -> &SparseInverse {
         self.revision.as_ref().map_or(&self.inverse, |revision| &revision.inverse)
     }
 
-    /// What belongs to the constraints, by place.
+    /// Reorders a vector over constraints into one over rows; removed rows are 0.
     pub fn by_place(&self, of_constraints: &[f64]) -> Vec<f64> {
         at_places(&self.order, of_constraints)
     }
 
-    /// What belongs to the places, by constraint.
+    /// Reorders a vector over rows into one over constraints.
     pub fn by_constraint(&self, of_places: &[f64]) -> Vec<f64> {
         let present = || self.order.iter().zip(of_places).filter(|(i, _)| **i != GONE);
         let mut all = vec![0.0; present().count()];
@@ -192,7 +196,7 @@ impl System {
         all
     }
 
-    /// The columns of B: 1, and with a thin plate x, y and z.
+    /// Returns the columns of B: 1, and with a thin plate x, y and z, at the centres.
     pub fn polynomials(&self) -> Vec<Vec<f64>> {
         let column = |power: usize| {
             let entry = |(centre, &i): (&DVec3, &u32)| match power {
@@ -205,7 +209,7 @@ impl System {
         (0..self.kernel().polynomials()).map(column).collect()
     }
 
-    /// (Φ+Λ)x with the approximated Φ.
+    /// Returns (Φ+Λ)x with the approximated Φ.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let own = self.own_centres().len();
         let mut out = match &self.matrix {
@@ -224,7 +228,7 @@ impl System {
         out
     }
 
-    /// yᵢ − ((Φ+Λ)w)ᵢ from the kernel itself.
+    /// Returns yᵢ − ((Φ+Λ)w)ᵢ for row `i`, from the kernel itself.
     pub fn row_residual(&self, i: usize, weights: &[f64]) -> f64 {
         if self.order[i] == GONE {
             return 0.0;
