@@ -210,7 +210,7 @@ impl From<Coverage> for Measured {
             area: part.area,
             kind: match part.kind {
                 Missing::Matter => "matter",
-                Missing::Hollow => "hollow",
+                Missing::Cavity => "hollow",
             },
         });
         Self { recall, precision, uncovered: parts.collect() }

@@ -1,8 +1,8 @@
 //! Methods that fit surfaces to data, each in a module of its own, and the stepping interface common to all.
 
+mod caller_mesh;
 pub mod deformable;
 mod error;
-mod given;
 pub mod implicit;
 pub mod multires;
 mod saved;

@@ -6,31 +6,31 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// The first bytes of a saved state: they identify the method, and the last one is the version of the layout.
-pub type Mark = [u8; 8];
+pub type Magic = [u8; 8];
 
 /// An upper bound of the valence of a vertex in a valid state; no edit creates more neighbours.
-pub const MOST_NEIGHBOURS: usize = 4096;
+pub const MAX_VALENCE: usize = 4096;
 
-/// Whether every vertex has at most [`MOST_NEIGHBOURS`] neighbours. Checking a mesh takes time quadratic in the
+/// Whether every vertex has at most [`MAX_VALENCE`] neighbours. Checking a mesh takes time quadratic in the
 /// valence, so a forged state could otherwise stall [`Mesh::check`].
 pub fn can_be_checked(mesh: &Mesh) -> bool {
-    mesh.rings().iter().all(|ring| ring.valence() <= MOST_NEIGHBOURS)
+    mesh.rings().iter().all(|ring| ring.valence() <= MAX_VALENCE)
 }
 
 /// Serialises a state of a method, preceded by the mark and a checksum.
-pub fn sealed<T: Serialize>(mark: &Mark, state: &T) -> Vec<u8> {
+pub fn encode<T: Serialize>(magic: &Magic, state: &T) -> Vec<u8> {
     // Serialising plain data into memory cannot fail.
     let body = postcard::to_allocvec(state).unwrap_or_default();
-    [&mark[..], &Hash::of(&body).to_le_bytes(), &body].concat()
+    [&magic[..], &Hash::of(&body).to_le_bytes(), &body].concat()
 }
 
-/// Deserialises a state from bytes made by [`sealed`] with the same mark.
+/// Deserialises a state from bytes made by [`encode`] with the same mark.
 ///
 /// # Errors
 /// [`MethodError::BadState`] if the mark or the checksum differs, or the bytes are not exactly one state.
-pub fn opened<T: DeserializeOwned>(mark: &Mark, bytes: &[u8]) -> Result<T, MethodError> {
+pub fn decode<T: DeserializeOwned>(magic: &Magic, bytes: &[u8]) -> Result<T, MethodError> {
     let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
-    let Some((sum, body)) = bytes.strip_prefix(mark).and_then(|rest| rest.split_first_chunk::<8>()) else {
+    let Some((sum, body)) = bytes.strip_prefix(magic).and_then(|rest| rest.split_first_chunk::<8>()) else {
         return bad("header", "these bytes are no saved state of this version");
     };
     if u64::from_le_bytes(*sum) != Hash::of(body) {

@@ -620,7 +620,7 @@ fn a_swing_on_a_coarse_level_comes_to_rest() {
         DeformableOptions {
             start: Start::Enclosing,
             levels: 2,
-            params: Some(DeformableParams::of_paper(&volume)),
+            params: Some(DeformableParams::as_published(&volume)),
             ..Default::default()
         },
     )

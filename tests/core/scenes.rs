@@ -54,7 +54,7 @@ fn play(name: &str, volume: &Volume, options: DeformableOptions, most: u32) -> (
 }
 
 fn params(volume: &Volume, iso: f64, rigidity: f64, stiffness: f64) -> Option<DeformableParams> {
-    Some(DeformableParams { iso, rigidity, stiffness, ..DeformableParams::of_paper(volume) })
+    Some(DeformableParams { iso, rigidity, stiffness, ..DeformableParams::as_published(volume) })
 }
 
 /// Mean distance of the vertices from the surface of which `distance` is the distance.

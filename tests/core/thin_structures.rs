@@ -165,7 +165,7 @@ fn coverage_tells_what_is_missing() {
     let mut model = DeformableModel::new(&volume, enclosing).unwrap();
     while !model.step().unwrap().done {}
     let kinds: Vec<Missing> = model.coverage().unwrap().uncovered.iter().map(|part| part.kind).collect();
-    assert_eq!(kinds, [Missing::Hollow]);
+    assert_eq!(kinds, [Missing::Cavity]);
     model.set_params(DeformableParams { seeding: Seeding::On, ..params }).unwrap();
     while !model.step().unwrap().done {}
     let coverage = model.coverage().unwrap();

@@ -6,7 +6,7 @@
 use crate::mesh::{Mesh, ScalarKey, VertexId};
 
 /// The number of still iterations after which a vertex sleeps.
-pub(super) const PATIENCE: f32 = 6.0;
+pub(super) const ITERATIONS_TO_SLEEP: f32 = 6.0;
 
 /// The speed below which a vertex is still, as a share of the speed that each vertex of a surface with the tolerated
 /// mean energy would have.
@@ -21,32 +21,32 @@ pub(super) struct Awake {
     /// The vertices awake, or all vertices: those that move in this iteration.
     pub(super) moving: Vec<VertexId>,
     /// The moving vertices and their neighbours, of which normals and L are needed.
-    pub(super) around: Vec<VertexId>,
-    is_around: Vec<bool>,
+    pub(super) with_neighbours: Vec<VertexId>,
+    is_included: Vec<bool>,
 }
 
 impl Awake {
-    /// Collects the vertices with fewer than [`PATIENCE`] still iterations, or all vertices if `all` is set or few
+    /// Collects the vertices with fewer than [`ITERATIONS_TO_SLEEP`] still iterations, or all vertices if `all` is set or few
     /// sleep.
     pub(super) fn find(&mut self, mesh: &Mesh, still: ScalarKey, all: bool) {
         let still = mesh.scalar(still);
         self.moving.clear();
-        let awake = still.iter().enumerate().filter(|(_, still)| **still < PATIENCE);
+        let awake = still.iter().enumerate().filter(|(_, still)| **still < ITERATIONS_TO_SLEEP);
         self.moving.extend(awake.map(|(i, _)| VertexId::from_index(i)).filter(|&v| mesh.is_live(v)));
-        self.around.clear();
+        self.with_neighbours.clear();
         let asleep = mesh.vertex_count() - self.moving.len();
         if all || (asleep as f64) < FEW_ASLEEP * mesh.vertex_count() as f64 {
             self.moving.clear();
             self.moving.extend(mesh.vertices());
-            self.around.extend_from_slice(&self.moving);
+            self.with_neighbours.extend_from_slice(&self.moving);
             return;
         }
-        self.is_around.clear();
-        self.is_around.resize(mesh.slots(), false);
+        self.is_included.clear();
+        self.is_included.resize(mesh.slots(), false);
         for &v in &self.moving {
             for &w in mesh.ring(v).as_slice().iter().chain([&v]) {
-                if !std::mem::replace(&mut self.is_around[w.index()], true) {
-                    self.around.push(w);
+                if !std::mem::replace(&mut self.is_included[w.index()], true) {
+                    self.with_neighbours.push(w);
                 }
             }
         }
@@ -69,32 +69,38 @@ mod tests {
     fn those_that_move_and_their_neighbours_are_found() {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 8.0, 1.0).unwrap();
         let still = mesh.add_scalar();
-        mesh.scalar_mut(still).fill(PATIENCE);
+        mesh.scalar_mut(still).fill(ITERATIONS_TO_SLEEP);
         let tip = mesh.vertices().last().unwrap();
-        mesh.scalar_mut(still)[tip.index()] = PATIENCE - 1.0;
+        mesh.scalar_mut(still)[tip.index()] = ITERATIONS_TO_SLEEP - 1.0;
         let mut awake = Awake::default();
         awake.find(&mesh, still, false);
         assert_eq!(awake.moving, [tip]);
         let mut expected = mesh.ring(tip).as_slice().to_vec();
         expected.push(tip);
         expected.sort_unstable();
-        awake.around.sort_unstable();
-        assert_eq!(awake.around, expected);
+        awake.with_neighbours.sort_unstable();
+        assert_eq!(awake.with_neighbours, expected);
     }
 
     #[test]
-    fn with_few_asleep_all_are_looked_at() {
+    fn all_vertices_are_processed_if_few_sleep() {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 8.0, 1.0).unwrap();
         let still = mesh.add_scalar();
         let few = mesh.vertex_count() / 5;
-        mesh.scalar_mut(still)[..few].fill(PATIENCE);
+        mesh.scalar_mut(still)[..few].fill(ITERATIONS_TO_SLEEP);
         let mut awake = Awake::default();
         awake.find(&mesh, still, false);
-        assert_eq!((awake.moving.len(), awake.around.len()), (mesh.vertex_count(), mesh.vertex_count()));
-        mesh.scalar_mut(still)[..2 * few].fill(PATIENCE);
+        assert_eq!(
+            (awake.moving.len(), awake.with_neighbours.len()),
+            (mesh.vertex_count(), mesh.vertex_count())
+        );
+        mesh.scalar_mut(still)[..2 * few].fill(ITERATIONS_TO_SLEEP);
         awake.find(&mesh, still, false);
         assert_eq!(awake.moving.len(), mesh.vertex_count() - 2 * few);
         awake.find(&mesh, still, true);
-        assert_eq!((awake.moving.len(), awake.around.len()), (mesh.vertex_count(), mesh.vertex_count()));
+        assert_eq!(
+            (awake.moving.len(), awake.with_neighbours.len()),
+            (mesh.vertex_count(), mesh.vertex_count())
+        );
     }
 }

@@ -42,8 +42,8 @@ const MOST_AMPLIFIED: f32 = 1e4;
 /// The number of iterations of a level with the full factor on α_I, and the number after which it is halved each time
 /// from then on. A head takes 300. A vertex on an edge steeper than most would oscillate for ever: one on a tooth did,
 /// at an iso value at which the model converges with a factor of 4.
-const FULL: u32 = 600;
-const HALVED: u32 = 100;
+const FULL_GAIN_ITERATIONS: u32 = 600;
+const HALVING_ITERATIONS: u32 = 100;
 
 /// Returns the π_I that the surface settles at on a level of a run without seeding, normalised: on coarse levels it is
 /// moved by [`MARGIN`] towards the background.
@@ -62,22 +62,22 @@ pub(super) fn gain(
     level: usize,
     [iso, delta]: [f32; 2],
 ) -> f32 {
-    if params.yields_to_image() && params.integrator == Integrator::Implicit {
-        let steepness = pyramid.levels[level].ordinary_steepness(iso);
+    if params.adapts_to_image() && params.integrator == Integrator::Implicit {
+        let steepness = pyramid.levels[level].median_steepness(iso);
         return if steepness > 0.0 { (LEAST_STEEPNESS / steepness).clamp(1.0, MOST_AMPLIFIED) } else { 1.0 };
     }
     if level == 0 || params.iso_force == 0.0 || params.integrator == Integrator::Implicit {
         return 1.0;
     }
     let stiffness = params.iso_force.abs() as f32 * delta * pyramid.levels[level].steepness(iso);
-    let turned = MOST_STIFFNESS * (params.mass / (params.time_step * params.time_step)) as f32;
-    let rigid = params.rigidity as f32 / LEAST_RIGIDITY;
-    [turned / stiffness, rigid].into_iter().fold(MOST_GAIN, f32::min).max(1.0)
+    let by_stiffness = MOST_STIFFNESS * (params.mass / (params.time_step * params.time_step)) as f32;
+    let by_rigidity = params.rigidity as f32 / LEAST_RIGIDITY;
+    [by_stiffness / stiffness, by_rigidity].into_iter().fold(MOST_GAIN, f32::min).max(1.0)
 }
 
 /// Returns the factor on α_I that is left of a level's `gain` after a number of iterations on that level.
-pub(super) fn left_of(gain: f32, iterations: u32) -> f32 {
-    let times = iterations.saturating_sub(FULL).div_ceil(HALVED);
+pub(super) fn decayed(gain: f32, iterations: u32) -> f32 {
+    let times = iterations.saturating_sub(FULL_GAIN_ITERATIONS).div_ceil(HALVING_ITERATIONS);
     // Eight halvings reduce any gain up to 256 to 1.
     (0..times.min(8)).fold(gain, |gain, _| 0.5 * gain).max(1.0)
 }
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn coarse_levels_rest_outside_and_the_finest_where_it_is_told() {
+    fn coarse_levels_settle_outside_and_the_finest_at_the_iso_value() {
         let pyramid = ramp(39.0);
         for (force, sign) in [(-1.0, -1.0), (1.0, 1.0)] {
             let [finest, coarse] = [0, 1].map(|level| iso(&pyramid, &params(force, 0.2), level));
@@ -127,10 +127,19 @@ mod tests {
 
     #[test]
     fn a_level_that_takes_long_loses_its_gain() {
-        let left = |iterations| left_of(MOST_GAIN, iterations);
-        assert_eq!([0, FULL, FULL + 1, FULL + HALVED + 1].map(left), [8.0, 8.0, 4.0, 2.0]);
-        assert_eq!([FULL + 10 * HALVED, u32::MAX].map(left), [1.0, 1.0]);
-        assert_eq!(left_of(1.0, u32::MAX), 1.0);
+        let left = |iterations| decayed(MOST_GAIN, iterations);
+        assert_eq!(
+            [
+                0,
+                FULL_GAIN_ITERATIONS,
+                FULL_GAIN_ITERATIONS + 1,
+                FULL_GAIN_ITERATIONS + HALVING_ITERATIONS + 1
+            ]
+            .map(left),
+            [8.0, 8.0, 4.0, 2.0]
+        );
+        assert_eq!([FULL_GAIN_ITERATIONS + 10 * HALVING_ITERATIONS, u32::MAX].map(left), [1.0, 1.0]);
+        assert_eq!(decayed(1.0, u32::MAX), 1.0);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::methods::MethodError;
 use crate::spatial::TriangleTree;
 
 /// The largest distance at which a surface covers a point of the other, in voxels of the finest level.
-const REACH: f64 = 1.0;
+const COVERED_DISTANCE: f64 = 1.0;
 
 /// The largest side of the pieces by which triangles are tested, in voxels.
 const PIECE: f32 = 1.0;
@@ -48,7 +48,7 @@ pub enum Missing {
     /// Part of the object is outside the surface.
     Matter,
     /// Part of the background is inside the surface.
-    Hollow,
+    Cavity,
 }
 
 /// A measurement of [`Coverage`] that can be advanced in slices; it refers to the surface at the time it began.
@@ -125,7 +125,7 @@ impl CoverageSurvey {
         let (mut covered, mut count) = (0u32, 0u32);
         for_each_piece(corners, |middle| {
             count += 1;
-            covered += u32::from(other.is_within(middle, REACH));
+            covered += u32::from(other.is_within(middle, COVERED_DISTANCE));
         });
         let in_world = corners.map(|p| self.to_world.transform_vector3(p.as_dvec3()));
         let area = 0.5 * (in_world[1] - in_world[0]).cross(in_world[2] - in_world[0]).length();
@@ -178,7 +178,7 @@ impl CoverageSurvey {
         }
         let found = nearest.into_iter().zip(&sums).filter_map(|(nearest, (_, area))| {
             let (_, local, position) = nearest?;
-            let kind = if self.is_inside_model(local) { Missing::Hollow } else { Missing::Matter };
+            let kind = if self.is_inside_model(local) { Missing::Cavity } else { Missing::Matter };
             Some(Uncovered { position, area: *area, kind })
         });
         let mut parts: Vec<Uncovered> = found.collect();

@@ -3,7 +3,7 @@
 use crate::math::{Bounds, Vec3};
 
 /// The size of the domain as a multiple of the enclosing start surface.
-const ROOM: f32 = 1.5;
+const DOMAIN_SCALE: f32 = 1.5;
 
 /// 3^(1/4): the half axes of the rounded box |x/a|⁴ + |y/b|⁴ + |z/c|⁴ = 1 through the corners of a box, in those of the
 /// box.
@@ -38,7 +38,11 @@ impl Domain {
     pub(super) fn new(dims: [usize; 3], delta: f32) -> Self {
         let centre = Vec3::from(dims.map(|n| 0.5 * (n as f32 - 1.0)));
         let axes = rounded_axes(Vec3::from(dims.map(|n| THROUGH_CORNERS * 0.5 * (n as f32 + 1.0))), delta);
-        Self { centre, axes, bounds: Bounds { min: centre - axes * ROOM, max: centre + axes * ROOM } }
+        Self {
+            centre,
+            axes,
+            bounds: Bounds { min: centre - axes * DOMAIN_SCALE, max: centre + axes * DOMAIN_SCALE },
+        }
     }
 
     /// Returns the approximate number of vertices of the enclosing start surface: one per 2 δ² of the box with its
@@ -49,7 +53,7 @@ impl Domain {
     }
 
     /// Returns the point of the domain nearest to `p`.
-    pub(super) fn hold(&self, p: Vec3) -> Vec3 {
+    pub(super) fn clamp(&self, p: Vec3) -> Vec3 {
         p.clamp(self.bounds.min, self.bounds.max)
     }
 

@@ -13,18 +13,18 @@ use crate::volume::KnownCell;
 /// vertices slide off ridges, edges there grow and are split, those beside shrink and are collapsed, and each edit
 /// displaces vertices, so that the energy never falls. Below 0.02 the sampling of slow fronts suffers; from 0.3 on
 /// sliding does not fade everywhere.
-const SLIDE_SPEED: f32 = 0.1;
+const FULL_TANGENTIAL_SPEED: f32 = 0.1;
 
 /// The approximate distance from the contour, in voxels, to which rigidity may pull the surface: with more, thin
 /// strands shrink; with less, noise is not smoothed.
-const YIELD: f32 = 0.1;
+const MAX_RIGIDITY_OFFSET: f32 = 0.1;
 
 /// The largest offset between a vertex and the mean of its triangles that is compensated, in voxels.
-const MOST_INSET: f32 = 0.15;
+const MAX_INSET: f32 = 0.15;
 
 /// An attractor in model space.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pull {
+pub(super) struct LocalAttractor {
     pub(super) point: Vec3,
     pub(super) strength: f32,
     /// Maps displacements in model space to world space, in radii of the attractor.
@@ -46,7 +46,7 @@ pub(super) struct ForceScale {
     voxel: f64,
     delta: f32,
     /// Whether the normal part of rigidity is limited by the image.
-    yields: bool,
+    adapts_to_image: bool,
     /// Whether [`Forces::slope`] is needed.
     needs_slope: bool,
 }
@@ -55,9 +55,9 @@ impl ForceScale {
     /// Converts parameters to model units. `iso` is normalised, `gain` is the factor on α_I, and `voxel` is the length
     /// of a model unit in the world.
     pub(super) fn new(params: &DeformableParams, [iso, gain]: [f32; 2], voxel: f64, delta: f32) -> Self {
-        let yields = params.yields_to_image();
+        let yields = params.adapts_to_image();
         Self {
-            yields,
+            adapts_to_image: yields,
             needs_slope: yields || params.integrator == Integrator::Implicit,
             iso,
             iso_force: params.iso_force as f32 * gain,
@@ -74,7 +74,7 @@ impl ForceScale {
     }
 
     /// Returns δ |α_I|: the image force per unit of |π_I − Π|.
-    pub(super) fn pull(&self) -> f32 {
+    pub(super) fn iso_stiffness(&self) -> f32 {
         self.delta * self.iso_force.abs()
     }
 
@@ -87,7 +87,7 @@ impl ForceScale {
 pub(super) struct Field<'a> {
     pub(super) image: &'a LevelImage,
     pub(super) scale: ForceScale,
-    pub(super) pulls: &'a [Pull],
+    pub(super) attractors: &'a [LocalAttractor],
 }
 
 /// The forces on the vertices and the quantities they depend on, by slot; buffers are kept between iterations.
@@ -105,7 +105,7 @@ pub(super) struct Forces {
     /// The sum of all forces.
     pub(super) force: Vec<Vec3>,
     /// The time spent on force evaluation and not yet reported, in milliseconds.
-    pub(super) spent: f64,
+    pub(super) milliseconds: f64,
 }
 
 impl Forces {
@@ -148,7 +148,7 @@ impl Forces {
         field: &Field,
         vertices: &[VertexId],
     ) {
-        let &Field { image, ref scale, pulls } = field;
+        let &Field { image, ref scale, attractors } = field;
         let rest = rest_length(rings, positions, scale);
         for v in vertices.iter().map(|v| v.index()) {
             let ring = &rings[v];
@@ -156,48 +156,52 @@ impl Forces {
             if scale.needs_slope {
                 self.slope[v] = self.slope_along_normal(v, x, image, scale);
             }
-            let miss = self.miss(v, x, image, scale);
-            let hold = if scale.yields { self.hold_of_image(v, miss, scale) } else { f32::INFINITY };
-            let mut force = self.curvature(v, ring, velocities[v], scale, hold);
+            let iso_difference = self.iso_difference(v, x, image, scale);
+            let rigidity_limit = if scale.adapts_to_image {
+                self.rigidity_limit(v, iso_difference, scale)
+            } else {
+                f32::INFINITY
+            };
+            let mut force = self.curvature(v, ring, velocities[v], scale, rigidity_limit);
             if scale.stiffness != 0.0 {
                 force += springs(ring, positions, x, rest) * scale.stiffness;
             }
-            force += self.iso_attraction(v, miss, scale);
+            force += self.iso_force(v, iso_difference, scale);
             if scale.uses_gradient() {
-                force += self.ridge_attraction(v, x, image, scale);
+                force += self.gradient_force(v, x, image, scale);
             }
-            if !pulls.is_empty() {
-                let pull = pulls.iter().map(|pull| attraction(pull, x)).sum();
-                force += self.without_slide(v, pull, velocities[v], scale.delta);
+            if !attractors.is_empty() {
+                let attractor = attractors.iter().map(|attractor| attraction(attractor, x)).sum();
+                force += self.fade_tangential(v, attractor, velocities[v], scale.delta);
             }
             self.force[v] = force;
         }
     }
 
     /// Returns f_c = α_c (L(x) − mean of L over the neighbours) (5). Its tangential part fades out as the surface
-    /// settles; its normal part is at most `most`.
+    /// settles; its normal part is at most `limit`.
     #[inline]
-    fn curvature(&self, v: usize, ring: &Ring, velocity: Vec3, scale: &ForceScale, most: f32) -> Vec3 {
+    fn curvature(&self, v: usize, ring: &Ring, velocity: Vec3, scale: &ForceScale, limit: f32) -> Vec3 {
         let sum: Vec3 = ring.as_slice().iter().map(|w| self.laplacian[w.index()]).sum();
         let bending = self.laplacian[v] - sum * (1.0 / ring.valence() as f32);
         let normal = self.normal[v];
         let along_normal = bending.dot(normal);
         let across = normal * along_normal;
-        let speed = velocity.dot(normal).abs() / (SLIDE_SPEED * scale.delta);
+        let speed = velocity.dot(normal).abs() / (FULL_TANGENTIAL_SPEED * scale.delta);
         let along = (bending - across) * if speed < 1.0 { speed } else { 1.0 };
         let strength = along_normal.abs() * scale.rigidity;
-        let yielding = if strength > most { across * (most / strength) } else { across };
-        (yielding + along) * scale.rigidity
+        let normal_part = if strength > limit { across * (limit / strength) } else { across };
+        (normal_part + along) * scale.rigidity
     }
 
     /// Returns the approximate mean position of the triangles at a vertex: with corners on a sphere of radius r,
     /// triangles of edge l are l²/8r inside, a quarter of L. The image is sampled there, so that the surface encloses
     /// the volume of the contour; with vertices on the contour the volume would be too small.
     #[inline]
-    fn middle_of_star(&self, v: usize, x: Vec3) -> Vec3 {
+    fn mean_of_triangles(&self, v: usize, x: Vec3) -> Vec3 {
         let normal = self.normal[v];
         let inset = 0.25 * self.laplacian[v].dot(normal);
-        x + normal * inset.clamp(-MOST_INSET, MOST_INSET)
+        x + normal * inset.clamp(-MAX_INSET, MAX_INSET)
     }
 
     /// Returns the absolute difference of Π over one voxel along the normal.
@@ -209,37 +213,37 @@ impl Forces {
     }
 
     /// Returns the largest normal part of rigidity that the image balances, so that no settled vertex is further than
-    /// 4/3 [`YIELD`] from the contour.
+    /// 4/3 [`MAX_RIGIDITY_OFFSET`] from the contour.
     #[inline]
-    fn hold_of_image(&self, v: usize, miss: f32, scale: &ForceScale) -> f32 {
-        scale.pull() * (YIELD * self.slope[v] + 0.25 * miss.abs())
+    fn rigidity_limit(&self, v: usize, iso_difference: f32, scale: &ForceScale) -> f32 {
+        scale.iso_stiffness() * (MAX_RIGIDITY_OFFSET * self.slope[v] + 0.25 * iso_difference.abs())
     }
 
     /// Returns a force with its tangential part faded out as the surface settles, faster than that of rigidity; used
     /// for attractors. Their tangential part would otherwise draw the surrounding vertices to a point, where they are
     /// collapsed, again and again.
-    fn without_slide(&self, v: usize, force: Vec3, velocity: Vec3, delta: f32) -> Vec3 {
+    fn fade_tangential(&self, v: usize, force: Vec3, velocity: Vec3, delta: f32) -> Vec3 {
         let normal = self.normal[v];
         let across = normal * force.dot(normal);
-        let speed = velocity.dot(normal) / (SLIDE_SPEED * delta);
+        let speed = velocity.dot(normal) / (FULL_TANGENTIAL_SPEED * delta);
         across + (force - across) * (speed * speed).min(1.0)
     }
 
     /// Returns π_I − Π(x), with x the mean position of the triangles at the vertex if the surface adapts to the image.
     #[inline]
-    fn miss(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
-        let p = if scale.yields { self.middle_of_star(v, x) } else { x };
+    fn iso_difference(&mut self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> f32 {
+        let p = if scale.adapts_to_image { self.mean_of_triangles(v, x) } else { x };
         scale.iso - image.intensity(p, scale.background, &mut self.cells[v])
     }
 
     /// Returns f_I = δ α_I (π_I − Π(x)) n (7).
     #[inline]
-    fn iso_attraction(&self, v: usize, miss: f32, scale: &ForceScale) -> Vec3 {
-        self.normal[v] * (scale.delta * scale.iso_force * miss)
+    fn iso_force(&self, v: usize, iso_difference: f32, scale: &ForceScale) -> Vec3 {
+        self.normal[v] * (scale.delta * scale.iso_force * iso_difference)
     }
 
     /// Returns f_∇I = δ ((α_g − β_g)(∇Π·n) n + β_g ∇Π) (8).
-    fn ridge_attraction(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> Vec3 {
+    fn gradient_force(&self, v: usize, x: Vec3, image: &LevelImage, scale: &ForceScale) -> Vec3 {
         let gradient = image.gradient(x, scale.gradient_bound);
         let normal = self.normal[v];
         (normal * (scale.gradient_across * gradient.dot(normal)) + gradient * scale.gradient_along)
@@ -276,8 +280,8 @@ fn springs(ring: &Ring, positions: &[Vec3], x: Vec3, rest: f32) -> Vec3 {
 }
 
 /// Returns the force of an attractor: a spring to its point that fades out smoothly at its radius.
-fn attraction(pull: &Pull, x: Vec3) -> Vec3 {
-    let offset = pull.point - x;
-    let far = (pull.in_radii * offset).length_squared();
-    if far >= 1.0 { Vec3::ZERO } else { offset * (pull.strength * (1.0 - far) * (1.0 - far)) }
+fn attraction(attractor: &LocalAttractor, x: Vec3) -> Vec3 {
+    let offset = attractor.point - x;
+    let far = (attractor.in_radii * offset).length_squared();
+    if far >= 1.0 { Vec3::ZERO } else { offset * (attractor.strength * (1.0 - far) * (1.0 - far)) }
 }

@@ -11,7 +11,7 @@ use crate::volume::{Grid, KnownCell, VectorGrid, Volume};
 pub(super) const REDUCTION: f64 = 1.732_050_807_568_877_2;
 
 /// The bound of the absolute value of normalised intensities; within it no force overflows.
-const FURTHEST: f64 = 100.0;
+const MAX_NORMALISED: f64 = 100.0;
 
 /// One level of the pyramid.
 #[derive(Clone, Debug)]
@@ -83,7 +83,7 @@ impl LevelImage {
     /// on opposite sides of it, per model unit; 0 if there are none.
     pub(super) fn steepness(&self, iso: f32) -> f32 {
         let (mut sum, mut count) = (0.0f64, 0usize);
-        self.for_each_passage(iso, |difference| {
+        self.for_each_iso_crossing(iso, |difference| {
             sum += f64::from(difference * difference);
             count += 1;
         });
@@ -93,9 +93,9 @@ impl LevelImage {
 
     /// Returns the steepness of the image at `iso` as [`Self::steepness`], but by the median, which a few edges much
     /// steeper than the others do not affect.
-    pub(super) fn ordinary_steepness(&self, iso: f32) -> f32 {
+    pub(super) fn median_steepness(&self, iso: f32) -> f32 {
         let mut differences = Vec::new();
-        self.for_each_passage(iso, |difference| differences.push(difference.abs()));
+        self.for_each_iso_crossing(iso, |difference| differences.push(difference.abs()));
         let middle = differences.len() / 2;
         if differences.is_empty() {
             return 0.0;
@@ -104,11 +104,11 @@ impl LevelImage {
     }
 
     /// Calls `visit` with the difference of each pair of neighbouring voxels on opposite sides of `iso`.
-    fn for_each_passage(&self, iso: f32, mut visit: impl FnMut(f32)) {
+    fn for_each_iso_crossing(&self, iso: f32, mut visit: impl FnMut(f32)) {
         let [nx, ny, nz] = self.grid.dims;
         let mut pass = |a: &[f32], b: &[f32]| {
-            let passages = a.iter().zip(b).filter(|&(&a, &b)| (a < iso) != (b < iso));
-            passages.for_each(|(&a, &b)| visit(a - b));
+            let crossings = a.iter().zip(b).filter(|&(&a, &b)| (a < iso) != (b < iso));
+            crossings.for_each(|(&a, &b)| visit(a - b));
         };
         let rows: Vec<&[f32]> = self.grid.values.chunks_exact(nx).collect();
         for (k, row) in rows.iter().enumerate() {
@@ -165,9 +165,9 @@ impl Pyramid {
         Ok(Self { levels, low: volume.range()[0], range: volume.span() })
     }
 
-    /// Normalises an intensity to the range of the volume, 0..1. Values outside are clamped to ±[`FURTHEST`].
+    /// Normalises an intensity to the range of the volume, 0..1. Values outside are clamped to ±[`MAX_NORMALISED`].
     pub(super) fn normalised(&self, intensity: f64) -> f32 {
-        ((intensity - self.low) / self.range).clamp(-FURTHEST, FURTHEST) as f32
+        ((intensity - self.low) / self.range).clamp(-MAX_NORMALISED, MAX_NORMALISED) as f32
     }
 
     /// Returns the dimensions of the finest level in voxels.

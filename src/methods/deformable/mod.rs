@@ -44,12 +44,12 @@
 
 mod awake;
 mod coarse;
-mod contact;
 mod contour;
 mod coverage;
 mod domain;
 mod forces;
 mod image;
+mod image_guide;
 mod motion;
 mod params;
 mod renewal;
@@ -70,11 +70,11 @@ use crate::remesh::{Changes, Resolver, Sampling};
 use crate::volume::Volume;
 use contour::ObjectIs;
 use domain::Domain;
-use forces::{Field, ForceScale, Pull};
+use forces::{Field, ForceScale, LocalAttractor};
 use image::Pyramid;
-use motion::{Motion, Movement, World};
-use schedule::Rest;
-use start::{Frame, on_contour};
+use motion::{Motion, MotionContext, SpeedSummary};
+use schedule::Convergence;
+use start::{StartContext, contour_mesh};
 use std::ops::RangeInclusive;
 
 /// Options for creating a [`DeformableModel`].
@@ -123,8 +123,8 @@ const DEFAULT_DELTA: f64 = 0.9;
 const DELTA_RANGE: RangeInclusive<f64> = 0.2..=20.0;
 
 /// The largest strength of an attractor, and its largest radius and coordinate in voxels; beyond them, forces overflow.
-const STRONGEST: f64 = 1e3;
-const FURTHEST: f64 = 1e6;
+const MAX_STRENGTH: f64 = 1e3;
+const MAX_ATTRACTOR_DISTANCE: f64 = 1e6;
 
 /// The distance in δ that a vertex travels before its edge bounds and contacts are checked again.
 const CHECK_TRAVEL: f32 = 0.1;
@@ -141,11 +141,11 @@ const LEAST_OCCUPANCY: f32 = 0.7;
 struct Keys {
     velocity: VectorKey,
     /// The position at the last check of edge bounds and contacts.
-    checked: VectorKey,
+    checked_position: VectorKey,
     /// The number of still iterations in a row; from [`awake::PATIENCE`] on the vertex sleeps.
-    still: ScalarKey,
+    still_iterations: ScalarKey,
     /// The number of iterations since an edit made or displaced the vertex.
-    calm: ScalarKey,
+    since_edit: ScalarKey,
     /// The decaying count of recent reversals of the velocity along the normal.
     reversals: ScalarKey,
     /// The size of the vertex less 1: the local δ is δ · (1 + this).
@@ -169,14 +169,14 @@ pub struct DeformableModel {
     /// π_I on this level, normalised to the range of the volume.
     level_iso: f32,
     /// The factor by which α_I is multiplied on this level.
-    gain: f32,
+    image_force_factor: f32,
     mesh: Mesh,
     keys: Keys,
     resolver: Resolver,
     motion: Motion,
     iteration: u32,
-    rest: Rest,
-    movement: Movement,
+    convergence: Convergence,
+    speed: SpeedSummary,
     components: u32,
     clock: fn() -> f64,
 }
@@ -194,7 +194,7 @@ impl DeformableModel {
         let pyramid = Pyramid::new(volume, options.frame, options.levels)?;
         let delta = delta_at(finest_delta, options.levels);
         let domain = Domain::new(volume.dims(), delta);
-        let frame = Frame {
+        let context = StartContext {
             image: &pyramid.levels[options.levels],
             brighter_than: (params.iso_force < 0.0).then(|| coarse::iso(&pyramid, &params, options.levels)),
             iso: pyramid.normalised(params.iso),
@@ -205,23 +205,23 @@ impl DeformableModel {
             from_world: volume.inverse_affine(),
             spacing: volume.spacing(),
             sampling: Sampling::new(delta),
-            may_be_empty: params.yields_to_image() && params.seeding != Seeding::Off,
+            may_be_empty: params.adapts_to_image() && params.seeding != Seeding::Off,
         };
         let from_contour = options.start == Start::Contour;
-        let contour = if from_contour { on_contour(&frame)? } else { None };
+        let contour = if from_contour { contour_mesh(&context)? } else { None };
         let begins_on_contour = contour.is_some();
         let mut mesh = match contour {
             Some(mesh) => mesh,
             None => {
-                let guide = contact::guide(frame.image, frame.iso, &params);
-                options.start.make(&frame, |value| pyramid.normalised(value), &*guide)?
+                let guide = image_guide::guide(context.image, context.iso, &params);
+                options.start.make(&context, |value| pyramid.normalised(value), &*guide)?
             }
         };
         let keys = Keys {
             velocity: mesh.add_vector(),
-            checked: mesh.add_vector(),
-            still: mesh.add_scalar(),
-            calm: mesh.add_scalar(),
+            checked_position: mesh.add_vector(),
+            still_iterations: mesh.add_scalar(),
+            since_edit: mesh.add_scalar(),
             reversals: mesh.add_scalar(),
             size: mesh.add_scalar(),
         };
@@ -237,14 +237,14 @@ impl DeformableModel {
             finest_delta,
             level: options.levels,
             level_iso: 0.0,
-            gain: 1.0,
+            image_force_factor: 1.0,
             mesh,
             keys,
             resolver: Resolver::with_room_for(domain.most_vertices(delta_at(finest_delta, 0))),
             motion: Motion::default(),
             iteration: 0,
-            rest: Rest::default(),
-            movement: Movement::default(),
+            convergence: Convergence::default(),
+            speed: SpeedSummary::default(),
             components: 0,
             clock: || 0.0,
         };
@@ -257,7 +257,7 @@ impl DeformableModel {
         }
         model.mark_checked();
         // No edit has displaced vertices recently.
-        model.mesh.scalar_mut(keys.calm).fill(motion::CALM);
+        model.mesh.scalar_mut(keys.since_edit).fill(motion::ITERATIONS_AFTER_EDIT);
         Ok(model)
     }
 
@@ -278,7 +278,7 @@ impl DeformableModel {
                 changes += self.restore_bounds(&active, &mut times);
             }
             self.iteration += 1;
-            changes += self.come_to_rest(&mut times)?;
+            changes += self.update_convergence(&mut times)?;
             self.count_components(changes);
             if let Some(most) = self.resolver.take_overflow() {
                 return Err(MethodError::TooManyVertices { most });
@@ -289,36 +289,39 @@ impl DeformableModel {
 
     fn move_vertices(&mut self, times: &mut Times) {
         let begin = (self.clock)();
-        let examines = std::mem::take(&mut self.rest.examines);
-        self.motion.prepare(&self.mesh, self.keys, examines);
+        let examine_all = std::mem::take(&mut self.convergence.examine_next);
+        self.motion.prepare(&self.mesh, self.keys, examine_all);
         let normals = (self.clock)();
         let delta = self.model_delta();
-        let pulls = self.pulls();
-        let gain = match self.params.integrator {
-            Integrator::Implicit => self.gain,
-            _ => coarse::left_of(self.gain, self.iteration.saturating_sub(self.rest.began)),
+        let attractors = self.local_attractors();
+        let image_force_factor = match self.params.integrator {
+            Integrator::Implicit => self.image_force_factor,
+            _ => coarse::decayed(
+                self.image_force_factor,
+                self.iteration.saturating_sub(self.convergence.began),
+            ),
         };
-        let world = World {
+        let context = MotionContext {
             field: Field {
                 image: &self.pyramid.levels[self.level],
-                scale: ForceScale::new(&self.params, [self.level_iso, gain], self.voxel, delta),
-                pulls: &pulls,
+                scale: ForceScale::new(&self.params, [self.level_iso, image_force_factor], self.voxel, delta),
+                attractors: &attractors,
             },
             domain: self.domain,
             params: &self.params,
             delta,
-            examines,
+            examine_all,
             clock: self.clock,
         };
         let (clock, mut embedding) = (self.clock, 0.0);
-        let carry = |mesh: &mut Mesh, moving: &[VertexId], displacements: &mut [Vec3]| {
+        let displace = |mesh: &mut Mesh, moving: &[VertexId], displacements: &mut [Vec3]| {
             let begin = clock();
             let held = self.resolver.carry_some(mesh, Sampling::new(delta), moving, displacements);
             embedding = clock() - begin;
             held
         };
-        self.movement = self.motion.advance(&mut self.mesh, self.keys, &world, carry);
-        let forces = std::mem::take(&mut self.motion.forces.spent);
+        self.speed = self.motion.advance(&mut self.mesh, self.keys, &context, displace);
+        let forces = std::mem::take(&mut self.motion.forces.milliseconds);
         times.add("normals", normals - begin);
         times.add("forces", forces);
         times.add("embedding", embedding);
@@ -330,13 +333,13 @@ impl DeformableModel {
     fn vertices_to_check(&mut self) -> Vec<VertexId> {
         let limit = CHECK_TRAVEL * self.model_delta();
         let turn = self.iteration as usize % CHECK_PERIOD;
-        let checked = self.mesh.vector(self.keys.checked);
+        let checked = self.mesh.vector(self.keys.checked_position);
         let travelled = |v: VertexId| checked[v.index()].distance_squared(self.mesh.position(v));
         let moving = self.motion.awake.moving.iter().copied();
         let mut active: Vec<VertexId> = moving.filter(|&v| travelled(v) > limit * limit).collect();
         let in_turn = (turn..self.mesh.slots()).step_by(CHECK_PERIOD).map(VertexId::from_index);
         active.extend(in_turn.filter(|&v| self.mesh.is_live(v) && travelled(v) > 0.0));
-        let (positions, checked) = self.mesh.positions_and_vector_mut(self.keys.checked);
+        let (positions, checked) = self.mesh.positions_and_vector_mut(self.keys.checked_position);
         active.iter().for_each(|v| checked[v.index()] = positions[v.index()]);
         active
     }
@@ -347,12 +350,12 @@ impl DeformableModel {
         let sampling = self.sampling();
         let changes = {
             let image = &self.pyramid.levels[self.level];
-            let guide = contact::guide(image, self.level_iso, &self.params);
+            let guide = image_guide::guide(image, self.level_iso, &self.params);
             self.resolver.resolve_guided(&mut self.mesh, sampling, active, &*guide)
         };
-        let calm = self.mesh.scalar_mut(self.keys.calm);
-        self.resolver.edited().iter().for_each(|v| calm[v.index()] = 0.0);
-        let (rings, still) = self.mesh.rings_and_scalar_mut(self.keys.still);
+        let since_edit = self.mesh.scalar_mut(self.keys.since_edit);
+        self.resolver.edited().iter().for_each(|v| since_edit[v.index()] = 0.0);
+        let (rings, still) = self.mesh.rings_and_scalar_mut(self.keys.still_iterations);
         for v in self.resolver.edited().iter().map(|v| v.index()) {
             still[v] = 0.0;
             rings[v].as_slice().iter().for_each(|w| still[w.index()] = 0.0);
@@ -397,7 +400,7 @@ impl DeformableModel {
     /// Marks every vertex as checked, and counts the components.
     fn mark_checked(&mut self) {
         let positions = self.mesh.positions().to_vec();
-        self.mesh.vector_mut(self.keys.checked).copy_from_slice(&positions);
+        self.mesh.vector_mut(self.keys.checked_position).copy_from_slice(&positions);
         self.components = self.mesh.component_count() as u32;
     }
 
@@ -408,7 +411,7 @@ impl DeformableModel {
             done,
             phase: if done { "done".into() } else { format!("level {}", self.level) },
             progress: self.progress(),
-            residual: self.movement.energy,
+            residual: self.speed.energy,
             tolerance: self.params.energy_tolerance,
             vertices: self.mesh.vertex_count() as u32,
             triangles: self.mesh.triangle_count() as u32,
@@ -447,13 +450,13 @@ impl DeformableModel {
     pub fn set_attractors(&mut self, attractors: Vec<Attractor>) -> Result<(), MethodError> {
         let from_world = self.to_world.inverse();
         for (i, a) in attractors.iter().enumerate() {
-            let local = from_world.transform_point3(a.point) / FURTHEST;
-            let radius = a.radius / (FURTHEST * self.voxel);
-            let fits = local.abs().max_element() <= 1.0 && a.strength.abs() <= STRONGEST;
+            let local = from_world.transform_point3(a.point) / MAX_ATTRACTOR_DISTANCE;
+            let radius = a.radius / (MAX_ATTRACTOR_DISTANCE * self.voxel);
+            let fits = local.abs().max_element() <= 1.0 && a.strength.abs() <= MAX_STRENGTH;
             if !(fits && local.is_finite() && radius > 0.0 && radius <= 1.0) {
                 let problem = format!(
-                    "attractor {i} needs a strength of {STRONGEST} at most, a positive radius, and both radius and \
-                     point within {FURTHEST} voxels"
+                    "attractor {i} needs a strength of {MAX_STRENGTH} at most, a positive radius, and both radius and \
+                     point within {MAX_ATTRACTOR_DISTANCE} voxels"
                 );
                 return Err(MethodError::invalid("attractors", problem));
             }
@@ -463,9 +466,9 @@ impl DeformableModel {
         Ok(())
     }
 
-    fn pulls(&self) -> Vec<Pull> {
+    fn local_attractors(&self) -> Vec<LocalAttractor> {
         let from_world = self.to_world.inverse();
-        let local = |a: &Attractor| Pull {
+        let local = |a: &Attractor| LocalAttractor {
             point: from_world.transform_point3(a.point).as_vec3(),
             strength: a.strength as f32,
             in_radii: (self.to_world.matrix3 * (1.0 / a.radius)).as_mat3(),
@@ -485,7 +488,7 @@ impl DeformableModel {
             coarse::iso(&self.pyramid, &self.params, self.level)
         };
         let here = [self.level_iso, self.model_delta()];
-        self.gain = coarse::gain(&self.pyramid, &self.params, self.level, here);
+        self.image_force_factor = coarse::gain(&self.pyramid, &self.params, self.level, here);
         Ok(())
     }
 
@@ -521,8 +524,8 @@ impl DeformableModel {
         let velocities = self.mesh.vector(self.keys.velocity);
         let steps = self.params.step_length() / self.params.time_step;
         let along = |(v, normal): (VertexId, Vec3)| {
-            let way = self.to_world.matrix3 * velocities[v.index()].as_dvec3();
-            (steps * way.dot(normal.as_dvec3())) as f32
+            let velocity = self.to_world.matrix3 * velocities[v.index()].as_dvec3();
+            (steps * velocity.dot(normal.as_dvec3())) as f32
         };
         self.mesh.vertices().zip(normals).map(along).collect()
     }

@@ -1,7 +1,7 @@
 //! Integration of the law of motion m ẍ + γ ẋ = f (4) over one iteration.
 
 use super::Keys;
-use super::awake::{Awake, PATIENCE, stillness};
+use super::awake::{Awake, ITERATIONS_TO_SLEEP, stillness};
 use super::domain::Domain;
 use super::forces::{Field, Forces};
 use super::params::{DeformableParams, Integrator};
@@ -10,7 +10,7 @@ use crate::mesh::{Mesh, VertexId};
 
 /// The speed of the mesh in one iteration, by which convergence is judged.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Movement {
+pub(super) struct SpeedSummary {
     /// The mean of ½ m (v·n)² / δ², the criterion of section 5.1.
     pub(super) energy: f64,
     /// The largest speed along a normal, in δ per unit of time, of vertices that no edit displaced recently. Edits
@@ -19,18 +19,18 @@ pub(super) struct Movement {
 }
 
 /// The number of iterations that a vertex needs to return after an edit.
-pub(super) const CALM: f32 = 6.0;
+pub(super) const ITERATIONS_AFTER_EDIT: f32 = 6.0;
 
 /// The number of still iterations counted in addition for a vertex that could not move at all: it is pressed against
 /// others and will not move in the next iteration either.
-const STUCK: f32 = 2.0;
+const STILL_IF_STUCK: f32 = 2.0;
 
 /// The number of still iterations that one long step counts as.
-const LONG_STEP: f32 = 2.0;
+const STILL_PER_IMPLICIT_STEP: f32 = 2.0;
 
 /// The speed above which a vertex wakes its neighbours, in multiples of the largest speed of a still vertex. A
 /// neighbour of valence six moves by at most a sixth of the displacement.
-const WAKING: f32 = 4.0;
+const WAKING_SPEED: f32 = 4.0;
 
 /// The stiffness of f_c and f_e against displacing a vertex of valence 6 from its neighbours, in α_c and α_e.
 const BENDING_STIFFNESS: f32 = 1.3;
@@ -38,21 +38,21 @@ const STRETCHING_STIFFNESS: f32 = 6.0;
 
 /// The share of its speed that a vertex must keep for a reversal to be counted; weaker oscillations decay by
 /// themselves.
-const UNDAMPED: f32 = 0.5;
+const MIN_KEPT_SPEED: f32 = 0.5;
 
 /// The decrease of the count of reversals in an iteration without one: oscillations with periods of up to eight
 /// iterations accumulate.
 const REVERSAL_DECAY: f32 = 0.25;
 
 /// The image, parameters and constraints that act on the mesh in one iteration.
-pub(super) struct World<'a> {
+pub(super) struct MotionContext<'a> {
     pub(super) field: Field<'a>,
     /// The region in which vertices must stay.
     pub(super) domain: Domain,
     pub(super) params: &'a DeformableParams,
     pub(super) delta: f32,
     /// Whether all vertices are examined: the forces on all are evaluated, and only those that have not settled move.
-    pub(super) examines: bool,
+    pub(super) examine_all: bool,
     pub(super) clock: fn() -> f64,
 }
 
@@ -66,48 +66,48 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// Selects the vertices to process, those awake or all if `examines`, and computes normals and L around them.
-    pub(super) fn prepare(&mut self, mesh: &Mesh, keys: Keys, examines: bool) {
-        self.awake.find(mesh, keys.still, examines);
-        self.forces.update_normals(mesh.rings(), mesh.positions(), &self.awake.around);
+    /// Selects the vertices to process, those awake or all if `examine_all`, and computes normals and L around them.
+    pub(super) fn prepare(&mut self, mesh: &Mesh, keys: Keys, examine_all: bool) {
+        self.awake.find(mesh, keys.still_iterations, examine_all);
+        self.forces.update_normals(mesh.rings(), mesh.positions(), &self.awake.with_neighbours);
         self.displacements.resize(mesh.slots(), Vec3::ZERO);
     }
 
-    /// Moves the vertices by one time step as far as `carry` allows; needs [`Self::prepare`] for the current mesh.
+    /// Moves the vertices by one time step as far as `displace` allows; needs [`Self::prepare`] for the current mesh.
     ///
-    /// `carry` moves vertices by displacements, given by slot, and replaces these by the ones applied. It returns the
+    /// `displace` moves vertices by displacements, given by slot, and replaces these by the ones applied. It returns the
     /// vertices held back, each with the share of its displacement that it moved by.
     pub(super) fn advance(
         &mut self,
         mesh: &mut Mesh,
         keys: Keys,
-        world: &World,
-        carry: impl FnOnce(&mut Mesh, &[VertexId], &mut [Vec3]) -> Vec<(VertexId, f32)>,
-    ) -> Movement {
-        match world.params.integrator {
-            Integrator::Euler => self.euler(mesh, keys, world),
-            Integrator::RungeKutta => self.runge_kutta(mesh, keys, world),
-            Integrator::Implicit => self.implicit(mesh, keys, world),
+        context: &MotionContext,
+        displace: impl FnOnce(&mut Mesh, &[VertexId], &mut [Vec3]) -> Vec<(VertexId, f32)>,
+    ) -> SpeedSummary {
+        match context.params.integrator {
+            Integrator::Euler => self.euler(mesh, keys, context),
+            Integrator::RungeKutta => self.runge_kutta(mesh, keys, context),
+            Integrator::Implicit => self.implicit(mesh, keys, context),
         }
-        if world.examines {
-            self.wake_those_not_at_rest(mesh, keys, world);
+        if context.examine_all {
+            self.wake_unsettled(mesh, keys, context);
         }
-        self.bound(mesh, keys, world);
-        let held = carry(mesh, &self.awake.moving, &mut self.displacements);
+        self.clamp_displacements(mesh, keys, context);
+        let held = displace(mesh, &self.awake.moving, &mut self.displacements);
         let velocities = mesh.vector_mut(keys.velocity);
         held.iter().for_each(|&(v, share)| velocities[v.index()] *= share);
         let stuck = held.iter().filter(|(_, share)| *share == 0.0);
-        let still = mesh.scalar_mut(keys.still);
-        stuck.for_each(|(v, _)| still[v.index()] += STUCK);
-        let movement = self.measure(mesh, keys, world);
+        let still = mesh.scalar_mut(keys.still_iterations);
+        stuck.for_each(|(v, _)| still[v.index()] += STILL_IF_STUCK);
+        let summary = self.measure(mesh, keys, context);
         self.awake.moving.iter().for_each(|v| self.displacements[v.index()] = Vec3::ZERO);
-        movement
+        summary
     }
 
     /// Computes velocities and displacements by semi-implicit Euler: the new velocity moves the vertex.
-    fn euler(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
-        self.act(mesh, mesh.positions(), mesh.vector(keys.velocity), world);
-        let &DeformableParams { time_step, mass, damping, .. } = world.params;
+    fn euler(&mut self, mesh: &mut Mesh, keys: Keys, context: &MotionContext) {
+        self.evaluate_forces(mesh, mesh.positions(), mesh.vector(keys.velocity), context);
+        let &DeformableParams { time_step, mass, damping, .. } = context.params;
         let (step, damping) = (time_step as f32 / mass as f32, damping as f32);
         let velocities = mesh.vector_mut(keys.velocity);
         for i in self.awake.moving.iter().map(|v| v.index()) {
@@ -123,12 +123,12 @@ impl Motion {
     /// Near steps of the image, or where edits displace them repeatedly, vertices would oscillate for ever. After n
     /// recent reversals a vertex moves by 1/(n + 1) of its displacement, so it settles at the mean (Kesten,
     /// *Accelerated stochastic approximation*, 1958).
-    fn implicit(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
-        self.act(mesh, mesh.positions(), mesh.vector(keys.velocity), world);
-        let &DeformableParams { mass, damping, rigidity, stiffness, .. } = world.params;
-        let (step, mass, damping) = (world.params.step_length() as f32, mass as f32, damping as f32);
+    fn implicit(&mut self, mesh: &mut Mesh, keys: Keys, context: &MotionContext) {
+        self.evaluate_forces(mesh, mesh.positions(), mesh.vector(keys.velocity), context);
+        let &DeformableParams { mass, damping, rigidity, stiffness, .. } = context.params;
+        let (step, mass, damping) = (context.params.step_length() as f32, mass as f32, damping as f32);
         let internal = BENDING_STIFFNESS * rigidity as f32 + STRETCHING_STIFFNESS * stiffness as f32;
-        let pull = world.field.scale.pull();
+        let pull = context.field.scale.iso_stiffness();
         let (velocities, reversals) = mesh.vector_and_scalar_mut(keys.velocity, keys.reversals);
         for i in self.awake.moving.iter().map(|v| v.index()) {
             let k = pull * self.forces.slope[i] + internal;
@@ -143,43 +143,49 @@ impl Motion {
     }
 
     /// Computes velocities and displacements by the classical fourth-order Runge–Kutta method.
-    fn runge_kutta(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
-        let &DeformableParams { time_step, mass, damping, .. } = world.params;
+    fn runge_kutta(&mut self, mesh: &mut Mesh, keys: Keys, context: &MotionContext) {
+        let &DeformableParams { time_step, mass, damping, .. } = context.params;
         let (step, mass, damping) = (time_step as f32, mass as f32, damping as f32);
         let (x0, v0) = (mesh.positions().to_vec(), mesh.vector(keys.velocity).to_vec());
         let normals = self.forces.normal.clone();
         let (mut x, mut v) = (x0.clone(), v0.clone());
-        let mut gain = vec![Vec3::ZERO; x.len()];
+        let mut velocity_change = vec![Vec3::ZERO; x.len()];
         for (stage, (weight, ahead)) in
             [(1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)].into_iter().enumerate()
         {
             if stage > 0 {
-                self.forces.update_normals(mesh.rings(), &x, &self.awake.around);
+                self.forces.update_normals(mesh.rings(), &x, &self.awake.with_neighbours);
             }
-            self.act(mesh, &x, &v, world);
+            self.evaluate_forces(mesh, &x, &v, context);
             for i in self.awake.moving.iter().map(|v| v.index()) {
                 let acceleration = (self.forces.force[i] - v[i] * damping) * (1.0 / mass);
                 self.displacements[i] += v[i] * (weight * step / 6.0);
-                gain[i] += acceleration * (weight * step / 6.0);
+                velocity_change[i] += acceleration * (weight * step / 6.0);
                 x[i] = x0[i] + v[i] * (ahead * step);
                 v[i] = v0[i] + acceleration * (ahead * step);
             }
         }
         self.forces.normal = normals;
         let velocities = mesh.vector_mut(keys.velocity);
-        self.awake.moving.iter().map(|v| v.index()).for_each(|i| velocities[i] += gain[i]);
+        self.awake.moving.iter().map(|v| v.index()).for_each(|i| velocities[i] += velocity_change[i]);
     }
 
     /// Evaluates the forces on the moving vertices at given positions, with the current normals.
-    fn act(&mut self, mesh: &Mesh, positions: &[Vec3], velocities: &[Vec3], world: &World) {
-        let begin = (world.clock)();
-        self.forces.evaluate(mesh.rings(), positions, velocities, &world.field, &self.awake.moving);
-        self.forces.spent += (world.clock)() - begin;
+    fn evaluate_forces(
+        &mut self,
+        mesh: &Mesh,
+        positions: &[Vec3],
+        velocities: &[Vec3],
+        context: &MotionContext,
+    ) {
+        let begin = (context.clock)();
+        self.forces.evaluate(mesh.rings(), positions, velocities, &context.field, &self.awake.moving);
+        self.forces.milliseconds += (context.clock)() - begin;
     }
 
     /// Shortens displacements that are too long or leave the domain, and scales the velocities accordingly.
-    fn bound(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
-        let &World { domain, params, delta, .. } = world;
+    fn clamp_displacements(&mut self, mesh: &mut Mesh, keys: Keys, context: &MotionContext) {
+        let &MotionContext { domain, params, delta, .. } = context;
         let limit = params.max_move as f32 * delta;
         for i in self.awake.moving.iter().map(|v| v.index()) {
             let displacement = &mut self.displacements[i];
@@ -190,7 +196,7 @@ impl Motion {
             }
             let from = mesh.positions()[i];
             if !domain.bounds.contains(from + *displacement) {
-                *displacement = domain.hold(from + *displacement) - from;
+                *displacement = domain.clamp(from + *displacement) - from;
                 mesh.vector_mut(keys.velocity)[i] = *displacement * (1.0 / params.step_length() as f32);
             }
         }
@@ -198,9 +204,9 @@ impl Motion {
 
     /// Keeps as moving, and wakes, the examined vertices whose displacement exceeds that of a still vertex; stops the
     /// others.
-    fn wake_those_not_at_rest(&mut self, mesh: &mut Mesh, keys: Keys, world: &World) {
-        let stillness = stillness(world.params.mass, world.params.energy_tolerance);
-        let least = stillness * world.params.step_length() as f32 * world.delta;
+    fn wake_unsettled(&mut self, mesh: &mut Mesh, keys: Keys, context: &MotionContext) {
+        let stillness = stillness(context.params.mass, context.params.energy_tolerance);
+        let least = stillness * context.params.step_length() as f32 * context.delta;
         let Self { awake, forces, displacements, .. } = self;
         awake.moving.retain(|v| {
             let i = v.index();
@@ -211,35 +217,36 @@ impl Motion {
             }
             is_about_to_move
         });
-        let still = mesh.scalar_mut(keys.still);
+        let still = mesh.scalar_mut(keys.still_iterations);
         awake.moving.iter().for_each(|v| still[v.index()] = 0.0);
     }
 
     /// Measures energy and largest speed, counts still iterations, and wakes fast vertices with their neighbours.
-    fn measure(&self, mesh: &mut Mesh, keys: Keys, world: &World) -> Movement {
-        let per_time = 1.0 / (world.params.step_length() as f32 * world.delta);
-        let stillness = stillness(world.params.mass, world.params.energy_tolerance);
-        let counted = if world.params.integrator == Integrator::Implicit { LONG_STEP } else { 1.0 };
-        let mut movement = Movement::default();
+    fn measure(&self, mesh: &mut Mesh, keys: Keys, context: &MotionContext) -> SpeedSummary {
+        let per_time = 1.0 / (context.params.step_length() as f32 * context.delta);
+        let stillness = stillness(context.params.mass, context.params.energy_tolerance);
+        let counted =
+            if context.params.integrator == Integrator::Implicit { STILL_PER_IMPLICIT_STEP } else { 1.0 };
+        let mut summary = SpeedSummary::default();
         for &v in &self.awake.moving {
             let i = v.index();
             let along = (self.displacements[i].dot(self.forces.normal[i]) * per_time).abs();
-            movement.energy += f64::from(along) * f64::from(along);
-            let calm = &mut mesh.scalar_mut(keys.calm)[i];
-            if along > movement.fastest && *calm >= CALM {
-                movement.fastest = along;
+            summary.energy += f64::from(along) * f64::from(along);
+            let since_edit = &mut mesh.scalar_mut(keys.since_edit)[i];
+            if along > summary.fastest && *since_edit >= ITERATIONS_AFTER_EDIT {
+                summary.fastest = along;
             }
-            *calm += 1.0;
-            if along > WAKING * stillness {
+            *since_edit += 1.0;
+            if along > WAKING_SPEED * stillness {
                 wake(mesh, keys, v);
             } else if along > stillness {
-                mesh.scalar_mut(keys.still)[i] = 0.0;
+                mesh.scalar_mut(keys.still_iterations)[i] = 0.0;
             } else {
                 count_still(mesh, keys, v, counted);
             }
         }
-        movement.energy *= 0.5 * world.params.mass / mesh.vertex_count().max(1) as f64;
-        movement
+        summary.energy *= 0.5 * context.params.mass / mesh.vertex_count().max(1) as f64;
+        summary
     }
 }
 
@@ -249,22 +256,22 @@ fn count_reversals(reversals: f32, before: f32, after: f32) -> f32 {
     if before * after >= 0.0 {
         return higher(reversals - REVERSAL_DECAY, 0.0);
     }
-    let is_undamped = after.abs() > UNDAMPED * before.abs();
+    let is_undamped = after.abs() > MIN_KEPT_SPEED * before.abs();
     if is_undamped { reversals + 1.0 } else { reversals }
 }
 
 /// Wakes a vertex and its neighbours.
 fn wake(mesh: &mut Mesh, keys: Keys, v: VertexId) {
-    let (rings, still) = mesh.rings_and_scalar_mut(keys.still);
+    let (rings, still) = mesh.rings_and_scalar_mut(keys.still_iterations);
     still[v.index()] = 0.0;
     rings[v.index()].as_slice().iter().for_each(|w| still[w.index()] = 0.0);
 }
 
 /// Adds to the still iterations of a vertex; once there are enough it sleeps, and its velocity is set to zero.
 fn count_still(mesh: &mut Mesh, keys: Keys, v: VertexId, iterations: f32) {
-    let still = &mut mesh.scalar_mut(keys.still)[v.index()];
+    let still = &mut mesh.scalar_mut(keys.still_iterations)[v.index()];
     *still += iterations;
-    if *still >= PATIENCE {
+    if *still >= ITERATIONS_TO_SLEEP {
         mesh.vector_mut(keys.velocity)[v.index()] = Vec3::ZERO;
     }
 }

@@ -51,7 +51,7 @@ pub struct DeformableParams {
 
 /// The step of the implicit integrator, in time steps. With 4 it takes twice as many iterations; with 64, fronts that
 /// meet pass by openings before they settle.
-const LONG_STEP: f64 = 16.0;
+const IMPLICIT_STEP: f64 = 16.0;
 
 /// The rest length of the edges as springs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,20 +109,20 @@ impl DeformableParams {
 
     /// Returns the parameters of the paper: uniform δ and rigidity, contact by distance alone, its law of motion; the
     /// others have their defaults.
-    pub fn of_paper(volume: &Volume) -> Self {
+    pub fn as_published(volume: &Volume) -> Self {
         Self { adaptivity: 0.0, integrator: Integrator::Euler, ..Self::for_volume(volume) }
     }
 
     /// Returns the time that passes in one iteration: Δt, or the long step of the implicit integrator.
     pub(super) fn step_length(&self) -> f64 {
         match self.integrator {
-            Integrator::Implicit => LONG_STEP * self.time_step,
+            Integrator::Implicit => IMPLICIT_STEP * self.time_step,
             Integrator::Euler | Integrator::RungeKutta => self.time_step,
         }
     }
 
     /// Whether sampling, topology and rigidity adapt to the image.
-    pub(super) fn yields_to_image(&self) -> bool {
+    pub(super) fn adapts_to_image(&self) -> bool {
         self.iso_force != 0.0 && self.adaptivity > 0.0
     }
 

@@ -12,7 +12,7 @@ use crate::methods::MethodError;
 use crate::spatial::TriangleTree;
 
 /// The distance from the mesh, in voxels of the finer level, above which the mesh lacks a point of the contour.
-const REACH: f32 = 1.0;
+const COVERED_DISTANCE: f32 = 1.0;
 
 /// The components to replace on a level change.
 #[derive(Default)]
@@ -36,7 +36,8 @@ impl DeformableModel {
         let image = &self.pyramid.levels[level];
         let iso = self.pyramid.normalised(self.params.iso);
         let contour = contour(image, iso, object, self.params.smallest_part)?;
-        let (stale, fresh) = self.incomplete(&contour, REACH / image.voxels_per_unit())?;
+        let (stale, fresh) =
+            self.components_to_replace(&contour, COVERED_DISTANCE / image.voxels_per_unit())?;
         if fresh.triangles.is_empty() {
             return Ok(Renewal::default());
         }
@@ -46,12 +47,12 @@ impl DeformableModel {
 
     /// Returns a vertex of each component of the mesh to remove, and the components of the contour that replace them.
     ///
-    /// Components of mesh and contour within `reach` of each other form groups. Groups with a point of the contour
-    /// further than `reach` from the mesh are replaced; components of the mesh near no contour are removed, too.
-    fn incomplete(
+    /// Components of mesh and contour within `covered_distance` of each other form groups. Groups with a point of the contour
+    /// further than `covered_distance` from the mesh are replaced; components of the mesh near no contour are removed, too.
+    fn components_to_replace(
         &self,
         contour: &TriangleMesh,
-        reach: f32,
+        covered_distance: f32,
     ) -> Result<(Vec<VertexId>, TriangleMesh), MethodError> {
         let surface = self.mesh.to_triangles();
         let tree = TriangleTree::new(&surface)?;
@@ -63,7 +64,7 @@ impl DeformableModel {
         let mut near = Vec::new();
         let label = |t: u32| part_of_surface[surface.triangles[t as usize][0] as usize];
         for (&p, &part) in contour.positions.iter().zip(&part_of_contour) {
-            tree.labels_within(p, f64::from(reach), label, &mut near);
+            tree.labels_within(p, f64::from(covered_distance), label, &mut near);
             is_left_out[part as usize] |= near.is_empty();
             near.iter().for_each(|&other| groups.join(part as usize, first + other as usize));
         }

@@ -1,7 +1,7 @@
 //! Convergence of a level, and the descent to the next (section 5.1, figures 12 and 13).
 
 use super::renewal::Renewal;
-use super::{DeformableModel, DeformableParams, Integrator, Topology, contact};
+use super::{DeformableModel, DeformableParams, Integrator, Topology, image_guide};
 use crate::mesh::VertexId;
 use crate::methods::{MethodError, Times};
 use crate::remesh::{Changes, Sampling};
@@ -19,23 +19,23 @@ const MOST_QUIET_ITERATIONS: f64 = 500.0;
 
 /// The largest speed in a converged surface, in δ per unit of time. The mean energy hides a few moving vertices, such
 /// as a front in a hole; without this bound the model would stop before the front has passed.
-const REST_SPEED: f32 = 0.03;
+const SETTLED_SPEED: f32 = 0.03;
 
 /// The largest number of searches of the finest level for missing parts.
 const MOST_SEARCHES: u32 = 3;
 
 /// The largest displacement in one iteration of a converged surface, in δ.
-const REST_MOVE: f32 = 0.1;
+const SETTLED_DISPLACEMENT: f32 = 0.1;
 
 /// The state of convergence on the current level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Rest {
+pub(super) struct Convergence {
     quiet: u32,
     /// Whether all vertices have been examined since the surface was first quiet on this level, or since parts were
     /// seeded.
-    examined: bool,
+    was_examined: bool,
     /// Whether the next iteration evaluates the forces on all vertices, asleep or not.
-    pub(super) examines: bool,
+    pub(super) examine_next: bool,
     done: bool,
     /// The number of searches of the finest level for missing parts; [`MOST_SEARCHES`] once a search found none.
     searches: u32,
@@ -50,57 +50,57 @@ pub(super) struct Rest {
 
 impl DeformableModel {
     pub(super) fn is_done(&self) -> bool {
-        self.rest.done
+        self.convergence.done
     }
 
     /// Returns the progress of the run from 0 to 1: the share of levels completed, and of the current one by the
     /// logarithm of the energy, from full speed to convergence. It may decrease when the surface starts moving again.
     pub(super) fn progress(&self) -> f64 {
-        if self.rest.done {
+        if self.convergence.done {
             return 1.0;
         }
         let DeformableParams { mass, max_move, energy_tolerance, .. } = self.params;
         let speed = max_move / self.params.step_length();
         let full = (0.5 * mass * speed * speed).max(2.0 * energy_tolerance);
         // At the beginning of a level the energy is still that of the level before.
-        let energy = if self.iteration == self.rest.began { full } else { self.movement.energy };
-        let way = libm::log(full / energy.max(energy_tolerance)) / libm::log(full / energy_tolerance);
+        let energy = if self.iteration == self.convergence.began { full } else { self.speed.energy };
+        let fraction = libm::log(full / energy.max(energy_tolerance)) / libm::log(full / energy_tolerance);
         let levels = self.pyramid.levels.len();
-        ((levels - 1 - self.level) as f64 + way.clamp(0.0, 1.0)) / levels as f64
+        ((levels - 1 - self.level) as f64 + fraction.clamp(0.0, 1.0)) / levels as f64
     }
 
     /// Wakes all vertices and restarts convergence, after a change that may move any of them.
     pub(super) fn wake_all(&mut self) {
-        self.mesh.scalar_mut(self.keys.still).fill(0.0);
+        self.mesh.scalar_mut(self.keys.still_iterations).fill(0.0);
         self.mesh.scalar_mut(self.keys.reversals).fill(0.0);
-        self.rest = Rest { began: self.rest.began, ..Rest::default() };
+        self.convergence = Convergence { began: self.convergence.began, ..Convergence::default() };
     }
 
     /// Counts quiet iterations. After enough of them it examines all vertices, checks the whole mesh, and descends one
     /// level or ends the run.
-    pub(super) fn come_to_rest(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
-        let is_slow = self.rest.began_on_contour || self.movement.fastest < self.rest_speed();
-        let quiet = is_slow && self.movement.energy < self.params.energy_tolerance;
-        self.rest.quiet = if quiet { self.rest.quiet + 1 } else { 0 };
-        if self.rest.quiet < self.quiet_iterations() {
+    pub(super) fn update_convergence(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
+        let is_slow = self.convergence.began_on_contour || self.speed.fastest < self.settled_speed();
+        let quiet = is_slow && self.speed.energy < self.params.energy_tolerance;
+        self.convergence.quiet = if quiet { self.convergence.quiet + 1 } else { 0 };
+        if self.convergence.quiet < self.quiet_iterations() {
             return Ok(Changes::default());
         }
         if self.level == 0 {
-            let changes = self.complete(times)?;
-            if self.rest.quiet == 0 {
+            let changes = self.size_and_seed(times)?;
+            if self.convergence.quiet == 0 {
                 return Ok(changes);
             }
         }
         // Sleeping vertices may be pushed by others that have settled since.
-        if !self.rest.examined {
-            self.rest.quiet = 0;
-            self.rest.examines = true;
-            self.rest.examined = true;
+        if !self.convergence.was_examined {
+            self.convergence.quiet = 0;
+            self.convergence.examine_next = true;
+            self.convergence.was_examined = true;
             return Ok(Changes::default());
         }
         let mut changes = self.check_everything(times);
         if self.level == 0 {
-            self.rest.done = true;
+            self.convergence.done = true;
             return Ok(changes);
         }
         changes += self.descend(times)?;
@@ -109,37 +109,37 @@ impl DeformableModel {
 
     /// Sets sizes on the finest level, or else seeds missing parts; if either changed the mesh, it is no longer quiet.
     /// Edits wake only the vertices around them.
-    fn complete(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
+    fn size_and_seed(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         if self.set_sizes() {
-            self.rest.quiet = 0;
+            self.convergence.quiet = 0;
             return Ok(self.check_everything(times));
         }
-        if !self.seeds_levels() || self.rest.searches == MOST_SEARCHES {
+        if !self.seeds_levels() || self.convergence.searches == MOST_SEARCHES {
             return Ok(Changes::default());
         }
         let found = self.seed_missing(times)?;
-        self.rest.searches += 1;
+        self.convergence.searches += 1;
         if found.seeds > 0 {
-            self.rest.quiet = 0;
-            self.rest.examined = false;
+            self.convergence.quiet = 0;
+            self.convergence.was_examined = false;
         } else {
-            self.rest.searches = MOST_SEARCHES;
+            self.convergence.searches = MOST_SEARCHES;
         }
         Ok(found)
     }
 
     /// Returns the speed, in δ per unit of time, below which the fastest vertex has settled; it also bounds the
     /// displacement in one step.
-    fn rest_speed(&self) -> f32 {
-        let longest = REST_MOVE / self.params.step_length() as f32;
-        if longest < REST_SPEED { longest } else { REST_SPEED }
+    fn settled_speed(&self) -> f32 {
+        let longest = SETTLED_DISPLACEMENT / self.params.step_length() as f32;
+        if longest < SETTLED_SPEED { longest } else { SETTLED_SPEED }
     }
 
     /// Returns the number of quiet iterations for convergence, at least the response time m/γ: a surface that has just
     /// begun to move is slow, too, without having converged.
     fn quiet_iterations(&self) -> u32 {
         let DeformableParams { mass, damping, integrator, .. } = self.params;
-        let is_settled = integrator == Integrator::Implicit && !self.rest.began_on_contour;
+        let is_settled = integrator == Integrator::Implicit && !self.convergence.began_on_contour;
         let least = if is_settled { QUIET_LONG_STEPS } else { QUIET_ITERATIONS };
         libm::ceil(mass / (damping * self.params.step_length())).clamp(least, MOST_QUIET_ITERATIONS) as u32
     }
@@ -152,7 +152,7 @@ impl DeformableModel {
         let all: Vec<VertexId> = self.mesh.vertices().collect();
         let mut changes = self.restore_bounds(&all, times);
         let sampling = self.sampling();
-        let guide = contact::guide(&self.pyramid.levels[self.level], self.level_iso, &self.params);
+        let guide = image_guide::guide(&self.pyramid.levels[self.level], self.level_iso, &self.params);
         changes.vanished += self.resolver.sweep(&mut self.mesh, sampling, &*guide);
         drop(guide);
         self.mark_checked();
@@ -203,7 +203,7 @@ impl DeformableModel {
         self.descend_refined()?;
         self.check_vertex_limit(&renewal.fresh)?;
         let added = self.mesh.append(&renewal.fresh)?;
-        self.welcome(&added);
+        self.initialise_attributes(&added);
         self.resolve_contour()?;
         self.mark_checked();
         Ok(())
@@ -212,7 +212,7 @@ impl DeformableModel {
     fn descend_refined(&mut self) -> Result<(), MethodError> {
         self.refine()?;
         self.level -= 1;
-        self.rest.began = self.iteration;
+        self.convergence.began = self.iteration;
         self.wake_all();
         self.prepare_level()
     }
@@ -271,10 +271,11 @@ mod tests {
     fn only_a_start_on_the_contour_begins_on_it() {
         let speck = volume(32, |p| if (p - 15.5).length() < 2.0 { 1.0 } else { 0.0 });
         for (iso, on_contour) in [(0.9, false), (0.05, true)] {
-            let params = DeformableParams { iso, smallest_part: 0.0, ..DeformableParams::of_paper(&speck) };
+            let params =
+                DeformableParams { iso, smallest_part: 0.0, ..DeformableParams::as_published(&speck) };
             let options = DeformableOptions { levels: 2, params: Some(params), ..Default::default() };
             let model = DeformableModel::new(&speck, options).unwrap();
-            assert_eq!(model.rest.began_on_contour, on_contour, "iso {iso}");
+            assert_eq!(model.convergence.began_on_contour, on_contour, "iso {iso}");
         }
     }
 
@@ -282,10 +283,10 @@ mod tests {
     fn the_fastest_vertex_counts_again_once_a_parameter_was_set() {
         let mut model = model();
         while !model.step().unwrap().done {}
-        assert!(model.movement.energy < model.params.energy_tolerance);
-        assert!(model.movement.fastest > model.rest_speed(), "nothing moved on: {}", model.movement.fastest);
+        assert!(model.speed.energy < model.params.energy_tolerance);
+        assert!(model.speed.fastest > model.settled_speed(), "nothing moved on: {}", model.speed.fastest);
         model.set_params(DeformableParams { iso: 0.3, ..model.params.clone() }).unwrap();
         while !model.step().unwrap().done {}
-        assert!(model.movement.fastest < model.rest_speed(), "{} at the end", model.movement.fastest);
+        assert!(model.speed.fastest < model.settled_speed(), "{} at the end", model.speed.fastest);
     }
 }

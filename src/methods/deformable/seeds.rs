@@ -63,7 +63,7 @@ impl DeformableModel {
         }
         times.add("seeding", (self.clock)() - begin);
         if changes.seeds > 0 {
-            if self.rest.sized {
+            if self.convergence.sized {
                 self.set_sizes_of(&added);
             }
             changes += self.restore_bounds(&added, times);
@@ -90,7 +90,7 @@ impl DeformableModel {
                 count -= 1;
             }
         }
-        self.welcome(&added);
+        self.initialise_attributes(&added);
         added.retain(|&v| self.mesh.is_live(v));
         Ok((Changes { seeds: count as u32, ..Changes::default() }, added))
     }
@@ -106,15 +106,15 @@ impl DeformableModel {
     }
 
     /// Initialises the attributes of vertices added to the mesh: at rest, awake and checked, with size 1.
-    pub(super) fn welcome(&mut self, added: &[VertexId]) {
+    pub(super) fn initialise_attributes(&mut self, added: &[VertexId]) {
         let keys = self.keys;
         for v in added.iter().map(|v| v.index()) {
             self.mesh.vector_mut(keys.velocity)[v] = Vec3::ZERO;
-            self.mesh.scalar_mut(keys.still)[v] = 0.0;
-            self.mesh.scalar_mut(keys.calm)[v] = 0.0;
+            self.mesh.scalar_mut(keys.still_iterations)[v] = 0.0;
+            self.mesh.scalar_mut(keys.since_edit)[v] = 0.0;
             self.mesh.scalar_mut(keys.reversals)[v] = 0.0;
             self.mesh.scalar_mut(keys.size)[v] = 0.0;
-            let (positions, checked) = self.mesh.positions_and_vector_mut(keys.checked);
+            let (positions, checked) = self.mesh.positions_and_vector_mut(keys.checked_position);
             checked[v] = positions[v];
         }
     }
@@ -132,7 +132,7 @@ impl DeformableModel {
         let in_mesh = voxels_inside(&surface, dims);
         let comparison = Comparison { image, iso: self.level_iso, object, in_contour, in_mesh, surface };
         let smallest = SMALLEST_SEED * self.params.smallest_part;
-        Ok([comparison.parts(Missing::Matter, smallest)?, comparison.parts(Missing::Hollow, smallest)?])
+        Ok([comparison.parts(Missing::Matter, smallest)?, comparison.parts(Missing::Cavity, smallest)?])
     }
 }
 
@@ -165,14 +165,14 @@ impl Comparison<'_> {
             let offset = Vec3::from(low.map(|k| k as f32));
             parts.append(&placed(marching_cubes(&field, 0.0)?, |p| position(p + offset)));
         }
-        if kind == Missing::Hollow {
+        if kind == Missing::Cavity {
             parts.triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
         Ok(parts.without_parts_below(smallest))
     }
 
     /// Whether the contour assigns a voxel to the object if matter is missing, or to the background if cavities are.
-    fn is_of(&self, kind: Missing, voxel: usize) -> bool {
+    fn is_in_missing_phase(&self, kind: Missing, voxel: usize) -> bool {
         self.in_contour.contains(voxel) == (kind == Missing::Matter)
     }
 
@@ -183,19 +183,19 @@ impl Comparison<'_> {
             return Ok(missing);
         }
         let dims = self.image.grid().0.dims;
-        let mut places = CellSet::new(CLEARANCE as f32 + longest_edge(&self.surface));
-        missing.iter().for_each(|&voxel| places.add(coordinates(dims, voxel)));
-        let tree = TriangleTree::new(&self.surface_near(&places))?;
+        let mut cells = CellSet::new(CLEARANCE as f32 + longest_edge(&self.surface));
+        missing.iter().for_each(|&voxel| cells.add(coordinates(dims, voxel)));
+        let tree = TriangleTree::new(&self.surface_near(&cells))?;
         missing.retain(|&voxel| !tree.is_within(coordinates(dims, voxel), CLEARANCE));
         Ok(missing)
     }
 
     /// Returns the voxels on the wrong side of the mesh whose six neighbours are on that side of it, too, in order.
     fn misplaced_voxels(&self, kind: Missing) -> Vec<usize> {
-        let is_inside = kind == Missing::Hollow;
+        let is_inside = kind == Missing::Cavity;
         let dims = self.image.grid().0.dims;
         let is_misplaced = |&voxel: &usize| {
-            self.is_of(kind, voxel)
+            self.is_in_missing_phase(kind, voxel)
                 && faces(dims, voxel).all(|w| w.map_or(!is_inside, |w| self.in_mesh.contains(w) == is_inside))
         };
         let mut differing = self.in_mesh.clone();
@@ -204,8 +204,8 @@ impl Comparison<'_> {
     }
 
     /// Returns the part of the mesh with the triangles that may be within [`CLEARANCE`] of some positions.
-    fn surface_near(&self, places: &CellSet) -> TriangleMesh {
-        let is_near: Vec<bool> = self.surface.positions.iter().map(|&p| places.contains(p)).collect();
+    fn surface_near(&self, cells: &CellSet) -> TriangleMesh {
+        let is_near: Vec<bool> = self.surface.positions.iter().map(|&p| cells.contains(p)).collect();
         let near =
             self.surface.triangles.iter().filter(|corners| corners.iter().any(|&v| is_near[v as usize]));
         TriangleMesh {
@@ -234,10 +234,10 @@ impl Comparison<'_> {
                 continue;
             }
             depths.add(depth * depth);
-            for beyond in
-                faces(dims, voxel).flatten().map(|w| self.depth(kind, w)).filter(|&beyond| beyond < 0.0)
+            for neighbour in
+                faces(dims, voxel).flatten().map(|w| self.depth(kind, w)).filter(|&neighbour| neighbour < 0.0)
             {
-                differences.add((depth - beyond) * (depth - beyond));
+                differences.add((depth - neighbour) * (depth - neighbour));
             }
         }
         differences.value().or(depths.value()).map_or(1.0, |square| square.sqrt() as f32)
@@ -247,21 +247,21 @@ impl Comparison<'_> {
     /// it bounds them, else halfway to the next voxel.
     fn field(&self, kind: Missing, missing: &[usize], [low, high]: [[usize; 3]; 2]) -> Grid {
         let grid = self.image.grid().0;
-        let steep = self.steepness(kind, missing);
+        let steepness = self.steepness(kind, missing);
         let size = [0, 1, 2].map(|k| high[k] - low[k]);
         let mut values = Vec::with_capacity(size.iter().product());
-        let mut ahead = missing.iter().peekable();
+        let mut remaining = missing.iter().peekable();
         let mut is_missing = |voxel: usize| {
-            while ahead.next_if(|&&next| next < voxel).is_some() {}
-            ahead.peek() == Some(&&voxel)
+            while remaining.next_if(|&&next| next < voxel).is_some() {}
+            remaining.peek() == Some(&&voxel)
         };
         let mut value = |voxel: usize| {
             let depth = self.depth(kind, voxel);
             match is_missing(voxel) {
                 // Voxels of a part that is too small for the contour have the other sign.
-                true if depth < 0.0 => 0.5 * steep,
-                true => depth.min(steep),
-                false if self.is_of(kind, voxel) || depth >= 0.0 => -steep,
+                true if depth < 0.0 => 0.5 * steepness,
+                true => depth.min(steepness),
+                false if self.is_in_missing_phase(kind, voxel) || depth >= 0.0 => -steepness,
                 false => depth,
             }
         };

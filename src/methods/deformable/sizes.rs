@@ -15,11 +15,11 @@ use crate::volume::KnownCell;
 
 /// The sagitta, in voxels, above which edges are made shorter. With 0.1 the surface of a rough image has as many
 /// vertices as marching cubes; with 0.5, small features are sampled no better than without sizes.
-const COARSE: f32 = 0.25;
+const MAX_SAGITTA: f32 = 0.25;
 
 /// The sagitta, in voxels, below which edges are made longer. The surface is inside its contour by two thirds of it:
 /// with 0.25, a ball of 7 voxels has 7 % less volume.
-const FINE: f32 = 0.05;
+const MIN_SAGITTA: f32 = 0.05;
 
 /// The smallest and the largest size of a vertex, a factor on δ, with full adaptivity.
 const SMALLEST: f32 = 0.7;
@@ -35,19 +35,19 @@ const STRIDE: f32 = 0.5;
 const PASSES: usize = 3;
 
 /// The length of an edge of size 1, in δ.
-const ORDINARY: f32 = super::MEAN_EDGE as f32;
+const MEAN_EDGE: f32 = super::MEAN_EDGE as f32;
 
 /// The largest offset from the contour that is measured, in voxels; larger ones are clamped.
-const FURTHEST: f32 = 0.5;
+const MAX_OFFSET: f32 = 0.5;
 
 impl DeformableModel {
     /// Sets the size of every vertex, and returns whether it did: not if sizes were set on this level before, or if the
     /// model does not adapt to the image. Seeds added later are given sizes separately.
     pub(super) fn set_sizes(&mut self) -> bool {
-        if self.rest.sized || self.params.adaptivity == 0.0 || self.params.iso_force == 0.0 {
+        if self.convergence.sized || self.params.adaptivity == 0.0 || self.params.iso_force == 0.0 {
             return false;
         }
-        self.rest.sized = true;
+        self.convergence.sized = true;
         let all: Vec<VertexId> = self.mesh.vertices().collect();
         self.set_sizes_of(&all);
         true
@@ -60,8 +60,8 @@ impl DeformableModel {
             self.bound_gradation(members, &mut sizes);
         }
         let share = self.params.adaptivity as f32;
-        let of = self.mesh.scalar_mut(self.keys.size);
-        members.iter().map(|v| v.index()).for_each(|v| of[v] = share * (sizes[v] - 1.0));
+        let size = self.mesh.scalar_mut(self.keys.size);
+        members.iter().map(|v| v.index()).for_each(|v| size[v] = share * (sizes[v] - 1.0));
     }
 
     /// Returns the smallest size of the edges at each vertex, bounded by the thickness of thin walls and gaps.
@@ -90,9 +90,9 @@ impl DeformableModel {
         let normal = self.mesh.area_normal(v).normalize_or_zero();
         let contact = Sampling::new(self.model_delta()).contact();
         let is_opposite = |k: i32| {
-            let way = f32::from(k as i16) * STRIDE;
+            let distance = f32::from(k as i16) * STRIDE;
             let p = self.mesh.position(v);
-            self.depth(p + normal * way) > 0.0 || self.depth(p - normal * way) < 0.0
+            self.depth(p + normal * distance) > 0.0 || self.depth(p - normal * distance) < 0.0
         };
         let strides = (LARGEST * contact / STRIDE) as i32;
         let thickness = (2..=strides).find(|&k| is_opposite(k)).map_or(f32::INFINITY, |k| k as f32 * STRIDE);
@@ -107,7 +107,7 @@ impl DeformableModel {
 
     fn bound_gradation(&self, members: &[VertexId], sizes: &mut [f32]) {
         let before = sizes.to_vec();
-        let per_length = GRADATION / (ORDINARY * self.model_delta());
+        let per_length = GRADATION / (MEAN_EDGE * self.model_delta());
         for (u, v) in self.mesh.edges_from(members.iter().copied()) {
             let growth = per_length * self.mesh.position(u).distance(self.mesh.position(v));
             for (a, b) in [(u.index(), v.index()), (v.index(), u.index())] {
@@ -133,8 +133,9 @@ impl DeformableModel {
         let [m, n] = ends.map(|w| self.mesh.area_normal(w).normalize_or_zero());
         let middle = self.offset_from_contour((p + q) * 0.5, (m + n).normalize_or_zero());
         let sagitta = (middle - (offsets[0] + offsets[1]) * 0.5).abs();
-        let length = p.distance(q) / (ORDINARY * self.model_delta());
-        let [shortened, lengthened] = [COARSE, FINE].map(|within| length * (within / sagitta).sqrt());
+        let length = p.distance(q) / (MEAN_EDGE * self.model_delta());
+        let [shortened, lengthened] =
+            [MAX_SAGITTA, MIN_SAGITTA].map(|within| length * (within / sagitta).sqrt());
         // The sagitta of a straight edge is 0, and its size infinite; the caller clamps it to the largest size.
         if shortened < 1.0 {
             shortened
@@ -149,7 +150,7 @@ impl DeformableModel {
     fn offset_from_contour(&self, p: Vec3, direction: Vec3) -> f32 {
         let [here, ahead, behind] = [p, p + direction * 0.5, p - direction * 0.5].map(|p| self.depth(p));
         let slope = (ahead - behind).abs();
-        if here.abs() < FURTHEST * slope { here / slope } else { FURTHEST.copysign(here) }
+        if here.abs() < MAX_OFFSET * slope { here / slope } else { MAX_OFFSET.copysign(here) }
     }
 }
 

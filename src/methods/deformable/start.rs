@@ -3,11 +3,11 @@
 use super::contour::{ObjectIs, contour, placed, simplified};
 use super::domain::{Domain, rounded_axes};
 use super::image::LevelImage;
-use super::{DeformableModel, contact};
+use super::{DeformableModel, image_guide};
 use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings};
 use crate::methods::MethodError;
-use crate::methods::given::surface;
+use crate::methods::caller_mesh::checked_mesh;
 use crate::remesh::{Resolver, Sampling, TopologyGuide, Unguided, Waiting};
 use crate::spatial::CellSet;
 use crate::volume::marching_cubes;
@@ -38,7 +38,7 @@ pub enum Start {
 }
 
 /// The image and the sampling that a start surface is made for.
-pub(super) struct Frame<'a> {
+pub(super) struct StartContext<'a> {
     pub(super) image: &'a LevelImage,
     /// The normalised intensity above which voxels are enclosed; `None` if the object is not the brighter side.
     pub(super) brighter_than: Option<f32>,
@@ -58,7 +58,7 @@ pub(super) struct Frame<'a> {
     pub(super) may_be_empty: bool,
 }
 
-impl Frame<'_> {
+impl StartContext<'_> {
     fn most_vertices(&self) -> usize {
         self.domain.most_vertices(self.sampling.shortest())
     }
@@ -69,7 +69,7 @@ impl Frame<'_> {
 const SMALLEST_RADIUS: f32 = 1.2;
 
 /// The distance between an object and the surface that encloses it, in δ.
-const OBJECT_ROOM: f32 = 1.5;
+const OBJECT_MARGIN: f32 = 1.5;
 
 /// The radius of a bubble as a share of its cell; neighbours are further apart than the contact distance.
 const BUBBLE_SHARE: f32 = 0.3;
@@ -104,18 +104,18 @@ impl Start {
     /// empty; [`MethodError::Mesh`] if the caller's mesh is open, not manifold or intersects itself.
     pub(super) fn make(
         &self,
-        frame: &Frame,
+        context: &StartContext,
         iso: impl Fn(f64) -> f32,
         guide: &dyn TopologyGuide,
     ) -> Result<Mesh, MethodError> {
         let mut mesh = match self {
-            Self::Contour | Self::Enclosing => enclosing(frame)?,
-            Self::Bubbles(n) => bubbles(frame, *n)?,
-            Self::Seeds { points, radius } => seeds(frame, points, *radius)?,
-            Self::MarchingCubes(value) => iso_surface(frame, iso(*value))?,
-            Self::Mesh(mesh) => given(frame, mesh)?,
+            Self::Contour | Self::Enclosing => enclosing(context)?,
+            Self::Bubbles(n) => bubble_grid(context, *n)?,
+            Self::Seeds { points, radius } => spheres_at(context, points, *radius)?,
+            Self::MarchingCubes(value) => iso_surface(context, iso(*value))?,
+            Self::Mesh(mesh) => caller_mesh(context, mesh)?,
         };
-        let mut resolver = resolve_all(&mut mesh, frame.most_vertices(), frame.sampling, guide)?;
+        let mut resolver = resolve_all(&mut mesh, context.most_vertices(), context.sampling, guide)?;
         if !resolver.is_embedded(&mesh) {
             return Err(MeshError::SelfIntersecting { pairs: count_crossings(&mesh.to_triangles()) }.into());
         }
@@ -147,7 +147,7 @@ impl DeformableModel {
             let guard = self.resolver.guard(&self.mesh, sampling);
             let crossing = guard.crossing(&self.mesh);
             if crossing.is_empty() || guard.separate(&mut self.mesh, &crossing) {
-                self.rest.began_on_contour = self.from_contour;
+                self.convergence.began_on_contour = self.from_contour;
                 return Ok(());
             }
             if runs == MOST_RUNS {
@@ -159,7 +159,7 @@ impl DeformableModel {
             let intersecting = std::mem::replace(&mut self.mesh, contour.clone());
             self.mesh.count_on_from(&intersecting);
             self.resolver.set_waiting(Waiting::default());
-            self.rest.sized = false;
+            self.convergence.sized = false;
         }
     }
 
@@ -175,7 +175,7 @@ impl DeformableModel {
 
     fn resolve_everywhere(&mut self) -> Result<(), MethodError> {
         let sampling = self.sampling();
-        let guide = contact::guide(&self.pyramid.levels[self.level], self.level_iso, &self.params);
+        let guide = image_guide::guide(&self.pyramid.levels[self.level], self.level_iso, &self.params);
         resolve_with(&mut self.resolver, &mut self.mesh, sampling, &*guide)
     }
 }
@@ -216,13 +216,13 @@ fn resolve_with(
 ///
 /// An icosahedron is refined, and after each refinement projected onto the box and resolved: a fine icosahedron
 /// squashed onto a flat box would have triangles that no edit can repair.
-fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
-    let delta = frame.sampling.shortest();
-    let most = frame.most_vertices();
-    if frame.domain.enclosing_vertices(delta) > most {
+fn enclosing(context: &StartContext) -> Result<Mesh, MethodError> {
+    let delta = context.sampling.shortest();
+    let most = context.most_vertices();
+    if context.domain.enclosing_vertices(delta) > most {
         return Err(MethodError::TooManyVertices { most });
     }
-    let (centre, axes) = around_object(frame).unwrap_or((frame.domain.centre, frame.domain.axes));
+    let (centre, axes) = around_object(context).unwrap_or((context.domain.centre, context.domain.axes));
     let onto_box = |p: Vec3| {
         let unit = (p - centre) / axes;
         centre + unit / rounded_distance(unit) * axes
@@ -246,20 +246,20 @@ fn enclosing(frame: &Frame) -> Result<Mesh, MethodError> {
 
 /// Returns the centre and the half axes of a rounded box around all of the object, with the proportions of its bounding
 /// box; `None` if there is no object.
-fn around_object(frame: &Frame) -> Option<(Vec3, Vec3)> {
-    let ends = frame.image.ends_of_rows(frame.brighter_than?);
+fn around_object(context: &StartContext) -> Option<(Vec3, Vec3)> {
+    let ends = context.image.ends_of_rows(context.brighter_than?);
     let Bounds { min, max } = Bounds::of(&ends);
     if ends.is_empty() {
         return None;
     }
-    let delta = frame.sampling.shortest();
+    let delta = context.sampling.shortest();
     let centre = (min + max) * 0.5;
-    let axes = rounded_axes((max - min) * 0.5 + OBJECT_ROOM * delta, delta);
-    let furthest = ends.iter().fold(1.0f32, |furthest, &p| {
-        let far = rounded_distance((p - centre) / (axes - OBJECT_ROOM * delta));
-        if far > furthest { far } else { furthest }
+    let axes = rounded_axes((max - min) * 0.5 + OBJECT_MARGIN * delta, delta);
+    let scale = ends.iter().fold(1.0f32, |scale, &p| {
+        let far = rounded_distance((p - centre) / (axes - OBJECT_MARGIN * delta));
+        if far > scale { far } else { scale }
     });
-    Some((centre, axes * furthest))
+    Some((centre, axes * scale))
 }
 
 /// Returns the fourth root of x⁴ + y⁴ + z⁴: 1 on the unit rounded box.
@@ -268,13 +268,13 @@ fn rounded_distance(p: Vec3) -> f32 {
     (square * square).element_sum().sqrt().sqrt()
 }
 
-fn sphere(frame: &Frame, centre: Vec3, radius: f32) -> Result<Mesh, MeshError> {
-    Mesh::icosphere(centre, radius, SPHERE_EDGE * frame.sampling.shortest())
+fn sphere(context: &StartContext, centre: Vec3, radius: f32) -> Result<Mesh, MeshError> {
+    Mesh::icosphere(centre, radius, SPHERE_EDGE * context.sampling.shortest())
 }
 
-fn bubbles(frame: &Frame, n: u32) -> Result<Mesh, MethodError> {
-    let smallest_axis = frame.dims.into_iter().min().unwrap_or(1) as f32;
-    let fitting = (smallest_axis * BUBBLE_SHARE / (SMALLEST_RADIUS * frame.sampling.shortest())) as u32;
+fn bubble_grid(context: &StartContext, n: u32) -> Result<Mesh, MethodError> {
+    let smallest_axis = context.dims.into_iter().min().unwrap_or(1) as f32;
+    let fitting = (smallest_axis * BUBBLE_SHARE / (SMALLEST_RADIUS * context.sampling.shortest())) as u32;
     let most = fitting.min(MOST_BUBBLES);
     if n == 0 || n > most {
         let hint = if most == 0 {
@@ -284,62 +284,65 @@ fn bubbles(frame: &Frame, n: u32) -> Result<Mesh, MethodError> {
         };
         return Err(MethodError::invalid("start.bubbles", format!("{n} given, {hint}")));
     }
-    let cell = Vec3::from(frame.dims.map(|m| m as f32 / n as f32));
+    let cell = Vec3::from(context.dims.map(|m| m as f32 / n as f32));
     let radius = BUBBLE_SHARE * cell.min_element();
     let mut mesh = Mesh::default();
     for k in 0..n * n * n {
         let at = Vec3::new((k % n) as f32, (k / n % n) as f32, (k / n / n) as f32);
-        mesh.append(&sphere(frame, (at + 0.5) * cell - 0.5, radius)?)?;
+        mesh.append(&sphere(context, (at + 0.5) * cell - 0.5, radius)?)?;
     }
     Ok(mesh)
 }
 
-fn seeds(frame: &Frame, points: &[DVec3], radius: f64) -> Result<Mesh, MethodError> {
+fn spheres_at(context: &StartContext, points: &[DVec3], radius: f64) -> Result<Mesh, MethodError> {
     if points.is_empty() || points.len() > MOST_SEEDS {
         let problem = format!("{} points given, 1 to {MOST_SEEDS} accepted", points.len());
         return Err(MethodError::invalid("start.seeds", problem));
     }
-    let ball = world_ball(frame, radius)?;
-    let reach = Bounds::of(ball.positions());
-    let room = frame.domain.bounds;
-    let centres: Vec<Vec3> = points.iter().map(|p| frame.from_world.transform_point3(*p).as_vec3()).collect();
-    let fits = |&c: &Vec3| room.contains(reach.min + c) && room.contains(reach.max + c);
+    let ball = world_ball(context, radius)?;
+    let ball_bounds = Bounds::of(ball.positions());
+    let domain_bounds = context.domain.bounds;
+    let centres: Vec<Vec3> =
+        points.iter().map(|p| context.from_world.transform_point3(*p).as_vec3()).collect();
+    let fits = |&c: &Vec3| {
+        domain_bounds.contains(ball_bounds.min + c) && domain_bounds.contains(ball_bounds.max + c)
+    };
     if let Some(i) = centres.iter().position(|c| !fits(c)) {
         let problem = format!("the sphere at point {i}, {}, is not in or near the image", points[i]);
         return Err(MethodError::invalid("start.seeds", problem));
     }
-    let apart = 2.0 * radius + f64::from(frame.sampling.contact()) * largest(frame.spacing);
+    let min_distance = 2.0 * radius + f64::from(context.sampling.contact()) * largest(context.spacing);
     let mut mesh = Mesh::default();
     for (i, point) in points.iter().enumerate() {
-        if let Some(j) = points[..i].iter().position(|other| other.distance(*point) < apart) {
+        if let Some(j) = points[..i].iter().position(|other| other.distance(*point) < min_distance) {
             let problem = format!("points {j} and {i} are too near: spheres of radius {radius} would touch");
             return Err(MethodError::invalid("start.seeds", problem));
         }
-        let mut there = ball.clone();
-        there.positions_mut().iter_mut().for_each(|p| *p += centres[i]);
-        mesh.append(&there)?;
+        let mut copy = ball.clone();
+        copy.positions_mut().iter_mut().for_each(|p| *p += centres[i]);
+        mesh.append(&copy)?;
     }
     Ok(mesh)
 }
 
 /// Makes a sphere of a radius in world units around the origin and maps it to model space without translation; it is an
 /// ellipsoid there if voxels are not cubes.
-fn world_ball(frame: &Frame, radius: f64) -> Result<Mesh, MethodError> {
-    let least = f64::from(SMALLEST_RADIUS * frame.sampling.shortest()) * largest(frame.spacing);
-    let most =
-        f64::from((frame.domain.bounds.max - frame.domain.bounds.min).max_element()) * largest(frame.spacing);
+fn world_ball(context: &StartContext, radius: f64) -> Result<Mesh, MethodError> {
+    let least = f64::from(SMALLEST_RADIUS * context.sampling.shortest()) * largest(context.spacing);
+    let most = f64::from((context.domain.bounds.max - context.domain.bounds.min).max_element())
+        * largest(context.spacing);
     if !(radius >= least && radius <= most) {
         let problem = format!(
             "{radius} given, {least:.3} to {most:.3} accepted (smaller ones with fewer pyramid levels or shorter edges)"
         );
         return Err(MethodError::invalid("start.radius", problem));
     }
-    let shortest = frame.spacing.into_iter().fold(f64::INFINITY, f64::min);
-    let edge = f64::from(SPHERE_EDGE * frame.sampling.shortest()) * shortest / radius;
+    let shortest = context.spacing.into_iter().fold(f64::INFINITY, f64::min);
+    let edge = f64::from(SPHERE_EDGE * context.sampling.shortest()) * shortest / radius;
     let mut ball = Mesh::icosphere(Vec3::ZERO, 1.0, edge as f32)?.to_triangles();
-    let turned = |p: Vec3| frame.from_world.transform_vector3(p.as_dvec3() * radius).as_vec3();
-    ball.positions.iter_mut().for_each(|p| *p = turned(*p));
-    if frame.from_world.matrix3.determinant() < 0.0 {
+    let to_model = |p: Vec3| context.from_world.transform_vector3(p.as_dvec3() * radius).as_vec3();
+    ball.positions.iter_mut().for_each(|p| *p = to_model(*p));
+    if context.from_world.matrix3.determinant() < 0.0 {
         ball.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     }
     Ok(Mesh::from_triangles(&ball)?)
@@ -351,17 +354,17 @@ fn largest(spacing: [f64; 3]) -> f64 {
 
 /// Makes the simplified contour at π_I of the start level, for [`DeformableModel::resolve_contour`]. If it is empty: an
 /// empty mesh if finer levels are searched for parts, else `None`.
-pub(super) fn on_contour(frame: &Frame) -> Result<Option<Mesh>, MethodError> {
-    let surface = contour(frame.image, frame.iso, frame.object, frame.smallest_part)?;
+pub(super) fn contour_mesh(context: &StartContext) -> Result<Option<Mesh>, MethodError> {
+    let surface = contour(context.image, context.iso, context.object, context.smallest_part)?;
     if surface.triangles.is_empty() {
-        return Ok(frame.may_be_empty.then(Mesh::default));
+        return Ok(context.may_be_empty.then(Mesh::default));
     }
-    let surface = simplified(surface, frame.image, frame.sampling.shortest());
+    let surface = simplified(surface, context.image, context.sampling.shortest());
     Ok(Some(Mesh::from_triangles(&surface)?))
 }
 
-fn iso_surface(frame: &Frame, iso: f32) -> Result<Mesh, MethodError> {
-    let (grid, position) = frame.image.grid();
+fn iso_surface(context: &StartContext, iso: f32) -> Result<Mesh, MethodError> {
+    let (grid, position) = context.image.grid();
     let surface = marching_cubes(grid, iso)?;
     if surface.triangles.is_empty() {
         return Err(MethodError::invalid(
@@ -372,11 +375,11 @@ fn iso_surface(frame: &Frame, iso: f32) -> Result<Mesh, MethodError> {
     Ok(Mesh::from_triangles(&placed(surface, position))?)
 }
 
-fn given(frame: &Frame, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
-    let local = mesh.transformed(&frame.from_world);
-    if let Some(far) = local.positions.iter().position(|&p| !frame.domain.bounds.contains(p)) {
+fn caller_mesh(context: &StartContext, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
+    let local = mesh.transformed(&context.from_world);
+    if let Some(far) = local.positions.iter().position(|&p| !context.domain.bounds.contains(p)) {
         let problem = format!("vertex {far} at {} is not in or near the image", mesh.positions[far]);
         return Err(MethodError::invalid("start.mesh", problem));
     }
-    surface("start.mesh", &local)
+    checked_mesh("start.mesh", &local)
 }

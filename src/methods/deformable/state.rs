@@ -1,17 +1,17 @@
 //! Saving and restoring a run; a restored run continues bit for bit.
 
 use super::domain::Domain;
-use super::motion::Movement;
-use super::schedule::Rest;
+use super::motion::SpeedSummary;
+use super::schedule::Convergence;
 use super::{Attractor, DeformableModel, DeformableParams, delta_at};
 use crate::mesh::{Mesh, VertexId};
 use crate::methods::MethodError;
-use crate::methods::saved::{Hash, MOST_NEIGHBOURS, Mark, can_be_checked, opened, sealed};
+use crate::methods::saved::{Hash, MAX_VALENCE, Magic, can_be_checked, decode, encode};
 use crate::remesh::{Resolver, Waiting};
 use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
 
-const MARK: Mark = *b"VSCLDEF\x05";
+const MAGIC: Magic = *b"VSCLDEF\x05";
 
 /// The saved part of a run: everything but the volume and what is computed from it.
 #[derive(Serialize, Deserialize)]
@@ -25,7 +25,7 @@ struct State {
     mesh: Mesh,
     waiting: Waiting,
     iteration: u32,
-    rest: Rest,
+    rest: Convergence,
     energy: f64,
     fastest: f32,
 }
@@ -43,11 +43,11 @@ impl DeformableModel {
             mesh: self.mesh.clone(),
             waiting: self.resolver.waiting(),
             iteration: self.iteration,
-            rest: self.rest,
-            energy: self.movement.energy,
-            fastest: self.movement.fastest,
+            rest: self.convergence,
+            energy: self.speed.energy,
+            fastest: self.speed.fastest,
         };
-        sealed(&MARK, &state)
+        encode(&MAGIC, &state)
     }
 
     /// Restores a run from bytes made by [`Self::save`]; this model must have the same volume, frame and levels.
@@ -57,7 +57,7 @@ impl DeformableModel {
     /// attractor in it is invalid, [`MethodError::Volume`] if the gradient image does not fit into memory; the model is
     /// unchanged then.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        let state: State = opened(&MARK, bytes)?;
+        let state: State = decode(&MAGIC, bytes)?;
         if state.fingerprint != self.fingerprint {
             let problem = "the state belongs to another volume, frame or number of levels".into();
             return Err(MethodError::BadState { field: "volume", problem });
@@ -70,7 +70,7 @@ impl DeformableModel {
         let bad = |field, problem: String| Err(MethodError::BadState { field, problem });
         state.params.validate()?;
         if !can_be_checked(&state.mesh) {
-            return bad("mesh", format!("a vertex has more than {MOST_NEIGHBOURS} neighbours"));
+            return bad("mesh", format!("a vertex has more than {MAX_VALENCE} neighbours"));
         }
         if let Err(flaw) = state.mesh.check() {
             return bad("mesh", flaw.to_string());
@@ -112,8 +112,8 @@ impl DeformableModel {
         next.watch_output();
         next.resolver.set_waiting(state.waiting);
         next.iteration = state.iteration;
-        next.rest = state.rest;
-        next.movement = Movement { energy: state.energy, fastest: state.fastest };
+        next.convergence = state.rest;
+        next.speed = SpeedSummary { energy: state.energy, fastest: state.fastest };
         next.components = next.mesh.component_count() as u32;
         next.prepare_level()?;
         *self = next;

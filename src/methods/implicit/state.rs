@@ -10,10 +10,10 @@ use super::{Edits, ImplicitParams, ImplicitSurface, Solved, Stage};
 use crate::math::Vec3;
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
-use crate::methods::saved::{Hash, Mark, opened, sealed};
+use crate::methods::saved::{Hash, Magic, decode, encode};
 use serde::{Deserialize, Serialize};
 
-const MARK: Mark = *b"VSCLIMP\x02";
+const MAGIC: Magic = *b"VSCLIMP\x02";
 
 /// The stage a saved run had reached, without the data of [`Stage`].
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -65,8 +65,8 @@ impl ImplicitSurface {
     /// Returns the run as bytes for [`Self::restore`], without points and options.
     pub fn save(&self) -> Vec<u8> {
         let mesh = &self.mesh;
-        sealed(
-            &MARK,
+        encode(
+            &MAGIC,
             &State {
                 fingerprint: self.fingerprint(),
                 params: self.params.clone(),
@@ -100,7 +100,7 @@ impl ImplicitSurface {
     /// # Errors
     /// [`MethodError::BadState`] if the bytes are not such a state; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        let state: State = opened(&MARK, bytes)?;
+        let state: State = decode(&MAGIC, bytes)?;
         self.restore_state(state).map_err(|error| match error {
             MethodError::BadState { .. } => error,
             other => MethodError::BadState { field: "contents", problem: other.to_string() },

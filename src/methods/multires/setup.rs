@@ -8,7 +8,7 @@ use super::{MOST_VERTICES, MultiresParams};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::methods::MethodError;
-use crate::methods::given::check_edges;
+use crate::methods::caller_mesh::check_edges;
 use crate::spatial::SurfaceWalker;
 use std::rc::Rc;
 

@@ -7,10 +7,10 @@ use super::{MultiresParams, MultiresolutionModel};
 use crate::math::Vec3;
 use crate::mesh::Mesh;
 use crate::methods::MethodError;
-use crate::methods::saved::{Hash, Mark, can_be_checked, opened, sealed};
+use crate::methods::saved::{Hash, Magic, can_be_checked, decode, encode};
 use serde::{Deserialize, Serialize};
 
-const MARK: Mark = *b"VSCLMRS\x02";
+const MAGIC: Magic = *b"VSCLMRS\x02";
 
 /// The saved state: everything of a run but its decomposition.
 #[derive(Serialize, Deserialize)]
@@ -30,8 +30,8 @@ struct State {
 impl MultiresolutionModel {
     /// Serialises the run, without the surfaces that it was made from.
     pub fn save(&self) -> Vec<u8> {
-        sealed(
-            &MARK,
+        encode(
+            &MAGIC,
             &State {
                 fingerprint: self.fingerprint(),
                 params: self.params.clone(),
@@ -51,7 +51,7 @@ impl MultiresolutionModel {
     /// # Errors
     /// [`MethodError::BadState`] for any other bytes; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        let state: State = opened(&MARK, bytes)?;
+        let state: State = decode(&MAGIC, bytes)?;
         let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
         if state.fingerprint != self.fingerprint() {
             return bad("surfaces", "the state belongs to another detail, base or start");

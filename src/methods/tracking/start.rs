@@ -6,7 +6,7 @@ use super::{Component, SurfaceTracker};
 use crate::math::{Vec3, triangle};
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::methods::MethodError;
-use crate::methods::given::surface;
+use crate::methods::caller_mesh::checked_mesh;
 use crate::remesh::{EdgeBounds, remesh};
 
 /// Target edge length of the first frame's mesh, in the shortest side of a voxel.
@@ -23,9 +23,9 @@ const FINEST: f64 = 0.1;
 ///
 /// # Errors
 /// [`MethodError::InvalidArgument`] if its edges are too short, or none of its vertices is in the box; the errors of
-/// [`surface`].
+/// [`checked_mesh`].
 pub(super) fn checked(start: &TriangleMesh, region: &Region) -> Result<Mesh, MethodError> {
-    let mesh = surface("start", start)?;
+    let mesh = checked_mesh("start", start)?;
     let (edge, least) = (measure(start).edge_mean, FINEST * region.spacing.min_element());
     if edge < least {
         let problem = format!(

@@ -7,10 +7,10 @@ use super::{Component, SurfaceTracker, TrackingParams};
 use crate::math::Vec3;
 use crate::mesh::{Mesh, TriangleMesh};
 use crate::methods::MethodError;
-use crate::methods::saved::{Hash, Mark, can_be_checked, opened, sealed};
+use crate::methods::saved::{Hash, Magic, can_be_checked, decode, encode};
 use serde::{Deserialize, Serialize};
 
-const MARK: Mark = *b"VSCLTRK\x01";
+const MAGIC: Magic = *b"VSCLTRK\x01";
 
 /// The saved state: everything of a run but its image.
 #[derive(Serialize, Deserialize)]
@@ -32,8 +32,8 @@ impl SurfaceTracker {
     /// Serialises the run, without the image.
     pub fn save(&self) -> Vec<u8> {
         let plain = |mesh: &TriangleMesh| (mesh.positions.clone(), mesh.triangles.clone());
-        sealed(
-            &MARK,
+        encode(
+            &MAGIC,
             &State {
                 fingerprint: self.fingerprint(),
                 params: self.params.clone(),
@@ -53,7 +53,7 @@ impl SurfaceTracker {
     /// # Errors
     /// [`MethodError::BadState`] for any other bytes; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        let state: State = opened(&MARK, bytes)?;
+        let state: State = decode(&MAGIC, bytes)?;
         let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
         if state.fingerprint != self.fingerprint() {
             return bad("volume", "the state belongs to another volume, box, component or start");

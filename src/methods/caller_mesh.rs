@@ -4,11 +4,11 @@ use super::MethodError;
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure};
 
 /// The shortest mean edge accepted. With shorter ones, areas in single precision are rounded to few digits, or to 0.
-const SHORTEST: f64 = 1e-12;
+const MIN_MEAN_EDGE: f64 = 1e-12;
 
 /// Converts a caller's mesh to a [`Mesh`] after checking that it is closed, faces outwards and does not intersect
 /// itself. `parameter` is the name used in errors.
-pub(super) fn surface(parameter: &'static str, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
+pub(super) fn checked_mesh(parameter: &'static str, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
     if mesh.triangles.is_empty() {
         return Err(MethodError::invalid(parameter, "the mesh is empty; a closed surface is needed"));
     }
@@ -27,9 +27,9 @@ pub(super) fn surface(parameter: &'static str, mesh: &TriangleMesh) -> Result<Me
 /// Checks that the mean edge is long enough for computations in single precision.
 pub(super) fn check_edges(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MethodError> {
     let edge = measure(mesh).edge_mean;
-    if edge < SHORTEST {
+    if edge < MIN_MEAN_EDGE {
         let problem =
-            format!("its edges are {edge:.1e} long in the mean; {SHORTEST:e} and more are accepted");
+            format!("its edges are {edge:.1e} long in the mean; {MIN_MEAN_EDGE:e} and more are accepted");
         return Err(MethodError::invalid(parameter, problem));
     }
     Ok(())

@@ -21,11 +21,11 @@ const FACING: f32 = 0.3;
 
 /// The largest distance of a settled surface from its contour, in voxels; intensities that differ by no more than over
 /// this distance are no reason to join or cut.
-const BLUR: f32 = 0.15;
+const MAX_OFFSET: f32 = 0.15;
 
 /// The distance from the vertices of a small component, towards its enclosed side, at which the image is sampled, in
 /// voxels.
-const WITHIN: f32 = 0.35;
+const SAMPLE_DEPTH: f32 = 0.35;
 
 /// A topology guide that allows only changes that agree with the image: sheets are joined where all between them is
 /// object (a gap) or background (a wall), and necks are cut where the image separates the parts.
@@ -55,7 +55,7 @@ impl<'a> ImageGuide<'a> {
         })
     }
 
-    /// Returns the largest difference of intensity over [`BLUR`] along the normals of some vertices. It vanishes inside
+    /// Returns the largest difference of intensity over [`MAX_OFFSET`] along the normals of some vertices. It vanishes inside
     /// object or background; on the contour it is the tolerance for settled vertices off the contour.
     fn tolerance(&self, mesh: &Mesh, vertices: &[VertexId]) -> f32 {
         vertices.iter().fold(0.0, |most, &v| {
@@ -63,7 +63,7 @@ impl<'a> ImageGuide<'a> {
             let [inside, here, outside] = [p - half, p, p + half].map(|p| self.depth(p));
             // In a slit or a thin wall both sides have like intensities, and their difference tells nothing: each half
             // counts separately.
-            let tolerance = 2.0 * BLUR * (outside - here).abs().max((here - inside).abs());
+            let tolerance = 2.0 * MAX_OFFSET * (outside - here).abs().max((here - inside).abs());
             if tolerance > most { tolerance } else { most }
         })
     }
@@ -75,7 +75,7 @@ pub(super) fn guide<'a>(
     iso: f32,
     params: &DeformableParams,
 ) -> Box<dyn TopologyGuide + 'a> {
-    if params.yields_to_image() { Box::new(ImageGuide::new(image, iso, params)) } else { Box::new(Unguided) }
+    if params.adapts_to_image() { Box::new(ImageGuide::new(image, iso, params)) } else { Box::new(Unguided) }
 }
 
 impl TopologyGuide for ImageGuide<'_> {
@@ -83,14 +83,14 @@ impl TopologyGuide for ImageGuide<'_> {
     /// are object; and across a wall, where their inward sides do, if all are background. Two vertices that do not face
     /// each other are on one sheet and are not joined.
     fn may_join(&self, mesh: &Mesh, [u, v]: [VertexId; 2]) -> bool {
-        let (p, way) = (mesh.position(u), mesh.position(v) - mesh.position(u));
-        let [m, n] = [u, v].map(|w| way.normalize_or_zero().dot(mesh.area_normal(w).normalize_or_zero()));
+        let (p, offset) = (mesh.position(u), mesh.position(v) - mesh.position(u));
+        let [m, n] = [u, v].map(|w| offset.normalize_or_zero().dot(mesh.area_normal(w).normalize_or_zero()));
         let is_gap = match (m, n) {
             (m, n) if m > FACING && n < -FACING => true,
             (m, n) if m < -FACING && n > FACING => false,
             _ => return false,
         };
-        self.are_all(is_gap, &SAMPLES.map(|share| p + way * share), self.tolerance(mesh, &[u, v]))
+        self.are_all(is_gap, &SAMPLES.map(|share| p + offset * share), self.tolerance(mesh, &[u, v]))
     }
 
     /// Allows a cut through a strand if its middle is background, and through a tunnel if its middle is object.
@@ -116,9 +116,9 @@ impl TopologyGuide for ImageGuide<'_> {
     }
 
     fn has_content(&self, mesh: &Mesh, members: &[VertexId], is_solid: bool) -> bool {
-        let side = if is_solid { -WITHIN } else { WITHIN };
-        let within = |&w: &VertexId| mesh.position(w) + mesh.area_normal(w).normalize_or_zero() * side;
-        let depth: f32 = members.iter().map(|w| self.depth(within(w))).sum();
+        let side = if is_solid { -SAMPLE_DEPTH } else { SAMPLE_DEPTH };
+        let sample_point = |&w: &VertexId| mesh.position(w) + mesh.area_normal(w).normalize_or_zero() * side;
+        let depth: f32 = members.iter().map(|w| self.depth(sample_point(w))).sum();
         if is_solid { depth > 0.0 } else { depth < 0.0 }
     }
 }
