@@ -107,7 +107,7 @@ impl RawTracker {
     /// Returns the numbers of frames in the volume, with a boundary, and with a surface.
     pub fn counts(&self) -> Vec<u32> {
         let tracker = self.0.borrow();
-        [tracker.frames(), tracker.bounded(), tracker.meshes().len()].map(|n| n as u32).to_vec()
+        [tracker.frames(), tracker.frames_with_boundary(), tracker.meshes().len()].map(|n| n as u32).to_vec()
     }
 
     /// Returns the boundary points of a frame, packed with five numbers each: x, y, z, t, w.
@@ -123,7 +123,8 @@ impl RawTracker {
     /// Returns further results: the image noise, the closure error of a cycle, and the statistics of each frame.
     pub fn facts(&self) -> Result<JsValue, JsValue> {
         let tracker = self.0.borrow();
-        let facts = Facts { noise: tracker.noise(), closing: tracker.closing(), frames: tracker.facts() };
+        let facts =
+            Facts { noise: tracker.noise(), closing: tracker.closure_error(), frames: tracker.facts() };
         Ok(to_js(&facts)?)
     }
 

@@ -6,7 +6,7 @@ use crate::math::{DVec3, symmetric};
 
 /// A least-squares plane through the points around a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Fit {
+pub(super) struct PlaneFit {
     /// The spatial part of the normal, of unit length together with `along_time`; its sign is arbitrary.
     pub normal: DVec3,
     /// The temporal component of the normal, for time in units of c per frame; 0 for a plane in space.
@@ -21,22 +21,22 @@ pub(super) struct Fit {
 const LEAST_WEIGHT: f64 = 1e-3;
 
 /// Points whose variance in time is at most this share of their variance in space are fitted in space only.
-const LEAST_DURATION: f64 = 1e-6;
+const MIN_TIME_SPREAD: f64 = 1e-6;
 
 /// Fits a plane in space: its normal is the direction of least variance. `None` if there are too few points.
-pub(super) fn plane(sums: &Sums) -> Option<Fit> {
-    let [mean, covariance] = moments(sums)?;
+pub(super) fn plane(sums: &Sums) -> Option<PlaneFit> {
+    let [mean, covariance] = mean_and_covariance(sums)?;
     let [xx, xy, xz, _, yy, yz, _, zz, ..] = covariance;
     let normal = DVec3::from(symmetric::least([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]));
     let distance = normal.dot(DVec3::new(mean[0], mean[1], mean[2]));
-    Some(Fit { normal, along_time: 0.0, distance, weight: sums.weight })
+    Some(PlaneFit { normal, along_time: 0.0, distance, weight: sums.weight })
 }
 
 /// Fits a hyperplane in space-time. `None` if there are too few points.
-pub(super) fn hyperplane(sums: &Sums) -> Option<Fit> {
-    let [mean, c] = moments(sums)?;
+pub(super) fn hyperplane(sums: &Sums) -> Option<PlaneFit> {
+    let [mean, c] = mean_and_covariance(sums)?;
     // All points are of a single moment: in space-time every hyperplane through their plane would fit.
-    if c[9] <= LEAST_DURATION * (c[0] + c[4] + c[7]) {
+    if c[9] <= MIN_TIME_SPREAD * (c[0] + c[4] + c[7]) {
         return plane(sums);
     }
     let matrix = [
@@ -47,12 +47,12 @@ pub(super) fn hyperplane(sums: &Sums) -> Option<Fit> {
     ];
     let n = symmetric::least(matrix);
     let distance = (0..4).map(|k| n[k] * mean[k]).sum();
-    Some(Fit { normal: DVec3::new(n[0], n[1], n[2]), along_time: n[3], distance, weight: sums.weight })
+    Some(PlaneFit { normal: DVec3::new(n[0], n[1], n[2]), along_time: n[3], distance, weight: sums.weight })
 }
 
 /// Returns the mean and the covariance, with products in the order of [`Sums::second`]; `None` if there are too few
 /// points.
-fn moments(sums: &Sums) -> Option<[[f64; 10]; 2]> {
+fn mean_and_covariance(sums: &Sums) -> Option<[[f64; 10]; 2]> {
     if sums.weight < LEAST_WEIGHT {
         return None;
     }

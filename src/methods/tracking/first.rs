@@ -2,9 +2,9 @@
 //! marching cubes.
 
 use super::extremal::plane;
+use super::labelling::{LEAST_WEIGHT, VoxelBox, label_bright};
 use super::region::Region;
-use super::samples::{Falloff, Field};
-use super::sides::{LEAST_WEIGHT, Part, sides};
+use super::samples::{Falloff, SampleField};
 use super::vote::{Faces, X, Y, Z};
 use crate::math::{DAffine3, DVec3};
 use crate::mesh::TriangleMesh;
@@ -16,7 +16,7 @@ use crate::volume::{Grid, marching_cubes};
 const BAND: f64 = 0.8;
 
 /// Voxels to either side over which the intensity gradient is estimated.
-const SLOPE: usize = 2;
+const SLOPE_RADIUS: usize = 2;
 
 /// A boundary point with its normal, which points from bright to dark.
 struct Oriented {
@@ -26,21 +26,21 @@ struct Oriented {
 }
 
 /// Returns the surface of all bright regions in the first frame, in world coordinates; empty without a boundary.
-pub(super) fn bright_surface(
+pub(super) fn extract_bright_surface(
     region: &Region,
     faces: &Faces,
     falloff: Falloff,
 ) -> Result<TriangleMesh, MethodError> {
-    let part = Part { ends: region.inner };
-    let Some(is_bright) = sides(region, 0, faces, part) else { return Ok(TriangleMesh::default()) };
+    let part = VoxelBox { ends: region.inner };
+    let Some(is_bright) = label_bright(region, 0, faces, part) else { return Ok(TriangleMesh::default()) };
     let points = oriented(region, faces, falloff);
     let band = BAND * falloff.radius;
-    let distance = distances(region, &points, band);
+    let distance = signed_distances(region, &points, band);
     let value = |i: usize| {
         let at = region.voxel(i as u32);
         let side = if part.index(at).is_some_and(|i| is_bright[i]) { band } else { -band };
         // Beyond the box everything is outside.
-        let most = -region.beyond(at);
+        let most = -region.distance_outside_box(at);
         distance[i].unwrap_or(side).clamp(-band, band).min(most) as f32
     };
     let values = (0..distance.len()).map(value).collect();
@@ -50,14 +50,15 @@ pub(super) fn bright_surface(
 
 /// Returns the face centres with the normals of their fitted planes, oriented towards falling intensity.
 fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
-    let field = Field::still(region, falloff, faces);
+    let field = SampleField::single_frame(region, falloff, faces);
     let mut points = Vec::new();
     for direction in [X, Y, Z] {
         for face in faces[direction].iter().filter(|face| face.weight >= LEAST_WEIGHT) {
             let (at, _) = region.face(direction, face.voxel);
             let Some(fit) = plane(&field.sums(at)) else { continue };
-            let out =
-                region.cut(direction, face.voxel).unwrap_or_else(|| -slope(region, region.voxel(face.voxel)));
+            let out = region
+                .outward_at_box_side(direction, face.voxel)
+                .unwrap_or_else(|| -rising_direction(region, region.voxel(face.voxel)));
             let normal = if fit.normal.dot(out) < 0.0 { -fit.normal } else { fit.normal };
             points.push(Oriented { at, normal, weight: f64::from(face.weight) });
         }
@@ -66,9 +67,10 @@ fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
 }
 
 /// Returns the direction in which intensity rises around a voxel: the covariance of intensity and position.
-fn slope(region: &Region, voxel: [usize; 3]) -> DVec3 {
+fn rising_direction(region: &Region, voxel: [usize; 3]) -> DVec3 {
     let [nx, ny, _] = region.dims;
-    let range = |k: usize| voxel[k].saturating_sub(SLOPE)..(voxel[k] + SLOPE + 1).min(region.dims[k]);
+    let range =
+        |k: usize| voxel[k].saturating_sub(SLOPE_RADIUS)..(voxel[k] + SLOPE_RADIUS + 1).min(region.dims[k]);
     let (mut sum, mut first, mut count, mut mean) = (DVec3::ZERO, DVec3::ZERO, 0.0, 0.0);
     for z in range(2) {
         for y in range(1) {
@@ -87,7 +89,7 @@ fn slope(region: &Region, voxel: [usize; 3]) -> DVec3 {
 
 /// Returns the weighted mean of the signed distances to the planes of nearby points, for each voxel in their band;
 /// positive inside.
-fn distances(region: &Region, points: &[Oriented], band: f64) -> Vec<Option<f64>> {
+fn signed_distances(region: &Region, points: &[Oriented], band: f64) -> Vec<Option<f64>> {
     let [nx, ny, nz] = region.dims;
     let mut sums = vec![(0.0f64, 0.0f64); nx * ny * nz];
     for point in points {

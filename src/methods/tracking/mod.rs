@@ -4,7 +4,7 @@
 //! for the faces between bright and dark voxels (`vote`; section 2). The votes are weighted points in space-time; their
 //! extremal surface consists of the positions that lie on the plane fitted to the points around them (`samples`,
 //! `extremal`; section 3). The surface of the first frame is meshed (`first`; section 4.1), and tracked from frame to
-//! frame by prediction and projection (`project`, `follow`; sections 3.3, 4.2 and 4.3).
+//! frame by prediction and projection (`project`, `frame_tracker`; sections 3.3, 4.2 and 4.3).
 //!
 //! # Guarantees
 //! After every step the surface is a closed, oriented 2-manifold without self-intersections. The same input gives the
@@ -16,21 +16,21 @@
 //! curved surfaces is corrected. Where two walls meet, the sheet between them has no boundary any more and is
 //! collapsed. No move makes the surface intersect itself.
 
-mod crevice;
-mod cut;
+mod boundary_loss;
+mod box_sides;
 mod extremal;
 mod first;
-mod follow;
+mod frame_tracker;
+mod labelling;
 mod params;
 mod project;
 mod region;
 mod samples;
-mod sides;
 mod start;
 mod state;
 mod vote;
 
-pub use follow::FrameFacts;
+pub use frame_tracker::FrameFacts;
 pub use params::{TrackingParams, param_specs};
 
 use super::{MethodError, StepReport, Times};
@@ -39,11 +39,11 @@ use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::remesh::Changes;
 use crate::spatial::surface_distance;
 use crate::volume::Volume;
-use follow::{Follower, Going};
-use project::Moment;
+use frame_tracker::{FrameContext, FrameTracker};
+use project::SpaceTimeSamples;
 use region::Region;
-use samples::{Falloff, Field};
-use vote::{Faces, Voting, Window};
+use samples::{Falloff, SampleField};
+use vote::{BoundaryVoting, Faces, Window};
 
 /// Selects which surface of the first frame is tracked.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -82,10 +82,10 @@ pub struct TrackingOptions {
 }
 
 /// A projection has converged after a step no longer than this, in the shortest side of a voxel.
-const STILL: f64 = 0.012;
+const CONVERGED_STEP: f64 = 0.012;
 
 /// Projections that move a vertex by more than this are rejected, in the shortest side of a voxel.
-const LONGEST: f64 = 4.8;
+const MAX_DISPLACEMENT: f64 = 4.8;
 
 /// Tracks a closed surface through the frames of a 4D image.
 #[derive(Clone, Debug)]
@@ -97,17 +97,17 @@ pub struct SurfaceTracker {
     params: TrackingParams,
     /// Properties of the image that default parameters are derived from.
     image: ImageFacts,
-    voting: Voting,
+    voting: BoundaryVoting,
     /// The boundary votes by frame, for the frames processed so far.
     faces: Vec<Faces>,
-    follower: Option<Follower>,
+    tracker: Option<FrameTracker>,
     /// The boundary points around the newest frame.
-    moment: Option<Moment>,
+    samples: Option<SpaceTimeSamples>,
     mesh: Mesh,
     /// The surface of each frame so far, in world coordinates.
     meshes: Vec<TriangleMesh>,
     facts: Vec<FrameFacts>,
-    closing: Option<f64>,
+    closure_error: Option<f64>,
     steps: u32,
     clock: fn() -> f64,
 }
@@ -116,9 +116,9 @@ pub struct SurfaceTracker {
 #[derive(Clone, Copy, Debug)]
 struct ImageFacts {
     /// The shortest side of a voxel, in world units.
-    pixel: f64,
+    shortest_side: f64,
     /// The longest side of a voxel among axes with more than one voxel, in world units.
-    thickest: f64,
+    longest_side: f64,
     /// The standard deviation of the noise, in intensity.
     noise: f64,
     /// The range of intensities, without outliers.
@@ -140,13 +140,15 @@ impl SurfaceTracker {
             let problem = "it has one frame; a 4D volume of two frames or more is needed";
             return Err(MethodError::invalid("volume", problem));
         }
-        let pixel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        let shortest_side = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         let region = Region::new(&volume, bounds)?;
-        let noise = region.noise() * region.step;
-        let image = ImageFacts { pixel, thickest: region.thickest(), noise, range: region.span() };
-        let start = start.as_ref().map_or(Ok(Mesh::default()), |mesh| start::checked(mesh, &region))?;
+        let noise = region.noise() * region.quantum;
+        let image =
+            ImageFacts { shortest_side, longest_side: region.longest_side(), noise, range: region.span() };
+        let start =
+            start.as_ref().map_or(Ok(Mesh::default()), |mesh| start::validate_start(mesh, &region))?;
         let mut tracker = Self {
-            voting: Voting::new(Window::default(), 0),
+            voting: BoundaryVoting::new(Window::default(), 0),
             mesh: start.clone(),
             region,
             component,
@@ -154,46 +156,48 @@ impl SurfaceTracker {
             params: TrackingParams::default(),
             image,
             faces: Vec::new(),
-            follower: None,
-            moment: None,
+            tracker: None,
+            samples: None,
             meshes: Vec::new(),
             facts: Vec::new(),
-            closing: None,
+            closure_error: None,
             steps: 0,
             clock: || 0.0,
         };
-        tracker.params = tracker.completed(params)?;
-        tracker.begin();
+        tracker.params = tracker.with_defaults(params)?;
+        tracker.restart();
         Ok(tracker)
     }
 
     /// Validates the parameters, and derives those that are 0 from the volume.
-    fn completed(&self, params: TrackingParams) -> Result<TrackingParams, MethodError> {
+    fn with_defaults(&self, params: TrackingParams) -> Result<TrackingParams, MethodError> {
         params.validate()?;
-        let pixel = self.image.pixel;
+        let shortest_side = self.image.shortest_side;
         let params = params.with_volume(&self.image);
-        let most = samples::MOST / 2 - 1;
-        let longest = pixel * most as f64;
-        if params.radius < pixel || params.radius > longest {
-            let problem =
-                format!("{} given, {pixel} to {longest} (1 to {most} voxels) accepted", params.radius);
+        let most = samples::MAX_FACES / 2 - 1;
+        let longest = shortest_side * most as f64;
+        if params.radius < shortest_side || params.radius > longest {
+            let problem = format!(
+                "{} given, {shortest_side} to {longest} (1 to {most} voxels) accepted",
+                params.radius
+            );
             return Err(MethodError::invalid("radius", problem));
         }
         Ok(params)
     }
 
     /// Resets the run to before its first step, with the current parameters.
-    fn begin(&mut self) {
-        self.region.threshold = self.params.threshold / self.region.step;
+    fn restart(&mut self) {
+        self.region.threshold = self.params.threshold / self.region.quantum;
         let window = Window {
-            reach: self.params.window as usize,
+            half_width: self.params.window as usize,
             frames: self.params.window_frames as usize,
             threshold: self.region.threshold,
             cyclic: self.params.cyclic,
         };
-        self.voting = Voting::new(window, self.frames());
+        self.voting = BoundaryVoting::new(window, self.frames());
         self.faces.clear();
-        (self.follower, self.moment, self.closing) = (None, None, None);
+        (self.tracker, self.samples, self.closure_error) = (None, None, None);
         self.meshes.clear();
         self.facts.clear();
         let replaced = std::mem::replace(&mut self.mesh, self.start.clone());
@@ -206,13 +210,13 @@ impl SurfaceTracker {
     /// # Errors
     /// [`MethodError::InvalidArgument`]; nothing has changed then.
     pub fn set_params(&mut self, params: TrackingParams) -> Result<(), MethodError> {
-        let params = self.completed(params)?;
-        let stands = params.same_boundary(&self.params);
+        let params = self.with_defaults(params)?;
+        let keeps_boundary = params.same_boundary(&self.params);
         self.params = params;
-        if stands {
-            self.moment = self.newest_moment();
+        if keeps_boundary {
+            self.samples = self.newest_samples();
         } else {
-            self.begin();
+            self.restart();
         }
         Ok(())
     }
@@ -259,12 +263,12 @@ impl SurfaceTracker {
 
     /// Returns the cycle closure error: the mean distance of the last frame's surface, tracked on to the first frame,
     /// from the surface there, in world units. `None` until it is known, and for sequences that are not cyclic.
-    pub fn closing(&self) -> Option<f64> {
-        self.closing
+    pub fn closure_error(&self) -> Option<f64> {
+        self.closure_error
     }
 
     /// Returns the number of frames, from the first on, whose boundary has been found.
-    pub fn bounded(&self) -> usize {
+    pub fn frames_with_boundary(&self) -> usize {
         self.faces.len()
     }
 
@@ -275,8 +279,8 @@ impl SurfaceTracker {
         let mut points = Vec::new();
         for (direction, list) in faces.iter().enumerate() {
             for face in list {
-                let (place, later) = self.region.face(direction, face.voxel);
-                let [x, y, z] = self.region.world(place).to_array();
+                let (position, later) = self.region.face(direction, face.voxel);
+                let [x, y, z] = self.region.to_world(position).to_array();
                 points.push([x, y, z, frame as f32 + later, face.weight]);
             }
         }
@@ -285,7 +289,7 @@ impl SurfaceTracker {
 
     /// Whether all frames are done, and the closure error of a cyclic sequence is known.
     pub fn is_done(&self) -> bool {
-        self.meshes.len() == self.frames() && (self.closing.is_some() || !self.params.cyclic)
+        self.meshes.len() == self.frames() && (self.closure_error.is_some() || !self.params.cyclic)
     }
 
     /// Processes one more frame: first finds the boundary in every frame, then tracks the surface through them, and
@@ -310,7 +314,7 @@ impl SurfaceTracker {
             changes = self.next_frame()?;
             times.add("surface", (self.clock)() - began);
         } else {
-            self.close();
+            self.close_cycle();
             times.add("closing", (self.clock)() - began);
         }
         self.steps = self.steps.saturating_add(1);
@@ -325,48 +329,58 @@ impl SurfaceTracker {
     /// Tracks the surface into the next frame. If it fails, nothing has changed.
     fn next_frame(&mut self) -> Result<Changes, MethodError> {
         let frame = self.meshes.len();
-        let mut follower = match self.follower.take() {
-            Some(follower) => follower,
+        let mut tracker = match self.tracker.take() {
+            Some(tracker) => tracker,
             None => {
                 self.find_first_mesh()?;
-                Follower::new(measure(&self.mesh.to_triangles()).edge_mean)
+                FrameTracker::new(measure(&self.mesh.to_triangles()).edge_mean)
             }
         };
         // Present for every frame but the first.
-        let from = self.moment.take();
-        let into = self.moment_of(frame);
-        self.voting.know_levels(&self.region, frame);
-        let going =
-            Going { region: &self.region, params: &self.params, frame, into: &into, voting: &self.voting };
-        let (changes, facts) = follower.go(&mut self.mesh, from.as_ref(), &going);
-        (self.follower, self.moment) = (Some(follower), Some(into));
+        let from = self.samples.take();
+        let samples = self.samples_around(frame);
+        self.voting.ensure_levels(&self.region, frame);
+        let context = FrameContext {
+            region: &self.region,
+            params: &self.params,
+            frame,
+            samples: &samples,
+            voting: &self.voting,
+        };
+        let (changes, facts) = tracker.track_frame(&mut self.mesh, from.as_ref(), &context);
+        (self.tracker, self.samples) = (Some(tracker), Some(samples));
         self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
         self.facts.push(facts);
         Ok(changes)
     }
 
     /// Tracks the surface of the last frame on to the first, and measures how far it is from where it began.
-    fn close(&mut self) {
-        let (Some(mut follower), Some(first)) = (self.follower.clone(), self.meshes.first()) else { return };
+    fn close_cycle(&mut self) {
+        let (Some(mut tracker), Some(first)) = (self.tracker.clone(), self.meshes.first()) else { return };
         let mut mesh = self.mesh.clone();
-        let into = self.moment_of(0);
-        self.voting.know_levels(&self.region, 0);
-        let going =
-            Going { region: &self.region, params: &self.params, frame: 0, into: &into, voting: &self.voting };
-        follower.go(&mut mesh, self.moment.as_ref(), &going);
-        let apart = surface_distance(&mesh.to_triangles(), first);
-        self.closing = Some(apart.map_or(f64::INFINITY, |distance| distance.mean));
+        let samples = self.samples_around(0);
+        self.voting.ensure_levels(&self.region, 0);
+        let context = FrameContext {
+            region: &self.region,
+            params: &self.params,
+            frame: 0,
+            samples: &samples,
+            voting: &self.voting,
+        };
+        tracker.track_frame(&mut mesh, self.samples.as_ref(), &context);
+        let distance = surface_distance(&mesh.to_triangles(), first);
+        self.closure_error = Some(distance.map_or(f64::INFINITY, |distance| distance.mean));
     }
 
     /// Collects the boundary points around the newest frame; `None` before the first.
-    fn newest_moment(&self) -> Option<Moment> {
-        self.meshes.len().checked_sub(1).map(|frame| self.moment_of(frame))
+    fn newest_samples(&self) -> Option<SpaceTimeSamples> {
+        self.meshes.len().checked_sub(1).map(|frame| self.samples_around(frame))
     }
 
     /// Collects the boundary points of a frame and of those around it in time.
-    fn moment_of(&self, frame: usize) -> Moment {
+    fn samples_around(&self, frame: usize) -> SpaceTimeSamples {
         let (count, falloff) = (self.frames(), self.falloff());
-        let mut field = Field::new(&self.region, falloff);
+        let mut field = SampleField::new(&self.region, falloff);
         // In a cycle, no frame is added twice.
         let most = if self.params.cyclic { (count - 1) / 2 } else { count - 1 };
         for offset in falloff.offsets(most) {
@@ -375,11 +389,19 @@ impl SurfaceTracker {
                 field.add(&self.faces[at.rem_euclid(count as i64) as usize], offset);
             }
         }
-        let pixel = self.region.spacing.min_element();
+        let shortest_side = self.region.spacing.min_element();
         let (damping, time_scale) = (self.params.damping, self.params.time_scale);
-        let cut = self.region.cut_voxels(&self.faces[frame]);
-        let own = Field::still(&self.region, falloff, &self.faces[frame]);
-        Moment { field, own, cut, time_scale, damping, still: STILL * pixel, longest: LONGEST * pixel }
+        let box_side_voxels = self.region.bright_box_side_voxels(&self.faces[frame]);
+        let own = SampleField::single_frame(&self.region, falloff, &self.faces[frame]);
+        SpaceTimeSamples {
+            field,
+            own,
+            box_side_voxels,
+            time_scale,
+            damping,
+            tolerance: CONVERGED_STEP * shortest_side,
+            max_displacement: MAX_DISPLACEMENT * shortest_side,
+        }
     }
 
     fn falloff(&self) -> Falloff {
@@ -389,22 +411,22 @@ impl SurfaceTracker {
     fn report(&self, events: Changes, times: Times) -> StepReport {
         let frames = self.frames();
         let (found, done) = (self.faces.len(), self.meshes.len());
-        let phase = if self.closing.is_some() {
+        let phase = if self.closure_error.is_some() {
             "surface, back in the first frame".into()
         } else if done > 0 {
             format!("surface, frame {done} of {frames}")
         } else {
             format!("boundary, frame {found} of {frames}")
         };
-        let closing = usize::from(self.params.cyclic);
-        let steps_done = found + done + usize::from(self.closing.is_some());
+        let closing_steps = usize::from(self.params.cyclic);
+        let steps_done = found + done + usize::from(self.closure_error.is_some());
         StepReport {
             iteration: self.steps,
             done: self.is_done(),
             phase,
-            progress: steps_done as f64 / (2 * frames + closing) as f64,
+            progress: steps_done as f64 / (2 * frames + closing_steps) as f64,
             residual: self.facts.last().map_or(f64::NAN, |facts| facts.correction),
-            tolerance: STILL * self.region.spacing.min_element(),
+            tolerance: CONVERGED_STEP * self.region.spacing.min_element(),
             vertices: self.mesh.vertex_count() as u32,
             triangles: self.mesh.triangle_count() as u32,
             components: self.mesh.component_count() as u32,
@@ -416,15 +438,15 @@ impl SurfaceTracker {
 }
 
 impl Region {
-    fn place(&self, p: Vec3) -> DVec3 {
+    fn to_local(&self, p: Vec3) -> DVec3 {
         self.from_world.transform_point3(p.as_dvec3())
     }
 
-    fn world(&self, place: DVec3) -> Vec3 {
-        self.to_world.transform_point3(place).as_vec3()
+    fn to_world(&self, position: DVec3) -> Vec3 {
+        self.to_world.transform_point3(position).as_vec3()
     }
 
-    fn direction(&self, way: DVec3) -> Vec3 {
-        self.to_world.transform_vector3(way).as_vec3()
+    fn direction_to_world(&self, displacement: DVec3) -> Vec3 {
+        self.to_world.transform_vector3(displacement).as_vec3()
     }
 }

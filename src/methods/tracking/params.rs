@@ -100,7 +100,7 @@ impl TrackingParams {
 
     /// Replaces parameters that are 0 by values derived from the volume.
     pub(super) fn with_volume(mut self, image: &ImageFacts) -> Self {
-        let ImageFacts { pixel, thickest, noise, range } = *image;
+        let ImageFacts { shortest_side: pixel, longest_side: thickest, noise, range } = *image;
         let or = |value: f64, usual: f64| if value == 0.0 { usual } else { value };
         self.threshold = or(self.threshold, (THRESHOLD_IN_NOISE * noise).max(LEAST_THRESHOLD * range));
         self.radius = or(self.radius, (RADIUS_IN_PIXELS * pixel).max(RADIUS_IN_SLICES * thickest));

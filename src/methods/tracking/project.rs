@@ -1,8 +1,8 @@
 //! Restricted projection onto the space-time surface within one frame (section 3.3), and prediction of the next frame
 //! (section 4.2).
 
-use super::extremal::{Fit, hyperplane, plane};
-use super::samples::Field;
+use super::extremal::{PlaneFit, hyperplane, plane};
+use super::samples::SampleField;
 use crate::math::DVec3;
 
 /// Smallest damping factor of a projection step; that of the i-th step is β^i until then.
@@ -13,24 +13,24 @@ const STEPS: usize = 30;
 
 /// Smallest |n₃|², the squared spatial part of the normal, for a projection: below, the hyperplane is nearly parallel
 /// to the frame, and cuts it in no well-defined plane.
-const LEAST_SLOPE: f64 = 0.05;
+const MIN_SPATIAL_NORMAL_SQUARED: f64 = 0.05;
 
 /// The boundary points around one frame in time, and the parameters of projections there.
 #[derive(Clone, Debug)]
-pub(super) struct Moment {
+pub(super) struct SpaceTimeSamples {
     /// Points of the frame and of those around it.
-    pub field: Field,
+    pub field: SampleField,
     /// Points of the frame alone.
-    pub own: Field,
+    pub own: SampleField,
     /// Voxels of the frame that are bright at a side of the box, sorted.
-    pub cut: Vec<u32>,
+    pub box_side_voxels: Vec<u32>,
     /// c: the distance that one frame counts as, in world units.
     pub time_scale: f64,
     pub damping: f64,
     /// A projection has converged after a step no longer than this, in world units.
-    pub still: f64,
+    pub tolerance: f64,
     /// Projections that move farther than this are rejected, in world units.
-    pub longest: f64,
+    pub max_displacement: f64,
 }
 
 /// The surface that a point is projected onto.
@@ -43,12 +43,11 @@ pub(super) enum Onto {
     Frame,
 }
 
-impl Moment {
-    fn fit(&self, at: DVec3, onto: Onto) -> Option<Fit> {
+impl SpaceTimeSamples {
+    fn fit(&self, at: DVec3, onto: Onto) -> Option<PlaneFit> {
         match onto {
-            Onto::SpaceTime => {
-                hyperplane(&self.field.sums(at)).filter(|fit| fit.normal.length_squared() >= LEAST_SLOPE)
-            }
+            Onto::SpaceTime => hyperplane(&self.field.sums(at))
+                .filter(|fit| fit.normal.length_squared() >= MIN_SPATIAL_NORMAL_SQUARED),
             Onto::Frame => plane(&self.own.sums(at)),
         }
     }
@@ -66,12 +65,12 @@ impl Moment {
             let above = n.dot(p - x) - fit.distance;
             let y = p - n * (above / n.length_squared());
             let next = x + (y - x) * damping;
-            let way = next.distance(x);
+            let change = next.distance(x);
             x = next;
-            if x.distance(p) > self.longest {
+            if x.distance(p) > self.max_displacement {
                 return None;
             }
-            if way < self.still {
+            if change < self.tolerance {
                 return Some((x, step + 1));
             }
             damping = (damping * self.damping).max(LEAST_DAMPING);
@@ -108,7 +107,7 @@ mod tests {
             to_world: DAffine3::IDENTITY,
             from_world: DAffine3::IDENTITY,
             frames: vec![Vec::new(); 5],
-            step: 1.0,
+            quantum: 1.0,
             threshold: 1.0,
         }
     }
@@ -132,14 +131,23 @@ mod tests {
     const FALLOFF: Falloff = Falloff { radius: 4.0, time_scale: C };
 
     /// Samples of a plane that moves along its normal.
-    fn moment(normal: DVec3, distance: f64, speed: f64) -> Moment {
+    fn moving_plane(normal: DVec3, distance: f64, speed: f64) -> SpaceTimeSamples {
         let region = region();
-        let mut field = Field::new(&region, FALLOFF);
+        let mut field = SampleField::new(&region, FALLOFF);
         for offset in FALLOFF.offsets(9) {
             field.add(&plane_faces(&region, normal, distance, speed, offset as f64), offset);
         }
-        let own = Field::still(&region, FALLOFF, &plane_faces(&region, normal, distance, speed, 0.0));
-        Moment { field, own, cut: Vec::new(), time_scale: C, damping: 0.9, still: 1e-4, longest: 4.0 }
+        let own =
+            SampleField::single_frame(&region, FALLOFF, &plane_faces(&region, normal, distance, speed, 0.0));
+        SpaceTimeSamples {
+            field,
+            own,
+            box_side_voxels: Vec::new(),
+            time_scale: C,
+            damping: 0.9,
+            tolerance: 1e-4,
+            max_displacement: 4.0,
+        }
     }
 
     #[test]
@@ -150,7 +158,7 @@ mod tests {
             let normal = DVec3::new(0.6, 0.0, 0.8);
             let frames: Vec<Faces> =
                 (-5..=5).map(|t| plane_faces(&region, normal, 12.0, 0.3, f64::from(t))).collect();
-            let mut field = Field::new(&region, falloff);
+            let mut field = SampleField::new(&region, falloff);
             for offset in falloff.offsets(5) {
                 field.add(&frames[(offset + 5) as usize], offset);
             }
@@ -189,18 +197,18 @@ mod tests {
     fn a_plane_is_found_from_both_sides_and_its_motion_predicted() {
         let normal = DVec3::new(2.0, -1.0, 2.0) / 3.0;
         for speed in [0.0, 0.5, -0.8] {
-            let moment = moment(normal, 9.0, speed);
+            let samples = moving_plane(normal, 9.0, speed);
             for start in
                 [DVec3::new(10.0, 10.0, 10.2), DVec3::new(9.0, 9.5, 8.3), DVec3::new(10.5, 11.0, 8.0)]
             {
                 // The points of a moving plane in other frames lie on it in space-time.
                 for onto in [Onto::SpaceTime, Onto::Frame] {
-                    let (x, _) = moment.project(start, onto).unwrap();
+                    let (x, _) = samples.project(start, onto).unwrap();
                     assert!((normal.dot(x) - 9.0).abs() < 0.03, "{speed} {start} {}", normal.dot(x));
                     assert!((x - start).cross(normal).length() < 0.05, "{}", x - start);
                 }
-                let (x, _) = moment.project(start, Onto::SpaceTime).unwrap();
-                let way = moment.prediction(x).unwrap();
+                let (x, _) = samples.project(start, Onto::SpaceTime).unwrap();
+                let way = samples.prediction(x).unwrap();
                 assert!((way - normal * speed).length() < 0.04, "{speed} {way}");
             }
         }
@@ -208,11 +216,11 @@ mod tests {
 
     #[test]
     fn where_there_are_no_points_or_they_are_too_far_nothing_is_found() {
-        let moment = moment(DVec3::X, 10.0, 0.0);
-        assert!(moment.project(DVec3::new(1.0, 10.0, 10.0), Onto::SpaceTime).is_none());
-        assert!(moment.project(DVec3::new(-500.0, 1e6, 3.0), Onto::Frame).is_none());
-        assert!(moment.project(DVec3::splat(1e300), Onto::SpaceTime).is_none());
-        let near = Moment { longest: 0.5, ..moment };
+        let samples = moving_plane(DVec3::X, 10.0, 0.0);
+        assert!(samples.project(DVec3::new(1.0, 10.0, 10.0), Onto::SpaceTime).is_none());
+        assert!(samples.project(DVec3::new(-500.0, 1e6, 3.0), Onto::Frame).is_none());
+        assert!(samples.project(DVec3::splat(1e300), Onto::SpaceTime).is_none());
+        let near = SpaceTimeSamples { max_displacement: 0.5, ..samples };
         assert!(near.project(DVec3::new(12.0, 10.0, 10.0), Onto::SpaceTime).is_none());
     }
 }

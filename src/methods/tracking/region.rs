@@ -7,7 +7,7 @@ use crate::methods::MethodError;
 use crate::volume::{Volume, trilinear};
 
 /// Highest quantised intensity: levels 0 to 254, one byte per voxel.
-const STEPS: f64 = 254.0;
+const MAX_LEVEL: f64 = 254.0;
 
 /// Share of the region's voxels at either end of the intensities, one in a thousand, that are clamped to the range.
 const OUTLIERS: f64 = 1e-3;
@@ -16,7 +16,7 @@ const OUTLIERS: f64 = 1e-3;
 const BINS: usize = 4096;
 
 /// Padding around the bounds, in voxels, for the windows of voxels at the border.
-const ROOM: usize = 2;
+const PADDING: usize = 2;
 
 /// Minimum number of voxels along at least two axes; a single slice is accepted.
 const LEAST_VOXELS: usize = 5;
@@ -49,7 +49,7 @@ pub(super) struct Region {
     /// Quantised intensities by frame, x fastest.
     pub frames: Vec<Vec<u8>>,
     /// The intensity of one quantisation step.
-    pub step: f64,
+    pub quantum: f64,
     /// τ, in quantisation steps.
     pub threshold: f64,
 }
@@ -71,11 +71,11 @@ impl Region {
                 "its voxel axes are not at right angles; resample it, or set an affine whose axes are";
             return Err(MethodError::invalid("volume", problem));
         }
-        let [low, high] = ends_of(volume, bounds)?;
-        let inner = [[ROOM; 3], [0, 1, 2].map(|k| high[k] - low[k] + ROOM)];
-        let dims = inner[1].map(|last| last + ROOM + 1);
+        let [low, high] = voxel_bounds(volume, bounds)?;
+        let inner = [[PADDING; 3], [0, 1, 2].map(|k| high[k] - low[k] + PADDING)];
+        let dims = inner[1].map(|last| last + PADDING + 1);
         check_size(dims, volume.frames())?;
-        let first = volume.affine().transform_point3(DVec3::from(low.map(|i| i as f64 - ROOM as f64)));
+        let first = volume.affine().transform_point3(DVec3::from(low.map(|i| i as f64 - PADDING as f64)));
         let to_world = DAffine3::from_mat3_translation(directions, first);
         let mut region = Self {
             dims,
@@ -84,47 +84,47 @@ impl Region {
             to_world,
             from_world: to_world.inverse(),
             frames: Vec::new(),
-            step: 0.0,
+            quantum: 0.0,
             threshold: 0.0,
         };
         region.read(volume, low)?;
         Ok(region)
     }
 
-    /// Quantises the intensities of all frames, between the quantiles found by [`ends`].
+    /// Quantises the intensities of all frames, between the quantiles found by [`intensity_quantiles`].
     fn read(&mut self, volume: &Volume, low: [usize; 3]) -> Result<(), MethodError> {
         let mut counts = vec![0u64; BINS];
         for frame in 0..volume.frames() {
-            self.each_row(volume, low, frame, |row| {
+            self.for_each_row(volume, low, frame, |row| {
                 row.iter().for_each(|&v| counts[bin_of(v)] += 1);
             })?;
         }
-        let [from, to] = ends(&counts);
+        let [from, to] = intensity_quantiles(&counts);
         if from >= to {
             let problem = "all voxels in the box have the same intensity; a boundary needs two";
             return Err(MethodError::invalid("volume", problem));
         }
-        let scale = STEPS / (to - from);
+        let scale = MAX_LEVEL / (to - from);
         for frame in 0..volume.frames() {
             let mut levels = Vec::with_capacity(self.dims.iter().product());
-            self.each_row(volume, low, frame, |row| {
+            self.for_each_row(volume, low, frame, |row| {
                 levels.extend(
-                    row.iter().map(|&v| ((f64::from(v) - from) * scale + 0.5).clamp(0.0, STEPS) as u8),
+                    row.iter().map(|&v| ((f64::from(v) - from) * scale + 0.5).clamp(0.0, MAX_LEVEL) as u8),
                 );
             })?;
             self.frames.push(levels);
         }
-        self.step = volume.span() / scale;
+        self.quantum = volume.span() / scale;
         Ok(())
     }
 
-    /// Calls `take` with each row of the region along x, in intensities from 0 to 1.
-    fn each_row(
+    /// Calls `visit` with each row of the region along x, in intensities from 0 to 1.
+    fn for_each_row(
         &self,
         volume: &Volume,
         low: [usize; 3],
         frame: usize,
-        mut take: impl FnMut(&[f32]),
+        mut visit: impl FnMut(&[f32]),
     ) -> Result<(), MethodError> {
         let grid = volume.normalised_grid(frame)?;
         // Indices into the volume, clamped to its border.
@@ -138,21 +138,21 @@ impl Region {
             for &y in &ys {
                 let start = (z * grid.dims[1] + y) * grid.dims[0];
                 row.iter_mut().zip(&xs).for_each(|(value, x)| *value = grid.values[start + x]);
-                take(&row);
+                visit(&row);
             }
         }
         Ok(())
     }
 
     /// Returns the longest side of a voxel among axes with more than one voxel, in world units.
-    pub fn thickest(&self) -> f64 {
+    pub fn longest_side(&self) -> f64 {
         let [first, last] = self.inner;
         (0..3).filter(|&axis| last[axis] > first[axis]).map(|axis| self.spacing[axis]).fold(0.0, f64::max)
     }
 
     /// Returns the range of intensities, without outliers.
     pub fn span(&self) -> f64 {
-        STEPS * self.step
+        MAX_LEVEL * self.quantum
     }
 
     /// Returns the grid coordinates of a voxel.
@@ -162,9 +162,9 @@ impl Region {
     }
 
     /// Returns the grid coordinates of the voxel nearest to a position.
-    pub fn nearest(&self, place: DVec3) -> [usize; 3] {
+    pub fn nearest(&self, position: DVec3) -> [usize; 3] {
         let last = DVec3::from(self.dims.map(|n| (n - 1) as f64));
-        (place / self.spacing).clamp(DVec3::ZERO, last).round().to_array().map(|i| i as usize)
+        (position / self.spacing).clamp(DVec3::ZERO, last).round().to_array().map(|i| i as usize)
     }
 
     /// Returns the centre of the face after a voxel along a direction, and its time after the voxel's frame, in frames.
@@ -178,8 +178,8 @@ impl Region {
     }
 
     /// Interpolates the quantised intensity trilinearly at a position, with the border replicated.
-    pub fn sample(&self, frame: usize, place: DVec3) -> f64 {
-        trilinear(self.dims, place / self.spacing, |i| f64::from(self.frames[frame][i]))
+    pub fn sample(&self, frame: usize, position: DVec3) -> f64 {
+        trilinear(self.dims, position / self.spacing, |i| f64::from(self.frames[frame][i]))
     }
 
     /// Estimates the standard deviation of the noise, in quantisation steps, from differences between neighbours along
@@ -226,7 +226,7 @@ fn bin_of(value: f32) -> usize {
 }
 
 /// Returns the lower and upper quantile of the intensities, from 0 to 1, beyond which voxels are outliers.
-fn ends(counts: &[u64]) -> [f64; 2] {
+fn intensity_quantiles(counts: &[u64]) -> [f64; 2] {
     let few = OUTLIERS * counts.iter().sum::<u64>() as f64;
     let beyond = |from_top: bool| {
         let mut sum = 0;
@@ -241,7 +241,7 @@ fn ends(counts: &[u64]) -> [f64; 2] {
 }
 
 /// Returns the first and the last voxel within bounds, validated; by default those of the whole volume.
-fn ends_of(volume: &Volume, bounds: Option<Bounds>) -> Result<[[usize; 3]; 2], MethodError> {
+fn voxel_bounds(volume: &Volume, bounds: Option<Bounds>) -> Result<[[usize; 3]; 2], MethodError> {
     let last = volume.dims().map(|n| n - 1);
     let (parameter, [low, high]) = match bounds {
         None => ("volume", [[0; 3], last]),

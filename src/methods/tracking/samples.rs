@@ -31,8 +31,8 @@ impl Falloff {
 
     /// Returns the offsets of the frames whose faces may be within the radius, at most `most` to either side.
     pub fn offsets(&self, most: usize) -> std::ops::RangeInclusive<i64> {
-        let reach = ((self.radius / self.time_scale + 1.0) as i64).min(most as i64);
-        -reach..=reach
+        let frames = ((self.radius / self.time_scale + 1.0) as i64).min(most as i64);
+        -frames..=frames
     }
 }
 
@@ -40,58 +40,58 @@ impl Falloff {
 const LANES: usize = 8;
 
 /// Maximum number of vectors along x.
-const MOST_LANES: usize = 4;
+const MAX_VECTORS: usize = 4;
 
 /// Maximum number of faces within the radius along one axis; limits the radius.
-pub(super) const MOST: usize = MOST_LANES * LANES;
+pub(super) const MAX_FACES: usize = MAX_VECTORS * LANES;
 
 /// The boundary points around one frame, as weights on faces; answers queries for [`Sums`].
 #[derive(Clone, Debug)]
-pub(super) struct Field {
+pub(super) struct SampleField {
     dims: [usize; 3],
     spacing: DVec3,
     falloff: Falloff,
     /// Length of a row, and its padding with zeros at either end.
-    row: usize,
-    room: usize,
+    stride: usize,
+    padding: usize,
     /// By axis, the constant factor by which the ratio of θ between neighbouring voxels changes from voxel to voxel.
     changes: DVec3,
     /// Whether the points are of several moments, so that temporal sums are kept.
-    timed: bool,
+    has_times: bool,
     /// Points by direction of the faces; faces along time are at voxel centres.
-    sites: [Sites; 4],
+    sites: [FaceWeights; 4],
 }
 
 /// Weights of the points of one direction, times θ of their time t: times 1 and, for several moments, times t and t².
 #[derive(Clone, Debug, Default)]
-struct Sites {
+struct FaceWeights {
     weights: [Vec<f32>; 3],
     /// By row, from the first voxel with a weight to after the last.
     extents: Vec<[u32; 2]>,
 }
 
-impl Field {
+impl SampleField {
     /// Creates a field without points, for several moments.
     pub fn new(region: &Region, falloff: Falloff) -> Self {
         let most = (2.0 * falloff.radius / region.spacing.x) as usize + 1;
-        let room = most + 1 + if most <= LANES { LANES } else { MOST };
+        let padding = most + 1 + if most <= LANES { LANES } else { MAX_FACES };
         let change = |k: usize| falloff.ratio(region.spacing[k] / 2.0, region.spacing[k]);
-        let row = region.dims[0] + 2 * room;
+        let row = region.dims[0] + 2 * padding;
         Self {
             dims: region.dims,
             spacing: region.spacing,
             falloff,
-            row,
-            room,
+            stride: row,
+            padding,
             changes: DVec3::new(change(0), change(1), change(2)),
-            timed: true,
+            has_times: true,
             sites: Default::default(),
         }
     }
 
     /// Creates a field with the points of a single frame, without those along time.
-    pub fn still(region: &Region, falloff: Falloff, faces: &Faces) -> Self {
-        let mut field = Self { timed: false, ..Self::new(region, falloff) };
+    pub fn single_frame(region: &Region, falloff: Falloff, faces: &Faces) -> Self {
+        let mut field = Self { has_times: false, ..Self::new(region, falloff) };
         for direction in [X, Y, Z] {
             field.add_direction(direction, faces, 0.0);
         }
@@ -114,16 +114,16 @@ impl Field {
         let [nx, ny, nz] = self.dims;
         let theta = self.falloff.theta(time);
         let factors = [theta, theta * time, theta * time * time].map(|factor| factor as f32);
-        let Sites { weights, extents } = &mut self.sites[direction];
+        let FaceWeights { weights, extents } = &mut self.sites[direction];
         if extents.is_empty() {
             extents.resize(ny * nz, [u32::MAX, 0]);
-            let lists = weights.iter_mut().take(if self.timed { 3 } else { 1 });
-            lists.for_each(|list| list.resize(self.row * ny * nz, 0.0));
+            let lists = weights.iter_mut().take(if self.has_times { 3 } else { 1 });
+            lists.for_each(|list| list.resize(self.stride * ny * nz, 0.0));
         }
         for face in &faces[direction] {
             let (line, x) = (face.voxel as usize / nx, face.voxel as usize % nx);
             for (list, factor) in weights.iter_mut().zip(factors).filter(|(list, _)| !list.is_empty()) {
-                list[line * self.row + self.room + x] += factor * face.weight;
+                list[line * self.stride + self.padding + x] += factor * face.weight;
             }
             let [first, end] = &mut extents[line];
             (*first, *end) = ((*first).min(x as u32), (*end).max(x as u32 + 1));
@@ -133,23 +133,24 @@ impl Field {
     /// Returns weighted sums over all points around a position in the frame.
     pub fn sums(&self, at: DVec3) -> Sums {
         let mut sums = Sums::default();
-        let axis =
-            |k: usize, offset: f64| Axis::new(at[k], self.spacing[k], offset, &self.falloff, self.changes[k]);
+        let axis = |k: usize, offset: f64| {
+            AxisWeights::new(at[k], self.spacing[k], offset, &self.falloff, self.changes[k])
+        };
         let axes = [[axis(0, 0.0), axis(0, 0.5)], [axis(1, 0.0), axis(1, 0.5)], [axis(2, 0.0), axis(2, 0.5)]];
         for direction in [X, Y, Z, TIME] {
             let [x, y, z] = [X, Y, Z].map(|k| &axes[k][usize::from(direction == k)]);
             // There are no points off the grid.
-            let room = self.room as i64;
-            let outside = x.first < -room || x.end() > self.dims[0] as i64 + room;
+            let padding = self.padding as i64;
+            let outside = x.first < -padding || x.end() > self.dims[0] as i64 + padding;
             if outside || self.sites[direction].extents.is_empty() {
                 continue;
             }
             let sites = &self.sites[direction];
-            match (x.count <= LANES, self.timed) {
+            match (x.count <= LANES, self.has_times) {
                 (true, true) => self.gather::<1, true>(sites, [x, y, z], &mut sums),
                 (true, false) => self.gather::<1, false>(sites, [x, y, z], &mut sums),
-                (false, true) => self.gather::<MOST_LANES, true>(sites, [x, y, z], &mut sums),
-                (false, false) => self.gather::<MOST_LANES, false>(sites, [x, y, z], &mut sums),
+                (false, true) => self.gather::<MAX_VECTORS, true>(sites, [x, y, z], &mut sums),
+                (false, false) => self.gather::<MAX_VECTORS, false>(sites, [x, y, z], &mut sums),
             }
         }
         sums
@@ -158,16 +159,16 @@ impl Field {
     /// Sums over the faces of one direction, with `N` vectors of lanes along x, enough for all faces within the radius.
     fn gather<const N: usize, const TIMED: bool>(
         &self,
-        sites: &Sites,
-        [x, y, z]: [&Axis; 3],
+        sites: &FaceWeights,
+        [x, y, z]: [&AxisWeights; 3],
         sums: &mut Sums,
     ) {
         let square = self.falloff.radius * self.falloff.radius;
         let near = [x.first, x.end()];
-        let mut columns = Columns::<N>::default();
+        let mut planes = PlaneSums::<N>::default();
         for k in z.range(self.dims[2]) {
             let dz = z.distance(k);
-            let mut plane = Plane::<N>::default();
+            let mut rows = RowSums::<N>::default();
             for j in y.range(self.dims[1]) {
                 let line = k as usize * self.dims[1] + j as usize;
                 let dy = y.distance(j);
@@ -175,43 +176,43 @@ impl Field {
                 if dy * dy + dz * dz >= square || first >= near[1] || end <= near[0] {
                     continue;
                 }
-                let from = ((line * self.row + self.room) as i64 + x.first) as usize;
+                let from = ((line * self.stride + self.padding) as i64 + x.first) as usize;
                 let row = |power: usize| lanes(&sites.weights[power][from..from + N * LANES]);
-                plane.add(&row(0), dy as f32, y.weight(j));
+                rows.add(&row(0), dy as f32, y.weight(j));
                 if TIMED {
-                    plane.add_timed([row(1), row(2)], dy as f32, y.weight(j));
+                    rows.add_timed([row(1), row(2)], dy as f32, y.weight(j));
                 }
             }
-            if plane.used {
-                columns.add(&plane, dz as f32, z.weight(k));
+            if rows.used {
+                planes.add(&rows, dz as f32, z.weight(k));
                 if TIMED {
-                    columns.add_timed(&plane, dz as f32, z.weight(k));
+                    planes.add_timed(&rows, dz as f32, z.weight(k));
                 }
             }
         }
-        if columns.plane.used {
-            columns.add_to(sums, x);
+        if planes.rows.used {
+            planes.add_to(sums, x);
         }
     }
 }
 
 /// The faces within the radius along one axis, indexed by the voxel before them, with their θ.
-struct Axis {
+struct AxisWeights {
     first: i64,
     /// Signed distance from the position to the first face, and from each face to the next.
     start: f64,
     spacing: f64,
-    weights: [f32; MOST],
+    weights: [f32; MAX_FACES],
     count: usize,
 }
 
-impl Axis {
+impl AxisWeights {
     fn new(at: f64, spacing: f64, offset: f64, falloff: &Falloff, change: f64) -> Self {
         let first = ((at - falloff.radius) / spacing - offset).ceil() as i64;
         let last = ((at + falloff.radius) / spacing - offset).floor() as i64;
-        let count = usize::try_from(last.saturating_sub(first) + 1).unwrap_or(0).min(MOST);
+        let count = usize::try_from(last.saturating_sub(first) + 1).unwrap_or(0).min(MAX_FACES);
         let start = (first as f64 + offset) * spacing - at;
-        let mut weights = [0.0; MOST];
+        let mut weights = [0.0; MAX_FACES];
         let (mut theta, mut ratio) = (falloff.theta(start), falloff.ratio(start, spacing));
         for weight in weights.iter_mut().take(count) {
             *weight = theta as f32;
@@ -257,21 +258,21 @@ fn add<const N: usize>(to: &mut Lanes<N>, lanes: &Lanes<N>, factor: f32) {
 }
 
 /// Sums over y in one plane of rows: weights times 1, y and y², weights times t, times 1 and y, and weights times t².
-struct Plane<const N: usize> {
+struct RowSums<const N: usize> {
     plain: [Lanes<N>; 3],
     timed: [Lanes<N>; 2],
     squared: Lanes<N>,
     used: bool,
 }
 
-impl<const N: usize> Default for Plane<N> {
+impl<const N: usize> Default for RowSums<N> {
     fn default() -> Self {
         let none = [f32x8::ZERO; N];
         Self { plain: [none; 3], timed: [none; 2], squared: none, used: false }
     }
 }
 
-impl<const N: usize> Plane<N> {
+impl<const N: usize> RowSums<N> {
     #[inline]
     fn add(&mut self, weights: &Lanes<N>, dy: f32, theta: f32) {
         let powers = [theta, theta * dy, theta * dy * dy];
@@ -287,41 +288,41 @@ impl<const N: usize> Plane<N> {
     }
 }
 
-/// Sums over the planes: those of [`Plane`], and its sums with factors z and z².
-struct Columns<const N: usize> {
-    plane: Plane<N>,
+/// Sums over the planes: those of [`RowSums`], and its sums with factors z and z².
+struct PlaneSums<const N: usize> {
+    rows: RowSums<N>,
     /// Weights times z, yz and zt.
-    high: [Lanes<N>; 3],
+    z_sums: [Lanes<N>; 3],
     /// Weights times z².
-    higher: Lanes<N>,
+    zz_sums: Lanes<N>,
 }
 
-impl<const N: usize> Default for Columns<N> {
+impl<const N: usize> Default for PlaneSums<N> {
     fn default() -> Self {
         let none = [f32x8::ZERO; N];
-        Self { plane: Plane::default(), high: [none; 3], higher: none }
+        Self { rows: RowSums::default(), z_sums: [none; 3], zz_sums: none }
     }
 }
 
-impl<const N: usize> Columns<N> {
+impl<const N: usize> PlaneSums<N> {
     #[inline]
-    fn add(&mut self, plane: &Plane<N>, dz: f32, theta: f32) {
-        let [one, y, _] = &plane.plain;
-        self.plane.plain.iter_mut().zip(&plane.plain).for_each(|(to, lanes)| add(to, lanes, theta));
-        self.high.iter_mut().zip([one, y]).for_each(|(to, lanes)| add(to, lanes, theta * dz));
-        add(&mut self.higher, one, theta * dz * dz);
-        self.plane.used = true;
+    fn add(&mut self, rows: &RowSums<N>, dz: f32, theta: f32) {
+        let [one, y, _] = &rows.plain;
+        self.rows.plain.iter_mut().zip(&rows.plain).for_each(|(to, lanes)| add(to, lanes, theta));
+        self.z_sums.iter_mut().zip([one, y]).for_each(|(to, lanes)| add(to, lanes, theta * dz));
+        add(&mut self.zz_sums, one, theta * dz * dz);
+        self.rows.used = true;
     }
 
     #[inline]
-    fn add_timed(&mut self, plane: &Plane<N>, dz: f32, theta: f32) {
-        self.plane.timed.iter_mut().zip(&plane.timed).for_each(|(to, lanes)| add(to, lanes, theta));
-        add(&mut self.plane.squared, &plane.squared, theta);
-        add(&mut self.high[2], &plane.timed[0], theta * dz);
+    fn add_timed(&mut self, rows: &RowSums<N>, dz: f32, theta: f32) {
+        self.rows.timed.iter_mut().zip(&rows.timed).for_each(|(to, lanes)| add(to, lanes, theta));
+        add(&mut self.rows.squared, &rows.squared, theta);
+        add(&mut self.z_sums[2], &rows.timed[0], theta * dz);
     }
 
     /// Sums over x, and adds the results to `sums`.
-    fn add_to(&self, sums: &mut Sums, x: &Axis) {
+    fn add_to(&self, sums: &mut Sums, x: &AxisWeights) {
         let theta = lanes::<N>(&x.weights);
         let mut away = [f32x8::ZERO; N];
         for (k, lane) in away.iter_mut().enumerate() {
@@ -336,12 +337,12 @@ impl<const N: usize> Columns<N> {
             let [a, b, c, d, e, f, g, h] = lane.to_array();
             f64::from(((a + e) + (b + f)) + ((c + g) + (d + h)))
         };
-        let ([one, y, yy], [t, yt]) = (&self.plane.plain, &self.plane.timed);
-        let [z, yz, zt] = &self.high;
+        let ([one, y, yy], [t, yt]) = (&self.rows.plain, &self.rows.timed);
+        let [z, yz, zt] = &self.z_sums;
         sums.weight += sum(one, 0);
         let first = [sum(one, 1), sum(y, 0), sum(z, 0), sum(t, 0)];
         let along_x = [sum(one, 2), sum(y, 1), sum(z, 1), sum(t, 1)];
-        let across = [yy, yz, yt, &self.higher, zt, &self.plane.squared].map(|lanes| sum(lanes, 0));
+        let across = [yy, yz, yt, &self.zz_sums, zt, &self.rows.squared].map(|lanes| sum(lanes, 0));
         sums.first.iter_mut().zip(first).for_each(|(sum, term)| *sum += term);
         sums.second.iter_mut().zip(along_x.into_iter().chain(across)).for_each(|(sum, term)| *sum += term);
     }

@@ -1,6 +1,6 @@
 //! The initial mesh: the caller's, or the surface of the first frame (section 4.1).
 
-use super::first::bright_surface;
+use super::first::extract_bright_surface;
 use super::region::Region;
 use super::{Component, SurfaceTracker};
 use crate::math::{Vec3, triangle};
@@ -13,27 +13,27 @@ use crate::remesh::{EdgeBounds, remesh};
 const EDGE: f64 = 1.2;
 
 /// Factor between the target edge and its bounds, to either side.
-const EDGE_SPREAD: f32 = 1.5;
+const EDGE_BOUND_RATIO: f32 = 1.5;
 
 /// Smallest mean edge of a caller's mesh, in the shortest side of a voxel. Its resolution is kept: with shorter edges,
 /// a surface as large as the image would have more triangles than fit into memory.
-const FINEST: f64 = 0.1;
+const MIN_EDGE: f64 = 0.1;
 
 /// Validates the caller's mesh, and returns it unchanged.
 ///
 /// # Errors
 /// [`MethodError::InvalidArgument`] if its edges are too short, or none of its vertices is in the box; the errors of
 /// [`checked_mesh`].
-pub(super) fn checked(start: &TriangleMesh, region: &Region) -> Result<Mesh, MethodError> {
+pub(super) fn validate_start(start: &TriangleMesh, region: &Region) -> Result<Mesh, MethodError> {
     let mesh = checked_mesh("start", start)?;
-    let (edge, least) = (measure(start).edge_mean, FINEST * region.spacing.min_element());
+    let (edge, least) = (measure(start).edge_mean, MIN_EDGE * region.spacing.min_element());
     if edge < least {
         let problem = format!(
             "its edges are {edge:.1e} long in the mean; a tenth of a voxel, {least:.1e}, or more is accepted"
         );
         return Err(MethodError::invalid("start", problem));
     }
-    if start.positions.iter().all(|&p| region.nearest_inside(region.place(p)).is_some()) {
+    if start.positions.iter().all(|&p| region.clamp_into_box(region.to_local(p)).is_some()) {
         let problem =
             "no vertex of the mesh is in the box; a surface of the first frame, in the world, is needed";
         return Err(MethodError::invalid("start", problem));
@@ -48,7 +48,7 @@ impl SurfaceTracker {
     /// [`MethodError::InvalidArgument`] if no frame has a boundary, or there is no closed surface in the first one.
     pub(super) fn find_first_mesh(&mut self) -> Result<(), MethodError> {
         if self.faces.iter().flatten().all(Vec::is_empty) {
-            let largest = self.voting.largest_step(&self.region) * self.region.step;
+            let largest = self.voting.largest_step(&self.region) * self.region.quantum;
             let problem = format!(
                 "{} given, no boundary found: the largest step in the box is {largest:.4}; less than that is needed",
                 self.params.threshold
@@ -58,21 +58,21 @@ impl SurfaceTracker {
         if self.mesh.vertex_count() > 0 {
             return Ok(());
         }
-        let surface = bright_surface(&self.region, &self.faces[0], self.falloff())?;
-        let Some(part) = self.chosen(surface.components()) else {
+        let surface = extract_bright_surface(&self.region, &self.faces[0], self.falloff())?;
+        let Some(part) = self.tracked_component(surface.components()) else {
             let problem =
                 "no closed surface is in the first frame; choose a larger box, or a lower threshold";
             return Err(MethodError::invalid("box", problem));
         };
         let mut mesh = Mesh::from_triangles(&part)?;
         let edge = (EDGE * self.region.spacing.min_element()) as f32;
-        remesh(&mut mesh, EdgeBounds { min: edge / EDGE_SPREAD, max: edge * EDGE_SPREAD })?;
+        remesh(&mut mesh, EdgeBounds { min: edge / EDGE_BOUND_RATIO, max: edge * EDGE_BOUND_RATIO })?;
         self.mesh = mesh;
         Ok(())
     }
 
     /// Returns the component to be tracked. Components with negative volume are cavities of others, and are skipped.
-    fn chosen(&self, parts: Vec<TriangleMesh>) -> Option<TriangleMesh> {
+    fn tracked_component(&self, parts: Vec<TriangleMesh>) -> Option<TriangleMesh> {
         let with_volume = parts.into_iter().map(|part| (measure(&part).volume, part));
         let solids = with_volume.filter(|(volume, _)| *volume > 0.0);
         let scored = solids.map(|(volume, part)| match self.component {

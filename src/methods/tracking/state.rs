@@ -1,7 +1,7 @@
 //! Saves a run and restores it bit for bit. A state holds the boundary votes and the surfaces; the image comes from the
 //! same volume, and sums around the newest frame are computed again.
 
-use super::follow::{Follower, FrameFacts};
+use super::frame_tracker::{FrameFacts, FrameTracker};
 use super::vote::{Faces, TIME};
 use super::{Component, SurfaceTracker, TrackingParams};
 use crate::math::Vec3;
@@ -39,10 +39,10 @@ impl SurfaceTracker {
                 params: self.params.clone(),
                 faces: self.faces.clone(),
                 mesh: self.mesh.clone(),
-                edge: self.follower.as_ref().map(|follower| follower.edge),
+                edge: self.tracker.as_ref().map(|follower| follower.edge),
                 meshes: self.meshes.iter().map(plain).collect(),
                 facts: self.facts.clone(),
-                closing: self.closing,
+                closing: self.closure_error,
                 steps: self.steps,
             },
         )
@@ -58,10 +58,10 @@ impl SurfaceTracker {
         if state.fingerprint != self.fingerprint() {
             return bad("volume", "the state belongs to another volume, box, component or start");
         }
-        let Ok(params) = self.completed(state.params) else {
+        let Ok(params) = self.with_defaults(state.params) else {
             return bad("parameters", "they are out of range");
         };
-        if state.faces.len() > self.frames() || !state.faces.iter().all(|faces| self.are_sound(faces)) {
+        if state.faces.len() > self.frames() || !state.faces.iter().all(|faces| self.are_valid(faces)) {
             return bad("boundary", "it is not in the box");
         }
         let meshes: Vec<TriangleMesh> = (state.meshes.into_iter())
@@ -69,11 +69,11 @@ impl SurfaceTracker {
             .collect();
         let frames_fit = meshes.len() <= self.frames() && meshes.len() == state.facts.len();
         let boundary_fits = meshes.is_empty() || state.faces.len() == self.frames();
-        let pixel = self.image.pixel;
+        let pixel = self.image.shortest_side;
         let edge_fits = state.edge.is_none_or(|edge| (1e-3 * pixel..1e3 * pixel).contains(&edge));
-        let closing_fits = state.closing.is_none() || params.cyclic && meshes.len() == self.frames();
+        let closure_fits = state.closing.is_none() || params.cyclic && meshes.len() == self.frames();
         let begins_well = !meshes.is_empty() || state.mesh.to_triangles() == self.start.to_triangles();
-        if !edge_fits || !closing_fits || !begins_well {
+        if !edge_fits || !closure_fits || !begins_well {
             return bad("frames", "they are none of this tracker's");
         }
         if !frames_fit || !boundary_fits || state.edge.is_some() == meshes.is_empty() {
@@ -87,18 +87,18 @@ impl SurfaceTracker {
             return bad("surface", "its parts do not fit each other");
         }
         self.params = params;
-        self.begin();
+        self.restart();
         let replaced = std::mem::replace(&mut self.mesh, state.mesh);
         self.mesh.count_on_from(&replaced);
         self.faces = state.faces;
         (self.meshes, self.facts) = (meshes, state.facts);
-        (self.closing, self.steps) = (state.closing, state.steps);
-        self.follower = state.edge.map(Follower::new);
-        self.moment = self.newest_moment();
+        (self.closure_error, self.steps) = (state.closing, state.steps);
+        self.tracker = state.edge.map(FrameTracker::new);
+        self.samples = self.newest_samples();
         Ok(())
     }
 
-    fn are_sound(&self, faces: &Faces) -> bool {
+    fn are_valid(&self, faces: &Faces) -> bool {
         let dims = self.region.dims;
         let is_sound = |direction: usize, voxel: u32, weight: f32| {
             let inside = (voxel as usize) < dims.iter().product()
@@ -115,7 +115,7 @@ impl SurfaceTracker {
         let mut mix = |values: &[f64]| values.iter().for_each(|value| hash.mix(value.to_bits()));
         mix(&self.region.to_world.to_cols_array());
         mix(&self.region.spacing.to_array());
-        mix(&[self.region.step]);
+        mix(&[self.region.quantum]);
         if let Component::Nearest(p) = self.component {
             mix(&p.to_array());
         }

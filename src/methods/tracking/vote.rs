@@ -21,7 +21,7 @@ const ITERATIONS: usize = 50;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Window {
     /// Voxels to either side of the central one: k.
-    pub reach: usize,
+    pub half_width: usize,
     /// Frames to either side of the central one; 0 processes each frame on its own.
     pub frames: usize,
     /// τ: the difference of the cluster means must exceed this, in quantisation steps.
@@ -50,7 +50,7 @@ pub(super) type Faces = [Vec<Face>; 4];
 
 /// Finds the levels and the boundary votes of a sequence, frame by frame.
 #[derive(Clone, Debug)]
-pub(super) struct Voting {
+pub(super) struct BoundaryVoting {
     window: Window,
     /// By frame, the level between the clusters of the window around each voxel, in padded rows (see [`Rows`]);
     /// computed when first needed.
@@ -59,28 +59,28 @@ pub(super) struct Voting {
     largest: f64,
 }
 
-impl Voting {
+impl BoundaryVoting {
     pub fn new(window: Window, frames: usize) -> Self {
         Self { window, levels: vec![None; frames], largest: 0.0 }
     }
 
     /// Returns the faces of a frame that have votes, within the box and in its sides. Frames are processed in order.
     pub fn faces(&mut self, region: &Region, frame: usize) -> Faces {
-        let around = self.window.around(frame, region.frames.len());
-        around.iter().for_each(|&t| self.know_levels(region, t));
+        let frames = self.window.frames_around(frame, region.frames.len());
+        frames.iter().for_each(|&t| self.ensure_levels(region, t));
         let mut faces = Faces::default();
         for direction in [X, Y, Z] {
-            faces[direction] = self.votes(region, frame, frame, direction, &around);
+            faces[direction] = self.votes(region, frame, frame, direction, &frames);
         }
         let count = region.frames.len();
         let next = if frame + 1 < count { Some(frame + 1) } else { self.window.cyclic.then_some(0) };
         if let (Some(next), true) = (next, self.window.frames > 0) {
             // Windows that contain both frames.
             let both: Vec<usize> =
-                self.window.around(next, count).into_iter().filter(|t| around.contains(t)).collect();
+                self.window.frames_around(next, count).into_iter().filter(|t| frames.contains(t)).collect();
             faces[TIME] = self.votes(region, frame, next, TIME, &both);
         }
-        region.close(frame, &mut faces);
+        region.clip_to_box(frame, &mut faces);
         faces
     }
 
@@ -93,7 +93,7 @@ impl Voting {
     }
 
     /// Computes the levels of a frame, unless they are known.
-    pub fn know_levels(&mut self, region: &Region, frame: usize) {
+    pub fn ensure_levels(&mut self, region: &Region, frame: usize) {
         if self.levels[frame].is_none() {
             self.levels[frame] = Some(self.levels_of(region, frame));
         }
@@ -102,27 +102,31 @@ impl Voting {
     /// Returns the level between the clusters of the window around a voxel, in a frame whose levels are known; `None`
     /// if the window has no boundary.
     pub fn level_at(&self, region: &Region, frame: usize, [x, y, z]: [usize; 3]) -> Option<u8> {
-        let level = self.levels[frame].as_ref()?[Rows::new(region.dims, self.window.reach).at(y, z) + x];
+        let level = self.levels[frame].as_ref()?[Rows::new(region.dims, self.window.half_width).at(y, z) + x];
         (level != NONE).then_some(level)
     }
 
     /// Computes the level of each window with its centre in a frame.
     fn levels_of(&mut self, region: &Region, frame: usize) -> Vec<u8> {
         let [nx, ny, nz] = region.dims;
-        let frames: Vec<&[u8]> =
-            self.window.around(frame, region.frames.len()).iter().map(|&t| &region.frames[t][..]).collect();
-        let rows = Rows::new(region.dims, self.window.reach);
+        let frames: Vec<&[u8]> = self
+            .window
+            .frames_around(frame, region.frames.len())
+            .iter()
+            .map(|&t| &region.frames[t][..])
+            .collect();
+        let rows = Rows::new(region.dims, self.window.half_width);
         let mut out = vec![NONE; rows.len()];
-        let mut slabs = Slabs::new(region.dims, self.window.reach, &frames);
+        let mut slabs = Slabs::new(region.dims, self.window.half_width, &frames);
         for z in 0..nz {
             for y in 0..ny {
-                slabs.go_to(y, z);
+                slabs.move_to_row(y, z);
                 let row = rows.at(y, z);
-                let mut counts = Counts::default();
-                for x in 0..nx + self.window.reach {
+                let mut counts = Histogram::default();
+                for x in 0..nx + self.window.half_width {
                     slabs.slide(&mut counts, x);
-                    if x >= self.window.reach {
-                        out[row + x - self.window.reach] = self.level(&counts);
+                    if x >= self.window.half_width {
+                        out[row + x - self.window.half_width] = self.level(&counts);
                     }
                 }
             }
@@ -132,7 +136,7 @@ impl Voting {
 
     /// Returns the level that separates the clusters of a window: voxels up to it are in the lower one. [`NONE`] if the
     /// clusters do not pass.
-    fn level(&mut self, counts: &Counts) -> u8 {
+    fn level(&mut self, counts: &Histogram) -> u8 {
         let Some((low, high)) = counts.two_means(self.window.threshold) else { return NONE };
         let enough = LEAST_SHARE * f64::from(low.count + high.count);
         if f64::from(low.count) <= enough || f64::from(high.count) <= enough {
@@ -147,18 +151,18 @@ impl Voting {
     }
 
     /// Counts votes for the faces between the voxels of `frame` and the next ones along a direction, which are in the
-    /// frame `other` for faces along time. The windows with centres in the frames `around` vote.
+    /// frame `other` for faces along time. The windows with centres in the frames `frames` vote.
     fn votes(
         &self,
         region: &Region,
         frame: usize,
         other: usize,
         direction: usize,
-        around: &[usize],
+        frames: &[usize],
     ) -> Vec<Face> {
-        let ballot = Ballot {
-            levels: around.iter().filter_map(|&t| self.levels[t].as_deref()).collect(),
-            rows: Rows::new(region.dims, self.window.reach),
+        let windows = VotingWindows {
+            levels: frames.iter().filter_map(|&t| self.levels[t].as_deref()).collect(),
+            rows: Rows::new(region.dims, self.window.half_width),
             dims: region.dims,
             direction,
         };
@@ -172,9 +176,9 @@ impl Voting {
             for x in (0..end(X, nx)).step_by(LANES) {
                 let lanes = start + x..start + (x + LANES).min(end(X, nx));
                 let pairs = Pairs::new(&here[lanes.clone()], &there[lanes.start + next..lanes.end + next]);
-                let votes = ballot.votes([x, y, z], &pairs);
+                let votes = windows.votes([x, y, z], &pairs);
                 for (i, voxel) in lanes.enumerate().filter(|&(i, _)| votes[i] > 0) {
-                    let weight = f32::from(votes[i]) / ballot.most([x + i, y, z]) as f32;
+                    let weight = f32::from(votes[i]) / windows.window_count([x + i, y, z]) as f32;
                     faces.push(Face { voxel: voxel as u32, weight });
                 }
             }
@@ -200,7 +204,7 @@ impl Pairs {
 }
 
 /// The windows that vote for faces along one direction in one frame.
-struct Ballot<'a> {
+struct VotingWindows<'a> {
     /// The levels of each frame with window centres.
     levels: Vec<&'a [u8]>,
     rows: Rows,
@@ -208,16 +212,16 @@ struct Ballot<'a> {
     direction: usize,
 }
 
-impl Ballot<'_> {
+impl VotingWindows<'_> {
     /// Returns the centres, along an axis, of the windows that contain a voxel and the next one.
-    fn middles(&self, at: usize, axis: usize) -> std::ops::Range<usize> {
+    fn centres(&self, at: usize, axis: usize) -> std::ops::Range<usize> {
         let first = at + usize::from(self.direction == axis);
-        first.saturating_sub(self.rows.reach)..(at + self.rows.reach + 1).min(self.dims[axis])
+        first.saturating_sub(self.rows.half_width)..(at + self.rows.half_width + 1).min(self.dims[axis])
     }
 
     /// Returns the maximum number of votes for a face: the number of windows that contain both of its voxels.
-    fn most(&self, at: [usize; 3]) -> usize {
-        [X, Y, Z].map(|axis| self.middles(at[axis], axis).len()).iter().product::<usize>() * self.levels.len()
+    fn window_count(&self, at: [usize; 3]) -> usize {
+        [X, Y, Z].map(|axis| self.centres(at[axis], axis).len()).iter().product::<usize>() * self.levels.len()
     }
 
     /// Returns the votes for the faces after [`LANES`] consecutive voxels along x, from the given one on.
@@ -226,13 +230,13 @@ impl Ballot<'_> {
         if pairs.span == [0; LANES] {
             return votes;
         }
-        let reach = self.rows.reach;
-        let windows = 2 * reach + usize::from(self.direction != X);
+        let half_width = self.rows.half_width;
+        let windows = 2 * half_width + usize::from(self.direction != X);
         for level in &self.levels {
-            for z in self.middles(z, Z) {
-                for y in self.middles(y, Y) {
-                    // A row has padding for `reach` windows before its first voxel.
-                    let from = self.rows.at(y, z) + x + usize::from(self.direction == X) - reach;
+            for z in self.centres(z, Z) {
+                for y in self.centres(y, Y) {
+                    // A row has padding for `half_width` windows before its first voxel.
+                    let from = self.rows.at(y, z) + x + usize::from(self.direction == X) - half_width;
                     count(&level[from..from + windows + LANES], windows, pairs, &mut votes);
                 }
             }
@@ -243,13 +247,13 @@ impl Ballot<'_> {
 
 impl Window {
     /// Returns the frames within a window's extent in time around a frame, with `count` frames in total.
-    fn around(&self, frame: usize, count: usize) -> Vec<usize> {
-        let reach = self.frames.min(if self.cyclic { (count - 1) / 2 } else { count });
+    fn frames_around(&self, frame: usize, count: usize) -> Vec<usize> {
+        let half_width = self.frames.min(if self.cyclic { (count - 1) / 2 } else { count });
         let at = |offset: usize| {
-            let t = (frame + count + offset).checked_sub(reach)?;
+            let t = (frame + count + offset).checked_sub(half_width)?;
             if self.cyclic { Some(t % count) } else { t.checked_sub(count).filter(|&t| t < count) }
         };
-        (0..=2 * reach).filter_map(at).collect()
+        (0..=2 * half_width).filter_map(at).collect()
     }
 }
 
@@ -270,12 +274,12 @@ struct Rows {
     ny: usize,
     nz: usize,
     row: usize,
-    reach: usize,
+    half_width: usize,
 }
 
 impl Rows {
-    fn new([nx, ny, nz]: [usize; 3], reach: usize) -> Self {
-        Self { ny, nz, row: nx + 2 * reach + 2 * LANES, reach }
+    fn new([nx, ny, nz]: [usize; 3], half_width: usize) -> Self {
+        Self { ny, nz, row: nx + 2 * half_width + 2 * LANES, half_width }
     }
 
     fn len(&self) -> usize {
@@ -284,15 +288,15 @@ impl Rows {
 
     /// Returns the index of the first voxel of a row.
     fn at(&self, y: usize, z: usize) -> usize {
-        (z * self.ny + y) * self.row + self.reach
+        (z * self.ny + y) * self.row + self.half_width
     }
 }
 
 /// A histogram of quantised intensities.
 #[derive(Clone)]
-struct Counts([u16; 256]);
+struct Histogram([u16; 256]);
 
-impl Default for Counts {
+impl Default for Histogram {
     fn default() -> Self {
         Self([0; 256])
     }
@@ -311,12 +315,12 @@ impl Cluster {
     }
 }
 
-impl Counts {
+impl Histogram {
     fn add(&mut self, other: &Self) {
         self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a += b);
     }
 
-    fn take(&mut self, other: &Self) {
+    fn subtract(&mut self, other: &Self) {
         self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a -= b);
     }
 
@@ -366,40 +370,40 @@ impl Counts {
 /// the sum of consecutive slabs.
 struct Slabs<'a> {
     dims: [usize; 3],
-    reach: usize,
+    half_width: usize,
     frames: &'a [&'a [u8]],
     at: Option<(usize, usize)>,
-    counts: Vec<Counts>,
+    counts: Vec<Histogram>,
 }
 
 impl<'a> Slabs<'a> {
-    fn new(dims: [usize; 3], reach: usize, frames: &'a [&'a [u8]]) -> Self {
-        Self { dims, reach, frames, at: None, counts: vec![Counts::default(); dims[0]] }
+    fn new(dims: [usize; 3], half_width: usize, frames: &'a [&'a [u8]]) -> Self {
+        Self { dims, half_width, frames, at: None, counts: vec![Histogram::default(); dims[0]] }
     }
 
     /// Moves the slabs to a row; incrementally if it follows the current one.
-    fn go_to(&mut self, y: usize, z: usize) {
+    fn move_to_row(&mut self, y: usize, z: usize) {
         let ny = self.dims[1];
         if y > 0 && self.at == Some((y - 1, z)) {
-            if y + self.reach < ny {
-                self.change(y + self.reach, z, |count| *count += 1);
+            if y + self.half_width < ny {
+                self.update_row(y + self.half_width, z, |count| *count += 1);
             }
-            if y > self.reach {
-                self.change(y - self.reach - 1, z, |count| *count -= 1);
+            if y > self.half_width {
+                self.update_row(y - self.half_width - 1, z, |count| *count -= 1);
             }
         } else {
-            self.counts.iter_mut().for_each(|counts| *counts = Counts::default());
-            for y in y.saturating_sub(self.reach)..(y + self.reach + 1).min(ny) {
-                self.change(y, z, |count| *count += 1);
+            self.counts.iter_mut().for_each(|counts| *counts = Histogram::default());
+            for y in y.saturating_sub(self.half_width)..(y + self.half_width + 1).min(ny) {
+                self.update_row(y, z, |count| *count += 1);
             }
         }
         self.at = Some((y, z));
     }
 
     /// Changes the counts of all voxels in row y of the slices within reach of z.
-    fn change(&mut self, y: usize, z: usize, change: impl Fn(&mut u16)) {
+    fn update_row(&mut self, y: usize, z: usize, change: impl Fn(&mut u16)) {
         let [nx, ny, nz] = self.dims;
-        for z in z.saturating_sub(self.reach)..(z + self.reach + 1).min(nz) {
+        for z in z.saturating_sub(self.half_width)..(z + self.half_width + 1).min(nz) {
             let start = (z * ny + y) * nx;
             for frame in self.frames {
                 for (counts, &level) in self.counts.iter_mut().zip(&frame[start..start + nx]) {
@@ -410,12 +414,12 @@ impl<'a> Slabs<'a> {
     }
 
     /// Adds the slab at `x` to the histogram of a sliding window, and subtracts the one that leaves it.
-    fn slide(&self, window: &mut Counts, x: usize) {
+    fn slide(&self, window: &mut Histogram, x: usize) {
         if let Some(counts) = self.counts.get(x) {
             window.add(counts);
         }
-        if x > 2 * self.reach {
-            window.take(&self.counts[x - 2 * self.reach - 1]);
+        if x > 2 * self.half_width {
+            window.subtract(&self.counts[x - 2 * self.half_width - 1]);
         }
     }
 }
@@ -445,7 +449,7 @@ mod tests {
             to_world: DAffine3::IDENTITY,
             from_world: DAffine3::IDENTITY,
             frames: (0..frames).map(|t| frame(t, &mut random)).collect(),
-            step: 1.0,
+            quantum: 1.0,
             threshold: 50.0,
         }
     }
@@ -453,12 +457,16 @@ mod tests {
     /// Returns the voxels of one window that are in the image, as index and frame.
     fn window_at(region: &Region, window: &Window, at: [usize; 3], frame: usize) -> Vec<(usize, usize)> {
         let [nx, ny, nz] = region.dims;
-        let near = |a: usize, b: usize| a.abs_diff(b) <= window.reach;
+        let near = |a: usize, b: usize| a.abs_diff(b) <= window.half_width;
         let cells = (0..nx * ny * nz)
             .filter(|i| near(i % nx, at[0]) && near(i / nx % ny, at[1]) && near(i / (nx * ny), at[2]));
         cells
             .flat_map(|i| {
-                window.around(frame, region.frames.len()).into_iter().map(move |t| (i, t)).collect::<Vec<_>>()
+                window
+                    .frames_around(frame, region.frames.len())
+                    .into_iter()
+                    .map(move |t| (i, t))
+                    .collect::<Vec<_>>()
             })
             .collect()
     }
@@ -491,8 +499,8 @@ mod tests {
     fn votes_are_those_of_all_windows_that_hold_both_voxels() {
         for (frames, reach_in_time, cyclic) in [(1, 0, false), (4, 1, false), (5, 2, true), (2, 2, true)] {
             let region = region([7, 6, 5], frames);
-            let window = Window { reach: 1, frames: reach_in_time, threshold: 50.0, cyclic };
-            let mut voting = Voting::new(window, frames);
+            let window = Window { half_width: 1, frames: reach_in_time, threshold: 50.0, cyclic };
+            let mut voting = BoundaryVoting::new(window, frames);
             let [nx, ny, nz] = region.dims;
             let count = nx * ny * nz;
             let at = |i: usize| [i % nx, i / nx % ny, i / (nx * ny)];
@@ -547,7 +555,8 @@ mod tests {
     #[test]
     fn a_threshold_above_all_steps_tells_how_large_they_are() {
         let region = region([9, 9, 9], 2);
-        let mut voting = Voting::new(Window { reach: 2, frames: 1, threshold: 100.0, cyclic: false }, 2);
+        let mut voting =
+            BoundaryVoting::new(Window { half_width: 2, frames: 1, threshold: 100.0, cyclic: false }, 2);
         let faces = voting.faces(&region, 0);
         assert!(faces.iter().all(Vec::is_empty));
         for threshold in [100.0, 1e6] {

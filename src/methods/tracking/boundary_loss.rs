@@ -3,7 +3,7 @@
 //! causes folds, so it is collapsed. Where a gap opens, the bright region advances faster than boundary points can
 //! attract the surface, so the surface grows into it.
 
-use super::follow::{Follower, FrameFacts, Going, Ground, middle};
+use super::frame_tracker::{FrameContext, FrameFacts, FrameTracker, Support, neighbour_mean};
 use super::project::Onto;
 use crate::math::Vec3;
 use crate::math::order::{by_both, rank, sort_by_rank};
@@ -31,70 +31,76 @@ const OPPOSITE: f32 = -0.3;
 /// Share of the displacement to the mean of its neighbours that is added for a vertex that grows.
 const SMOOTHING: f32 = 0.5;
 
-impl Follower {
+impl FrameTracker {
     /// Collapses sheets between walls that have met, grows the surface into bright regions, and smooths the other
     /// vertices without a boundary. Counts them in `facts`, and returns the edits.
-    pub fn retract(&mut self, mesh: &mut Mesh, going: &Going, facts: &mut FrameFacts) -> Changes {
+    pub fn resolve_boundary_loss(
+        &mut self,
+        mesh: &mut Mesh,
+        going: &FrameContext,
+        facts: &mut FrameFacts,
+    ) -> Changes {
         let mut changes = Changes::default();
         let mut grown = BTreeSet::new();
         let mut before = usize::MAX;
         for round in 0..ROUNDS {
-            let lost = lost(mesh, going);
+            let without_boundary = without_boundary(mesh, going);
             if round == 0 {
-                facts.retracted = lost.len();
+                facts.boundary_lost = without_boundary.len();
             }
-            let progresses = (lost.len() as f64) < LITTLE_PROGRESS * before as f64;
-            if lost.is_empty() || round >= LEAST_ROUNDS && !progresses {
+            let progresses = (without_boundary.len() as f64) < LITTLE_PROGRESS * before as f64;
+            if without_boundary.is_empty() || round >= LEAST_ROUNDS && !progresses {
                 break;
             }
-            before = lost.len();
-            let gone = self.draw_in(mesh, &sheets(mesh, &lost, going));
-            if gone > 0 {
-                changes.deletions += gone;
+            before = without_boundary.len();
+            let collapsed = self.collapse_sheets(mesh, &on_sheets(mesh, &without_boundary, going));
+            if collapsed > 0 {
+                changes.deletions += collapsed;
                 changes += restructure(mesh, self.bounds, &mut self.guard);
             }
             for _ in 0..MOVES {
-                grown.extend(self.move_lost(mesh, going));
+                grown.extend(self.move_without_boundary(mesh, going));
             }
         }
         // Growing has brought these vertices near points of the boundary.
         let grown: Vec<VertexId> = grown.into_iter().filter(|&v| mesh.is_live(v)).collect();
         if !grown.is_empty() {
-            let still = vec![Vec3::ZERO; mesh.slots()];
-            self.project(mesh, &grown, &still, going, Onto::Frame, facts);
+            let no_offsets = vec![Vec3::ZERO; mesh.slots()];
+            self.project(mesh, &grown, &no_offsets, going, Onto::Frame, facts);
         }
         changes
     }
 
     /// Moves vertices without a boundary: outwards if they are surrounded by bright voxels and on no sheet, else to the
     /// mean of their neighbours. Returns the vertices that moved outwards.
-    fn move_lost(&mut self, mesh: &mut Mesh, going: &Going) -> Vec<VertexId> {
-        let lost = lost(mesh, going);
-        let sheets = sheets(mesh, &lost, going);
-        let far = going.region.spacing.min_element() as f32;
-        let mut ways = vec![Vec3::ZERO; mesh.slots()];
+    fn move_without_boundary(&mut self, mesh: &mut Mesh, going: &FrameContext) -> Vec<VertexId> {
+        let without_boundary = without_boundary(mesh, going);
+        let sheets = on_sheets(mesh, &without_boundary, going);
+        let voxel = going.region.spacing.min_element() as f32;
+        let mut displacements = vec![Vec3::ZERO; mesh.slots()];
         let mut grown = Vec::new();
-        for &(v, ground) in &lost {
-            let way = middle(mesh, v) - mesh.position(v);
-            let grows = ground == Ground::Bright && sheets.binary_search(&v).is_err();
-            ways[v.index()] = way;
+        for &(v, support) in &without_boundary {
+            let to_mean = neighbour_mean(mesh, v) - mesh.position(v);
+            let grows = support == Support::Bright && sheets.binary_search(&v).is_err();
+            displacements[v.index()] = to_mean;
             if grows {
-                ways[v.index()] = mesh.area_normal(v).normalize_or_zero() * far + way * SMOOTHING;
+                displacements[v.index()] =
+                    mesh.area_normal(v).normalize_or_zero() * voxel + to_mean * SMOOTHING;
                 grown.push(v);
             }
         }
-        self.carry(mesh, ways);
+        self.move_vertices(mesh, displacements);
         grown
     }
 
     /// Collapses the vertices of sheets into their neighbours, from the innermost to the rim; returns the number of
     /// collapses.
-    fn draw_in(&mut self, mesh: &mut Mesh, sheets: &[VertexId]) -> u32 {
+    fn collapse_sheets(&mut self, mesh: &mut Mesh, sheets: &[VertexId]) -> u32 {
         self.guard.follow_with(mesh, self.bounds.max);
         let depth = depths(mesh, sheets);
         let mut order = sheets.to_vec();
         sort_by_rank(&mut order, |v| by_both(!depth[v.index()], v.0));
-        let mut gone = 0;
+        let mut collapsed = 0;
         for v in order {
             let from = mesh.position(v);
             let ring = mesh.ring(v).as_slice().iter().copied();
@@ -104,24 +110,25 @@ impl Follower {
                 let place = mesh.position(w);
                 self.guard.attempt(mesh, |mesh| mesh.collapse(w, v, place)).is_ok()
             });
-            gone += u32::from(drawn);
+            collapsed += u32::from(drawn);
         }
-        gone
+        collapsed
     }
 }
 
 /// Returns the vertices without a boundary, and the intensity around each.
-fn lost(mesh: &Mesh, going: &Going) -> Vec<(VertexId, Ground)> {
-    let ground = |v: VertexId| (v, going.ground(mesh.position(v), mesh.area_normal(v)));
-    mesh.vertices().map(ground).filter(|(_, ground)| *ground != Ground::Boundary).collect()
+fn without_boundary(mesh: &Mesh, going: &FrameContext) -> Vec<(VertexId, Support)> {
+    let support = |v: VertexId| (v, going.classify(mesh.position(v), mesh.area_normal(v)));
+    mesh.vertices().map(support).filter(|(_, support)| *support != Support::Boundary).collect()
 }
 
-/// Returns the vertices among `lost` that are on a sheet: another one close by faces the opposite way. In ascending
+/// Returns the vertices among `without_boundary` that are on a sheet: another one close by faces the opposite way. In ascending
 /// order.
-fn sheets(mesh: &Mesh, lost: &[(VertexId, Ground)], going: &Going) -> Vec<VertexId> {
+fn on_sheets(mesh: &Mesh, without_boundary: &[(VertexId, Support)], going: &FrameContext) -> Vec<VertexId> {
     let thickness = (THICKNESS * going.region.spacing.min_element()) as f32;
-    let positions: Vec<Vec3> = lost.iter().map(|&(v, _)| mesh.position(v)).collect();
-    let normals: Vec<Vec3> = lost.iter().map(|&(v, _)| mesh.area_normal(v).normalize_or_zero()).collect();
+    let positions: Vec<Vec3> = without_boundary.iter().map(|&(v, _)| mesh.position(v)).collect();
+    let normals: Vec<Vec3> =
+        without_boundary.iter().map(|&(v, _)| mesh.area_normal(v).normalize_or_zero()).collect();
     let grid = PointGrid::of(&positions, thickness);
     let has_opposite = |i: usize| {
         let mut found = false;
@@ -131,7 +138,7 @@ fn sheets(mesh: &Mesh, lost: &[(VertexId, Ground)], going: &Going) -> Vec<Vertex
         });
         found
     };
-    (0..lost.len()).filter(|&i| has_opposite(i)).map(|i| lost[i].0).collect()
+    (0..without_boundary.len()).filter(|&i| has_opposite(i)).map(|i| without_boundary[i].0).collect()
 }
 
 /// Returns for each vertex of the sheets the number of edges to the nearest vertex off the sheets, by slot; 0 for other

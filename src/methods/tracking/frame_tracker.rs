@@ -2,9 +2,9 @@
 //! connectivity.
 
 use super::TrackingParams;
-use super::project::{Moment, Onto};
+use super::project::{Onto, SpaceTimeSamples};
 use super::region::Region;
-use super::vote::Voting;
+use super::vote::BoundaryVoting;
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId, curvature, measure};
 use crate::remesh::{Changes, EdgeBounds, Embedding, restructure};
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 const SMOOTHINGS: usize = 5;
 
 /// Largest curvature correction of a vertex, in the shortest side of a voxel; larger ones occur at sharp corners.
-const MOST_UNBENT: f64 = 0.3;
+const MAX_CURVATURE_CORRECTION: f64 = 0.3;
 
 /// Maximum number of passes that smooth folds in a frame.
 const UNFOLDINGS: usize = 3;
@@ -45,7 +45,7 @@ pub struct FrameFacts {
     pub held: usize,
     /// Number of vertices without a boundary: collapsed between walls that have met, grown into gaps that open, else
     /// smoothed.
-    pub retracted: usize,
+    pub boundary_lost: usize,
     /// Mean number of projection steps per vertex, over the projections onto space-time and onto the frame together.
     pub steps: f64,
     /// Mean displacement of the vertices by the last projection, in world units.
@@ -53,19 +53,19 @@ pub struct FrameFacts {
 }
 
 /// The frame that the mesh is tracked into, with its image and parameters.
-pub(super) struct Going<'a> {
+pub(super) struct FrameContext<'a> {
     pub region: &'a Region,
     pub params: &'a TrackingParams,
     pub frame: usize,
     /// The boundary points around that frame in time.
-    pub into: &'a Moment,
+    pub samples: &'a SpaceTimeSamples,
     /// The levels between bright and dark; those of that frame are known.
-    pub voting: &'a Voting,
+    pub voting: &'a BoundaryVoting,
 }
 
 /// The image around a point of the surface: whether there is a boundary, and if not, its intensity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Ground {
+pub(super) enum Support {
     /// Inside is brighter than outside, or the box cuts a bright region.
     Boundary,
     /// Both sides are bright.
@@ -74,93 +74,102 @@ pub(super) enum Ground {
     Dark,
 }
 
-impl Going<'_> {
+impl FrameContext<'_> {
     /// Classifies a point of the surface by the intensities one voxel inside and one voxel outside, in the shortest
     /// side of a voxel.
-    pub fn ground(&self, at: Vec3, normal: Vec3) -> Ground {
+    pub fn classify(&self, at: Vec3, normal: Vec3) -> Support {
         let region = self.region;
-        let way = region.from_world.transform_vector3(normal.as_dvec3()).normalize_or_zero()
+        let displacement = region.from_world.transform_vector3(normal.as_dvec3()).normalize_or_zero()
             * region.spacing.min_element();
-        let place = region.place(at);
-        if let Some(voxel) = region.nearest_inside(place + way) {
-            let is_cut = self.into.cut.binary_search(&voxel).is_ok();
-            return if is_cut { Ground::Boundary } else { Ground::Dark };
+        let position = region.to_local(at);
+        if let Some(voxel) = region.clamp_into_box(position + displacement) {
+            let is_box_side = self.samples.box_side_voxels.binary_search(&voxel).is_ok();
+            return if is_box_side { Support::Boundary } else { Support::Dark };
         }
-        let [inside, outside] = [place - way, place + way].map(|place| region.sample(self.frame, place));
+        let [inside, outside] = [position - displacement, position + displacement]
+            .map(|position| region.sample(self.frame, position));
         if inside - outside >= LEAST_STEP * region.threshold {
-            return Ground::Boundary;
+            return Support::Boundary;
         }
-        let level = self.voting.level_at(region, self.frame, region.nearest(place + way));
+        let level = self.voting.level_at(region, self.frame, region.nearest(position + displacement));
         let is_bright = level.is_some_and(|level| inside.min(outside) > f64::from(level));
-        if is_bright { Ground::Bright } else { Ground::Dark }
+        if is_bright { Support::Bright } else { Support::Dark }
     }
 }
 
 /// Tracks one mesh, in world coordinates, through the frames.
 #[derive(Clone, Debug)]
-pub(super) struct Follower {
+pub(super) struct FrameTracker {
     pub(super) guard: Embedding,
     /// Mean edge length of the mesh in the first frame; the edge bounds are multiples of it.
     pub edge: f64,
     pub(super) bounds: EdgeBounds,
 }
 
-impl Follower {
+impl FrameTracker {
     pub fn new(edge: f64) -> Self {
         Self { guard: Embedding::default(), edge, bounds: EdgeBounds { min: 0.0, max: 0.0 } }
     }
 
     /// Moves the mesh into the next frame, with a prediction from the samples of the frame before, if any.
-    pub fn go(&mut self, mesh: &mut Mesh, from: Option<&Moment>, going: &Going) -> (Changes, FrameFacts) {
+    pub fn track_frame(
+        &mut self,
+        mesh: &mut Mesh,
+        from: Option<&SpaceTimeSamples>,
+        context: &FrameContext,
+    ) -> (Changes, FrameFacts) {
         let mut facts = FrameFacts::default();
         let bound = |share: f64| (share * self.edge) as f32;
-        self.bounds = EdgeBounds { min: bound(going.params.edge_min), max: bound(going.params.edge_max) };
+        self.bounds = EdgeBounds { min: bound(context.params.edge_min), max: bound(context.params.edge_max) };
         let mut changes = Changes::default();
         let mut predicted = match from {
-            Some(from) if going.params.prediction => prediction(mesh, going.region, from),
+            Some(from) if context.params.prediction => prediction(mesh, context.region, from),
             _ => vec![Vec3::ZERO; mesh.slots()],
         };
         for _ in 0..if from.is_some() { 1 } else { FIRST_SETTLINGS } {
-            changes += self.settle(mesh, predicted, going, &mut facts);
+            changes += self.settle(mesh, predicted, context, &mut facts);
             predicted = vec![Vec3::ZERO; mesh.slots()];
         }
-        self.unbend(mesh, going, &mut facts);
+        self.correct_curvature_bias(mesh, context, &mut facts);
         facts.folded = self.unfold(mesh);
         let measured = measure(&mesh.to_triangles());
         (facts.volume, facts.area, facts.triangles) = (measured.volume, measured.area, measured.triangles);
         (changes, facts)
     }
 
-    /// Projects the mesh, displaced by `ahead`, onto the surface of a frame, and restores its edge bounds.
+    /// Projects the mesh, displaced by `offsets`, onto the surface of a frame, and restores its edge bounds.
     fn settle(
         &mut self,
         mesh: &mut Mesh,
-        ahead: Vec<Vec3>,
-        going: &Going,
+        offsets: Vec<Vec3>,
+        context: &FrameContext,
         facts: &mut FrameFacts,
     ) -> Changes {
         let mut changes = Changes::default();
-        self.project_all(mesh, &ahead, going, Onto::SpaceTime, facts);
+        self.project_all(mesh, &offsets, context, Onto::SpaceTime, facts);
         changes += restructure(mesh, self.bounds, &mut self.guard);
-        self.project_all(mesh, &spacing(mesh), going, Onto::Frame, facts);
-        changes += self.retract(mesh, going, facts);
+        self.project_all(mesh, &tangential_displacements(mesh), context, Onto::Frame, facts);
+        changes += self.resolve_boundary_loss(mesh, context, facts);
         changes
     }
 
     /// Corrects the bias of the fitted planes on curved surfaces: a plane lies on the inner side by the variance of the
     /// points along it, R²/8 for θ = exp(−4r²/R²), times the mean curvature. Vertices move along their normals by as
     /// much, outwards where the surface is convex.
-    fn unbend(&mut self, mesh: &mut Mesh, going: &Going, facts: &mut FrameFacts) {
-        let spread = (going.params.radius * going.params.radius / 8.0) as f32;
-        let most = (MOST_UNBENT * going.region.spacing.min_element()) as f32;
+    fn correct_curvature_bias(&mut self, mesh: &mut Mesh, context: &FrameContext, facts: &mut FrameFacts) {
+        let spread = (context.params.radius * context.params.radius / 8.0) as f32;
+        let limit = (MAX_CURVATURE_CORRECTION * context.region.spacing.min_element()) as f32;
         let bends = curvature(&mesh.to_triangles()).mean;
-        let mut ways = vec![Vec3::ZERO; mesh.slots()];
+        let mut displacements = vec![Vec3::ZERO; mesh.slots()];
         for (v, bend) in mesh.vertices().zip(bends) {
-            ways[v.index()] = mesh.area_normal(v).normalize_or_zero() * (spread * bend as f32);
+            displacements[v.index()] = mesh.area_normal(v).normalize_or_zero() * (spread * bend as f32);
         }
-        ways = (0..SMOOTHINGS).fold(ways, |ways, _| means(mesh, &ways));
-        ways.iter_mut().for_each(|way| *way = way.clamp_length_max(most));
-        facts.held += self.carry(mesh, ways);
+        displacements =
+            (0..SMOOTHINGS).fold(displacements, |displacements, _| neighbour_means(mesh, &displacements));
+        displacements
+            .iter_mut()
+            .for_each(|displacement| *displacement = displacement.clamp_length_max(limit));
+        facts.held += self.move_vertices(mesh, displacements);
     }
 
     /// Moves the vertices of folded triangles to the mean of their neighbours. Returns the number of triangles that
@@ -171,11 +180,11 @@ impl Follower {
             if folds.is_empty() {
                 break;
             }
-            let mut ways = vec![Vec3::ZERO; mesh.slots()];
+            let mut displacements = vec![Vec3::ZERO; mesh.slots()];
             for v in folds.into_iter().flatten() {
-                ways[v.index()] = middle(mesh, v) - mesh.position(v);
+                displacements[v.index()] = neighbour_mean(mesh, v) - mesh.position(v);
             }
-            self.carry(mesh, ways);
+            self.move_vertices(mesh, displacements);
             folds = folded(mesh);
         }
         folds.len()
@@ -185,100 +194,103 @@ impl Follower {
     fn project_all(
         &mut self,
         mesh: &mut Mesh,
-        ahead: &[Vec3],
-        going: &Going,
+        offsets: &[Vec3],
+        context: &FrameContext,
         onto: Onto,
         facts: &mut FrameFacts,
     ) {
         let all: Vec<VertexId> = mesh.vertices().collect();
-        let (steps, way) = self.project(mesh, &all, ahead, going, onto, facts);
+        let (steps, displacement) = self.project(mesh, &all, offsets, context, onto, facts);
         let count = all.len().max(1) as f64;
         facts.steps += steps as f64 / count;
-        facts.correction = way / count;
+        facts.correction = displacement / count;
     }
 
-    /// Projects vertices onto the surface of a frame, each displaced by `ahead` first. All move at once, with one
+    /// Projects vertices onto the surface of a frame, each displaced by `offsets` first. All move at once, with one
     /// collision test. Returns the total number of steps, and the total displacement by the projection.
     pub(super) fn project(
         &mut self,
         mesh: &mut Mesh,
         vertices: &[VertexId],
-        ahead: &[Vec3],
-        going: &Going,
+        offsets: &[Vec3],
+        context: &FrameContext,
         onto: Onto,
         facts: &mut FrameFacts,
     ) -> (usize, f64) {
-        let mut ways: Vec<Option<Vec3>> = vec![None; mesh.slots()];
+        let mut displacements: Vec<Option<Vec3>> = vec![None; mesh.slots()];
         let mut rejected = Vec::new();
         let (mut steps, mut sum) = (0, 0.0);
         for &v in vertices {
-            let from = mesh.position(v) + ahead[v.index()];
-            let Some((place, count)) = going.into.project(going.region.place(from), onto) else {
+            let from = mesh.position(v) + offsets[v.index()];
+            let Some((position, count)) = context.samples.project(context.region.to_local(from), onto) else {
                 rejected.push(v);
                 continue;
             };
-            let to = going.region.world(place);
-            ways[v.index()] = Some(to - mesh.position(v));
+            let to = context.region.to_world(position);
+            displacements[v.index()] = Some(to - mesh.position(v));
             steps += count;
             sum += f64::from(to.distance(from));
         }
         facts.rejected += rejected.len();
-        let filled = filled(mesh, &ways, &rejected);
-        facts.held += self.carry(mesh, filled);
+        let filled_displacements = fill_rejected(mesh, &displacements, &rejected);
+        facts.held += self.move_vertices(mesh, filled_displacements);
         (steps, sum)
     }
 
-    /// Moves the vertices by `ways` under the collision guard. Returns the number held back.
-    pub(super) fn carry(&mut self, mesh: &mut Mesh, mut ways: Vec<Vec3>) -> usize {
+    /// Moves the vertices by `displacements` under the collision guard. Returns the number held back.
+    pub(super) fn move_vertices(&mut self, mesh: &mut Mesh, mut displacements: Vec<Vec3>) -> usize {
         self.guard.follow_with(mesh, self.bounds.max);
-        self.guard.carry(mesh, &mut ways).len()
+        self.guard.carry(mesh, &mut displacements).len()
     }
 }
 
 /// Predicts the displacement of each vertex to the next frame, by slot, from the slope of the space-time surface;
 /// smoothed over the mesh.
-fn prediction(mesh: &Mesh, region: &Region, moment: &Moment) -> Vec<Vec3> {
-    let mut ways = vec![Vec3::ZERO; mesh.slots()];
+fn prediction(mesh: &Mesh, region: &Region, moment: &SpaceTimeSamples) -> Vec<Vec3> {
+    let mut displacements = vec![Vec3::ZERO; mesh.slots()];
     for v in mesh.vertices() {
-        let at = region.place(mesh.position(v));
-        ways[v.index()] = moment.prediction(at).map_or(Vec3::ZERO, |way| region.direction(way));
+        let at = region.to_local(mesh.position(v));
+        displacements[v.index()] =
+            moment.prediction(at).map_or(Vec3::ZERO, |displacement| region.direction_to_world(displacement));
     }
-    (0..SMOOTHINGS).fold(ways, |ways, _| means(mesh, &ways))
+    (0..SMOOTHINGS).fold(displacements, |displacements, _| neighbour_means(mesh, &displacements))
 }
 
 /// Returns tangential displacements towards the mean of the neighbours, by slot, which even out the vertices.
-fn spacing(mesh: &Mesh) -> Vec<Vec3> {
-    let mut ways = vec![Vec3::ZERO; mesh.slots()];
+fn tangential_displacements(mesh: &Mesh) -> Vec<Vec3> {
+    let mut displacements = vec![Vec3::ZERO; mesh.slots()];
     for v in mesh.vertices() {
         let normal = mesh.area_normal(v).normalize_or_zero();
-        let way = middle(mesh, v) - mesh.position(v);
-        ways[v.index()] = (way - normal * normal.dot(way)) * SPACING;
+        let displacement = neighbour_mean(mesh, v) - mesh.position(v);
+        displacements[v.index()] = (displacement - normal * normal.dot(displacement)) * SPACING;
     }
-    ways
+    displacements
 }
 
-pub(super) fn middle(mesh: &Mesh, v: VertexId) -> Vec3 {
+pub(super) fn neighbour_mean(mesh: &Mesh, v: VertexId) -> Vec3 {
     let ring = mesh.ring(v).as_slice();
     ring.iter().fold(Vec3::ZERO, |sum, &w| sum + mesh.position(w)) * (1.0 / ring.len() as f32)
 }
 
 /// Returns for each vertex the mean of its neighbours' displacements.
-fn means(mesh: &Mesh, ways: &[Vec3]) -> Vec<Vec3> {
-    let mut out = vec![Vec3::ZERO; ways.len()];
+fn neighbour_means(mesh: &Mesh, displacements: &[Vec3]) -> Vec<Vec3> {
+    let mut out = vec![Vec3::ZERO; displacements.len()];
     for v in mesh.vertices() {
         let ring = mesh.ring(v).as_slice();
         out[v.index()] =
-            ring.iter().fold(Vec3::ZERO, |sum, w| sum + ways[w.index()]) * (1.0 / ring.len() as f32);
+            ring.iter().fold(Vec3::ZERO, |sum, w| sum + displacements[w.index()]) * (1.0 / ring.len() as f32);
     }
     out
 }
 
 /// Fills in each `rejected` vertex with the mean displacement of its neighbours.
-fn filled(mesh: &Mesh, ways: &[Option<Vec3>], rejected: &[VertexId]) -> Vec<Vec3> {
-    let mut out: Vec<Vec3> = ways.iter().map(|way| way.unwrap_or(Vec3::ZERO)).collect();
+fn fill_rejected(mesh: &Mesh, displacements: &[Option<Vec3>], rejected: &[VertexId]) -> Vec<Vec3> {
+    let mut out: Vec<Vec3> =
+        displacements.iter().map(|displacement| displacement.unwrap_or(Vec3::ZERO)).collect();
     for &v in rejected {
-        let known = mesh.ring(v).as_slice().iter().filter_map(|w| ways[w.index()]);
-        let (sum, count) = known.fold((Vec3::ZERO, 0.0f32), |(sum, count), way| (sum + way, count + 1.0));
+        let known = mesh.ring(v).as_slice().iter().filter_map(|w| displacements[w.index()]);
+        let (sum, count) =
+            known.fold((Vec3::ZERO, 0.0f32), |(sum, count), displacement| (sum + displacement, count + 1.0));
         out[v.index()] = sum * (1.0 / count.max(1.0));
     }
     out

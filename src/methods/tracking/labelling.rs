@@ -20,12 +20,12 @@ const ITERATIONS: usize = 400;
 
 /// A box of voxels within a region.
 #[derive(Clone, Copy)]
-pub(super) struct Part {
+pub(super) struct VoxelBox {
     /// First and last voxel, inclusive.
     pub ends: [[usize; 3]; 2],
 }
 
-impl Part {
+impl VoxelBox {
     fn dims(&self) -> [usize; 3] {
         [0, 1, 2].map(|axis| self.ends[1][axis] - self.ends[0][axis] + 1)
     }
@@ -51,50 +51,61 @@ impl Part {
 }
 
 /// Labels the voxels of a box in one frame: true on the bright side of the boundary. `None` if there are no walls.
-pub(super) fn sides(region: &Region, frame: usize, faces: &Faces, part: Part) -> Option<Vec<bool>> {
-    let dims = part.dims();
-    let steps = steps(region, frame, faces, part);
+pub(super) fn label_bright(
+    region: &Region,
+    frame: usize,
+    faces: &Faces,
+    voxels: VoxelBox,
+) -> Option<Vec<bool>> {
+    let dims = voxels.dims();
+    let steps = face_steps(region, frame, faces, voxels);
     let mut source = vec![0.0; dims.iter().product()];
     for &(i, j, step) in &steps {
         source[i] -= f64::from(step);
         source[j] += f64::from(step);
     }
-    let remade = solved(dims, source);
+    let reconstructed = solve_poisson(dims, source);
     // Weighted means of the middles of the steps, at voxels adjacent to walls.
-    let mut middles = vec![(0.0, 0.0); remade.len()];
+    let mut middles = vec![(0.0, 0.0); reconstructed.len()];
     for &(i, j, step) in steps.iter().filter(|(.., step)| step.abs() >= LEAST_WEIGHT) {
-        let (weight, middle) = (f64::from(step.abs()), (remade[i] + remade[j]) / 2.0);
+        let (weight, middle) = (f64::from(step.abs()), (reconstructed[i] + reconstructed[j]) / 2.0);
         for k in [i, j] {
             middles[k].0 += weight * middle;
             middles[k].1 += weight;
         }
     }
     let known = middles.into_iter().map(|(sum, total)| (total > 0.0).then(|| sum / total)).collect();
-    let levels = spread(known, dims)?;
-    Some(remade.iter().zip(levels).map(|(value, level)| *value > level).collect())
+    let levels = extend_to_all(known, dims)?;
+    Some(reconstructed.iter().zip(levels).map(|(value, level)| *value > level).collect())
 }
 
-/// As [`sides`], by comparing each intensity with the middle of the step at the nearest wall. Needs no solve, but is
+/// As [`label_bright`], by comparing each intensity with the middle of the step at the nearest wall. Needs no solve, but is
 /// only right where the signal is as strong as at that wall.
-pub(super) fn nearest_sides(region: &Region, frame: usize, faces: &Faces, part: Part) -> Option<Vec<bool>> {
+pub(super) fn label_bright_by_level(
+    region: &Region,
+    frame: usize,
+    faces: &Faces,
+    voxels: VoxelBox,
+) -> Option<Vec<bool>> {
     let [nx, ny, _] = region.dims;
     let level = |i: usize| {
-        let [x, y, z] = part.at(i);
+        let [x, y, z] = voxels.at(i);
         f64::from(region.frames[frame][(z * ny + y) * nx + x])
     };
-    let mut known = vec![None; part.len()];
-    for (i, j, _) in steps(region, frame, faces, part).into_iter().filter(|step| step.2.abs() >= LEAST_WEIGHT)
+    let mut known = vec![None; voxels.len()];
+    for (i, j, _) in
+        face_steps(region, frame, faces, voxels).into_iter().filter(|step| step.2.abs() >= LEAST_WEIGHT)
     {
         let middle = (level(i) + level(j)) / 2.0;
         (known[i], known[j]) = (Some(middle), Some(middle));
     }
-    let levels = spread(known, part.dims())?;
+    let levels = extend_to_all(known, voxels.dims())?;
     Some(levels.into_iter().enumerate().map(|(i, middle)| level(i) > middle).collect())
 }
 
 /// Returns the steps at the faces within a box: the indices of the voxels before and after, and the share of votes,
 /// negative if intensity falls.
-fn steps(region: &Region, frame: usize, faces: &Faces, part: Part) -> Vec<(usize, usize, f32)> {
+fn face_steps(region: &Region, frame: usize, faces: &Faces, voxels: VoxelBox) -> Vec<(usize, usize, f32)> {
     let image = &region.frames[frame];
     let mut steps = Vec::new();
     for direction in [X, Y, Z] {
@@ -103,7 +114,7 @@ fn steps(region: &Region, frame: usize, faces: &Faces, part: Part) -> Vec<(usize
             let before = region.voxel(face.voxel);
             let mut after = before;
             after[direction] += 1;
-            let (Some(i), Some(j)) = (part.index(before), part.index(after)) else { continue };
+            let (Some(i), Some(j)) = (voxels.index(before), voxels.index(after)) else { continue };
             let is_up = image[face.voxel as usize] < image[face.voxel as usize + stride];
             steps.push((i, j, if is_up { face.weight } else { -face.weight }));
         }
@@ -113,31 +124,31 @@ fn steps(region: &Region, frame: usize, faces: &Faces, part: Part) -> Vec<(usize
 
 /// Solves the Poisson equation for the image whose differences to its neighbours sum to `source` at each voxel, by
 /// conjugate gradients.
-fn solved(dims: [usize; 3], source: Vec<f64>) -> Vec<f64> {
+fn solve_poisson(dims: [usize; 3], source: Vec<f64>) -> Vec<f64> {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-    let mut image = vec![0.0; source.len()];
+    let mut solution = vec![0.0; source.len()];
     let mut residual = source;
-    let mut way = residual.clone();
+    let mut direction = residual.clone();
     let mut square = dot(&residual, &residual);
     let enough = TOLERANCE * TOLERANCE * square;
-    let mut product = vec![0.0; way.len()];
+    let mut product = vec![0.0; direction.len()];
     for _ in 0..ITERATIONS {
         if square <= enough {
             break;
         }
-        differences(dims, &way, &mut product);
-        let step = square / dot(&way, &product);
-        image.iter_mut().zip(&way).for_each(|(x, p)| *x += step * p);
+        laplacian(dims, &direction, &mut product);
+        let step = square / dot(&direction, &product);
+        solution.iter_mut().zip(&direction).for_each(|(x, p)| *x += step * p);
         residual.iter_mut().zip(&product).for_each(|(r, q)| *r -= step * q);
         let next = dot(&residual, &residual);
-        way.iter_mut().zip(&residual).for_each(|(p, r)| *p = r + next / square * *p);
+        direction.iter_mut().zip(&residual).for_each(|(p, r)| *p = r + next / square * *p);
         square = next;
     }
-    image
+    solution
 }
 
 /// Writes the sum of differences to the neighbours of each voxel: the graph Laplacian.
-fn differences([nx, ny, nz]: [usize; 3], values: &[f64], out: &mut [f64]) {
+fn laplacian([nx, ny, nz]: [usize; 3], values: &[f64], out: &mut [f64]) {
     out.fill(0.0);
     let mut add = |i: usize, j: usize| {
         let difference = values[i] - values[j];
@@ -159,7 +170,7 @@ fn differences([nx, ny, nz]: [usize; 3], values: &[f64], out: &mut [f64]) {
 }
 
 /// Extends known values to all voxels, each from the nearest along the axes; `None` if no value is known.
-fn spread(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Vec<f64>> {
+fn extend_to_all(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Vec<f64>> {
     let mut all = known;
     let mut front: Vec<usize> = (0..all.len()).filter(|&i| all[i].is_some()).collect();
     while !front.is_empty() {
@@ -188,7 +199,7 @@ fn spread(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Vec<f64>>
 
 #[cfg(test)]
 mod tests {
-    use super::super::vote::{Voting, Window};
+    use super::super::vote::{BoundaryVoting, Window};
     use super::*;
     use crate::math::{DAffine3, DVec3, Random};
     #[cfg(target_arch = "wasm32")]
@@ -218,20 +229,20 @@ mod tests {
             to_world: DAffine3::IDENTITY,
             from_world: DAffine3::IDENTITY,
             frames: vec![(0..DIMS.iter().product()).map(value).collect()],
-            step: 1.0,
+            quantum: 1.0,
             threshold: 20.0,
         }
     }
 
     fn faces(region: &Region, threshold: f64) -> Faces {
-        Voting::new(Window { reach: 2, frames: 0, threshold, cyclic: false }, 1).faces(region, 0)
+        BoundaryVoting::new(Window { half_width: 2, frames: 0, threshold, cyclic: false }, 1).faces(region, 0)
     }
 
     #[test]
-    fn what_is_bright_is_told_by_its_wall_however_the_signal_falls() {
+    fn walls_decide_what_is_bright_even_under_shading() {
         let region = shaded();
-        let whole = Part { ends: region.inner };
-        let found = sides(&region, 0, &faces(&region, 20.0), whole).unwrap();
+        let whole = VoxelBox { ends: region.inner };
+        let found = label_bright(&region, 0, &faces(&region, 20.0), whole).unwrap();
         for (i, &is_bright) in found.iter().enumerate().filter(|&(i, _)| depth(i).abs() > 1.5) {
             assert_eq!(is_bright, depth(i) > 0.0, "{:?}", whole.at(i));
         }
@@ -242,10 +253,10 @@ mod tests {
     }
 
     #[test]
-    fn a_sheet_of_voxels_has_its_own() {
+    fn a_single_layer_of_voxels_is_labelled() {
         let region = shaded();
-        let sheet = Part { ends: [[0, 0, 17], [DIMS[0] - 1, DIMS[1] - 1, 17]] };
-        let found = sides(&region, 0, &faces(&region, 20.0), sheet).unwrap();
+        let sheet = VoxelBox { ends: [[0, 0, 17], [DIMS[0] - 1, DIMS[1] - 1, 17]] };
+        let found = label_bright(&region, 0, &faces(&region, 20.0), sheet).unwrap();
         let near_wall = |at: [usize; 3]| {
             let [nx, ny, _] = DIMS;
             depth((at[2] * ny + at[1]) * nx + at[0])
@@ -257,8 +268,8 @@ mod tests {
     }
 
     #[test]
-    fn without_walls_there_are_no_sides() {
+    fn without_walls_nothing_is_labelled() {
         let region = shaded();
-        assert!(sides(&region, 0, &faces(&region, 250.0), Part { ends: region.inner }).is_none());
+        assert!(label_bright(&region, 0, &faces(&region, 250.0), VoxelBox { ends: region.inner }).is_none());
     }
 }

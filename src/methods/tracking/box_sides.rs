@@ -2,8 +2,8 @@
 //! without a step in intensity, so the box ends the region: its sides get faces of full weight there, and the surface
 //! is closed.
 
+use super::labelling::{VoxelBox, label_bright, label_bright_by_level};
 use super::region::Region;
-use super::sides::{Part, nearest_sides, sides};
 use super::vote::{Face, Faces, TIME, X, Y, Z};
 use crate::math::DVec3;
 use std::cell::OnceCell;
@@ -15,7 +15,7 @@ impl Region {
     }
 
     /// Returns the voxels before and after a face; the same voxel twice for a face along time.
-    fn beside(&self, direction: usize, voxel: u32) -> [[usize; 3]; 2] {
+    fn voxels_at_face(&self, direction: usize, voxel: u32) -> [[usize; 3]; 2] {
         let before = self.voxel(voxel);
         let mut after = before;
         if direction != TIME {
@@ -25,8 +25,8 @@ impl Region {
     }
 
     /// Returns the outward direction through a face in a side of the box; `None` for all other faces.
-    pub fn cut(&self, direction: usize, voxel: u32) -> Option<DVec3> {
-        match self.beside(direction, voxel).map(|at| self.is_inside(at)) {
+    pub fn outward_at_box_side(&self, direction: usize, voxel: u32) -> Option<DVec3> {
+        match self.voxels_at_face(direction, voxel).map(|at| self.is_inside(at)) {
             [true, false] => Some(DVec3::AXES[direction]),
             [false, true] => Some(-DVec3::AXES[direction]),
             _ => None,
@@ -35,7 +35,7 @@ impl Region {
 
     /// Returns the distance from a voxel's centre to the box along the axis where it is largest, in world units;
     /// negative infinity inside.
-    pub fn beyond(&self, at: [usize; 3]) -> f64 {
+    pub fn distance_outside_box(&self, at: [usize; 3]) -> f64 {
         let [first, last] = self.inner;
         let beyond = |axis: usize| {
             let voxels = (first[axis] as f64 - at[axis] as f64).max(at[axis] as f64 - last[axis] as f64);
@@ -45,9 +45,9 @@ impl Region {
     }
 
     /// Returns the voxel of the box nearest to a position outside; `None` for positions inside.
-    pub fn nearest_inside(&self, place: DVec3) -> Option<u32> {
+    pub fn clamp_into_box(&self, position: DVec3) -> Option<u32> {
         let [first, last] = self.inner.map(|at| DVec3::from(at.map(|i| i as f64)));
-        let at = place / self.spacing;
+        let at = position / self.spacing;
         let is_inside = at.cmpge(first - 0.5).all() && at.cmple(last + 0.5).all();
         let [x, y, z] = at.clamp(first, last).round().to_array().map(|i| i as u32);
         let [nx, ny, _] = self.dims.map(|n| n as u32);
@@ -55,23 +55,28 @@ impl Region {
     }
 
     /// Removes the faces beyond the box, and adds faces in its sides where the frame is bright.
-    pub fn close(&self, frame: usize, faces: &mut Faces) {
+    pub fn clip_to_box(&self, frame: usize, faces: &mut Faces) {
         for (direction, list) in faces.iter_mut().enumerate() {
-            list.retain(|face| self.beside(direction, face.voxel).iter().all(|&at| self.is_inside(at)));
+            list.retain(|face| {
+                self.voxels_at_face(direction, face.voxel).iter().all(|&at| self.is_inside(at))
+            });
         }
         // Used for sides that no wall crosses: there, the nearest wall decides.
-        let whole = OnceCell::new();
-        let whole =
-            || whole.get_or_init(|| nearest_sides(self, frame, faces, Part { ends: self.inner })).as_deref();
+        let fallback = OnceCell::new();
+        let fallback = || {
+            fallback
+                .get_or_init(|| label_bright_by_level(self, frame, faces, VoxelBox { ends: self.inner }))
+                .as_deref()
+        };
         let added = [X, Y, Z].map(|direction| {
             let [first, last] = self.inner.map(|at| at[direction]);
             let mut list = Vec::new();
             // A face is indexed by the voxel before it.
             if let Some(before) = first.checked_sub(1) {
-                list.extend(self.cut_faces(frame, faces, direction, [first, before], whole));
+                list.extend(self.box_side_faces(frame, faces, direction, [first, before], fallback));
             }
             if last + 1 < self.dims[direction] {
-                list.extend(self.cut_faces(frame, faces, direction, [last; 2], whole));
+                list.extend(self.box_side_faces(frame, faces, direction, [last; 2], fallback));
             }
             list
         });
@@ -80,26 +85,26 @@ impl Region {
 
     /// Returns faces in a side of the box where the adjacent `layer` of voxels is bright; `at` is the layer of the
     /// voxels before the faces.
-    fn cut_faces<'a>(
+    fn box_side_faces<'a>(
         &self,
         frame: usize,
         faces: &Faces,
         direction: usize,
         [layer, at]: [usize; 2],
-        whole: impl Fn() -> Option<&'a [bool]>,
+        fallback: impl Fn() -> Option<&'a [bool]>,
     ) -> Vec<Face> {
-        let mut part = Part { ends: self.inner };
-        part.ends.iter_mut().for_each(|end| end[direction] = layer);
-        let inner = Part { ends: self.inner };
-        let own = sides(self, frame, faces, part);
+        let mut side = VoxelBox { ends: self.inner };
+        side.ends.iter_mut().for_each(|end| end[direction] = layer);
+        let inner = VoxelBox { ends: self.inner };
+        let own = label_bright(self, frame, faces, side);
         let is_bright = |i: &usize| match &own {
             Some(own) => own[*i],
-            None => inner.index(part.at(*i)).zip(whole()).is_some_and(|(i, whole)| whole[i]),
+            None => inner.index(side.at(*i)).zip(fallback()).is_some_and(|(i, fallback)| fallback[i]),
         };
         let [nx, ny, _] = self.dims;
-        let bright = (0..part.len()).filter(is_bright);
+        let bright = (0..side.len()).filter(is_bright);
         let voxel = |i: usize| {
-            let mut voxel = part.at(i);
+            let mut voxel = side.at(i);
             voxel[direction] = at;
             ((voxel[2] * ny + voxel[1]) * nx + voxel[0]) as u32
         };
@@ -107,14 +112,14 @@ impl Region {
     }
 
     /// Returns the voxels of the box that are adjacent to faces in its sides, sorted.
-    pub fn cut_voxels(&self, faces: &Faces) -> Vec<u32> {
+    pub fn bright_box_side_voxels(&self, faces: &Faces) -> Vec<u32> {
         let [nx, ny, _] = self.dims;
         let mut voxels = Vec::new();
         for direction in [X, Y, Z] {
             let step = [1, nx, nx * ny][direction] as u32;
             for face in &faces[direction] {
-                match self.cut(direction, face.voxel) {
-                    Some(way) if way[direction] > 0.0 => voxels.push(face.voxel),
+                match self.outward_at_box_side(direction, face.voxel) {
+                    Some(outward) if outward[direction] > 0.0 => voxels.push(face.voxel),
                     Some(_) => voxels.push(face.voxel + step),
                     None => {}
                 }
