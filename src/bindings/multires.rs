@@ -39,7 +39,7 @@ impl Live for View {
         match self.which {
             Which::Detailed => model.surface(),
             Which::Base => model.base_mesh().to_triangles(),
-            Which::Link => model.link_mesh(),
+            Which::Link => model.base_correspondence(),
         }
     }
 
@@ -124,7 +124,7 @@ impl RawMultires {
 
     /// Returns the target ellipsoids, packed.
     pub fn goals(&self) -> Vec<f64> {
-        packed(&self.0.borrow().goals())
+        packed(&self.0.borrow().targets())
     }
 
     /// Returns the distortion of areas (0) or of angles (1) across the base correspondence, per vertex.
@@ -152,7 +152,7 @@ impl RawMultires {
     /// missed the finer surface, and vertices held back to avoid self-intersections.
     pub fn facts(&self) -> Result<JsValue, JsValue> {
         let model = self.0.borrow();
-        let [missed, held] = model.misses();
+        let [missed, held] = model.detail_counts();
         Ok(to_js(&Facts { bands: model.bands(), folded: model.folded(), missed, held })?)
     }
 

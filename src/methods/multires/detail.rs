@@ -1,8 +1,8 @@
 //! Detail: the signed distance λ from each surface of the decomposition to the next finer one along its normals, and
 //! its reconstruction on the deformed base (sections 2 and 3).
 
-use super::link::{Link, Linked, NOWHERE, normal_at};
-use super::prisms::Prisms;
+use super::correspondence::{BasePoint, Correspondence, UNSET, normal_at};
+use super::prisms::PrismLookup;
 use crate::math::Vec3;
 use crate::mesh::{Mesh, MeshError, TriangleMesh, VertexId};
 use crate::remesh::Embedding;
@@ -30,25 +30,25 @@ impl Band {
 #[derive(Clone, Debug)]
 pub(super) struct Bands {
     pub all: Vec<Rc<Band>>,
-    leaps: Vec<Leap>,
+    lookups: Vec<BandLookup>,
 }
 
 /// The lookup of normals from one surface of a decomposition to the next finer one.
 #[derive(Clone, Debug)]
-struct Leap {
+struct BandLookup {
     /// The largest distance of a hit; farther ones belong to another part of the surface.
     reach: f64,
-    prisms: Prisms,
+    prisms: PrismLookup,
 }
 
 impl Bands {
     /// Prepares the surfaces of a decomposition, from coarse to fine; the first is the base.
     pub fn new(all: Vec<Rc<Band>>) -> Self {
-        let leap = |pair: &[Rc<Band>]| {
+        let lookup = |pair: &[Rc<Band>]| {
             let reach = reach(&pair[0], &pair[1]);
-            Leap { reach, prisms: Prisms::new(&pair[0], &pair[1], reach) }
+            BandLookup { reach, prisms: PrismLookup::new(&pair[0], &pair[1], reach) }
         };
-        Self { leaps: all.windows(2).map(leap).collect(), all }
+        Self { lookups: all.windows(2).map(lookup).collect(), all }
     }
 
     pub fn base(&self) -> &Band {
@@ -61,19 +61,19 @@ impl Bands {
 
     /// Returns the detail at a point of the base: for each band but the first, its signed distance from the band before
     /// along the normal.
-    pub fn offsets(&self, at: &Linked) -> Offsets {
-        let mut offsets = Offsets { last: *at, ..NOTHING };
-        for (k, Leap { reach, prisms }) in self.leaps.iter().enumerate() {
+    pub fn detail_at(&self, at: &BasePoint) -> Detail {
+        let mut detail = Detail { last: *at, ..NOTHING };
+        for (k, BandLookup { reach, prisms }) in self.lookups.iter().enumerate() {
             let (from, to) = (&self.all[k], &self.all[k + 1]);
-            let normal = normal_at(&from.walker, &from.normals, &offsets.last);
-            let met = prisms.line_hit(to, &offsets.last, normal, *reach);
-            (offsets.lambdas[k], offsets.last) = met.map_or_else(
-                || to.beside(offsets.last.point, normal),
+            let normal = normal_at(&from.walker, &from.normals, &detail.last);
+            let met = prisms.line_hit(to, &detail.last, normal, *reach);
+            (detail.lambdas[k], detail.last) = met.map_or_else(
+                || to.closest_fallback(detail.last.point, normal),
                 |found| (found.distance as f32, found.into()),
             );
-            offsets.missed |= met.is_none();
+            detail.missed |= met.is_none();
         }
-        offsets
+        detail
     }
 }
 
@@ -82,7 +82,7 @@ const REACH: f64 = 2.0;
 
 /// Returns the search distance for hits along the normals of `from` on `to`.
 pub(super) fn reach(from: &Band, to: &Band) -> f64 {
-    REACH * farthest(from, to)
+    REACH * hausdorff_bound(from, to)
 }
 
 /// Maximum number of bands above the base.
@@ -90,27 +90,27 @@ pub(super) const MOST_BANDS: usize = 8;
 
 /// The detail at a point of the base: the signed distances of all bands.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Offsets {
+pub(super) struct Detail {
     lambdas: [f32; MOST_BANDS],
     /// Whether a normal did not hit its surface and the closest point was used instead.
     pub missed: bool,
     /// The corresponding point on the finest surface.
-    pub last: Linked,
+    pub last: BasePoint,
 }
 
 impl Band {
     /// Returns the closest point to `origin`, and its signed distance along `normal`: the fallback where the normal
     /// hits nothing.
-    fn beside(&self, origin: Vec3, normal: Vec3) -> (f32, Linked) {
+    fn closest_fallback(&self, origin: Vec3, normal: Vec3) -> (f32, BasePoint) {
         match self.walker.closest(origin) {
             Some(found) => ((found.point - origin).dot(normal), found.into()),
-            None => (0.0, NOWHERE),
+            None => (0.0, UNSET),
         }
     }
 }
 
 /// Returns the largest distance from a vertex of one surface to the other surface.
-fn farthest(a: &Band, b: &Band) -> f64 {
+fn hausdorff_bound(a: &Band, b: &Band) -> f64 {
     let one_way = |from: &Band, to: &Band| {
         let distances = from.walker.mesh().positions.iter().filter_map(|&p| to.walker.closest(p));
         distances.map(|found| found.distance).fold(0.0, f64::max)
@@ -122,16 +122,16 @@ fn farthest(a: &Band, b: &Band) -> f64 {
 pub(super) struct Detailed {
     pub mesh: Mesh,
     /// The corresponding point on the finest surface for each vertex, by slot; for texture coordinates.
-    pub places: Link,
+    pub points: Correspondence,
     /// Number of vertices whose normal hit no surface.
     pub missed: usize,
     /// Number of vertices that moved by less than their displacement, to avoid self-intersections.
-    pub held: usize,
+    pub held_back: usize,
 }
 
 /// How finely the deformed base is sampled for the detail.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fineness {
+pub(super) struct DetailSampling {
     /// Longer edges of the detailed surface are split.
     pub longest: f32,
     /// How often an edge of the deformed base may be halved.
@@ -142,44 +142,44 @@ pub(super) struct Fineness {
 /// Vertices move only as far as no triangles intersect.
 pub(super) fn detailed(
     surface: &Mesh,
-    link: &Link,
+    link: &Correspondence,
     bands: &Bands,
     guard: &mut Embedding,
-    fineness: Fineness,
+    sampling: DetailSampling,
 ) -> Detailed {
-    let mut fine = Samples::new(surface, link, bands);
-    for _ in 0..fineness.rounds {
-        fine.refine(bands, fineness.longest);
+    let mut fine = DetailSamples::new(surface, link, bands);
+    for _ in 0..sampling.rounds {
+        fine.refine(bands, sampling.longest);
     }
-    let shown = carried(fine, bands, guard);
-    if fineness.rounds > 0 && guard.left_crossing(&shown.mesh) {
+    let detailed = displace(fine, bands, guard);
+    if sampling.rounds > 0 && guard.left_crossing(&detailed.mesh) {
         // A part of the membrane is so small that rounding dominates: edge midpoints then cause intersections.
-        return carried(Samples::new(surface, link, bands), bands, guard);
+        return displace(DetailSamples::new(surface, link, bands), bands, guard);
     }
-    shown
+    detailed
 }
 
 /// Displaces the samples by their detail, band by band, guarded against self-intersections.
-fn carried(samples: Samples, bands: &Bands, guard: &mut Embedding) -> Detailed {
-    let Samples { mut mesh, normals, offsets, .. } = samples;
+fn displace(samples: DetailSamples, bands: &Bands, guard: &mut Embedding) -> Detailed {
+    let DetailSamples { mut mesh, normals, details: detail, .. } = samples;
     let mut held = 0;
-    for k in 0..bands.leaps.len() {
-        let mut ways = vec![Vec3::ZERO; mesh.slots()];
+    for k in 0..bands.lookups.len() {
+        let mut displacements = vec![Vec3::ZERO; mesh.slots()];
         for v in mesh.vertices() {
             let normal = if k == 0 { normals[v.index()] } else { mesh.area_normal(v).normalize_or_zero() };
-            ways[v.index()] = normal * offsets[v.index()].lambdas[k];
+            displacements[v.index()] = normal * detail[v.index()].lambdas[k];
         }
-        guard.follow_with(&mesh, super::usual_edge(&mesh));
-        let wanted = ways.clone();
-        let back = guard.carry(&mut mesh, &mut ways);
+        guard.follow_with(&mesh, super::typical_edge(&mesh));
+        let wanted = displacements.clone();
+        let back = guard.carry(&mut mesh, &mut displacements);
         held += back.len();
         if !back.is_empty() {
-            let mut ways = softened(&mesh, &wanted, &back);
-            guard.carry(&mut mesh, &mut ways);
+            let mut displacements = spread_hold_back(&mesh, &wanted, &back);
+            guard.carry(&mut mesh, &mut displacements);
         }
     }
-    let missed = mesh.vertices().filter(|v| offsets[v.index()].missed).count();
-    Detailed { mesh, places: offsets.into_iter().map(|offsets| offsets.last).collect(), missed, held }
+    let missed = mesh.vertices().filter(|v| detail[v.index()].missed).count();
+    Detailed { mesh, points: detail.into_iter().map(|detail| detail.last).collect(), missed, held_back: held }
 }
 
 /// Number of one-rings around a held-back vertex that are moved back partly as well; without them, the surface has a
@@ -187,13 +187,13 @@ fn carried(samples: Samples, bands: &Bands, guard: &mut Embedding) -> Detailed {
 const SOFT_RINGS: usize = 4;
 
 /// Returns corrections, by slot, that move the neighbours of held-back vertices back as well, less with every ring.
-/// `ways` are the intended displacements of all vertices, and `held` the share of it that each held-back vertex moved
+/// `displacements` are the intended displacements of all vertices, and `held_back` the share of it that each held-back vertex moved
 /// by.
-fn softened(mesh: &Mesh, ways: &[Vec3], held: &[(VertexId, f32)]) -> Vec<Vec3> {
+fn spread_hold_back(mesh: &Mesh, displacements: &[Vec3], held_back: &[(VertexId, f32)]) -> Vec<Vec3> {
     let mut missing = vec![0.0_f32; mesh.slots()];
-    held.iter().for_each(|&(v, share)| missing[v.index()] = 1.0 - share);
+    held_back.iter().for_each(|&(v, share)| missing[v.index()] = 1.0 - share);
     let went = missing.clone();
-    let mut around: Vec<VertexId> = held.iter().map(|&(v, _)| v).collect();
+    let mut around: Vec<VertexId> = held_back.iter().map(|&(v, _)| v).collect();
     for _ in 0..SOFT_RINGS {
         around.extend(around.clone().iter().flat_map(|&v| mesh.ring(v).as_slice()));
         around.sort_unstable();
@@ -205,75 +205,76 @@ fn softened(mesh: &Mesh, ways: &[Vec3], held: &[(VertexId, f32)]) -> Vec<Vec3> {
         let spread: Vec<f32> = around.iter().map(|&v| mean(v).max(missing[v.index()])).collect();
         around.iter().zip(spread).for_each(|(v, share)| missing[v.index()] = share);
     }
-    let back = |(way, (before, after)): (&Vec3, (&f32, &f32))| *way * (before - after);
-    ways.iter().zip(went.iter().zip(&missing)).map(back).collect()
+    let back = |(displacement, (before, after)): (&Vec3, (&f32, &f32))| *displacement * (before - after);
+    displacements.iter().zip(went.iter().zip(&missing)).map(back).collect()
 }
 
 /// The vertices of the deformed base, with those added by edge splits, and the detail at each; by slot.
-struct Samples {
+struct DetailSamples {
     mesh: Mesh,
-    link: Link,
+    correspondence: Correspondence,
     normals: Vec<Vec3>,
-    offsets: Vec<Offsets>,
+    details: Vec<Detail>,
 }
 
 /// An edge is halved if the detail at its midpoint is off the straight line by more than this share of the longest
 /// edge. With a larger value, noses and eyelids stay blunt; with a smaller one, every edge is split.
-const BEND: f32 = 0.04;
+const MAX_DEVIATION: f32 = 0.04;
 
-impl Samples {
-    fn new(surface: &Mesh, link: &Link, bands: &Bands) -> Self {
+impl DetailSamples {
+    fn new(surface: &Mesh, link: &Correspondence, bands: &Bands) -> Self {
         let ids = (0..surface.slots()).map(VertexId::from_index);
         let normals = ids.clone().map(|v| surface.area_normal(v).normalize_or_zero()).collect();
-        let offsets = ids.map(|v| match surface.is_live(v) {
-            true => bands.offsets(&link[v.index()]),
+        let detail = ids.map(|v| match surface.is_live(v) {
+            true => bands.detail_at(&link[v.index()]),
             false => NOTHING,
         });
-        Self { offsets: offsets.collect(), mesh: surface.clone(), link: link.clone(), normals }
+        Self { details: detail.collect(), mesh: surface.clone(), correspondence: link.clone(), normals }
     }
 
     /// Returns the approximate position of a vertex with its detail: all bands along the normal of the deformed base.
-    fn place(&self, v: VertexId) -> Vec3 {
-        self.placed(self.mesh.position(v), self.normals[v.index()], &self.offsets[v.index()])
+    fn detailed_position(&self, v: VertexId) -> Vec3 {
+        self.position_with(self.mesh.position(v), self.normals[v.index()], &self.details[v.index()])
     }
 
-    fn placed(&self, p: Vec3, normal: Vec3, offsets: &Offsets) -> Vec3 {
-        p + normal * offsets.lambdas.iter().sum::<f32>()
+    fn position_with(&self, p: Vec3, normal: Vec3, detail: &Detail) -> Vec3 {
+        p + normal * detail.lambdas.iter().sum::<f32>()
     }
 
     /// Halves edges that are too long with their detail, or off it at their midpoint, longest first.
     fn refine(&mut self, bands: &Bands, longest: f32) {
         let mut wanted: Vec<(f32, VertexId, VertexId, Sample)> = Vec::new();
         for (u, v) in self.mesh.edges() {
-            let (p, q) = (self.place(u), self.place(v));
+            let (p, q) = (self.detailed_position(u), self.detailed_position(v));
             let middle = self.middle(bands, u, v);
-            let bend = self.placed(middle.position, middle.normal, &middle.offsets).distance((p + q) * 0.5);
-            if p.distance(q) > longest || bend > BEND * longest {
+            let deviation =
+                self.position_with(middle.position, middle.normal, &middle.detail).distance((p + q) * 0.5);
+            if p.distance(q) > longest || deviation > MAX_DEVIATION * longest {
                 wanted.push((p.distance_squared(q), u, v, middle));
             }
         }
         wanted.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
         for (_, u, v, middle) in wanted {
             let Ok(w) = self.mesh.split(u, v, middle.position) else { continue };
-            self.link.resize(self.mesh.slots(), NOWHERE);
+            self.correspondence.resize(self.mesh.slots(), UNSET);
             self.normals.resize(self.mesh.slots(), Vec3::ZERO);
-            self.offsets.resize(self.mesh.slots(), NOTHING);
-            self.link[w.index()] = middle.link;
+            self.details.resize(self.mesh.slots(), NOTHING);
+            self.correspondence[w.index()] = middle.base_point;
             self.normals[w.index()] = middle.normal;
-            self.offsets[w.index()] = middle.offsets;
+            self.details[w.index()] = middle.detail;
         }
     }
 
     /// Returns the midpoint of an edge, with its detail.
     fn middle(&self, bands: &Bands, u: VertexId, v: VertexId) -> Sample {
-        let (from, to) = (&self.link[u.index()], &self.link[v.index()]);
+        let (from, to) = (&self.correspondence[u.index()], &self.correspondence[v.index()]);
         let on_base = bands.base().walker.march(from.triangle, (from.point + to.point) * 0.5);
-        let link: Linked = on_base.into();
+        let link: BasePoint = on_base.into();
         Sample {
             position: (self.mesh.position(u) + self.mesh.position(v)) * 0.5,
             normal: (self.normals[u.index()] + self.normals[v.index()]).normalize_or_zero(),
-            offsets: bands.offsets(&link),
-            link,
+            detail: bands.detail_at(&link),
+            base_point: link,
         }
     }
 }
@@ -282,12 +283,12 @@ impl Samples {
 struct Sample {
     position: Vec3,
     normal: Vec3,
-    link: Linked,
-    offsets: Offsets,
+    base_point: BasePoint,
+    detail: Detail,
 }
 
 /// The entry of a free slot.
-const NOTHING: Offsets = Offsets { lambdas: [0.0; MOST_BANDS], missed: false, last: NOWHERE };
+const NOTHING: Detail = Detail { lambdas: [0.0; MOST_BANDS], missed: false, last: UNSET };
 
 #[cfg(test)]
 mod tests {
@@ -296,18 +297,23 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     #[test]
-    fn what_is_held_back_draws_back_what_is_around_it() {
+    fn a_vertex_held_back_holds_back_its_neighbourhood() {
         let mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.1).unwrap();
-        let ways: Vec<Vec3> = mesh.positions().iter().map(|&p| p * 0.1).collect();
+        let displacements: Vec<Vec3> = mesh.positions().iter().map(|&p| p * 0.1).collect();
         let held = VertexId::from_index(100);
-        let back = softened(&mesh, &ways, &[(held, 0.0)]);
+        let back = spread_hold_back(&mesh, &displacements, &[(held, 0.0)]);
         assert_eq!(back[held.index()], Vec3::ZERO, "it has not gone");
         for &v in mesh.ring(held).as_slice() {
-            let share = -back[v.index()].dot(ways[v.index()]) / ways[v.index()].length_squared();
+            let share =
+                -back[v.index()].dot(displacements[v.index()]) / displacements[v.index()].length_squared();
             assert!(share > 0.1 && share < 0.5, "{share}");
         }
         let far = (0..mesh.slots()).filter(|&i| mesh.position(held).distance(mesh.positions()[i]) > 0.6);
         assert!(far.clone().count() > 100 && far.into_iter().all(|i| back[i] == Vec3::ZERO));
-        assert!(softened(&mesh, &ways, &[]).iter().all(|&way| way == Vec3::ZERO));
+        assert!(
+            spread_hold_back(&mesh, &displacements, &[])
+                .iter()
+                .all(|&displacement| displacement == Vec3::ZERO)
+        );
     }
 }

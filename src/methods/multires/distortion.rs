@@ -1,6 +1,6 @@
 //! Distortion of the map T, which the operator D keeps low (section 3).
 
-use super::link::Link;
+use super::correspondence::Correspondence;
 use crate::math::{DVec3, triangle};
 use crate::mesh::{Mesh, VertexId};
 
@@ -15,12 +15,12 @@ pub struct Distortion {
     pub angle: Vec<f64>,
 }
 
-pub(super) fn distortion(mesh: &Mesh, link: &Link) -> Distortion {
+pub(super) fn distortion(mesh: &Mesh, correspondence: &Correspondence) -> Distortion {
     let slots = mesh.slots();
     let (mut before, mut after, mut stretch) = (vec![0.0; slots], vec![0.0; slots], vec![0.0; slots]);
     for corners in mesh.triangles() {
         let deformed = mesh.facet(corners).points;
-        let original = corners.map(|v| link[v.index()].point);
+        let original = corners.map(|v| correspondence[v.index()].point);
         let area = triangle::area(deformed);
         let ratio = anisotropy(deformed.map(|p| p.as_dvec3()), original.map(|p| p.as_dvec3()));
         for v in corners {
@@ -37,7 +37,7 @@ pub(super) fn distortion(mesh: &Mesh, link: &Link) -> Distortion {
     Distortion { area: per_vertex(&before), angle: per_vertex(&stretch) }
 }
 
-/// Returns the ratio of the singular values of the affine map from one triangle to another, at most [`MOST`]; 1 for a
+/// Returns the ratio of the singular values of the affine map from one triangle to another, at most [`MAX_ANISOTROPY`]; 1 for a
 /// similarity.
 fn anisotropy(from: [DVec3; 3], to: [DVec3; 3]) -> f64 {
     // In the plane of the first triangle, with one edge along x, the linear part is a 3 × 2 matrix with columns p and
@@ -52,10 +52,10 @@ fn anisotropy(from: [DVec3; 3], to: [DVec3; 3]) -> f64 {
     let root = (half * half + p.dot(q) * p.dot(q)).sqrt();
     let ratio = ((mean + root) / (mean - root)).sqrt();
     // For a triangle without area the ratio is infinite or NaN.
-    if ratio < MOST { ratio } else { MOST }
+    if ratio < MAX_ANISOTROPY { ratio } else { MAX_ANISOTROPY }
 }
 
-const MOST: f64 = 1e3;
+const MAX_ANISOTROPY: f64 = 1e3;
 
 #[cfg(test)]
 mod tests {
@@ -70,7 +70,7 @@ mod tests {
         assert!((anisotropy([o, x, y], [turn(o), turn(x), turn(y)]) - 1.0).abs() < 1e-9);
         let stretch = |p: DVec3| DVec3::new(p.x, 5.0 * p.y, 0.0);
         assert!((anisotropy([o, x, y], [stretch(o), stretch(x), stretch(y)]) - 5.0).abs() < 1e-9);
-        assert_eq!(anisotropy([o, x, y], [o, x, x * 2.0]), MOST);
-        assert_eq!(anisotropy([o, x, x * 2.0], [o, x, y]), MOST);
+        assert_eq!(anisotropy([o, x, y], [o, x, x * 2.0]), MAX_ANISOTROPY);
+        assert_eq!(anisotropy([o, x, x * 2.0], [o, x, y]), MAX_ANISOTROPY);
     }
 }

@@ -79,7 +79,7 @@ pub(super) struct Ellipsoid {
     /// divisions by the semi-axes took a large part of a frame.
     to_unit: DMat3,
     /// The square of the longest semi-axis: points farther from the centre are outside.
-    square: f64,
+    bounding_radius_squared: f64,
 }
 
 /// The geometry of an ellipsoid: centre, orientation and semi-axes.
@@ -96,7 +96,7 @@ impl From<Shape> for Ellipsoid {
     fn from(shape: Shape) -> Self {
         let to_unit = DMat3::from_diagonal(shape.lengths.recip()) * shape.rotation.transpose();
         let longest = shape.lengths.max_element();
-        Self { shape, to_unit, square: longest * longest }
+        Self { shape, to_unit, bounding_radius_squared: longest * longest }
     }
 }
 
@@ -140,7 +140,7 @@ impl Ellipsoid {
     }
 
     /// Converts the ellipsoid back to the caller's form.
-    pub fn given(&self) -> ControlEllipsoid {
+    pub fn to_control(&self) -> ControlEllipsoid {
         let axis = |k: usize| (self.rotation.col(k) * self.lengths[k]).to_array();
         ControlEllipsoid { center: self.center.to_array(), axes: [axis(0), axis(1), axis(2)] }
     }
@@ -168,7 +168,8 @@ impl Ellipsoid {
     pub fn contains(&self, p: DVec3) -> bool {
         let seen = p - self.center;
         // Most ellipsoids are far from most points.
-        seen.length_squared() < self.square && (self.to_unit * seen).length_squared() < OUTSIDE * OUTSIDE
+        seen.length_squared() < self.bounding_radius_squared
+            && (self.to_unit * seen).length_squared() < OUTSIDE * OUTSIDE
     }
 
     /// Maps a point from the unit-ball frame of [`Self::unit`] to the world.
@@ -177,18 +178,18 @@ impl Ellipsoid {
     }
 
     /// Returns the length of the shortest semi-axis.
-    pub fn thinnest(&self) -> f64 {
+    pub fn shortest_axis(&self) -> f64 {
         self.lengths.min_element()
     }
 
     /// Returns the smallest radius of curvature, that of the sharpest tip.
-    pub fn sharpest(&self) -> f64 {
-        self.thinnest() * self.thinnest() / self.lengths.max_element()
+    pub fn min_radius(&self) -> f64 {
+        self.shortest_axis() * self.shortest_axis() / self.lengths.max_element()
     }
 
     /// Returns the distance from `p` to the surface along the ray to the centre, an upper bound of the distance; 0
     /// inside.
-    pub fn clearance(&self, p: DVec3) -> f64 {
+    pub fn ray_distance(&self, p: DVec3) -> f64 {
         let size = self.unit(p).length();
         if size > 1.0 { p.distance(self.center) * (1.0 - 1.0 / size) } else { 0.0 }
     }
@@ -200,7 +201,7 @@ impl Ellipsoid {
     /// + t) for the largest root t of Σ (a y/(a² + t))² = 1.
     pub fn nearest(&self, p: DVec3) -> DVec3 {
         if self.lengths.min_element() == self.lengths.max_element() {
-            return self.center + self.thinnest() * (p - self.center).normalize_or(self.rotation.x_axis);
+            return self.center + self.shortest_axis() * (p - self.center).normalize_or(self.rotation.x_axis);
         }
         let squares = self.lengths * self.lengths;
         let least = squares.min_element();
@@ -245,20 +246,22 @@ fn largest_root(weights: DVec3, squares: DVec3, least: f64) -> f64 {
 ///
 /// # Errors
 /// [`MethodError::InvalidArgument`] naming the first ellipsoid that the membrane would slip off.
-pub(super) fn check_sizes(ellipsoids: &[Ellipsoid], longest: f64) -> Result<(), MethodError> {
-    let slips = |(k, e): (usize, &Ellipsoid)| (longest > BLUNT * e.sharpest()).then_some((k, e.sharpest()));
+pub(super) fn check_tips(ellipsoids: &[Ellipsoid], longest: f64) -> Result<(), MethodError> {
+    let slips = |(k, e): (usize, &Ellipsoid)| {
+        (longest > MAX_EDGE_PER_RADIUS * e.min_radius()).then_some((k, e.min_radius()))
+    };
     let Some((k, radius)) = ellipsoids.iter().enumerate().find_map(slips) else { return Ok(()) };
     let problem = format!(
         "number {k} has tips of radius {radius:.3}, where a skin with edges up to {longest:.3} would slip off: edgeMax up to \
          {:.3}, or a rounder ellipsoid, is accepted",
-        BLUNT * radius
+        MAX_EDGE_PER_RADIUS * radius
     );
     Err(MethodError::invalid("ellipsoids", problem))
 }
 
 /// Longest edge that holds on to a tip, as a multiple of its radius of curvature. Only vertices are pushed out, not
 /// triangles: with much longer edges the tip pierces a triangle, and the membrane retracts from it.
-const BLUNT: f64 = 1.6;
+const MAX_EDGE_PER_RADIUS: f64 = 1.6;
 
 /// Returns `p` moved out of all ellipsoids, by repeated pushes out of the one that it is deepest in; `p` itself if it
 /// is outside of all.
@@ -274,7 +277,7 @@ pub(super) fn pushed_out(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
             Some((_, nearest)) => at = nearest,
         }
     }
-    straight_out(ellipsoids, at)
+    push_straight(ellipsoids, at)
 }
 
 /// Maximum number of pushes out of one ellipsoid after the other; a crease of 90° takes some three for each digit.
@@ -293,27 +296,27 @@ fn deepest(ellipsoids: &[Ellipsoid], p: DVec3) -> Option<(usize, DVec3)> {
 }
 
 /// Moves `p` along the sum of the normals of all ellipsoids that contain it until it is outside of every one.
-fn straight_out(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
+fn push_straight(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
     let containing = ellipsoids.iter().filter(|e| e.contains(p));
     let away = |e: &Ellipsoid| (e.rotation * (e.unit(p) / e.lengths)).normalize_or_zero();
     let direction = containing.map(away).sum::<DVec3>().normalize_or(DVec3::Z);
-    let mut way = 0.0;
+    let mut distance = 0.0;
     // An ellipsoid is convex, so each is left once: the loop ends.
-    while let Some(exit) = ellipsoids.iter().find_map(|e| exit_beyond(e, p, direction, way)) {
-        way = exit;
+    while let Some(exit) = ellipsoids.iter().find_map(|e| exit_beyond(e, p, direction, distance)) {
+        distance = exit;
     }
-    p + direction * way
+    p + direction * distance
 }
 
-/// Returns the distance at which a ray leaves the ellipsoid, if it is inside at the distance `way`; `None` otherwise.
-fn exit_beyond(e: &Ellipsoid, p: DVec3, direction: DVec3, way: f64) -> Option<f64> {
-    if e.unit(p + direction * way).length_squared() >= OUTSIDE * OUTSIDE {
+/// Returns the distance at which a ray leaves the ellipsoid, if it is inside at the distance `distance`; `None` otherwise.
+fn exit_beyond(e: &Ellipsoid, p: DVec3, direction: DVec3, distance: f64) -> Option<f64> {
+    if e.unit(p + direction * distance).length_squared() >= OUTSIDE * OUTSIDE {
         return None;
     }
     let (from, step) = (e.unit(p), e.rotation.transpose() * direction / e.lengths);
     let (a, b, c) = (step.length_squared(), from.dot(step), from.length_squared() - 1.0);
     let exit = (-b + (b * b - a * c).max(0.0).sqrt()) / a;
-    (exit > way).then_some(exit)
+    (exit > distance).then_some(exit)
 }
 
 /// Returns `p` moved along with the ellipsoids from `before` to `after`: by the mean of their affine maps, with larger
@@ -321,12 +324,12 @@ fn exit_beyond(e: &Ellipsoid, p: DVec3, direction: DVec3, way: f64) -> Option<f6
 ///
 /// If all ellipsoids move alike, so does every point. Otherwise, points nearer to an ellipsoid than its size mostly
 /// move with it, and the space between two is stretched evenly.
-pub(super) fn carried(before: &[Ellipsoid], after: &[Ellipsoid], p: Vec3) -> Vec3 {
+pub(super) fn move_with(before: &[Ellipsoid], after: &[Ellipsoid], p: Vec3) -> Vec3 {
     let p = p.as_dvec3();
     let (mut sum, mut total) = (DVec3::ZERO, 0.0);
     for (from, to) in before.iter().zip(after) {
-        let clearance = from.clearance(p) / from.thinnest();
-        let weight = 1.0 / (SOFTNESS + clearance * clearance);
+        let distance = from.ray_distance(p) / from.shortest_axis();
+        let weight = 1.0 / (SOFTNESS + distance * distance);
         sum += weight * (to.at_unit(from.unit(p)) - p);
         total += weight;
     }
@@ -377,8 +380,8 @@ mod tests {
             assert!(nearest.distance(p) <= least + 1e-9, "{} {least}", nearest.distance(p));
             // The normal there passes through p.
             let normal = (e.rotation * (e.unit(nearest) / e.lengths)).normalize();
-            let way = p - nearest;
-            assert!((way - normal * way.dot(normal)).length() < 1e-7, "{:?} {p}", e);
+            let distance = p - nearest;
+            assert!((distance - normal * distance.dot(normal)).length() < 1e-7, "{:?} {p}", e);
         }
     }
 
@@ -434,9 +437,9 @@ mod tests {
         let after: Vec<_> = before.iter().map(moved).collect();
         let p = (vector(&mut random) * 3.0).as_vec3();
         let expected = (turn * p.as_dvec3() + DVec3::X).as_vec3();
-        assert!(carried(&before, &after, p).distance(expected) < 1e-6);
+        assert!(move_with(&before, &after, p).distance(expected) < 1e-6);
 
-        assert_eq!(carried(&[], &[], Vec3::X), Vec3::X);
+        assert_eq!(move_with(&[], &[], Vec3::X), Vec3::X);
     }
 
     #[test]
@@ -444,7 +447,7 @@ mod tests {
         let good =
             ControlEllipsoid { center: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]] };
         assert_eq!(good.validate(0), Ok(()));
-        assert_eq!(Ellipsoid::new(&good).given(), good);
+        assert_eq!(Ellipsoid::new(&good).to_control(), good);
         let spoilt = |change: fn(&mut ControlEllipsoid)| {
             let mut bad = good;
             change(&mut bad);

@@ -1,12 +1,12 @@
 //! One frame of the model: moves the ellipsoids, updates the membrane and its map T, and reconstructs the detail.
 
-use super::ellipsoid::{Ellipsoid, carried};
-use super::holding::held;
-use super::link::{Before, Linked, distribute, project, unfold};
-use super::membrane::{freshen, hold, settle, unrest};
-use super::parting::{cut_threads, follow, ways_to};
+use super::containment::contains_centres;
+use super::correspondence::{BasePoint, Current, distribute, project, unfold};
+use super::ellipsoid::{Ellipsoid, move_with};
+use super::guarded::{cut_threads, displacements_to, move_guarded};
+use super::membrane::{pushed_positions, refresh, residual, solve};
 use super::setup::check_size;
-use super::{MOST_VERTICES, MultiresParams, MultiresolutionModel, REST, area, mean_edge, usual_edge};
+use super::{MOST_VERTICES, MultiresParams, MultiresolutionModel, TOLERANCE, area, mean_edge, typical_edge};
 use crate::mesh::{Mesh, VertexId, measure};
 use crate::methods::{MethodError, Times};
 use crate::remesh::{Changes, EdgeBounds, Resolver};
@@ -18,14 +18,14 @@ const MOST_CHANGE: f64 = 2.0;
 
 /// While ellipsoids move, a membrane with at most this residual is only refreshed on one level: three times as fast as
 /// a solve on all levels.
-const NEARLY_AT_REST: f64 = 3.0 * REST;
+const REFRESH_TOLERANCE: f64 = 3.0 * TOLERANCE;
 
 /// Depth by which rounding may put vertices inside an ellipsoid, as a share of the target edge; a rigid motion stays
 /// below.
 const ROUNDING: f64 = 1e-3;
 
 /// Maximum number of frames in a row that only refresh the membrane, so that wide saddles do not lag far behind.
-const MOST_PASSING: u32 = 3;
+const MAX_REFRESHED_FRAMES: u32 = 3;
 
 impl MultiresolutionModel {
     /// Returns the parameters with edge bounds that one frame can reach: within a factor of 2 of the current mean edge.
@@ -45,97 +45,101 @@ impl MultiresolutionModel {
     /// Advances the model by one frame. If it fails, nothing has changed.
     pub(super) fn frame(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let mut lap = Lap::new(self.clock, times);
-        let mut movers = self.movers.clone();
-        movers.advance();
-        let ahead = self.ahead(movers.now())?;
-        lap.ends("motion");
-        let changes = match self.followed(&ahead) {
+        let mut moving = self.ellipsoids.clone();
+        moving.advance();
+        let prediction = self.predict(moving.now())?;
+        lap.end("motion");
+        let changes = match self.predict_only(&prediction) {
             Some(next) => {
                 self.surface = next;
-                lap.ends("membrane");
+                lap.end("membrane");
                 Changes::default()
             }
-            None => self.solve(&ahead, &mut lap)?,
+            None => self.solve(&prediction, &mut lap)?,
         };
-        movers.drop_vanished();
-        self.movers = movers;
-        self.residual = self.unrest(&self.surface, &self.movers.now());
-        lap.ends("rest");
-        self.show();
-        lap.ends("detail");
+        moving.drop_vanished();
+        self.ellipsoids = moving;
+        self.residual = self.residual_of(&self.surface, &self.ellipsoids.now());
+        lap.end("rest");
+        self.reconstruct_detail();
+        lap.end("detail");
         Ok(changes)
     }
 
-    fn unrest(&self, mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> f64 {
-        unrest(mesh, ellipsoids, self.params.energy) / self.params.target()
+    fn residual_of(&self, mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> f64 {
+        residual(mesh, ellipsoids, self.params.energy) / self.params.target()
     }
 
-    /// Predicts the membrane for the next positions `are` of the ellipsoids.
-    fn ahead(&self, are: Vec<Ellipsoid>) -> Result<Ahead, MethodError> {
-        let were = self.movers.now();
-        let mut carried_along = self.surface.clone();
-        if were != are {
-            carried_along.positions_mut().iter_mut().for_each(|p| *p = carried(&were, &are, *p));
+    /// Predicts the membrane for the next positions `ellipsoids_after` of the ellipsoids.
+    fn predict(&self, ellipsoids_after: Vec<Ellipsoid>) -> Result<Prediction, MethodError> {
+        let before = self.ellipsoids.now();
+        let mut predicted = self.surface.clone();
+        if before != ellipsoids_after {
+            predicted.positions_mut().iter_mut().for_each(|p| *p = move_with(&before, &ellipsoids_after, *p));
         }
         let params = self.params_now();
-        check_size(area(&carried_along), &params)?;
-        let unrest = self.unrest(&carried_along, &are);
-        Ok(Ahead { were, are, carried: carried_along, unrest, params })
+        check_size(area(&predicted), &params)?;
+        let residual = self.residual_of(&predicted, &ellipsoids_after);
+        Ok(Prediction { ellipsoids_before: before, ellipsoids_after, predicted, residual, params })
     }
 
     /// Returns the membrane moved along with the ellipsoids, if nothing else has to be done: it is at rest and its
     /// edges are within bounds. This makes rigid motions exact. `None` if the membrane has to be solved.
-    fn followed(&mut self, ahead: &Ahead) -> Option<Mesh> {
+    fn predict_only(&mut self, prediction: &Prediction) -> Option<Mesh> {
         // A membrane that was only refreshed is solved when the ellipsoids stop, even if its residual is small.
-        let is_due = !ahead.moves() && self.passing > 0;
-        if is_due || ahead.unrest > REST || !fits(&ahead.carried, ahead.params.bounds()) {
+        let is_due = !prediction.moves() && self.refreshed_frames > 0;
+        if is_due
+            || prediction.residual > TOLERANCE
+            || !edges_within_bounds(&prediction.predicted, prediction.params.bounds())
+        {
             return None;
         }
-        let places = hold(&ahead.carried, &ahead.are);
-        let depth = |v: VertexId| ahead.carried.position(v).distance(places[v.index()]);
+        let positions = pushed_positions(&prediction.predicted, &prediction.ellipsoids_after);
+        let depth = |v: VertexId| prediction.predicted.position(v).distance(positions[v.index()]);
         let deepest =
-            f64::from(ahead.carried.vertices().map(depth).fold(0.0, f32::max)) / self.params.target();
-        if deepest > REST {
+            f64::from(prediction.predicted.vertices().map(depth).fold(0.0, f32::max)) / self.params.target();
+        if deepest > TOLERANCE {
             return None;
         }
         let mut next = self.surface.clone();
-        let mut ways = ways_to(&next, ahead.carried.positions());
-        self.guard.follow_with(&next, usual_edge(&next));
-        if !self.guard.carry(&mut next, &mut ways).is_empty() {
+        let mut displacements = displacements_to(&next, prediction.predicted.positions());
+        self.guard.follow_with(&next, typical_edge(&next));
+        if !self.guard.carry(&mut next, &mut displacements).is_empty() {
             return None;
         }
         if deepest > ROUNDING {
-            self.passing = self.passing.max(1);
+            self.refreshed_frames = self.refreshed_frames.max(1);
         }
         Some(next)
     }
 
     /// Computes a new membrane over the ellipsoids, and its map T.
-    fn solve(&mut self, ahead: &Ahead, lap: &mut Lap) -> Result<Changes, MethodError> {
-        let walker = SurfaceWalker::new(ahead.carried.to_triangles())?;
-        let (next, changes) = self.solved(ahead);
-        lap.ends("membrane");
-        let linked: Vec<Linked> = self.surface.vertices().map(|v| self.link[v.index()]).collect();
-        let before = Before { walker: &walker, link: &linked };
+    fn solve(&mut self, prediction: &Prediction, lap: &mut Lap) -> Result<Changes, MethodError> {
+        let walker = SurfaceWalker::new(prediction.predicted.to_triangles())?;
+        let (next, changes) = self.solved(prediction);
+        lap.end("membrane");
+        let points: Vec<BasePoint> =
+            self.surface.vertices().map(|v| self.correspondence[v.index()]).collect();
+        let before = Current { walker: &walker, correspondence: &points };
         let base = self.bands.base();
-        let mut link = project(&next, &before, &base.walker, f64::MAX);
-        lap.ends("project");
+        let mut correspondence = project(&next, &before, &base.walker, f64::MAX);
+        lap.end("project");
         for _ in 0..self.params.distribute {
-            distribute(&next, &base.walker, &mut link);
+            distribute(&next, &base.walker, &mut correspondence);
         }
-        unfold(&next, &base.walker, &base.normals, &mut link);
-        lap.ends("distribute");
-        (self.surface, self.link) = (next, link);
+        unfold(&next, &base.walker, &base.normals, &mut correspondence);
+        lap.end("distribute");
+        (self.surface, self.correspondence) = (next, correspondence);
         Ok(changes)
     }
 
     /// Returns the membrane for the next positions of the ellipsoids: refreshed if that is sufficient, else solved on
     /// all levels, else moved under the collision guard.
-    fn solved(&mut self, ahead: &Ahead) -> (Mesh, Changes) {
+    fn solved(&mut self, prediction: &Prediction) -> (Mesh, Changes) {
         let (next, changes) = self
-            .freshened(ahead)
-            .or_else(|| self.settled(ahead))
-            .unwrap_or_else(|| self.followed_with_care(ahead));
+            .refresh(prediction)
+            .or_else(|| self.solve_levels(prediction))
+            .unwrap_or_else(|| self.move_guarded(prediction));
         if changes.changed_topology() {
             self.components = measure(&next.to_triangles()).components as u32;
         }
@@ -144,29 +148,37 @@ impl MultiresolutionModel {
 
     /// Returns the predicted membrane refreshed on one level; `None` unless the ellipsoids move and its residual is
     /// small.
-    fn freshened(&mut self, ahead: &Ahead) -> Option<(Mesh, Changes)> {
-        let may_pass = ahead.moves() && ahead.params.levels > 0 && ahead.unrest <= NEARLY_AT_REST;
-        if !may_pass || self.passing >= MOST_PASSING {
+    fn refresh(&mut self, prediction: &Prediction) -> Option<(Mesh, Changes)> {
+        let may_refresh =
+            prediction.moves() && prediction.params.levels > 0 && prediction.residual <= REFRESH_TOLERANCE;
+        if !may_refresh || self.refreshed_frames >= MAX_REFRESHED_FRAMES {
             return None;
         }
-        let mut next = ahead.carried.clone();
-        let changes = freshen(&mut next, &ahead.are, &ahead.params);
-        let passed = self.with_threads_cut(next, changes, ahead)?;
-        self.passing += 1;
-        Some(passed)
+        let mut next = prediction.predicted.clone();
+        let changes = refresh(&mut next, &prediction.ellipsoids_after, &prediction.params);
+        let refreshed = self.with_threads_cut(next, changes, prediction)?;
+        self.refreshed_frames += 1;
+        Some(refreshed)
     }
 
-    fn settled(&mut self, ahead: &Ahead) -> Option<(Mesh, Changes)> {
-        self.passing = 0;
-        let mut next = ahead.carried.clone();
-        let changes = settle(&mut next, &ahead.are, &ahead.params, ahead.params.levels);
-        self.with_threads_cut(next, changes, ahead)
+    fn solve_levels(&mut self, prediction: &Prediction) -> Option<(Mesh, Changes)> {
+        self.refreshed_frames = 0;
+        let mut next = prediction.predicted.clone();
+        let changes =
+            solve(&mut next, &prediction.ellipsoids_after, &prediction.params, prediction.params.levels);
+        self.with_threads_cut(next, changes, prediction)
     }
 
-    fn followed_with_care(&self, ahead: &Ahead) -> (Mesh, Changes) {
+    fn move_guarded(&self, prediction: &Prediction) -> (Mesh, Changes) {
         let mut next = self.surface.clone();
         let resolver = &mut Resolver::with_room_for(MOST_VERTICES);
-        let changes = follow(&mut next, ahead.carried.positions(), &ahead.are, &ahead.params, resolver);
+        let changes = move_guarded(
+            &mut next,
+            prediction.predicted.positions(),
+            &prediction.ellipsoids_after,
+            &prediction.params,
+            resolver,
+        );
         (next, changes)
     }
 
@@ -176,70 +188,74 @@ impl MultiresolutionModel {
         &mut self,
         mut mesh: Mesh,
         mut changes: Changes,
-        ahead: &Ahead,
+        prediction: &Prediction,
     ) -> Option<(Mesh, Changes)> {
         let loses = |(before, now): (bool, bool)| before && !now;
-        if held(&self.surface, &ahead.were).into_iter().zip(held(&mesh, &ahead.are)).any(loses) {
+        if contains_centres(&self.surface, &prediction.ellipsoids_before)
+            .into_iter()
+            .zip(contains_centres(&mesh, &prediction.ellipsoids_after))
+            .any(loses)
+        {
             return None;
         }
-        self.guard.follow_with(&mesh, usual_edge(&mesh));
+        self.guard.follow_with(&mesh, typical_edge(&mesh));
         if !self.guard.is_embedded(&mesh) {
             return None;
         }
-        changes += cut_threads(&mut mesh, &ahead.params, MOST_VERTICES);
+        changes += cut_threads(&mut mesh, &prediction.params, MOST_VERTICES);
         Some((mesh, changes))
     }
 }
 
 /// The prediction that a frame starts from.
-struct Ahead {
+struct Prediction {
     /// The ellipsoids before the frame.
-    were: Vec<Ellipsoid>,
+    ellipsoids_before: Vec<Ellipsoid>,
     /// The ellipsoids after the frame.
-    are: Vec<Ellipsoid>,
+    ellipsoids_after: Vec<Ellipsoid>,
     /// The membrane moved along with the ellipsoids.
-    carried: Mesh,
+    predicted: Mesh,
     /// Its residual, as a share of the target edge.
-    unrest: f64,
+    residual: f64,
     /// The parameters, with edge bounds that one frame can reach.
     params: MultiresParams,
 }
 
-impl Ahead {
+impl Prediction {
     fn moves(&self) -> bool {
-        self.were != self.are
+        self.ellipsoids_before != self.ellipsoids_after
     }
 }
 
 /// Measures the time of each part of a frame, for [`StepReport::times`](crate::methods::StepReport::times).
 struct Lap<'a> {
     clock: fn() -> f64,
-    begun: f64,
+    start: f64,
     times: &'a mut Times,
 }
 
 impl<'a> Lap<'a> {
     fn new(clock: fn() -> f64, times: &'a mut Times) -> Self {
-        Self { clock, begun: clock(), times }
+        Self { clock, start: clock(), times }
     }
 
     /// Adds the time since the last call to `part`.
-    fn ends(&mut self, part: &'static str) {
+    fn end(&mut self, part: &'static str) {
         let now = (self.clock)();
-        self.times.add(part, now - self.begun);
-        self.begun = now;
+        self.times.add(part, now - self.start);
+        self.start = now;
     }
 }
 
-/// Whether at most [`MISFITS`] of the edges are out of bounds.
-fn fits(mesh: &Mesh, bounds: EdgeBounds) -> bool {
+/// Whether at most [`MAX_OUT_OF_BOUNDS`] of the edges are out of bounds.
+fn edges_within_bounds(mesh: &Mesh, bounds: EdgeBounds) -> bool {
     let (shortest, longest) = (bounds.min * bounds.min, bounds.max * bounds.max);
     let outside = mesh.edges().filter(|&(u, v)| {
         let square = mesh.position(u).distance_squared(mesh.position(v));
         square < shortest || square > longest
     });
-    outside.count() as f64 <= MISFITS * mesh.edge_count() as f64
+    outside.count() as f64 <= MAX_OUT_OF_BOUNDS * mesh.edge_count() as f64
 }
 
 /// Share of edges that may be out of bounds without remeshing. Restructuring leaves some thousandths.
-const MISFITS: f64 = 0.02;
+const MAX_OUT_OF_BOUNDS: f64 = 0.02;

@@ -9,11 +9,11 @@ use crate::remesh::{Changes, EdgeBounds, Unchecked, restructure};
 
 /// Longest edge of a coarse level, as a share of the shortest semi-axis of all ellipsoids: a much coarser mesh would
 /// slip off the thinnest.
-const COARSEST: f64 = 0.8;
+const MAX_EDGE_PER_AXIS: f64 = 0.8;
 
 /// The iterations of a finer level end when one moves vertices by no more than this share of the level's target edge,
 /// as a root mean square: from there on they slide along the surface, and a tenth of that motion is normal to it.
-const STILL: f64 = 0.025;
+const LEVEL_TOLERANCE: f64 = 0.025;
 
 /// Minimum number of vertices of a coarse level: fewer do not represent the shape.
 const LEAST_VERTICES: f64 = 60.0;
@@ -22,22 +22,22 @@ const LEAST_VERTICES: f64 = 60.0;
 /// the last one is left in `mesh`.
 ///
 /// Edits are made without collision tests; the caller checks the result for self-intersections.
-pub(super) fn settle(
+pub(super) fn solve(
     mesh: &mut Mesh,
     ellipsoids: &[Ellipsoid],
     params: &MultiresParams,
     levels: u32,
 ) -> Changes {
-    settle_seen(mesh, ellipsoids, params, levels, |_| {})
+    solve_with(mesh, ellipsoids, params, levels, |_| {})
 }
 
-/// As [`settle`], and calls `see` with the mesh of each level when it is solved.
-pub(super) fn settle_seen(
+/// As [`solve`], and calls `visit` with the mesh of each level when it is solved.
+pub(super) fn solve_with(
     mesh: &mut Mesh,
     ellipsoids: &[Ellipsoid],
     params: &MultiresParams,
     levels: u32,
-    mut see: impl FnMut(&Mesh),
+    mut visit: impl FnMut(&Mesh),
 ) -> Changes {
     let mut changes = Changes::default();
     let bounds = params.bounds();
@@ -45,9 +45,9 @@ pub(super) fn settle_seen(
     for level in (0..=coarsest).rev() {
         let coarser = libm::pow(params.refine_factor, -f64::from(level));
         // The coarsest level finds the shape; the finer ones only refine it.
-        let still = if level == coarsest { 0.0 } else { STILL * coarser * params.target() };
-        changes += solve_level(mesh, ellipsoids, params, bounds.scaled(coarser as f32), still);
-        see(mesh);
+        let tolerance = if level == coarsest { 0.0 } else { LEVEL_TOLERANCE * coarser * params.target() };
+        changes += solve_level(mesh, ellipsoids, params, bounds.scaled(coarser as f32), tolerance);
+        visit(mesh);
     }
     changes += finish(mesh, ellipsoids, bounds);
     changes
@@ -55,24 +55,24 @@ pub(super) fn settle_seen(
 
 /// Refreshes a membrane that is nearly at rest, on the target resolution only: restructures its edges and removes the
 /// small residual.
-pub(super) fn freshen(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], params: &MultiresParams) -> Changes {
+pub(super) fn refresh(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], params: &MultiresParams) -> Changes {
     let bounds = params.bounds();
-    let mut changes = solve_level(mesh, ellipsoids, params, bounds, STILL * params.target());
+    let mut changes = solve_level(mesh, ellipsoids, params, bounds, LEVEL_TOLERANCE * params.target());
     changes += finish(mesh, ellipsoids, bounds);
     changes
 }
 
-/// Restructures the edges to `bounds` and iterates; `still` as in [`relaxed`].
+/// Restructures the edges to `bounds` and iterates; `tolerance` as in [`relaxed`].
 fn solve_level(
     mesh: &mut Mesh,
     ellipsoids: &[Ellipsoid],
     params: &MultiresParams,
     bounds: EdgeBounds,
-    still: f64,
+    tolerance: f64,
 ) -> Changes {
     let changes = restructure(mesh, bounds, &mut Unchecked);
-    let places = relaxed(mesh, ellipsoids, params, still);
-    mesh.positions_mut().copy_from_slice(&places);
+    let positions = relaxed(mesh, ellipsoids, params, tolerance);
+    mesh.positions_mut().copy_from_slice(&positions);
     changes
 }
 
@@ -80,54 +80,54 @@ fn solve_level(
 /// out of the ellipsoids.
 fn finish(mesh: &mut Mesh, ellipsoids: &[Ellipsoid], bounds: EdgeBounds) -> Changes {
     let changes = restructure(mesh, bounds, &mut Unchecked);
-    let places = hold(mesh, ellipsoids);
-    mesh.positions_mut().copy_from_slice(&places);
+    let positions = pushed_positions(mesh, ellipsoids);
+    mesh.positions_mut().copy_from_slice(&positions);
     changes
 }
 
 /// Returns the coarsest usable level, at most `levels`: fine enough for the thinnest ellipsoid, and with enough
 /// vertices. 0 is the target resolution.
 fn coarsest(mesh: &Mesh, ellipsoids: &[Ellipsoid], params: &MultiresParams, levels: u32) -> u32 {
-    let thinnest = ellipsoids.iter().map(Ellipsoid::thinnest).fold(f64::MAX, f64::min);
+    let thinnest = ellipsoids.iter().map(Ellipsoid::shortest_axis).fold(f64::MAX, f64::min);
     let fits = |level: u32| {
         let coarser = libm::pow(params.refine_factor, -f64::from(level));
         let vertices = mesh.vertex_count() as f64 / (coarser * coarser);
-        params.edge_max * coarser <= COARSEST * thinnest && vertices >= LEAST_VERTICES
+        params.edge_max * coarser <= MAX_EDGE_PER_AXIS * thinnest && vertices >= LEAST_VERTICES
     };
     (0..=levels).rev().find(|&level| level == 0 || fits(level)).unwrap_or(0)
 }
 
 /// One Gauss–Seidel iteration: moves every vertex to its energy minimum with all others fixed, then out of the
 /// ellipsoids. Returns the root mean square of the displacements.
-fn sweep(mesh: &Mesh, places: &mut [Vec3], ellipsoids: &[Ellipsoid], energy: Energy) -> f64 {
+fn sweep(mesh: &Mesh, positions: &mut [Vec3], ellipsoids: &[Ellipsoid], energy: Energy) -> f64 {
     let mut sum = 0.0;
     for v in mesh.vertices() {
-        let place = pushed(ellipsoids, best(mesh, places, energy, v));
-        sum += f64::from(place.distance_squared(places[v.index()]));
-        places[v.index()] = place;
+        let position = pushed(ellipsoids, minimiser(mesh, positions, energy, v));
+        sum += f64::from(position.distance_squared(positions[v.index()]));
+        positions[v.index()] = position;
     }
     (sum / mesh.vertex_count().max(1) as f64).sqrt()
 }
 
 /// Returns the position of a vertex with the least energy, with all others fixed.
-fn best(mesh: &Mesh, places: &[Vec3], energy: Energy, v: VertexId) -> Vec3 {
+fn minimiser(mesh: &Mesh, positions: &[Vec3], energy: Energy, v: VertexId) -> Vec3 {
     match energy {
-        Energy::Membrane => middle(mesh, places, v),
-        Energy::ThinPlate => flattest(mesh, places, v),
+        Energy::Membrane => neighbour_mean(mesh, positions, v),
+        Energy::ThinPlate => min_bending_position(mesh, positions, v),
     }
 }
 
 /// Returns the mean of the neighbours, the umbrella operator: p ← Σ pᵢ / n (equation 2).
 #[inline]
-fn middle(mesh: &Mesh, places: &[Vec3], v: VertexId) -> Vec3 {
+fn neighbour_mean(mesh: &Mesh, positions: &[Vec3], v: VertexId) -> Vec3 {
     let ring = mesh.ring(v).as_slice();
-    ring.iter().fold(Vec3::ZERO, |sum, w| sum + places[w.index()]) * (1.0 / ring.len() as f32)
+    ring.iter().fold(Vec3::ZERO, |sum, w| sum + positions[w.index()]) * (1.0 / ring.len() as f32)
 }
 
 /// Returns the position with the least bending energy: p ← p − U²(p) / ν, with U(p) = Σ pᵢ / n − p, U² of U, and ν = 1
 /// + Σ 1/nᵢ / n (Kobbelt et al., *Interactive multi-resolution modeling on arbitrary meshes*, 1998).
-fn flattest(mesh: &Mesh, places: &[Vec3], v: VertexId) -> Vec3 {
-    let umbrella = |w: VertexId| middle(mesh, places, w) - places[w.index()];
+fn min_bending_position(mesh: &Mesh, positions: &[Vec3], v: VertexId) -> Vec3 {
+    let umbrella = |w: VertexId| neighbour_mean(mesh, positions, w) - positions[w.index()];
     let ring = mesh.ring(v).as_slice();
     let share = 1.0 / ring.len() as f32;
     let (mut sum, mut weight) = (Vec3::ZERO, 0.0);
@@ -136,7 +136,7 @@ fn flattest(mesh: &Mesh, places: &[Vec3], v: VertexId) -> Vec3 {
         weight += 1.0 / mesh.ring(w).valence() as f32;
     }
     let second = sum * share - umbrella(v);
-    places[v.index()] - second * (1.0 / (1.0 + weight * share))
+    positions[v.index()] - second * (1.0 / (1.0 + weight * share))
 }
 
 #[inline]
@@ -146,35 +146,35 @@ fn pushed(ellipsoids: &[Ellipsoid], p: Vec3) -> Vec3 {
 
 /// Returns the residual: the root mean square of the displacements along the normals that one more iteration would
 /// make.
-pub(super) fn unrest(mesh: &Mesh, ellipsoids: &[Ellipsoid], energy: Energy) -> f64 {
-    let places = mesh.positions();
+pub(super) fn residual(mesh: &Mesh, ellipsoids: &[Ellipsoid], energy: Energy) -> f64 {
+    let positions = mesh.positions();
     let mut sum = 0.0;
     for v in mesh.vertices() {
-        let way = pushed(ellipsoids, best(mesh, places, energy, v)) - mesh.position(v);
-        let along = f64::from(way.dot(mesh.area_normal(v).normalize_or_zero()));
+        let displacement = pushed(ellipsoids, minimiser(mesh, positions, energy, v)) - mesh.position(v);
+        let along = f64::from(displacement.dot(mesh.area_normal(v).normalize_or_zero()));
         sum += along * along;
     }
     (sum / mesh.vertex_count().max(1) as f64).sqrt()
 }
 
 /// Returns the positions after the iterations of one level, by slot, without changes of connectivity. They end early
-/// when one moves the vertices by no more than `still`, as a root mean square.
+/// when one moves the vertices by no more than `tolerance`, as a root mean square.
 pub(super) fn relaxed(
     mesh: &Mesh,
     ellipsoids: &[Ellipsoid],
     params: &MultiresParams,
-    still: f64,
+    tolerance: f64,
 ) -> Vec<Vec3> {
-    let mut places = mesh.positions().to_vec();
+    let mut positions = mesh.positions().to_vec();
     for _ in 0..params.smoothing {
-        if sweep(mesh, &mut places, ellipsoids, params.energy) <= still {
+        if sweep(mesh, &mut positions, ellipsoids, params.energy) <= tolerance {
             break;
         }
     }
-    places
+    positions
 }
 
 /// Returns the position of each vertex pushed out of the ellipsoids, by slot.
-pub(super) fn hold(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<Vec3> {
+pub(super) fn pushed_positions(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<Vec3> {
     mesh.positions().iter().map(|&p| pushed(ellipsoids, p)).collect()
 }

@@ -3,7 +3,7 @@
 //! Kobbelt, Bareuther & Seidel, *Multiresolution shape deformations for meshes with dynamic vertex connectivity*. A
 //! detailed surface M₁ is split into a smooth base M₀ and the signed distance λ to M₁ along the normals of M₀ (`base`,
 //! `detail`; section 2). The deformed base S is a membrane over control ellipsoids (`ellipsoid`, `motion`), solved from
-//! coarse to fine and remeshed on the way (`membrane`; sections 4 and 5). A map T leads from S back to M₀ (`link`;
+//! coarse to fine and remeshed on the way (`membrane`; sections 4 and 5). A map T leads from S back to M₀ (`correspondence`;
 //! section 3), where λ is sampled to reconstruct the detail on S (section 6). Without detail the model is a lava lamp.
 //!
 //! # Guarantees
@@ -15,16 +15,16 @@
 //! so that the surface does not intersect itself.
 
 mod base;
+mod containment;
+mod correspondence;
 mod detail;
 mod distortion;
 mod ellipsoid;
 mod frame;
-mod holding;
-mod link;
+mod guarded;
 mod membrane;
 mod motion;
 mod params;
-mod parting;
 mod prisms;
 mod setup;
 mod state;
@@ -38,14 +38,14 @@ use super::{MethodError, StepReport, Times};
 use crate::math::triangle;
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::remesh::{Changes, Embedding, restructure};
-use detail::{Bands, Detailed, Fineness, detailed};
-use ellipsoid::{Ellipsoid, check_ellipsoids, check_sizes};
-use holding::held;
-use link::{Before, Link, folded, project};
-use membrane::{hold, settle_seen};
-use motion::Movers;
-use parting::ways_to;
-use setup::{check_size, on_itself, set_up};
+use containment::contains_centres;
+use correspondence::{Correspondence, Current, folded, project};
+use detail::{Bands, DetailSampling, Detailed, detailed};
+use ellipsoid::{Ellipsoid, check_ellipsoids, check_tips};
+use guarded::displacements_to;
+use membrane::{pushed_positions, solve_with};
+use motion::MovingEllipsoids;
+use setup::{check_size, identity, set_up};
 
 /// Options to create a [`MultiresolutionModel`].
 #[derive(Clone, Debug, Default)]
@@ -63,7 +63,7 @@ pub struct MultiresOptions {
 
 /// Convergence threshold: the model is at rest when one more iteration moves the surface along its normals by at most
 /// this share of the target edge, as a root mean square.
-const REST: f64 = 0.01;
+const TOLERANCE: f64 = 0.01;
 
 /// The largest number of vertices of the deformed base.
 const MOST_VERTICES: usize = 200_000;
@@ -71,19 +71,19 @@ const MOST_VERTICES: usize = 200_000;
 /// A surface that is deformed by control ellipsoids and keeps its detail.
 pub struct MultiresolutionModel {
     bands: Bands,
-    movers: Movers,
+    ellipsoids: MovingEllipsoids,
     params: MultiresParams,
     /// The deformed base S.
     surface: Mesh,
     /// The map T: the point of the base M₀ that belongs to each vertex of `surface`, by slot.
-    link: Link,
-    shown: Detailed,
+    correspondence: Correspondence,
+    detailed: Detailed,
     /// The collision guard. Only its memory is reused between frames, not its state.
     guard: Embedding,
     components: u32,
     iteration: u32,
     /// Frames in a row that refreshed the membrane on the finest level only; 0 after a solve on all levels.
-    passing: u32,
+    refreshed_frames: u32,
     residual: f64,
     clock: fn() -> f64,
 }
@@ -98,44 +98,44 @@ impl MultiresolutionModel {
     pub fn new(options: MultiresOptions) -> Result<Self, MethodError> {
         let MultiresOptions { detail, base, ellipsoids: given, params } = options;
         check_ellipsoids(&given)?;
-        let movers = Movers::new(&given);
-        let ellipsoids = movers.now();
+        let moving = MovingEllipsoids::new(&given);
+        let ellipsoids = moving.now();
         let (bands, params) = set_up(detail, base, &ellipsoids, params)?;
         let bands = Bands::new(bands);
         let surface = Mesh::from_triangles(bands.base().walker.mesh())?;
-        Self::started(bands, movers, params, surface)
+        Self::from_parts(bands, moving, params, surface)
     }
 
-    fn started(
+    fn from_parts(
         bands: Bands,
-        movers: Movers,
+        moving: MovingEllipsoids,
         params: MultiresParams,
         base: Mesh,
     ) -> Result<Self, MethodError> {
         let mut surface = base;
         check_size(area(&surface), &params)?;
         let mut guard = Embedding::default();
-        guard.follow_with(&surface, usual_edge(&surface));
+        guard.follow_with(&surface, typical_edge(&surface));
         restructure(&mut surface, params.bounds(), &mut guard);
-        let places = hold(&surface, &movers.now());
-        let mut ways = ways_to(&surface, &places);
-        guard.carry(&mut surface, &mut ways);
+        let positions = pushed_positions(&surface, &moving.now());
+        let mut displacements = displacements_to(&surface, &positions);
+        guard.carry(&mut surface, &mut displacements);
         let walker = &bands.base().walker;
-        let itself = on_itself(walker);
-        let before = Before { walker, link: &itself };
-        let link = project(&surface, &before, walker, f64::MAX);
-        let shown = detailed(&surface, &link, &bands, &mut guard, fineness(&params));
+        let identity = identity(walker);
+        let before = Current { walker, correspondence: &identity };
+        let correspondence = project(&surface, &before, walker, f64::MAX);
+        let detailed = detailed(&surface, &correspondence, &bands, &mut guard, detail_sampling(&params));
         let mut model = Self {
             components: 0,
             bands,
-            movers,
+            ellipsoids: moving,
             params,
             surface,
-            link,
-            shown,
+            correspondence,
+            detailed,
             guard,
             iteration: 0,
-            passing: 0,
+            refreshed_frames: 0,
             residual: f64::NAN,
             clock: || 0.0,
         };
@@ -151,15 +151,15 @@ impl MultiresolutionModel {
 
     /// Returns the deformed surface with its detail.
     pub fn mesh(&self) -> &Mesh {
-        &self.shown.mesh
+        &self.detailed.mesh
     }
 
     /// Returns the deformed surface with its detail as triangles, with texture coordinates if the finest input surface
     /// has them.
     pub fn surface(&self) -> TriangleMesh {
-        let mut mesh = self.shown.mesh.to_triangles();
+        let mut mesh = self.detailed.mesh.to_triangles();
         let finest = &self.bands.finest().walker;
-        mesh.corner_uvs = texture::corner_uvs(&self.shown.mesh, &self.shown.places, finest);
+        mesh.corner_uvs = texture::corner_uvs(&self.detailed.mesh, &self.detailed.points, finest);
         mesh.texture = finest.mesh().texture.clone();
         mesh
     }
@@ -168,9 +168,9 @@ impl MultiresolutionModel {
     /// (figure 8).
     pub fn levels(&self) -> Vec<TriangleMesh> {
         let mut levels = Vec::new();
-        let ellipsoids = self.movers.now();
+        let ellipsoids = self.ellipsoids.now();
         let mut mesh = self.surface.clone();
-        settle_seen(&mut mesh, &ellipsoids, &self.params, self.params.levels, |mesh| {
+        solve_with(&mut mesh, &ellipsoids, &self.params, self.params.levels, |mesh| {
             levels.push(mesh.to_triangles());
         });
         levels
@@ -178,7 +178,7 @@ impl MultiresolutionModel {
 
     /// Returns how much the map T from the deformed base to the base M₀ distorts area and angles.
     pub fn distortion(&self) -> Distortion {
-        distortion::distortion(&self.surface, &self.link)
+        distortion::distortion(&self.surface, &self.correspondence)
     }
 
     /// Returns the deformed base S, without detail.
@@ -188,9 +188,9 @@ impl MultiresolutionModel {
 
     /// Returns the mesh T: the triangles of [`Self::base_mesh`] with each vertex at its position on the undeformed base
     /// M₀.
-    pub fn link_mesh(&self) -> TriangleMesh {
+    pub fn base_correspondence(&self) -> TriangleMesh {
         let mut mesh = self.surface.to_triangles();
-        mesh.positions = self.surface.vertices().map(|v| self.link[v.index()].point).collect();
+        mesh.positions = self.surface.vertices().map(|v| self.correspondence[v.index()].point).collect();
         mesh.normals = None;
         mesh
     }
@@ -207,21 +207,21 @@ impl MultiresolutionModel {
     /// and [`MethodError::TooManyVertices`] if they are too short. Nothing has changed then.
     pub fn set_params(&mut self, params: MultiresParams) -> Result<(), MethodError> {
         params.validate()?;
-        check_sizes(&self.movers.goals(), params.edge_max)?;
+        check_tips(&self.ellipsoids.targets(), params.edge_max)?;
         check_size(area(&self.surface), &params)?;
         let before = std::mem::replace(&mut self.params, params);
         if self.params != before {
-            self.take_effect(&before);
+            self.apply_params(&before);
         }
         Ok(())
     }
 
     /// Applies changed parameters: a change of `supersample` alone only reconstructs the detail, any other makes the
     /// model solve again.
-    fn take_effect(&mut self, before: &MultiresParams) {
+    fn apply_params(&mut self, before: &MultiresParams) {
         let supersample = self.params.supersample;
         if self.params == (MultiresParams { supersample, ..before.clone() }) {
-            self.show();
+            self.reconstruct_detail();
         } else {
             self.residual = f64::NAN;
         }
@@ -236,27 +236,27 @@ impl MultiresolutionModel {
     /// the edges; nothing has changed then.
     pub fn set_ellipsoids(&mut self, given: &[ControlEllipsoid]) -> Result<(), MethodError> {
         check_ellipsoids(given)?;
-        check_sizes(&given.iter().map(Ellipsoid::new).collect::<Vec<_>>(), self.params.edge_max)?;
+        check_tips(&given.iter().map(Ellipsoid::new).collect::<Vec<_>>(), self.params.edge_max)?;
         let surface = &self.surface;
-        self.movers.send(given, |goal| held(surface, std::slice::from_ref(goal))[0]);
+        self.ellipsoids.set_targets(given, |goal| contains_centres(surface, std::slice::from_ref(goal))[0]);
         self.residual = f64::NAN;
         Ok(())
     }
 
     /// Returns the ellipsoids at their current positions, including those that are being removed.
     pub fn ellipsoids(&self) -> Vec<ControlEllipsoid> {
-        self.movers.now().iter().map(Ellipsoid::given).collect()
+        self.ellipsoids.now().iter().map(Ellipsoid::to_control).collect()
     }
 
     /// Returns the target ellipsoids.
-    pub fn goals(&self) -> Vec<ControlEllipsoid> {
-        self.movers.goals().iter().map(Ellipsoid::given).collect()
+    pub fn targets(&self) -> Vec<ControlEllipsoid> {
+        self.ellipsoids.targets().iter().map(Ellipsoid::to_control).collect()
     }
 
     /// Counts the triangles of the deformed base whose image on the base M₀ under T is flipped or has no area.
     pub fn folded(&self) -> usize {
         let base = self.bands.base();
-        folded(&self.surface, &base.walker, &base.normals, &self.link)
+        folded(&self.surface, &base.walker, &base.normals, &self.correspondence)
     }
 
     /// Returns the number of surfaces in the decomposition, including the base.
@@ -266,8 +266,8 @@ impl MultiresolutionModel {
 
     /// Returns two counts of vertices from the last reconstruction of the detail: those whose normal did not hit the
     /// finer surface, and those held back to avoid self-intersections.
-    pub fn misses(&self) -> [usize; 2] {
-        [self.shown.missed, self.shown.held]
+    pub fn detail_counts(&self) -> [usize; 2] {
+        [self.detailed.missed, self.detailed.held_back]
     }
 
     /// Advances by one frame: moves the ellipsoids as far as the membrane can follow, and updates the membrane and its
@@ -283,27 +283,34 @@ impl MultiresolutionModel {
     }
 
     fn is_done(&self) -> bool {
-        let at_rest = self.residual <= REST && self.passing == 0 && self.params == self.params_now();
+        let has_converged =
+            self.residual <= TOLERANCE && self.refreshed_frames == 0 && self.params == self.params_now();
         // A membrane that encloses no ellipsoid shrinks until it has no vertices.
-        self.surface.vertex_count() == 0 || self.movers.have_arrived() && at_rest
+        self.surface.vertex_count() == 0 || self.ellipsoids.have_arrived() && has_converged
     }
 
     /// Reconstructs the detail on the deformed base.
-    fn show(&mut self) {
-        let shown = detailed(&self.surface, &self.link, &self.bands, &mut self.guard, fineness(&self.params));
-        let replaced = std::mem::replace(&mut self.shown, shown);
-        self.shown.mesh.count_on_from(&replaced.mesh);
+    fn reconstruct_detail(&mut self) {
+        let detailed = detailed(
+            &self.surface,
+            &self.correspondence,
+            &self.bands,
+            &mut self.guard,
+            detail_sampling(&self.params),
+        );
+        let replaced = std::mem::replace(&mut self.detailed, detailed);
+        self.detailed.mesh.count_on_from(&replaced.mesh);
     }
 
     fn report(&self, events: Changes, times: Times) -> StepReport {
-        let mesh = &self.shown.mesh;
+        let mesh = &self.detailed.mesh;
         StepReport {
             iteration: self.iteration,
             done: self.is_done(),
             phase: "frame".into(),
             progress: f64::NAN,
             residual: self.residual,
-            tolerance: REST,
+            tolerance: TOLERANCE,
             vertices: mesh.vertex_count() as u32,
             triangles: mesh.triangle_count() as u32,
             components: self.components,
@@ -314,8 +321,8 @@ impl MultiresolutionModel {
     }
 }
 
-fn fineness(params: &MultiresParams) -> Fineness {
-    Fineness { longest: params.edge_max as f32, rounds: params.supersample }
+fn detail_sampling(params: &MultiresParams) -> DetailSampling {
+    DetailSampling { longest: params.edge_max as f32, rounds: params.supersample }
 }
 
 fn mean_edge(mesh: &Mesh) -> f64 {
@@ -324,7 +331,7 @@ fn mean_edge(mesh: &Mesh) -> f64 {
 }
 
 /// Returns an edge length that most edges are shorter than, for the grid of the collision guard.
-fn usual_edge(mesh: &Mesh) -> f32 {
+fn typical_edge(mesh: &Mesh) -> f32 {
     (1.5 * mean_edge(mesh)) as f32
 }
 

@@ -1,8 +1,8 @@
 //! Lists, for each triangle of a coarser surface, the triangles of the finer one that its normals can hit. Testing a
 //! line against these few replaces a tree query, which took half of the time of a frame with much detail.
 
+use super::correspondence::{BasePoint, normal_at};
 use super::detail::Band;
-use super::link::{Linked, normal_at};
 use crate::math::triangle::Line;
 use crate::math::{Bounds, DVec3, Vec3};
 use crate::spatial::{FirstHit, SurfacePoint};
@@ -10,10 +10,10 @@ use crate::spatial::{FirstHit, SurfacePoint};
 /// For each triangle of one surface, the triangles of another that intersect its prism: the points of the triangle
 /// moved along its interpolated normals by up to a depth, to either side.
 #[derive(Clone, Debug)]
-pub(super) struct Prisms {
-    /// Start of each triangle's list in `met`, and the end of the last.
+pub(super) struct PrismLookup {
+    /// Start of each triangle's list in `candidates`, and the end of the last.
     first: Vec<u32>,
-    met: Vec<u32>,
+    candidates: Vec<u32>,
     depths: Vec<f32>,
 }
 
@@ -28,34 +28,34 @@ const ROUNDING: f64 = 1e-5;
 /// and the tree is used.
 const LEAST_COSINE: f32 = 0.1;
 
-impl Prisms {
+impl PrismLookup {
     /// Builds the lists for the triangles of `from` among those of `to`, with prisms no deeper than `reach`.
     pub fn new(from: &Band, to: &Band, reach: f64) -> Self {
         let count = from.walker.mesh().triangles.len();
-        let mut prisms = Self { first: vec![0], met: Vec::new(), depths: Vec::with_capacity(count) };
+        let mut prisms = Self { first: vec![0], candidates: Vec::new(), depths: Vec::with_capacity(count) };
         for t in 0..count as u32 {
             let depth = depth(from, to, reach, t).min(reach);
             prisms.depths.push(depth as f32);
             if depth > 0.0 {
                 let prism = Prism::new(from, t, depth);
                 to.walker.tree().meeting(&prism.bounds(), |other| {
-                    if prism.meets(to.walker.corners(other)) {
-                        prisms.met.push(other);
+                    if prism.may_intersect(to.walker.corners(other)) {
+                        prisms.candidates.push(other);
                     }
                 });
             }
-            prisms.first.push(prisms.met.len() as u32);
+            prisms.first.push(prisms.candidates.len() as u32);
         }
         prisms
     }
 
     /// Returns the intersection with the other surface nearest to a point along its normal, no farther away than
     /// `reach`. The same result as the tree's, which is queried if the lists have none.
-    pub fn line_hit(&self, to: &Band, at: &Linked, normal: Vec3, reach: f64) -> Option<SurfacePoint> {
+    pub fn line_hit(&self, to: &Band, at: &BasePoint, normal: Vec3, reach: f64) -> Option<SurfacePoint> {
         let t = at.triangle as usize;
         let line = Line::new(at.point.as_dvec3(), normal.as_dvec3().try_normalize()?);
         let mut nearest = FirstHit::within(f64::from(self.depths[t]));
-        for &other in &self.met[self.first[t] as usize..self.first[t + 1] as usize] {
+        for &other in &self.candidates[self.first[t] as usize..self.first[t + 1] as usize] {
             nearest.look_at(other, line.hit(to.walker.corners(other)));
         }
         let found = nearest.found(|other| to.walker.corners(other));
@@ -67,7 +67,7 @@ impl Prisms {
 fn depth(from: &Band, to: &Band, reach: f64, t: u32) -> f64 {
     let third = Vec3::splat(1.0 / 3.0);
     let farthest = [Vec3::X, Vec3::Y, Vec3::Z, third].into_iter().filter_map(|weights| {
-        let at = Linked::at(&from.walker, t, weights);
+        let at = BasePoint::at(&from.walker, t, weights);
         let normal = normal_at(&from.walker, &from.normals, &at);
         to.walker.tree().line_hit(at.point, normal, reach).map(|hit| hit.distance.abs())
     });
@@ -97,15 +97,15 @@ impl Prism {
         let corners = from.walker.corners(t).map(Vec3::as_dvec3);
         let normals = corner_normals(from, t).map(Vec3::as_dvec3);
         let square = (0..3).map(|k| normals[k].dot(normals[(k + 1) % 3])).fold(1.0, f64::min);
-        let way = depth / square.sqrt();
+        let length = depth / square.sqrt();
         let points = std::array::from_fn(|i| {
-            let side = if i < 3 { way } else { -way };
+            let side = if i < 3 { length } else { -length };
             corners[i % 3] + normals[i % 3] * side
         });
         let normal = normals[0] + normals[1] + normals[2];
         let axes =
             std::array::from_fn(|k| (corners[(k + 1) % 3] - corners[k]).cross(normal).normalize_or_zero());
-        let size = corners.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max) + way;
+        let size = corners.iter().map(|c| c.abs().max_element()).fold(0.0, f64::max) + length;
         Self { points, axes, margin: ROUNDING * size }
     }
 
@@ -117,7 +117,7 @@ impl Prism {
     }
 
     /// Whether none of the lateral faces separates a triangle from the prism. The caller has tested the bounding boxes.
-    fn meets(&self, corners: [Vec3; 3]) -> bool {
+    fn may_intersect(&self, corners: [Vec3; 3]) -> bool {
         self.axes.iter().all(|axis| {
             let (least, most) = extent(axis, &self.points);
             let (low, high) = extent(axis, &corners.map(Vec3::as_dvec3));
@@ -152,7 +152,7 @@ mod tests {
     #[test]
     fn lines_meet_what_they_meet_in_the_tree() {
         let (from, to) = pair();
-        let prisms = Prisms::new(&from, &to, 0.5);
+        let prisms = PrismLookup::new(&from, &to, 0.5);
         let count = from.walker.mesh().triangles.len();
         let mut random = Random::new(8);
         for k in 0..20_000 {
@@ -163,14 +163,14 @@ mod tests {
                 Vec3::new(u + v - 1.0, 1.0 - u, 1.0 - v)
             };
             let triangle = (k % count) as u32;
-            let at = Linked::at(&from.walker, triangle, weights);
+            let at = BasePoint::at(&from.walker, triangle, weights);
             let normal = normal_at(&from.walker, &from.normals, &at);
             let expected = to.walker.tree().line_hit(at.point, normal, 0.5);
             assert_eq!(prisms.line_hit(&to, &at, normal, 0.5), expected, "{triangle} {weights}");
             assert!(expected.is_some());
         }
         // The lists are short, so few triangles are tested in vain.
-        let mean = prisms.met.len() as f64 / count as f64;
+        let mean = prisms.candidates.len() as f64 / count as f64;
         assert!(mean < 20.0, "{mean}");
         assert!(prisms.depths.iter().all(|&depth| depth > 0.0));
     }

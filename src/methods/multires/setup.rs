@@ -1,9 +1,9 @@
 //! Validates the input of a model, and prepares its decomposition and parameters.
 
-use super::base::{check_embedded, decomposition, edge_for, skin};
+use super::base::{check_embedded, decomposition, edge_for, membrane_around};
+use super::correspondence::{BasePoint, UNSET};
 use super::detail::Band;
-use super::ellipsoid::{Ellipsoid, check_sizes};
-use super::link::{Linked, NOWHERE};
+use super::ellipsoid::{Ellipsoid, check_tips};
 use super::{MOST_VERTICES, MultiresParams};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, measure};
@@ -29,37 +29,37 @@ pub(super) fn set_up(
     let sized = |area: f64| {
         let params = params.clone().with_target(edge_for(area, DEFAULT_TRIANGLES));
         params.validate()?;
-        check_sizes(ellipsoids, params.edge_max)?;
+        check_tips(ellipsoids, params.edge_max)?;
         check_size(area, &params).map(|()| params)
     };
     let bands = match (detail, base) {
         (detail, Some(base)) => {
-            let base = closed("base", base)?;
+            let base = validate_closed("base", base)?;
             check_embedded(&base)?;
             let params = sized(measure(&base).area)?;
             let mut bands = vec![Band::of(base)?];
             if let Some(detail) = detail {
-                bands.push(Band::of(closed("detail", detail)?)?);
+                bands.push(Band::of(validate_closed("detail", detail)?)?);
             }
             (bands, params)
         }
         (Some(detail), None) => {
-            let detail = closed("detail", detail)?;
+            let detail = validate_closed("detail", detail)?;
             let params = sized(measure(&detail).area)?;
             (decomposition(detail, ellipsoids, &params)?, params)
         }
         (None, None) => {
             let ball = |e: &Ellipsoid| 4.0 * std::f64::consts::PI * e.lengths.length_squared() / 3.0;
             let params = sized(ellipsoids.iter().map(ball).sum())?;
-            (vec![Band::of(skin(ellipsoids, &params)?)?], params)
+            (vec![Band::of(membrane_around(ellipsoids, &params)?)?], params)
         }
     };
-    touches(ellipsoids, &bands.0[0].walker, bands.1.target())?;
+    check_touching(ellipsoids, &bands.0[0].walker, bands.1.target())?;
     Ok(bands)
 }
 
 /// Validates a closed mesh, and returns it without isolated vertices.
-fn closed(parameter: &'static str, mesh: TriangleMesh) -> Result<TriangleMesh, MethodError> {
+fn validate_closed(parameter: &'static str, mesh: TriangleMesh) -> Result<TriangleMesh, MethodError> {
     mesh.validate()?;
     let mesh = mesh.welded();
     Mesh::from_triangles(&mesh)?;
@@ -68,7 +68,7 @@ fn closed(parameter: &'static str, mesh: TriangleMesh) -> Result<TriangleMesh, M
 }
 
 /// Checks that at least one ellipsoid reaches the base: otherwise nothing would hold it.
-fn touches(ellipsoids: &[Ellipsoid], base: &SurfaceWalker, target: f64) -> Result<(), MethodError> {
+fn check_touching(ellipsoids: &[Ellipsoid], base: &SurfaceWalker, target: f64) -> Result<(), MethodError> {
     let near = |p: &Vec3| {
         let p: DVec3 = p.as_dvec3();
         ellipsoids.iter().any(|e| e.unit(p).length_squared() <= 1.0 || e.nearest(p).distance(p) <= target)
@@ -89,15 +89,15 @@ pub(super) fn check_size(area: f64, params: &MultiresParams) -> Result<(), Metho
 }
 
 /// Returns the identity map from the base to itself, as the map T of every vertex.
-pub(super) fn on_itself(walker: &SurfaceWalker) -> Vec<Linked> {
-    let mut link = vec![NOWHERE; walker.mesh().positions.len()];
+pub(super) fn identity(walker: &SurfaceWalker) -> Vec<BasePoint> {
+    let mut correspondence = vec![UNSET; walker.mesh().positions.len()];
     for (t, corners) in walker.mesh().triangles.iter().enumerate() {
         for (k, &v) in corners.iter().enumerate() {
             let mut weights = Vec3::ZERO;
             weights[k] = 1.0;
-            link[v as usize] =
-                Linked { triangle: t as u32, weights, point: walker.mesh().positions[v as usize] };
+            correspondence[v as usize] =
+                BasePoint { triangle: t as u32, weights, point: walker.mesh().positions[v as usize] };
         }
     }
-    link
+    correspondence
 }

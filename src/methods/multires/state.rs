@@ -1,8 +1,8 @@
 //! Saves a run and restores it bit for bit. A state holds the deformed base and its map T; the decomposition is made
 //! again from the same options, and the detail reconstructed.
 
-use super::link::{Link, Linked};
-use super::motion::Movers;
+use super::correspondence::{BasePoint, Correspondence};
+use super::motion::MovingEllipsoids;
 use super::{MultiresParams, MultiresolutionModel};
 use crate::math::Vec3;
 use crate::mesh::Mesh;
@@ -17,7 +17,7 @@ const MAGIC: Magic = *b"VSCLMRS\x02";
 struct State {
     fingerprint: u64,
     params: MultiresParams,
-    movers: Movers,
+    moving: MovingEllipsoids,
     surface: Mesh,
     /// Triangle and barycentric coordinates of the map T, by slot.
     link: Vec<(u32, Vec3)>,
@@ -35,11 +35,11 @@ impl MultiresolutionModel {
             &State {
                 fingerprint: self.fingerprint(),
                 params: self.params.clone(),
-                movers: self.movers.clone(),
+                moving: self.ellipsoids.clone(),
                 surface: self.surface.clone(),
-                link: self.link.iter().map(|at| (at.triangle, at.weights)).collect(),
+                link: self.correspondence.iter().map(|at| (at.triangle, at.weights)).collect(),
                 iteration: self.iteration,
-                passing: self.passing,
+                passing: self.refreshed_frames,
                 components: self.components,
                 residual: self.residual,
             },
@@ -56,33 +56,35 @@ impl MultiresolutionModel {
         if state.fingerprint != self.fingerprint() {
             return bad("surfaces", "the state belongs to another detail, base or start");
         }
-        if state.params.validate().is_err() || !state.movers.are_sound() {
+        if state.params.validate().is_err() || !state.moving.are_valid() {
             return bad("parameters", "they are out of range");
         }
-        let is_sound = can_be_checked(&state.surface) && state.surface.check().is_ok();
-        let is_like_this = state.surface.attribute_counts() == self.surface.attribute_counts();
-        if !is_sound || !is_like_this || state.link.len() != state.surface.slots() {
+        let is_valid = can_be_checked(&state.surface) && state.surface.check().is_ok();
+        let has_same_attributes = state.surface.attribute_counts() == self.surface.attribute_counts();
+        if !is_valid || !has_same_attributes || state.link.len() != state.surface.slots() {
             return bad("surface", "its parts do not fit each other");
         }
-        let Some(link) = self.linked(&state.link) else { return bad("link", "it leads nowhere") };
-        (self.params, self.movers, self.link) = (state.params, state.movers, link);
+        let Some(correspondence) = self.correspondence_of(&state.link) else {
+            return bad("link", "it leads nowhere");
+        };
+        (self.params, self.ellipsoids, self.correspondence) = (state.params, state.moving, correspondence);
         let replaced = std::mem::replace(&mut self.surface, state.surface);
         self.surface.count_on_from(&replaced);
-        (self.iteration, self.passing) = (state.iteration, state.passing);
+        (self.iteration, self.refreshed_frames) = (state.iteration, state.passing);
         (self.components, self.residual) = (state.components, state.residual);
-        self.show();
+        self.reconstruct_detail();
         Ok(())
     }
 
     /// Restores the points of the map T; `None` if one refers to a triangle that does not exist.
-    fn linked(&self, places: &[(u32, Vec3)]) -> Option<Link> {
+    fn correspondence_of(&self, points: &[(u32, Vec3)]) -> Option<Correspondence> {
         let base = &self.bands.base().walker;
         let count = base.mesh().triangles.len();
-        let place = |&(triangle, weights): &(u32, Vec3)| {
+        let point = |&(triangle, weights): &(u32, Vec3)| {
             let fits = (triangle as usize) < count && weights.is_finite();
-            fits.then(|| Linked::at(base, triangle, weights))
+            fits.then(|| BasePoint::at(base, triangle, weights))
         };
-        places.iter().map(place).collect()
+        points.iter().map(point).collect()
     }
 
     /// Returns a hash of all surfaces, which identifies the decomposition.

@@ -1,7 +1,7 @@
 //! Texture coordinates of the deformed surface, taken from the corresponding points of the finest surface; seams are
 //! respected (section 7).
 
-use super::link::{Link, Linked};
+use super::correspondence::{BasePoint, Correspondence};
 use crate::math::{Vec2, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, VertexId};
 use crate::spatial::SurfaceWalker;
@@ -9,31 +9,35 @@ use crate::spatial::SurfaceWalker;
 /// A triangle whose texture coordinates are farther apart than this multiple of what its size implies crosses a seam.
 /// With a smaller value, stretched texture is mistaken for a seam; with a much larger one, narrow strips of the whole
 /// texture appear along it.
-const JUMP: f32 = 6.0;
+const SEAM_RATIO: f32 = 6.0;
 
 /// Returns texture coordinates by corner of each triangle, in the order of [`Mesh::triangles`]; `None` if the finest
-/// surface has none. `places` are the corresponding points on the finest surface, by slot.
-pub(super) fn corner_uvs(mesh: &Mesh, places: &Link, finest: &SurfaceWalker) -> Option<Vec<[Vec2; 3]>> {
+/// surface has none. `points` are the corresponding points on the finest surface, by slot.
+pub(super) fn corner_uvs(
+    mesh: &Mesh,
+    points: &Correspondence,
+    finest: &SurfaceWalker,
+) -> Option<Vec<[Vec2; 3]>> {
     let source = finest.mesh();
     if source.uvs.is_none() && source.corner_uvs.is_none() {
         return None;
     }
-    Some(mesh.triangles().map(|corners| of_triangle(corners, places, finest)).collect())
+    Some(mesh.triangles().map(|corners| triangle_corner_uvs(corners, points, finest)).collect())
 }
 
-fn of_triangle(corners: [VertexId; 3], places: &Link, finest: &SurfaceWalker) -> [Vec2; 3] {
-    let at = corners.map(|v| places[v.index()]);
+fn triangle_corner_uvs(corners: [VertexId; 3], points: &Correspondence, finest: &SurfaceWalker) -> [Vec2; 3] {
+    let at = corners.map(|v| points[v.index()]);
     let own = at.map(|at| uv_at(finest.mesh(), &at));
     let [a, b, c] = own;
     let spread = a.distance(b).max(b.distance(c)).max(c.distance(a));
     let [p, q, r] = at.map(|at| at.point);
     let size = p.distance(q).max(q.distance(r)).max(r.distance(p));
-    if spread <= JUMP * size * density(finest, at[0].triangle) {
+    if spread <= SEAM_RATIO * size * density(finest, at[0].triangle) {
         return own;
     }
     // All three from one side of the seam, that of the centroid.
-    let middle: Linked = finest.march(at[0].triangle, (p + q + r) * (1.0 / 3.0)).into();
-    at.map(|at| continued(finest, middle.triangle, at.point))
+    let middle: BasePoint = finest.march(at[0].triangle, (p + q + r) * (1.0 / 3.0)).into();
+    at.map(|at| extrapolated_uv(finest, middle.triangle, at.point))
 }
 
 fn triangle_uvs(mesh: &TriangleMesh, triangle: u32) -> [Vec2; 3] {
@@ -48,7 +52,7 @@ fn blend([a, b, c]: [Vec2; 3], weights: Vec3) -> Vec2 {
     a * weights.x + b * weights.y + c * weights.z
 }
 
-fn uv_at(mesh: &TriangleMesh, at: &Linked) -> Vec2 {
+fn uv_at(mesh: &TriangleMesh, at: &BasePoint) -> Vec2 {
     blend(triangle_uvs(mesh, at.triangle), at.weights)
 }
 
@@ -61,7 +65,7 @@ fn density(finest: &SurfaceWalker, triangle: u32) -> f32 {
 }
 
 /// Extrapolates the texture coordinates of a triangle to a point beside it.
-fn continued(finest: &SurfaceWalker, triangle: u32, p: Vec3) -> Vec2 {
+fn extrapolated_uv(finest: &SurfaceWalker, triangle: u32, p: Vec3) -> Vec2 {
     let [a, b, c] = finest.corners(triangle);
     let normal = (b - a).cross(c - a);
     let size = normal.length_squared();

@@ -37,46 +37,46 @@ impl FrameTracker {
     pub fn resolve_boundary_loss(
         &mut self,
         mesh: &mut Mesh,
-        going: &FrameContext,
+        context: &FrameContext,
         facts: &mut FrameFacts,
     ) -> Changes {
         let mut changes = Changes::default();
         let mut grown = BTreeSet::new();
         let mut before = usize::MAX;
         for round in 0..ROUNDS {
-            let without_boundary = without_boundary(mesh, going);
+            let without_boundary = without_boundary(mesh, context);
             if round == 0 {
-                facts.boundary_lost = without_boundary.len();
+                facts.without_boundary = without_boundary.len();
             }
             let progresses = (without_boundary.len() as f64) < LITTLE_PROGRESS * before as f64;
             if without_boundary.is_empty() || round >= LEAST_ROUNDS && !progresses {
                 break;
             }
             before = without_boundary.len();
-            let collapsed = self.collapse_sheets(mesh, &on_sheets(mesh, &without_boundary, going));
+            let collapsed = self.collapse_sheets(mesh, &on_sheets(mesh, &without_boundary, context));
             if collapsed > 0 {
                 changes.deletions += collapsed;
                 changes += restructure(mesh, self.bounds, &mut self.guard);
             }
             for _ in 0..MOVES {
-                grown.extend(self.move_without_boundary(mesh, going));
+                grown.extend(self.move_without_boundary(mesh, context));
             }
         }
         // Growing has brought these vertices near points of the boundary.
         let grown: Vec<VertexId> = grown.into_iter().filter(|&v| mesh.is_live(v)).collect();
         if !grown.is_empty() {
             let no_offsets = vec![Vec3::ZERO; mesh.slots()];
-            self.project(mesh, &grown, &no_offsets, going, Onto::Frame, facts);
+            self.project(mesh, &grown, &no_offsets, context, Onto::Frame, facts);
         }
         changes
     }
 
     /// Moves vertices without a boundary: outwards if they are surrounded by bright voxels and on no sheet, else to the
     /// mean of their neighbours. Returns the vertices that moved outwards.
-    fn move_without_boundary(&mut self, mesh: &mut Mesh, going: &FrameContext) -> Vec<VertexId> {
-        let without_boundary = without_boundary(mesh, going);
-        let sheets = on_sheets(mesh, &without_boundary, going);
-        let voxel = going.region.spacing.min_element() as f32;
+    fn move_without_boundary(&mut self, mesh: &mut Mesh, context: &FrameContext) -> Vec<VertexId> {
+        let without_boundary = without_boundary(mesh, context);
+        let sheets = on_sheets(mesh, &without_boundary, context);
+        let voxel = context.region.spacing.min_element() as f32;
         let mut displacements = vec![Vec3::ZERO; mesh.slots()];
         let mut grown = Vec::new();
         for &(v, support) in &without_boundary {
@@ -117,15 +117,15 @@ impl FrameTracker {
 }
 
 /// Returns the vertices without a boundary, and the intensity around each.
-fn without_boundary(mesh: &Mesh, going: &FrameContext) -> Vec<(VertexId, Support)> {
-    let support = |v: VertexId| (v, going.classify(mesh.position(v), mesh.area_normal(v)));
+fn without_boundary(mesh: &Mesh, context: &FrameContext) -> Vec<(VertexId, Support)> {
+    let support = |v: VertexId| (v, context.classify(mesh.position(v), mesh.area_normal(v)));
     mesh.vertices().map(support).filter(|(_, support)| *support != Support::Boundary).collect()
 }
 
 /// Returns the vertices among `without_boundary` that are on a sheet: another one close by faces the opposite way. In ascending
 /// order.
-fn on_sheets(mesh: &Mesh, without_boundary: &[(VertexId, Support)], going: &FrameContext) -> Vec<VertexId> {
-    let thickness = (THICKNESS * going.region.spacing.min_element()) as f32;
+fn on_sheets(mesh: &Mesh, without_boundary: &[(VertexId, Support)], context: &FrameContext) -> Vec<VertexId> {
+    let thickness = (THICKNESS * context.region.spacing.min_element()) as f32;
     let positions: Vec<Vec3> = without_boundary.iter().map(|&(v, _)| mesh.position(v)).collect();
     let normals: Vec<Vec3> =
         without_boundary.iter().map(|&(v, _)| mesh.area_normal(v).normalize_or_zero()).collect();

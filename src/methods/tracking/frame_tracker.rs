@@ -45,7 +45,7 @@ pub struct FrameFacts {
     pub held: usize,
     /// Number of vertices without a boundary: collapsed between walls that have met, grown into gaps that open, else
     /// smoothed.
-    pub boundary_lost: usize,
+    pub without_boundary: usize,
     /// Mean number of projection steps per vertex, over the projections onto space-time and onto the frame together.
     pub steps: f64,
     /// Mean displacement of the vertices by the last projection, in world units.
@@ -246,12 +246,12 @@ impl FrameTracker {
 
 /// Predicts the displacement of each vertex to the next frame, by slot, from the slope of the space-time surface;
 /// smoothed over the mesh.
-fn prediction(mesh: &Mesh, region: &Region, moment: &SpaceTimeSamples) -> Vec<Vec3> {
+fn prediction(mesh: &Mesh, region: &Region, samples: &SpaceTimeSamples) -> Vec<Vec3> {
     let mut displacements = vec![Vec3::ZERO; mesh.slots()];
     for v in mesh.vertices() {
         let at = region.to_local(mesh.position(v));
         displacements[v.index()] =
-            moment.prediction(at).map_or(Vec3::ZERO, |displacement| region.direction_to_world(displacement));
+            samples.prediction(at).map_or(Vec3::ZERO, |displacement| region.direction_to_world(displacement));
     }
     (0..SMOOTHINGS).fold(displacements, |displacements, _| neighbour_means(mesh, &displacements))
 }

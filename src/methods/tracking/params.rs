@@ -100,10 +100,11 @@ impl TrackingParams {
 
     /// Replaces parameters that are 0 by values derived from the volume.
     pub(super) fn with_volume(mut self, image: &ImageFacts) -> Self {
-        let ImageFacts { shortest_side: pixel, longest_side: thickest, noise, range } = *image;
+        let ImageFacts { shortest_side, longest_side, noise, range } = *image;
         let or = |value: f64, usual: f64| if value == 0.0 { usual } else { value };
         self.threshold = or(self.threshold, (THRESHOLD_IN_NOISE * noise).max(LEAST_THRESHOLD * range));
-        self.radius = or(self.radius, (RADIUS_IN_PIXELS * pixel).max(RADIUS_IN_SLICES * thickest));
+        self.radius =
+            or(self.radius, (RADIUS_IN_PIXELS * shortest_side).max(RADIUS_IN_SLICES * longest_side));
         self.time_scale = or(self.time_scale, TIME_SCALE_IN_RADIUS * self.radius);
         self
     }

@@ -39,7 +39,7 @@ impl SurfaceTracker {
                 params: self.params.clone(),
                 faces: self.faces.clone(),
                 mesh: self.mesh.clone(),
-                edge: self.tracker.as_ref().map(|follower| follower.edge),
+                edge: self.tracker.as_ref().map(|tracker| tracker.edge),
                 meshes: self.meshes.iter().map(plain).collect(),
                 facts: self.facts.clone(),
                 closing: self.closure_error,

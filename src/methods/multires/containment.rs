@@ -7,15 +7,15 @@ use crate::mesh::Mesh;
 
 /// Returns for each ellipsoid whether its centre is inside the closed mesh, by the parity of the hits of a ray from it.
 /// Used to detect a membrane that has slipped off an ellipsoid.
-pub(super) fn held(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<bool> {
-    let middles: Vec<[f32; 2]> = ellipsoids.iter().map(|e| seen_along_ray(e.center.as_vec3())).collect();
-    let places: Vec<[f32; 2]> = mesh.positions().iter().map(|&p| seen_along_ray(p)).collect();
+pub(super) fn contains_centres(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<bool> {
+    let centres: Vec<[f32; 2]> = ellipsoids.iter().map(|e| seen_along_ray(e.center.as_vec3())).collect();
+    let projected: Vec<[f32; 2]> = mesh.positions().iter().map(|&p| seen_along_ray(p)).collect();
     let rays: Vec<Line> = ellipsoids.iter().map(|e| Line::new(e.center, RAY)).collect();
     let mut inside = vec![false; ellipsoids.len()];
     for corners in mesh.triangles() {
-        let seen = corners.map(|v| places[v.index()]);
-        for (k, middle) in middles.iter().enumerate() {
-            if may_cover(&seen, middle) {
+        let seen = corners.map(|v| projected[v.index()]);
+        for (k, centre) in centres.iter().enumerate() {
+            if may_cover(&seen, centre) {
                 inside[k] ^= rays[k].hit(mesh.facet(corners).points).is_some_and(|hit| hit.distance >= 0.0);
             }
         }
@@ -56,18 +56,20 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     #[test]
-    fn those_in_a_ball_are_held() {
+    fn centres_in_a_ball_are_contained() {
         let mesh = Mesh::icosphere(Vec3::new(50.0, 0.0, 0.0), 1.0, 0.1).unwrap();
         let mut random = Random::new(3);
-        let middles: Vec<[f64; 3]> =
+        let centres: Vec<[f64; 3]> =
             (0..400).map(|_| [50.0 + 4.0 * random.unit() - 2.0, 4.0 * random.unit() - 2.0, 0.0]).collect();
         let tiny = |&center: &[f64; 3]| ControlEllipsoid {
             center,
             axes: [[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01]],
         };
-        let ellipsoids: Vec<Ellipsoid> = middles.iter().map(|at| Ellipsoid::new(&tiny(at))).collect();
+        let ellipsoids: Vec<Ellipsoid> = centres.iter().map(|at| Ellipsoid::new(&tiny(at))).collect();
         let far = |e: &Ellipsoid| (e.center.distance(DVec3::new(50.0, 0.0, 0.0)) - 1.0).abs() > 0.01;
-        for (e, is_held) in ellipsoids.iter().zip(held(&mesh, &ellipsoids)).filter(|(e, _)| far(e)) {
+        for (e, is_held) in
+            ellipsoids.iter().zip(contains_centres(&mesh, &ellipsoids)).filter(|(e, _)| far(e))
+        {
             assert_eq!(is_held, e.center.distance(DVec3::new(50.0, 0.0, 0.0)) < 1.0, "{}", e.center);
         }
     }

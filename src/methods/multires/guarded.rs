@@ -4,7 +4,7 @@
 //! the mesh of the frame before is moved here, guarded, and annular and axial changes cut and join it.
 
 use super::ellipsoid::Ellipsoid;
-use super::membrane::{hold, relaxed};
+use super::membrane::{pushed_positions, relaxed};
 use super::params::{MultiresParams, Topology};
 use crate::math::Vec3;
 use crate::mesh::{EditError, Mesh, VertexId};
@@ -15,7 +15,7 @@ const ROUNDS: usize = 2;
 
 /// Moves `mesh` under the guard to the `predicted` positions, one for each slot, and on towards the membrane's energy
 /// minimum.
-pub(super) fn follow(
+pub(super) fn move_guarded(
     mesh: &mut Mesh,
     predicted: &[Vec3],
     ellipsoids: &[Ellipsoid],
@@ -24,20 +24,20 @@ pub(super) fn follow(
 ) -> Changes {
     let sampling = sampling(params.bounds());
     let mut changes = Changes::default();
-    carry(mesh, predicted, resolver, sampling);
+    move_to(mesh, predicted, resolver, sampling);
     for _ in 0..ROUNDS {
-        let places = relaxed(mesh, ellipsoids, params, 0.0);
-        carry(mesh, &places, resolver, sampling);
-        changes += mend(mesh, params, resolver);
+        let positions = relaxed(mesh, ellipsoids, params, 0.0);
+        move_to(mesh, &positions, resolver, sampling);
+        changes += remesh_and_resolve(mesh, params, resolver);
     }
     // Pushes edge midpoints that remeshing added out of the ellipsoids.
-    let places = hold(mesh, ellipsoids);
-    carry(mesh, &places, resolver, sampling);
+    let positions = pushed_positions(mesh, ellipsoids);
+    move_to(mesh, &positions, resolver, sampling);
     changes
 }
 
 /// Restores the edge bounds, and makes the topology changes at necks and contacts that the parameters allow.
-fn mend(mesh: &mut Mesh, params: &MultiresParams, resolver: &mut Resolver) -> Changes {
+fn remesh_and_resolve(mesh: &mut Mesh, params: &MultiresParams, resolver: &mut Resolver) -> Changes {
     let bounds = params.bounds();
     let mut changes = restructure(mesh, bounds, resolver.guard(mesh, sampling(bounds)));
     let active: Vec<VertexId> = match params.topology {
@@ -85,15 +85,15 @@ fn pinched(mesh: &Mesh, bounds: EdgeBounds) -> Vec<VertexId> {
     mesh.vertices().filter(|&u| mesh.ring(u).as_slice().iter().any(|&v| is_pinched(u, v))).collect()
 }
 
-fn carry(mesh: &mut Mesh, places: &[Vec3], resolver: &mut Resolver, sampling: Sampling) {
-    let mut ways = ways_to(mesh, places);
-    resolver.carry(mesh, sampling, &mut ways);
+fn move_to(mesh: &mut Mesh, positions: &[Vec3], resolver: &mut Resolver, sampling: Sampling) {
+    let mut displacements = displacements_to(mesh, positions);
+    resolver.carry(mesh, sampling, &mut displacements);
 }
 
-/// Returns the displacement of each vertex to its position in `places`, by slot.
-pub(super) fn ways_to(mesh: &Mesh, places: &[Vec3]) -> Vec<Vec3> {
-    let mut ways = vec![Vec3::ZERO; mesh.slots()];
+/// Returns the displacement of each vertex to its position in `positions`, by slot.
+pub(super) fn displacements_to(mesh: &Mesh, positions: &[Vec3]) -> Vec<Vec3> {
+    let mut displacements = vec![Vec3::ZERO; mesh.slots()];
     // Free slots have no position.
-    mesh.vertices().for_each(|v| ways[v.index()] = places[v.index()] - mesh.position(v));
-    ways
+    mesh.vertices().for_each(|v| displacements[v.index()] = positions[v.index()] - mesh.position(v));
+    displacements
 }
