@@ -14,7 +14,7 @@ use super::volume::RawVolume;
 use crate::io::{PointCloud, parse_points};
 use crate::math::Vec3;
 use crate::methods::implicit::{
-    Camera, Cloud, Edits, ImplicitOptions, ImplicitParams, ImplicitSurface, param_specs,
+    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits, param_specs,
 };
 
 /// A point cloud read from a file.
@@ -163,7 +163,7 @@ impl RawImplicit {
         removed: Vec<u32>,
         outside: &Float32Array,
     ) -> Result<(), JsValue> {
-        let edits = Edits { added: points(added)?, removed, outside: points(outside)? };
+        let edits = PointEdits { added: points(added)?, removed, outside: points(outside)? };
         self.0.borrow_mut().set_edits(edits).map_err(Failure::from)?;
         Ok(())
     }
@@ -229,7 +229,7 @@ impl RawImplicit {
             cell: surface.cell(),
             spacing: surface.spacing(),
             duplicates: surface.duplicates(),
-            strays: surface.strays(),
+            strays: surface.spurious_components(),
             warning: surface.params().warning(),
         })?)
     }

@@ -6,7 +6,8 @@ use crate::common::{Random, euler_of_parts, fingerprint};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{TriangleMesh, curvature, measure, report};
 use vesicle::methods::implicit::{
-    Camera, Cloud, Edits, ImplicitOptions, ImplicitParams, ImplicitSurface, KernelKind, Level, param_specs,
+    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits,
+    param_specs,
 };
 use vesicle::methods::{MethodError, StepReport};
 use vesicle::volume::marching_cubes_world;
@@ -89,7 +90,7 @@ fn comes_out(shape: Shape, euler: &[i64], noise: f64, mean: f64, largest: f64) {
         found[1]
     );
     assert_eq!(euler_of_parts(surface.surface()), euler);
-    assert_eq!(surface.strays(), 0);
+    assert_eq!(surface.spurious_components(), 0);
     assert!(found[0] < mean && found[1] < largest, "{found:?}");
 }
 
@@ -168,7 +169,7 @@ fn more_regularization_makes_noisy_points_smoother() {
     let mut curvatures = Vec::new();
     for lambda_surface in [0.0, 0.001, 0.01, 0.1] {
         surface
-            .set_params(ImplicitParams { lambda_surface, level: Level::Mean, ..ImplicitParams::default() })
+            .set_params(ImplicitParams { lambda_surface, level: IsoValue::Mean, ..ImplicitParams::default() })
             .unwrap();
         finish(&mut surface);
         sound(surface.surface());
@@ -197,7 +198,7 @@ fn a_gap_is_closed() {
 fn the_mean_level_passes_nearer_to_the_points() {
     let mut surface = finished(noisy(sphere, 1000, 0.0, 1), ImplicitParams::default());
     let (zero, volume) = (surface.fitness().unwrap().mean, measure(surface.surface()).volume);
-    surface.set_params(ImplicitParams { level: Level::Mean, ..ImplicitParams::default() }).unwrap();
+    surface.set_params(ImplicitParams { level: IsoValue::Mean, ..ImplicitParams::default() }).unwrap();
     finish(&mut surface);
     println!("{zero} and {}", surface.fitness().unwrap().mean);
     assert!(surface.fitness().unwrap().mean < zero);
@@ -211,7 +212,7 @@ fn other_parameters_give_what_a_fresh_surface_has() {
         ImplicitParams { delta: 10.0, tau: 0.01, ..ImplicitParams::default() },
         ImplicitParams { delta: 10.0, tau: 0.01, cell: 0.03, ..ImplicitParams::default() },
         ImplicitParams { lambda_surface: 0.0, lambda_exterior: 0.5, cell: 0.03, ..ImplicitParams::default() },
-        ImplicitParams { kernel: KernelKind::ThinPlate, level: Level::Mean, ..ImplicitParams::default() },
+        ImplicitParams { kernel: KernelKind::ThinPlate, level: IsoValue::Mean, ..ImplicitParams::default() },
         ImplicitParams { kernel: KernelKind::Biharmonic, tolerance: 1e-8, ..ImplicitParams::default() },
         ImplicitParams { kernel: KernelKind::Gaussian, sigma: 0.2, ..ImplicitParams::default() },
     ];
@@ -237,7 +238,7 @@ fn only_what_depends_on_a_parameter_is_done_again() {
     let mut surface = finished(noisy(sphere, 400, 0.0, 4), ImplicitParams::default());
     for change in [
         ImplicitParams { cell: 0.05, ..ImplicitParams::default() },
-        ImplicitParams { cell: 0.05, level: Level::Mean, ..ImplicitParams::default() },
+        ImplicitParams { cell: 0.05, level: IsoValue::Mean, ..ImplicitParams::default() },
     ] {
         let before = surface.surface().clone();
         surface.set_params(change.clone()).unwrap();
@@ -357,12 +358,12 @@ fn a_restored_run_goes_on_bit_for_bit() {
 }
 
 /// A ball of 800 points with three outliers beside it, and what to do about them: a bump is added, and a dent.
-fn edited() -> (Vec<Vec3>, Edits) {
+fn edited() -> (Vec<Vec3>, PointEdits) {
     let mut points = noisy(sphere, 800, 0.0, 4);
     let first = points.len() as u32;
     points.extend([1.35_f32, 1.37, 1.39].map(|x| Vec3::X * x));
     let bump = [0.0_f32, 0.1, -0.1].map(|y| Vec3::new(0.0, y, 1.12));
-    let edits = Edits {
+    let edits = PointEdits {
         added: bump.to_vec(),
         removed: (first..first + 3).collect(),
         outside: vec![Vec3::new(0.0, 1.03, 0.0)],
@@ -402,7 +403,7 @@ fn points_by_hand_change_the_surface_as_if_they_had_been_there() {
     assert_eq!(surface.constraints()[0].len(), 803);
     assert!(surface.fitness().unwrap().max < 0.1);
     // And back.
-    surface.set_edits(Edits::default()).unwrap();
+    surface.set_edits(PointEdits::default()).unwrap();
     finish(&mut surface);
     let [now, then] = [surface.surface(), &before].map(|mesh| measure(mesh).volume);
     assert!((now / then - 1.0).abs() < 1e-5, "{now} for {then}");
@@ -413,7 +414,7 @@ fn many_points_by_hand_are_solved_from_the_start() {
     let points = noisy(torus, 900, 0.0, 4);
     let (half, rest) = points.split_at(500);
     let mut surface = finished(half.to_vec(), ImplicitParams::default());
-    surface.set_edits(Edits { added: rest.to_vec(), ..Edits::default() }).unwrap();
+    surface.set_edits(PointEdits { added: rest.to_vec(), ..PointEdits::default() }).unwrap();
     finish(&mut surface);
     sound(surface.surface());
     assert_eq!(surface.constraints()[0].len(), 900);
@@ -441,7 +442,7 @@ fn a_clump_beside_a_ball_is_solved_with_a_narrow_gaussian() {
 fn far_from_the_origin_points_by_hand_have_room() {
     let points = noisy(sphere, 3000, 0.0, 3).iter().map(|p| *p + Vec3::X * 120.0).collect();
     let mut surface = finished(points, ImplicitParams::default());
-    surface.set_edits(Edits { added: vec![Vec3::X * 122.9], ..Edits::default() }).unwrap();
+    surface.set_edits(PointEdits { added: vec![Vec3::X * 122.9], ..PointEdits::default() }).unwrap();
     finish(&mut surface);
     sound(surface.surface());
 }
@@ -449,7 +450,7 @@ fn far_from_the_origin_points_by_hand_have_room() {
 #[test]
 fn impossible_edits_are_named_and_change_nothing() {
     let (points, edits) = edited();
-    let on_a_point = Edits { outside: vec![Vec3::X, points[7]], ..Edits::default() };
+    let on_a_point = PointEdits { outside: vec![Vec3::X, points[7]], ..PointEdits::default() };
     let mut surface = begun(points.clone(), ImplicitParams::default());
     // Also before anything was chosen.
     assert_eq!(refused(surface.set_edits(on_a_point)), "outside");
@@ -457,9 +458,9 @@ fn impossible_edits_are_named_and_change_nothing() {
     surface.set_edits(edits.clone()).unwrap();
     finish(&mut surface);
     let before = surface.surface().clone();
-    let added = |p: Vec3| Edits { added: vec![Vec3::X, p], ..Edits::default() };
-    let outside = |p: Vec3| Edits { outside: vec![p], ..Edits::default() };
-    let removed = |removed: Vec<u32>| Edits { removed, ..Edits::default() };
+    let added = |p: Vec3| PointEdits { added: vec![Vec3::X, p], ..PointEdits::default() };
+    let outside = |p: Vec3| PointEdits { outside: vec![p], ..PointEdits::default() };
+    let removed = |removed: Vec<u32>| PointEdits { removed, ..PointEdits::default() };
     for (name, bad) in [
         ("added", added(Vec3::new(0.0, f32::NAN, 0.0))),
         ("added", added(Vec3::X * 7.0)),
@@ -481,9 +482,9 @@ fn a_restored_run_goes_on_bit_for_bit_through_edits() {
     let (points, edits) = edited();
     let begun = || begun(points.clone(), ImplicitParams::default());
     let mut running = begun();
-    let fewer = Edits { removed: Vec::new(), ..edits.clone() };
+    let fewer = PointEdits { removed: Vec::new(), ..edits.clone() };
     let mut steps = 0;
-    for edits in [fewer, edits, Edits::default()] {
+    for edits in [fewer, edits, PointEdits::default()] {
         loop {
             let done = running.step().unwrap().done;
             steps += 1;
@@ -712,7 +713,7 @@ fn bad_points_and_options_are_named() {
     let flat: Vec<Vec3> = points.iter().map(|p| Vec3::new(p.x, p.y, 0.5 * p.x - 0.3 * p.y)).collect();
     let line: Vec<Vec3> = points.iter().map(|p| Vec3::ONE * p.x).collect();
     let crowd = vec![Vec3::X; 100_001];
-    let outside = Edits { outside: crowd.clone(), ..Edits::default() };
+    let outside = PointEdits { outside: crowd.clone(), ..PointEdits::default() };
     assert_eq!(refused(new(of_points(points.clone()), options()).unwrap().set_edits(outside)), "outside");
     let exterior = ImplicitOptions { exterior: Some(crowd), ..options() };
     assert_eq!(refused(new(of_points(points.clone()), exterior)), "exterior");
@@ -720,7 +721,7 @@ fn bad_points_and_options_are_named() {
     let exterior = ImplicitOptions { exterior: Some(vec![Vec3::X * 1.2]), ..options() };
     let mut placed = new(of_points(points.clone()), exterior).unwrap();
     finish(&mut placed);
-    let added = Edits { added: vec![Vec3::X * 1.2], ..Edits::default() };
+    let added = PointEdits { added: vec![Vec3::X * 1.2], ..PointEdits::default() };
     assert_eq!(refused(placed.set_edits(added)), "added");
     let moved = |by: f32| points.iter().map(|p| *p + Vec3::splat(by)).collect::<Vec<Vec3>>();
     let scaled = |by: f32| points.iter().map(|p| *p * by).collect::<Vec<Vec3>>();

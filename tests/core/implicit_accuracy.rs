@@ -17,7 +17,7 @@ use crate::common::{Random, euler_of_parts};
 use std::fmt::Write;
 use std::path::Path;
 use vesicle::mesh::{TriangleMesh, report};
-use vesicle::methods::implicit::{Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, Level};
+use vesicle::methods::implicit::{Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue};
 
 const POINTS: usize = 3000;
 const SEEDS: [u64; 3] = [1, 2, 3];
@@ -55,7 +55,7 @@ fn usual() -> ImplicitParams {
         delta: 2.0,
         tau: 0.1,
         lambda_surface: 0.0015,
-        level: Level::Mean,
+        level: IsoValue::Mean,
         cell: 0.02,
         ..ImplicitParams::default()
     }

@@ -8,7 +8,7 @@ use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{measure, report};
 use vesicle::methods::MethodError;
 use vesicle::methods::implicit::{
-    Camera, Cloud, Edits, ImplicitOptions, ImplicitParams, ImplicitSurface, KernelKind, Level,
+    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits,
 };
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -103,7 +103,7 @@ fn params(random: &mut Random) -> ImplicitParams {
         lambda_exterior: one_of(&[0.0, 2.0, 2.0, 1000.0]),
         tolerance: one_of(&[1e-2, 1e-5, 1e-5, 1e-8, 1e-12]),
         cell: 0.0,
-        level: if random.below(4) == 0 { Level::Mean } else { Level::Zero },
+        level: if random.below(4) == 0 { IsoValue::Mean } else { IsoValue::Zero },
         kernel: match random.below(8) {
             0 => KernelKind::ThinPlate,
             1 => KernelKind::Biharmonic,
@@ -210,7 +210,7 @@ fn run(seed: u64, tally: &mut Tally) {
 }
 
 /// Points by hand, near others or anywhere, and some of the first taken away; or all edits taken back.
-fn edits(surface: &ImplicitSurface, count: usize, random: &mut Random) -> Edits {
+fn edits(surface: &ImplicitSurface, count: usize, random: &mut Random) -> PointEdits {
     let [known, _] = surface.constraints();
     let mut places = |most: usize| -> Vec<Vec3> {
         let near = |random: &mut Random| match known.get(random.below(known.len().max(1))) {
@@ -220,11 +220,11 @@ fn edits(surface: &ImplicitSurface, count: usize, random: &mut Random) -> Edits 
         (0..random.below(most)).map(|_| near(random)).collect()
     };
     if places(5).is_empty() {
-        return Edits::default();
+        return PointEdits::default();
     }
     let (added, outside) = (places(300), places(4));
     let removed = (0..random.below(40)).map(|_| random.below(count + 1) as u32).collect();
-    Edits { added, removed, outside }
+    PointEdits { added, removed, outside }
 }
 
 fn change(surface: &mut ImplicitSurface, count: usize, random: &mut Random) -> Result<(), MethodError> {
@@ -235,7 +235,7 @@ fn change(surface: &mut ImplicitSurface, count: usize, random: &mut Random) -> R
     let now = surface.params().clone();
     let next = match random.below(3) {
         0 => ImplicitParams {
-            level: if now.level == Level::Zero { Level::Mean } else { Level::Zero },
+            level: if now.level == IsoValue::Zero { IsoValue::Mean } else { IsoValue::Zero },
             ..now.clone()
         },
         1 => ImplicitParams { cell: surface.cell() * random.within(0.7, 3.0), ..now.clone() },

@@ -23,21 +23,21 @@ const MARGIN: f32 = 0.35;
 /// Where the image hardly differs from π_I, as in the soft tissue around bone, the surface creeps: with α_I unchanged
 /// it took 2,500 iterations of 3,000 to cross a head. The finest level undoes the effect of the factor in a few
 /// iterations; area and volume are the same within 0.1 %.
-const MOST_GAIN: f32 = 8.0;
+const MAX_GAIN: f32 = 8.0;
 
 /// The smallest ratio of rigidity to amplified α_I on coarse levels. With less, the surface is drawn into holes that a
 /// coarse mesh cannot follow, and splits and merges there for ever.
-const LEAST_RIGIDITY: f32 = 0.025;
+const MIN_RIGIDITY: f32 = 0.025;
 
 /// The largest stiffness of the amplified image force where the image is steep, in units of m/Δt². With more, the
 /// surface oscillates.
-const MOST_STIFFNESS: f32 = 1.0;
+const MAX_STIFFNESS: f32 = 1.0;
 
 /// The least steepness of the image at π_I, in ranges of intensity per voxel; if the median is smaller, the implicit
 /// integrator amplifies α_I, up to the factor below. A few voxels much brighter than all others make the object faint;
 /// rigidity would then pull the surface off its contour, slowly. Computed tomographies have 0.1 to 0.6.
-const LEAST_STEEPNESS: f32 = 0.1;
-const MOST_AMPLIFIED: f32 = 1e4;
+const MIN_STEEPNESS: f32 = 0.1;
+const MAX_AMPLIFICATION: f32 = 1e4;
 
 /// The number of iterations of a level with the full factor on α_I, and the number after which it is halved each time
 /// from then on. A head takes 300. A vertex on an edge steeper than most would oscillate for ever: one on a tooth did,
@@ -64,15 +64,15 @@ pub(super) fn gain(
 ) -> f32 {
     if params.adapts_to_image() && params.integrator == Integrator::Implicit {
         let steepness = pyramid.levels[level].median_steepness(iso);
-        return if steepness > 0.0 { (LEAST_STEEPNESS / steepness).clamp(1.0, MOST_AMPLIFIED) } else { 1.0 };
+        return if steepness > 0.0 { (MIN_STEEPNESS / steepness).clamp(1.0, MAX_AMPLIFICATION) } else { 1.0 };
     }
     if level == 0 || params.iso_force == 0.0 || params.integrator == Integrator::Implicit {
         return 1.0;
     }
     let stiffness = params.iso_force.abs() as f32 * delta * pyramid.levels[level].steepness(iso);
-    let by_stiffness = MOST_STIFFNESS * (params.mass / (params.time_step * params.time_step)) as f32;
-    let by_rigidity = params.rigidity as f32 / LEAST_RIGIDITY;
-    [by_stiffness / stiffness, by_rigidity].into_iter().fold(MOST_GAIN, f32::min).max(1.0)
+    let by_stiffness = MAX_STIFFNESS * (params.mass / (params.time_step * params.time_step)) as f32;
+    let by_rigidity = params.rigidity as f32 / MIN_RIGIDITY;
+    [by_stiffness / stiffness, by_rigidity].into_iter().fold(MAX_GAIN, f32::min).max(1.0)
 }
 
 /// Returns the factor on α_I that is left of a level's `gain` after a number of iterations on that level.
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn a_level_that_takes_long_loses_its_gain() {
-        let left = |iterations| decayed(MOST_GAIN, iterations);
+        let left = |iterations| decayed(MAX_GAIN, iterations);
         assert_eq!(
             [
                 0,
@@ -146,13 +146,13 @@ mod tests {
     fn the_gain_is_for_coarse_levels_faint_images_and_rigid_surfaces() {
         let (faint, steep) = (ramp(39.0), ramp(1.0));
         let of = |pyramid, force, rigidity, level| gain(pyramid, &params(force, rigidity), level, [0.5, 1.5]);
-        assert_eq!(of(&faint, -1.0, 0.2, 1), MOST_GAIN);
+        assert_eq!(of(&faint, -1.0, 0.2, 1), MAX_GAIN);
         assert_eq!(of(&faint, -1.0, 0.2, 0), 1.0);
         assert_eq!(of(&faint, 0.0, 0.2, 1), 1.0);
         assert!((of(&faint, -1.0, 0.1, 1) - 4.0).abs() < 1e-5);
         assert_eq!(of(&faint, -1.0, 0.0, 1), 1.0);
         let held = of(&steep, -1.0, 0.4, 1);
-        assert!((1.0..0.6 * MOST_GAIN).contains(&held), "{held}");
+        assert!((1.0..0.6 * MAX_GAIN).contains(&held), "{held}");
         assert!(of(&steep, -5.0, 0.4, 1) < 0.3 * held.max(4.0));
     }
 }

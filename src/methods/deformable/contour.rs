@@ -11,7 +11,7 @@ use crate::volume::{Grid, marching_cubes};
 
 /// The least δ, in voxels of the level, for which a contour is simplified; for finer meshes, clusters as large as a
 /// voxel are too coarse.
-const LEAST_SIDE: f32 = 0.7;
+const MIN_SIDE: f32 = 0.7;
 
 /// The largest distance along its normal, in voxels, between a vertex and the mean of its cluster. Without this bound,
 /// a tube of radius 1.2 became a square prism.
@@ -74,7 +74,7 @@ pub(super) fn contour(
 /// merged. This saves more than half of the edits that bring edges within bounds.
 pub(super) fn simplified(contour: TriangleMesh, image: &LevelImage, delta: f32) -> TriangleMesh {
     let side = delta * image.voxels_per_unit();
-    if side < LEAST_SIDE {
+    if side < MIN_SIDE {
         return contour;
     }
     let side = if side > 1.0 { side } else { 1.0 };

@@ -11,11 +11,11 @@ const THROUGH_CORNERS: f32 = 1.316_074;
 
 /// The largest ratio of the axes of the enclosing start surface. Around flatter images it leaves more room: the flatter
 /// it is, the more its triangles are squashed before they can be resolved; at 33 some of them crossed.
-const MOST_ELONGATED: f32 = 6.0;
+const MAX_ELONGATION: f32 = 6.0;
 
 /// The largest number of vertices of any surface. A vertex takes about 200 bytes, meshes are copied several times, and
 /// wasm32 has 4 GiB.
-const MOST_VERTICES: f64 = 4e6;
+const MAX_VERTICES: f64 = 4e6;
 
 /// A box around the image in model space.
 #[derive(Clone, Copy, Debug)]
@@ -29,7 +29,7 @@ pub(super) struct Domain {
 /// Returns half axes of a rounded box, at least `around`, that is neither too small for a mesh with the sampling
 /// distance `delta` nor too flat.
 pub(super) fn rounded_axes(around: Vec3, delta: f32) -> Vec3 {
-    let least = (4.0 * delta).max(around.max_element() / MOST_ELONGATED);
+    let least = (4.0 * delta).max(around.max_element() / MAX_ELONGATION);
     around.max(Vec3::splat(least))
 }
 
@@ -58,9 +58,9 @@ impl Domain {
     }
 
     /// Returns the largest number of vertices of a surface in the domain without unresolved contacts, one per cube of
-    /// side δ, but at most [`MOST_VERTICES`].
+    /// side δ, but at most [`MAX_VERTICES`].
     pub(super) fn most_vertices(&self, delta: f32) -> usize {
         let cubes = ((self.bounds.max - self.bounds.min) / delta).as_dvec3().element_product();
-        if cubes < MOST_VERTICES { cubes as usize } else { MOST_VERTICES as usize }
+        if cubes < MAX_VERTICES { cubes as usize } else { MAX_VERTICES as usize }
     }
 }

@@ -134,7 +134,7 @@ const CHECK_TRAVEL: f32 = 0.1;
 const CHECK_PERIOD: usize = 50;
 
 /// The share of live vertex slots below which the mesh is renumbered.
-const LEAST_OCCUPANCY: f32 = 0.7;
+const MIN_OCCUPANCY: f32 = 0.7;
 
 /// The keys of the model's vertex attributes.
 #[derive(Clone, Copy, Debug)]
@@ -360,7 +360,7 @@ impl DeformableModel {
             still[v] = 0.0;
             rings[v].as_slice().iter().for_each(|w| still[w.index()] = 0.0);
         }
-        if self.mesh.occupancy() < LEAST_OCCUPANCY {
+        if self.mesh.occupancy() < MIN_OCCUPANCY {
             self.reorder();
         }
         times.add("topology", (self.clock)() - begin);

@@ -15,14 +15,14 @@ const QUIET_ITERATIONS: f64 = 3.0;
 const QUIET_LONG_STEPS: f64 = 2.0;
 
 /// The largest number of quiet iterations required, whatever the time step and the damping.
-const MOST_QUIET_ITERATIONS: f64 = 500.0;
+const MAX_QUIET_ITERATIONS: f64 = 500.0;
 
 /// The largest speed in a converged surface, in δ per unit of time. The mean energy hides a few moving vertices, such
 /// as a front in a hole; without this bound the model would stop before the front has passed.
 const SETTLED_SPEED: f32 = 0.03;
 
 /// The largest number of searches of the finest level for missing parts.
-const MOST_SEARCHES: u32 = 3;
+const MAX_SEARCHES: u32 = 3;
 
 /// The largest displacement in one iteration of a converged surface, in δ.
 const SETTLED_DISPLACEMENT: f32 = 0.1;
@@ -37,7 +37,7 @@ pub(super) struct Convergence {
     /// Whether the next iteration evaluates the forces on all vertices, asleep or not.
     pub(super) examine_next: bool,
     done: bool,
-    /// The number of searches of the finest level for missing parts; [`MOST_SEARCHES`] once a search found none.
+    /// The number of searches of the finest level for missing parts; [`MAX_SEARCHES`] once a search found none.
     searches: u32,
     /// Whether vertices have been given sizes by the curvature of this level.
     pub(super) sized: bool,
@@ -114,7 +114,7 @@ impl DeformableModel {
             self.convergence.quiet = 0;
             return Ok(self.check_everything(times));
         }
-        if !self.seeds_levels() || self.convergence.searches == MOST_SEARCHES {
+        if !self.seeds_levels() || self.convergence.searches == MAX_SEARCHES {
             return Ok(Changes::default());
         }
         let found = self.seed_missing(times)?;
@@ -123,7 +123,7 @@ impl DeformableModel {
             self.convergence.quiet = 0;
             self.convergence.was_examined = false;
         } else {
-            self.convergence.searches = MOST_SEARCHES;
+            self.convergence.searches = MAX_SEARCHES;
         }
         Ok(found)
     }
@@ -141,7 +141,7 @@ impl DeformableModel {
         let DeformableParams { mass, damping, integrator, .. } = self.params;
         let is_settled = integrator == Integrator::Implicit && !self.convergence.began_on_contour;
         let least = if is_settled { QUIET_LONG_STEPS } else { QUIET_ITERATIONS };
-        libm::ceil(mass / (damping * self.params.step_length())).clamp(least, MOST_QUIET_ITERATIONS) as u32
+        libm::ceil(mass / (damping * self.params.step_length())).clamp(least, MAX_QUIET_ITERATIONS) as u32
     }
 
     /// Restores the bounds around all vertices, and removes specks.

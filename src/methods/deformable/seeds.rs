@@ -27,7 +27,7 @@ const SMALLEST_SEED: f64 = 1.0 / 32.0;
 
 /// The volume of the octahedron of the six neighbours of a voxel, in voxels; the contour of a single voxel encloses no
 /// more.
-const MOST_OF_ONE_VOXEL: f64 = 4.0 / 3.0;
+const MAX_VOLUME_OF_ONE_VOXEL: f64 = 4.0 / 3.0;
 
 impl DeformableModel {
     /// Searches the current level for parts of the contour that the mesh lacks and adds them, whatever the parameter
@@ -157,7 +157,9 @@ impl Comparison<'_> {
         let missing = self.missing_voxels(kind)?;
         let voxel = 1.0 / f64::from(self.image.voxels_per_unit());
         let mut clusters = clusters(&missing, grid.dims);
-        clusters.retain(|cluster| cluster.len() > 1 || MOST_OF_ONE_VOXEL * voxel * voxel * voxel >= smallest);
+        clusters.retain(|cluster| {
+            cluster.len() > 1 || MAX_VOLUME_OF_ONE_VOXEL * voxel * voxel * voxel >= smallest
+        });
         let mut parts = TriangleMesh::default();
         for cluster in clusters {
             let (low, high) = bounding_box(&cluster, grid.dims);

@@ -79,19 +79,19 @@ const BUBBLE_SHARE: f32 = 0.3;
 const SPHERE_EDGE: f32 = 2.2;
 
 /// The largest number of bubbles along an axis, and of seeds: with more, memory, not the method, is the limit.
-const MOST_BUBBLES: u32 = 100;
-const MOST_SEEDS: usize = 10_000;
+const MAX_BUBBLES: u32 = 100;
+const MAX_SEEDS: usize = 10_000;
 
 /// The side of the cells around self-intersections of a resolved contour in which edits are tested in full, as a
 /// multiple of the longest edge.
 const TESTED_CELL: f32 = 2.5;
 
 /// The number of times that a contour is resolved with some edits not tested in full, before all are.
-const MOST_RUNS: usize = 2;
+const MAX_RUNS: usize = 2;
 
 /// The largest number of resolver calls to bring the edges of a start mesh within bounds; each refines a coarse mesh
 /// several times.
-const MOST_CALLS: usize = 20;
+const MAX_CALLS: usize = 20;
 
 impl Start {
     /// Makes the start mesh on the coarsest level, with its edges within bounds and no two parts in contact. For
@@ -138,7 +138,7 @@ impl DeformableModel {
         let mut tested = CellSet::new(TESTED_CELL * self.sampling().longest());
         let mut runs = 0;
         loop {
-            self.resolver.test_in((runs < MOST_RUNS).then(|| tested.clone()));
+            self.resolver.test_in((runs < MAX_RUNS).then(|| tested.clone()));
             let resolved = self.resolve_sized();
             // Later calls have no contour to return to, so all their edits are tested, also after an error.
             self.resolver.test_in(None);
@@ -150,7 +150,7 @@ impl DeformableModel {
                 self.convergence.began_on_contour = self.from_contour;
                 return Ok(());
             }
-            if runs == MOST_RUNS {
+            if runs == MAX_RUNS {
                 let pairs = count_crossings(&self.mesh.to_triangles());
                 return Err(MeshError::SelfIntersecting { pairs }.into());
             }
@@ -199,7 +199,7 @@ fn resolve_with(
     guide: &dyn TopologyGuide,
 ) -> Result<(), MethodError> {
     resolver.resolve_guided(mesh, sampling, &mesh.vertices().collect::<Vec<_>>(), guide);
-    for _ in 0..MOST_CALLS {
+    for _ in 0..MAX_CALLS {
         if !resolver.is_waiting() {
             break;
         }
@@ -275,7 +275,7 @@ fn sphere(context: &StartContext, centre: Vec3, radius: f32) -> Result<Mesh, Mes
 fn bubble_grid(context: &StartContext, n: u32) -> Result<Mesh, MethodError> {
     let smallest_axis = context.dims.into_iter().min().unwrap_or(1) as f32;
     let fitting = (smallest_axis * BUBBLE_SHARE / (SMALLEST_RADIUS * context.sampling.shortest())) as u32;
-    let most = fitting.min(MOST_BUBBLES);
+    let most = fitting.min(MAX_BUBBLES);
     if n == 0 || n > most {
         let hint = if most == 0 {
             "none fits: take fewer pyramid levels or shorter edges".into()
@@ -295,8 +295,8 @@ fn bubble_grid(context: &StartContext, n: u32) -> Result<Mesh, MethodError> {
 }
 
 fn spheres_at(context: &StartContext, points: &[DVec3], radius: f64) -> Result<Mesh, MethodError> {
-    if points.is_empty() || points.len() > MOST_SEEDS {
-        let problem = format!("{} points given, 1 to {MOST_SEEDS} accepted", points.len());
+    if points.is_empty() || points.len() > MAX_SEEDS {
+        let problem = format!("{} points given, 1 to {MAX_SEEDS} accepted", points.len());
         return Err(MethodError::invalid("start.seeds", problem));
     }
     let ball = world_ball(context, radius)?;

@@ -5,14 +5,14 @@ use crate::methods::MethodError;
 use crate::methods::saved::Hash;
 
 /// Largest accepted side of an image, in pixels: more than any photograph has, and its bytes still fit in memory.
-const MOST_PIXELS: u32 = 16384;
+const MAX_PIXELS: u32 = 16384;
 
 /// Threshold below which the left 3×3 block of a projection counts as singular: the volume that its rows span, each
 /// scaled to length 1.
 ///
 /// Rows of a parallel projection span 1e-16 or so by rounding; with a focal length of one pixel in an image of 16384 it
 /// is still 1e-8.
-const LEAST_SPAN: f64 = 1e-12;
+const MIN_SPAN: f64 = 1e-12;
 
 /// A calibrated perspective camera, with its image if there is one. Cameras tell where the outside is, and colour the
 /// surface.
@@ -63,7 +63,7 @@ impl Camera {
         if let Some(problem) = problem(&projection, width, height, length) {
             return Err(MethodError::invalid("cameras", problem));
         }
-        let to_view = view(projection).ok_or_else(|| {
+        let to_view = normalized_projection(projection).ok_or_else(|| {
             let problem = "the left 3×3 block of the projection is singular; a perspective camera is needed, which has \
                            a centre";
             MethodError::invalid("cameras", problem)
@@ -72,7 +72,7 @@ impl Camera {
     }
 
     /// Adds the camera and its image to `hash`, by which a saved state is checked against its input.
-    pub fn mix_into(&self, hash: &mut Hash) {
+    pub fn hash_into(&self, hash: &mut Hash) {
         self.to_view.to_cols_array().into_iter().for_each(|x| hash.mix(x.to_bits()));
         [self.width, self.height].into_iter().for_each(|n| hash.mix(u64::from(n)));
         let (words, _) = self.image.as_deref().unwrap_or_default().as_chunks::<4>();
@@ -83,7 +83,7 @@ impl Camera {
     /// Returns the same camera for a world transformed by `map`, which must be invertible: it sees `map`(p) where it
     /// saw p.
     #[must_use]
-    pub fn moved(self, map: &DAffine3) -> Self {
+    pub fn transformed(self, map: &DAffine3) -> Self {
         let to_view = scaled_to_depth(self.to_view * map.inverse());
         Self { to_view, from_view: to_view.inverse(), ..self }
     }
@@ -122,17 +122,17 @@ impl Camera {
     ///
     /// Bilinear between the centres of pixels; colours are weighted by alpha, so that masked pixels do not bleed in.
     pub fn color_at(&self, x: f64, y: f64) -> Option<(Vec3, f32)> {
-        let mut mix = Mix::default();
-        for (pixel, share) in self.around(x, y)? {
-            mix.add(self.pixel(pixel)?, share);
+        let mut mean = ColorMean::default();
+        for (pixel, share) in self.bilinear_pixels(x, y)? {
+            mean.add(self.pixel(pixel)?, share);
         }
-        mix.color()
+        mean.color()
     }
 
     /// Returns column and row of the four pixels whose centres surround (x, y), with their bilinear weights; `None`
     /// outside the image.
-    pub(super) fn around(&self, x: f64, y: f64) -> Option<[([usize; 2], f32); 4]> {
-        let [columns, rows] = [between(x, self.width), between(y, self.height)];
+    pub(super) fn bilinear_pixels(&self, x: f64, y: f64) -> Option<[([usize; 2], f32); 4]> {
+        let [columns, rows] = [linear_weights(x, self.width), linear_weights(y, self.height)];
         let pixel = |i: usize, j: usize| ([columns[i].0, rows[j].0], columns[i].1 * rows[j].1);
         self.covers(x, y).then(|| [pixel(0, 0), pixel(1, 0), pixel(0, 1), pixel(1, 1)])
     }
@@ -156,12 +156,12 @@ impl Camera {
 
 /// Accumulates a mean colour of pixels, weighted by their shares and alpha.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Mix {
+pub(super) struct ColorMean {
     sum: Vec3,
     alpha: f32,
 }
 
-impl Mix {
+impl ColorMean {
     pub(super) fn add(&mut self, pixel: [u8; 4], share: f32) {
         let [r, g, b, a] = pixel.map(|c| f32::from(c) / 255.0);
         self.sum += Vec3::new(r, g, b) * (share * a);
@@ -183,8 +183,8 @@ fn problem(projection: &[f64; 12], width: u32, height: u32, length: Option<usize
             "row {row}, column {column} of the projection is {entry}; finite numbers are accepted"
         ));
     }
-    if [width, height].iter().any(|side| !(1..=MOST_PIXELS).contains(side)) {
-        return Some(format!("{width} × {height} pixels; 1 to {MOST_PIXELS} a side are accepted"));
+    if [width, height].iter().any(|side| !(1..=MAX_PIXELS).contains(side)) {
+        return Some(format!("{width} × {height} pixels; 1 to {MAX_PIXELS} a side are accepted"));
     }
     let expected = 4 * width as usize * height as usize;
     let found = length.filter(|&found| found != expected)?;
@@ -194,13 +194,13 @@ fn problem(projection: &[f64; 12], width: u32, height: u32, length: Option<usize
 }
 
 /// Returns the projection with the scale that makes its last coordinate the depth; `None` if it has no centre.
-fn view(projection: [f64; 12]) -> Option<DAffine3> {
+fn normalized_projection(projection: [f64; 12]) -> Option<DAffine3> {
     // Normalised first, as products of extreme entries overflow or underflow.
     let size = projection.iter().fold(0.0, |size: f64, entry| size.max(entry.abs()));
     let p = projection.map(|entry| entry / size);
     let rows = [0, 4, 8].map(|i| DVec3::new(p[i], p[i + 1], p[i + 2]));
     let [a, b, c] = rows.map(DVec3::normalize_or_zero);
-    if a.dot(b.cross(c)).abs() < LEAST_SPAN {
+    if a.dot(b.cross(c)).abs() < MIN_SPAN {
         return None;
     }
     let matrix = DMat3::from_cols(rows[0], rows[1], rows[2]).transpose();
@@ -218,7 +218,7 @@ fn scaled_to_depth(to_view: DAffine3) -> DAffine3 {
 }
 
 /// Returns the two of `side` pixels whose centres surround `at`, clamped at the borders, with their linear weights.
-fn between(at: f64, side: u32) -> [(usize, f32); 2] {
+fn linear_weights(at: f64, side: u32) -> [(usize, f32); 2] {
     let at = at.clamp(0.0, f64::from(side - 1));
     let low = at as usize;
     let share = (at - at.floor()) as f32;
@@ -282,7 +282,7 @@ mod tests {
         let scaled = DAffine3::from_mat3_translation(turn * 0.01, DVec3::new(7.0, 8.0, 9.0));
         let mirrored = DAffine3::from_scale(DVec3::new(-2.0, 2.0, 2.0));
         for (map, size) in [(scaled, 0.01), (mirrored, 2.0)] {
-            let (before, after) = (camera(AHEAD), camera(AHEAD).moved(&map));
+            let (before, after) = (camera(AHEAD), camera(AHEAD).transformed(&map));
             assert!((map.transform_point3(before.centre()) - after.centre()).length() < 1e-9);
             for p in [DVec3::new(1.2, 2.3, 0.4), DVec3::new(0.0, 3.0, 4.0)] {
                 let Projected { x, y, depth } = before.project(p).unwrap();

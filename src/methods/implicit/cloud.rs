@@ -19,7 +19,7 @@ pub struct Cloud {
 }
 
 /// Minimum number of distinct points: fewer span no volume.
-pub const LEAST_POINTS: usize = 4;
+pub const MIN_POINTS: usize = 4;
 /// Ratio of thickness to length up to which a cloud counts as flat.
 const FLAT: f64 = 1e-6;
 
@@ -64,7 +64,7 @@ impl Cloud {
     }
 
     /// Returns the points with the given indices, in that order, with their attributes.
-    pub fn gathered(&self, indices: &[u32]) -> Self {
+    pub fn select(&self, indices: &[u32]) -> Self {
         fn gather<T: Copy>(all: &[T], indices: &[u32]) -> Vec<T> {
             indices.iter().map(|&i| all[i as usize]).collect()
         }
@@ -83,7 +83,7 @@ impl Cloud {
         order.sort_unstable();
         let mut first: Vec<u32> = order.chunk_by(|a, b| a.0 == b.0).map(|same| same[0].1).collect();
         first.sort_unstable();
-        if first.len() == self.len() { self.clone() } else { self.gathered(&first) }
+        if first.len() == self.len() { self.clone() } else { self.select(&first) }
     }
 
     /// Checks that there are enough points.
@@ -91,10 +91,10 @@ impl Cloud {
     /// # Errors
     /// [`MethodError::InvalidArgument`] for fewer than four.
     pub fn check_count(&self) -> Result<(), MethodError> {
-        if self.len() >= LEAST_POINTS {
+        if self.len() >= MIN_POINTS {
             return Ok(());
         }
-        let problem = format!("{} different ones; at least {LEAST_POINTS} are needed", self.len());
+        let problem = format!("{} different ones; at least {MIN_POINTS} are needed", self.len());
         Err(MethodError::invalid("points", problem))
     }
 
@@ -121,17 +121,17 @@ impl Cloud {
 }
 
 /// Maximum number of points in a system: their matrix takes about 2 GB.
-pub const MOST_POINTS: usize = 100_000;
+pub const MAX_POINTS: usize = 100_000;
 
 /// Checks that `count` points are not too many for a system.
 ///
 /// # Errors
 /// [`MethodError::InvalidArgument`] with both numbers.
-pub fn check_number(name: &'static str, count: usize) -> Result<(), MethodError> {
-    if count <= MOST_POINTS {
+pub fn check_max_count(name: &'static str, count: usize) -> Result<(), MethodError> {
+    if count <= MAX_POINTS {
         return Ok(());
     }
-    Err(MethodError::invalid(name, format!("{count} points; at most {MOST_POINTS} are accepted")))
+    Err(MethodError::invalid(name, format!("{count} points; at most {MAX_POINTS} are accepted")))
 }
 
 /// Checks that all values are finite.
@@ -149,12 +149,12 @@ pub fn check_finite(name: &'static str, values: &[Vec3]) -> Result<(), MethodErr
 }
 
 /// Smallest accepted size of a cloud, the longest side of its bounding box in world units; limited by single precision.
-const LEAST_SIZE: f64 = 1e-27;
+const MIN_SIZE: f64 = 1e-27;
 /// Largest accepted size of a cloud, the longest side of its bounding box in world units; limited by single precision.
-const MOST_SIZE: f64 = 1e38;
+const MAX_SIZE: f64 = 1e38;
 /// Maximum distance of the points from the origin, in longest sides of their bounding box: a cell of 1/30 of a side is
 /// still as exact as needed there.
-const MOST_AWAY: f64 = 240.0;
+const MAX_SIZES_FROM_ORIGIN: f64 = 240.0;
 
 /// Uniform map from world units (those of the input points) into the normalised box, whose longest side is 2, and back.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -173,7 +173,7 @@ impl BoxMap {
     }
 
     /// Returns an upper bound of the distance of the box from the world's origin, along each axis, in world units.
-    pub fn reach(&self) -> f64 {
+    pub fn max_coordinate(&self) -> f64 {
         self.centre.abs().max_element() + 1.0 / self.scale
     }
 
@@ -181,25 +181,23 @@ impl BoxMap {
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for points too small or too large, or too far from the origin for their size.
-    pub fn check_place(&self) -> Result<(), MethodError> {
+    pub fn check_precision(&self) -> Result<(), MethodError> {
         let size = 2.0 / self.scale;
-        let largest = self.reach() + size;
+        let largest = self.max_coordinate() + size;
         let bad = |problem| Err(MethodError::invalid("points", problem));
-        if !(LEAST_SIZE..=MOST_SIZE).contains(&size) {
-            return bad(format!(
-                "their longest side is {size:e}; {LEAST_SIZE:e} to {MOST_SIZE:e} is accepted"
-            ));
+        if !(MIN_SIZE..=MAX_SIZE).contains(&size) {
+            return bad(format!("their longest side is {size:e}; {MIN_SIZE:e} to {MAX_SIZE:e} is accepted"));
         }
-        let away = self.reach() / size;
+        let away = self.max_coordinate() / size;
         if largest > f64::from(f32::MAX) {
             return bad(format!("they reach to {largest:e} with some room, beyond single precision"));
         }
-        if away <= MOST_AWAY {
+        if away <= MAX_SIZES_FROM_ORIGIN {
             return Ok(());
         }
         bad(format!(
             "they lie {away:.0} times their size from the origin, where single precision has too few digits left; \
-             {MOST_AWAY} times is accepted: move them nearer"
+             {MAX_SIZES_FROM_ORIGIN} times is accepted: move them nearer"
         ))
     }
 

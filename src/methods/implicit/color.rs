@@ -8,7 +8,7 @@
 //! A depth buffer for each camera decides visibility. At silhouettes, where the image may show the background, a camera
 //! has hardly any weight. Vertices that no camera sees are filled in from their neighbours.
 
-use super::camera::{Camera, Mix, Projected};
+use super::camera::{Camera, ColorMean, Projected};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::TriangleMesh;
 use std::borrow::Cow;
@@ -25,13 +25,13 @@ const GRAZING: f64 = 0.1;
 /// Width of a silhouette, in pixels of the image. The surface is never exact, and where it is slightly too large the
 /// image shows the background: on a painted ball too large by half a pixel, colours are off by 0.14 with a width of 0
 /// and by 0.01 with 3. With 4, small parts in small images are nothing but silhouette, and it is 0.07.
-const RIM_WIDTH: f64 = 3.0;
+const SILHOUETTE_WIDTH: f64 = 3.0;
 
 /// Factor of the weight of a view at a silhouette: it matters only where no camera has a better view.
-const RIM: f32 = 0.01;
+const SILHOUETTE_WEIGHT: f32 = 0.01;
 
 /// Margin of a triangle's pixel bounds against rounding, in pixels; without it, single pixels on edges are missed.
-const BORDER: f64 = 1e-6;
+const PIXEL_MARGIN: f64 = 1e-6;
 
 /// Returns the colour of each vertex, red, green and blue in 0..1, from all cameras that have an image; `None` if they
 /// see nothing of the surface. See [`Coloring`] for the requirements on the surface.
@@ -47,13 +47,13 @@ pub fn colors(surface: &TriangleMesh, cameras: &[Camera]) -> Option<Vec<Vec3>> {
 /// no normals, those of [`TriangleMesh::vertex_normals`] are computed for each camera.
 #[derive(Clone, Debug)]
 pub struct Coloring {
-    gathered: Vec<Gathered>,
+    gathered: Vec<WeightedColor>,
     depths: DepthBuffer,
 }
 
 /// The accumulated colour of a vertex.
 #[derive(Clone, Copy, Debug, Default)]
-struct Gathered {
+struct WeightedColor {
     /// Sum of the colours, each times its weight.
     color: Vec3,
     weight: f32,
@@ -62,7 +62,7 @@ struct Gathered {
 impl Coloring {
     /// Creates an accumulator without colours, for a surface of `vertices` vertices.
     pub fn new(vertices: usize) -> Self {
-        Self { gathered: vec![Gathered::default(); vertices], depths: DepthBuffer::default() }
+        Self { gathered: vec![WeightedColor::default(); vertices], depths: DepthBuffer::default() }
     }
 
     /// Adds the colours that `camera` sees of the surface; none if it has no image.
@@ -76,7 +76,7 @@ impl Coloring {
             None => Cow::Owned(surface.vertex_normals()),
         };
         for ((gathered, p), normal) in self.gathered.iter_mut().zip(&surface.positions).zip(normals.iter()) {
-            if let Some((color, weight)) = self.depths.look(camera, p.as_dvec3(), normal.as_dvec3()) {
+            if let Some((color, weight)) = self.depths.sample_view(camera, p.as_dvec3(), normal.as_dvec3()) {
                 gathered.color += color * weight;
                 gathered.weight += weight;
             }
@@ -84,7 +84,7 @@ impl Coloring {
     }
 
     /// Adds one weighted colour to a vertex, for example that of a nearby point.
-    pub fn gather(&mut self, vertex: usize, color: Vec3, weight: f32) {
+    pub fn add_color(&mut self, vertex: usize, color: Vec3, weight: f32) {
         self.gathered[vertex].color += color * weight;
         self.gathered[vertex].weight += weight;
     }
@@ -98,10 +98,10 @@ impl Coloring {
     /// neighbours, ring by ring outwards from the seen ones; connected components of which nothing is seen take the
     /// mean of all seen vertices. `None` if no vertex is seen.
     pub fn finish(self, surface: &TriangleMesh) -> Option<Vec<Vec3>> {
-        let mean = |g: &Gathered| (g.weight > 0.0).then(|| g.color / g.weight);
+        let mean = |g: &WeightedColor| (g.weight > 0.0).then(|| g.color / g.weight);
         let mut colors: Vec<Option<Vec3>> = self.gathered.iter().map(mean).collect();
         let overall = mean_of(colors.iter().flatten().copied())?;
-        spread(&mut colors, &Neighbours::of(surface));
+        fill_unseen(&mut colors, &Neighbours::of(surface));
         Some(colors.into_iter().map(|color| color.unwrap_or(overall)).collect())
     }
 }
@@ -114,7 +114,7 @@ fn mean_of(colors: impl Iterator<Item = Vec3>) -> Option<Vec3> {
 
 /// Fills in vertices without a colour that are connected to coloured ones, ring by ring, with the mean of their
 /// neighbours.
-fn spread(colors: &mut [Option<Vec3>], neighbours: &Neighbours) {
+fn fill_unseen(colors: &mut [Option<Vec3>], neighbours: &Neighbours) {
     let mut front: Vec<usize> = (0..colors.len()).filter(|&v| colors[v].is_some()).collect();
     while !front.is_empty() {
         let around = front.iter().flat_map(|&v| neighbours.around(v));
@@ -169,7 +169,7 @@ struct DepthBuffer {
     scale: f64,
     /// 1/depth at the centres of the pixels, row by row: unlike depth, it is linear over a triangle in the image. 0
     /// where there is no surface.
-    nearness: Vec<f32>,
+    inverse_depth: Vec<f32>,
     /// The vertices as (x·depth, y·depth, depth), with x and y in buffer pixels.
     view: Vec<DVec3>,
 }
@@ -181,8 +181,8 @@ impl DepthBuffer {
         self.scale = (f64::from(LARGEST_BUFFER) / f64::from(width.max(height))).min(1.0);
         [self.width, self.height] =
             [width, height].map(|side| (f64::from(side) * self.scale).ceil() as usize);
-        self.nearness.clear();
-        self.nearness.resize(self.width * self.height, 0.0);
+        self.inverse_depth.clear();
+        self.inverse_depth.resize(self.width * self.height, 0.0);
         let mut view = std::mem::take(&mut self.view);
         view.clear();
         view.extend(surface.positions.iter().map(|p| {
@@ -211,23 +211,23 @@ impl DepthBuffer {
         }
         let factors = [b.cross(c), c.cross(a), a.cross(b)].map(|edge| edge * volume.signum());
         let sum = (factors[0] + factors[1] + factors[2]) / volume.abs();
-        let (columns, rows) = self.reach(corners);
+        let (columns, rows) = self.pixel_bounds(corners);
         let limits = nearness_limits(corners);
         for row in rows {
             for column in columns.clone() {
                 let pixel = DVec3::new(column as f64, row as f64, 1.0);
                 // Triangles that share an edge leave no gap: on it, their factors are exact opposites.
                 if factors.iter().all(|factor| factor.dot(pixel) >= 0.0) {
-                    let nearness = sum.dot(pixel).max(limits.start).min(limits.end) as f32;
-                    let there = &mut self.nearness[row * self.width + column];
-                    *there = there.max(nearness);
+                    let inverse_depth = sum.dot(pixel).max(limits.start).min(limits.end) as f32;
+                    let there = &mut self.inverse_depth[row * self.width + column];
+                    *there = there.max(inverse_depth);
                 }
             }
         }
     }
 
     /// Returns the columns and rows that the part of a triangle in front of the camera can cover.
-    fn reach(&self, corners: [DVec3; 3]) -> (Range<usize>, Range<usize>) {
+    fn pixel_bounds(&self, corners: [DVec3; 3]) -> (Range<usize>, Range<usize>) {
         // Near plane, relative to the deepest corner: the image of an edge through the camera's plane is unbounded.
         let near = 1e-6 * corners.iter().fold(0.0, |deepest: f64, p| deepest.max(p.z));
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -245,18 +245,19 @@ impl DepthBuffer {
         }
         // Casts from float saturate: negative values become 0.
         let pixels = |low: f64, high: f64, count: usize| {
-            (low - BORDER).ceil() as usize..((high + BORDER).floor() + 1.0).min(count as f64) as usize
+            (low - PIXEL_MARGIN).ceil() as usize
+                ..((high + PIXEL_MARGIN).floor() + 1.0).min(count as f64) as usize
         };
         (pixels(low.x, high.x, self.width), pixels(low.y, high.y, self.height))
     }
 
     /// Returns the colour of a surface point in the camera's image, and its weight: the cosine between normal and
-    /// direction to the camera, times alpha, at a silhouette times [`RIM`]. `None` if the camera does not see the
+    /// direction to the camera, times alpha, at a silhouette times [`SILHOUETTE_WEIGHT`]. `None` if the camera does not see the
     /// point.
     ///
     /// Only those of the four surrounding pixels that show the surface near the point are blended. If one shows
     /// something nearer, the point counts as hidden.
-    fn look(&self, camera: &Camera, p: DVec3, normal: DVec3) -> Option<(Vec3, f32)> {
+    fn sample_view(&self, camera: &Camera, p: DVec3, normal: DVec3) -> Option<(Vec3, f32)> {
         let to_camera = camera.centre() - p;
         let distance = to_camera.length();
         let cosine = normal.dot(to_camera) / distance;
@@ -265,41 +266,41 @@ impl DepthBuffer {
         }
         let at = camera.project(p)?;
         let slope = normal / (cosine.max(GRAZING) * distance);
-        let margin = self.margin(camera, at.depth, slope);
-        let mut mix = Mix::default();
-        for (pixel, share) in camera.around(at.x, at.y)? {
+        let tolerance = self.depth_tolerance(camera, at.depth, slope);
+        let mut mix = ColorMean::default();
+        for (pixel, share) in camera.bilinear_pixels(at.x, at.y)? {
             let [nearest, farthest] = self.depths_at(pixel);
-            if nearest < at.depth - margin {
+            if nearest < at.depth - tolerance {
                 return None;
             }
-            if farthest <= at.depth + margin {
+            if farthest <= at.depth + tolerance {
                 mix.add(camera.pixel(pixel)?, share);
             }
         }
         let (color, alpha) = mix.color()?;
-        let worth = if self.on_rim(camera, at, margin) { RIM } else { 1.0 };
+        let worth = if self.at_silhouette(camera, at, tolerance) { SILHOUETTE_WEIGHT } else { 1.0 };
         Some((color, cosine as f32 * alpha * worth))
     }
 
-    /// Returns whether a surface point is at a silhouette: something farther away, or nothing, is [`RIM_WIDTH`] pixels
+    /// Returns whether a surface point is at a silhouette: something farther away, or nothing, is [`SILHOUETTE_WIDTH`] pixels
     /// beside it in the image.
-    fn on_rim(&self, camera: &Camera, at: Projected, margin: f64) -> bool {
+    fn at_silhouette(&self, camera: &Camera, at: Projected, tolerance: f64) -> bool {
         let [width, height] = camera.size().map(|side| side as usize);
-        let beyond = at.depth + (RIM_WIDTH + 1.0) * margin;
-        [(-RIM_WIDTH, 0.0), (RIM_WIDTH, 0.0), (0.0, -RIM_WIDTH), (0.0, RIM_WIDTH)].into_iter().any(
-            |(x, y)| {
+        let beyond = at.depth + (SILHOUETTE_WIDTH + 1.0) * tolerance;
+        [(-SILHOUETTE_WIDTH, 0.0), (SILHOUETTE_WIDTH, 0.0), (0.0, -SILHOUETTE_WIDTH), (0.0, SILHOUETTE_WIDTH)]
+            .into_iter()
+            .any(|(x, y)| {
                 let [column, row] = [at.x + x, at.y + y].map(|at| at.round() as usize);
                 let [_, farthest] = self.depths_at([column.min(width - 1), row.min(height - 1)]);
                 farthest > beyond
-            },
-        )
+            })
     }
 
     /// Returns the depth tolerance of the visibility test: a bound on the difference between a surface point at `depth`
     /// and the buffer in the pixels around it. It is the change of depth in the tangent plane, plus the distance
     /// spanned by these pixels for deviations from that plane. `slope` is the normal divided by its dot product with
     /// the vector to the camera.
-    fn margin(&self, camera: &Camera, depth: f64, slope: DVec3) -> f64 {
+    fn depth_tolerance(&self, camera: &Camera, depth: f64, slope: DVec3) -> f64 {
         // One image pixel along each axis, and one buffer pixel more if those are larger.
         let pixels = if self.scale < 1.0 { 1.0 + 1.0 / self.scale } else { 1.0 };
         let change = |axis: DVec3| depth * slope.dot(axis).abs() + 0.5 * axis.length();
@@ -313,12 +314,12 @@ impl DepthBuffer {
         let (mut nearest, mut farthest) = (0.0, f32::INFINITY);
         for row in [row.floor(), row.ceil()].map(|row| (row as usize).min(self.height - 1)) {
             for column in [column.floor(), column.ceil()].map(|at| (at as usize).min(self.width - 1)) {
-                let nearness = self.nearness[row * self.width + column];
-                nearest = nearness.max(nearest);
-                farthest = nearness.min(farthest);
+                let inverse_depth = self.inverse_depth[row * self.width + column];
+                nearest = inverse_depth.max(nearest);
+                farthest = inverse_depth.min(farthest);
             }
         }
-        [nearest, farthest].map(|nearness| f64::from(nearness).recip())
+        [nearest, farthest].map(|inverse_depth| f64::from(inverse_depth).recip())
     }
 }
 

@@ -1,16 +1,16 @@
 //! Manual edits of the input: points added, removed, and marked as outside.
 
-use super::cloud::{BoxMap, Cloud, check_finite, check_number};
+use super::cloud::{BoxMap, Cloud, check_finite, check_max_count};
 use super::exterior::Exterior;
 use super::sampling::Samples;
-use super::solve::{ByPlace, Constraints};
+use super::solve::{Constraints, PositionIndex};
 use crate::math::Vec3;
 use crate::methods::MethodError;
 use serde::{Deserialize, Serialize};
 
 /// Manual edits of an implicit surface, as differences from its input points.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Edits {
+pub struct PointEdits {
     /// Additional points near the surface, in world units.
     pub added: Vec<Vec3>,
     /// Indices of input points to leave out; points at the same position are left out, too. If only a sample of the
@@ -22,18 +22,20 @@ pub struct Edits {
 
 /// Maximum distance, along each axis, of added points from the centre of the input points' bounding box, in half its
 /// longest side.
-pub const REACH: f32 = 3.0;
+pub const MAX_ADDED_DISTANCE: f32 = 3.0;
 
-impl Edits {
+impl PointEdits {
     /// Checks the edits against the input points: numbers of points, finite coordinates, distances and indices.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the list, the entry and what is accepted.
     pub fn validate(&self, original: &[Vec3], map: &BoxMap) -> Result<(), MethodError> {
         for (name, points) in [("added", &self.added), ("outside", &self.outside)] {
-            check_number(name, points.len())?;
+            check_max_count(name, points.len())?;
             check_finite(name, points)?;
-            if let Some(i) = points.iter().position(|&p| map.in_box(p).abs().max_element() > REACH) {
+            if let Some(i) =
+                points.iter().position(|&p| map.in_box(p).abs().max_element() > MAX_ADDED_DISTANCE)
+            {
                 let problem =
                     format!("point {i} is {}, more than the size of the others away from them", points[i]);
                 return Err(MethodError::invalid(name, problem));
@@ -53,7 +55,7 @@ impl Edits {
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the first point that does.
     pub fn check_outside(&self, surface: &Cloud, map: &BoxMap) -> Result<(), MethodError> {
-        let known = ByPlace::new(&surface.points);
+        let known = PositionIndex::new(&surface.points);
         match self.outside.iter().position(|&p| known.find(map.in_box(p)).is_some()) {
             Some(i) => {
                 let problem = format!("point {i} is {}, where a point of the surface is", self.outside[i]);
@@ -64,32 +66,32 @@ impl Edits {
     }
 
     /// Returns a lookup of the removed points by their positions in the box.
-    pub fn removed_places(&self, original: &[Vec3], map: &BoxMap) -> ByPlace {
+    pub fn removed_positions(&self, original: &[Vec3], map: &BoxMap) -> PositionIndex {
         let places: Vec<Vec3> = self.removed.iter().map(|&i| map.in_box(original[i as usize])).collect();
-        ByPlace::new(&places)
+        PositionIndex::new(&places)
     }
 
     /// Returns `cloud`, which is in the box, without the removed points and with the added ones. As added points have
     /// no normals or colours, the result has neither; their confidence is 1.
-    pub fn applied(&self, cloud: &Cloud, original: &[Vec3], map: &BoxMap) -> Cloud {
-        let left = self.left(cloud, original, map);
+    pub fn apply_to(&self, cloud: &Cloud, original: &[Vec3], map: &BoxMap) -> Cloud {
+        let remaining = self.without_removed(cloud, original, map);
         let added = self.added.iter().map(|&p| map.in_box(p));
-        let points: Vec<Vec3> = left.points.iter().copied().chain(added).collect();
-        let confidence = left.confidence.map(|mut sure| {
-            sure.resize(points.len(), 1.0);
-            sure
+        let points: Vec<Vec3> = remaining.points.iter().copied().chain(added).collect();
+        let confidence = remaining.confidence.map(|mut confidence| {
+            confidence.resize(points.len(), 1.0);
+            confidence
         });
         Cloud { points, confidence, ..Cloud::default() }.distinct()
     }
 
     /// Returns `cloud`, which is in the box, without the removed points.
-    pub fn left(&self, cloud: &Cloud, original: &[Vec3], map: &BoxMap) -> Cloud {
+    pub fn without_removed(&self, cloud: &Cloud, original: &[Vec3], map: &BoxMap) -> Cloud {
         if self.removed.is_empty() {
             return cloud.clone();
         }
-        let removed = self.removed_places(original, map);
+        let removed = self.removed_positions(original, map);
         let stays = |i: &u32| removed.find(cloud.points[*i as usize]).is_none();
-        cloud.gathered(&(0..cloud.len() as u32).filter(stays).collect::<Vec<u32>>())
+        cloud.select(&(0..cloud.len() as u32).filter(stays).collect::<Vec<u32>>())
     }
 
     /// Builds the constraints from the sampled points, the exterior points and these edits.
@@ -103,13 +105,14 @@ impl Edits {
         original: &[Vec3],
         map: &BoxMap,
     ) -> Result<Constraints, MethodError> {
-        let surface = self.applied(&samples.cloud, original, map);
+        let surface = self.apply_to(&samples.cloud, original, map);
         surface.check_count()?;
         surface.check_span()?;
         let all_in_box = |all: &[Vec3]| all.iter().map(|&p| map.in_box(p)).collect::<Vec<Vec3>>();
-        let mut outside: Vec<Vec3> = exterior.beside(&surface.points, &all_in_box(&self.added)).collect();
+        let mut outside: Vec<Vec3> =
+            exterior.valid_after_edits(&surface.points, &all_in_box(&self.added)).collect();
         outside.extend(all_in_box(&self.outside));
-        outside.extend(&exterior.around);
+        outside.extend(&exterior.on_sphere);
         let outside = Cloud { points: outside, ..Cloud::default() }.distinct().points;
         let constraints = Constraints::new(&surface, &outside);
         match constraints.shared_centre() {

@@ -8,7 +8,7 @@ use crate::math::{Bounds, DVec3, Vec3};
 use crate::spatial::PointGrid;
 
 /// Number of exterior points on the bounding sphere, which are always added.
-const ON_SPHERE: usize = 16;
+const SPHERE_POINTS: usize = 16;
 /// Radius of the bounding sphere, in half diagonals of the points' bounding box: near enough to confine the surface,
 /// and outside of it where it bulges between points.
 const SPHERE: f64 = 1.2;
@@ -22,10 +22,10 @@ const OFFSET: f32 = 3.0;
 /// Minimum distance of exterior points from the surface, in standard deviations of the noise.
 const NOISE: f32 = 4.0;
 /// Minimum distance of exterior points from the surface, in box units: dense clouds are not less noisy.
-const LEAST_OFFSET: f32 = 0.04;
+const MIN_OFFSET: f32 = 0.04;
 /// Minimum distance of an exterior point from all surface points, as a share of the distance at which it was made: a
 /// nearer one may be inside.
-const CLEAR: f32 = 0.8;
+const MIN_CLEARANCE: f32 = 0.8;
 
 /// The points that become exterior constraints, in box units.
 #[derive(Clone, Debug)]
@@ -35,29 +35,34 @@ pub struct Exterior {
     /// Distance from the surface at which `near` was made; 0 if it was given.
     pub offset: f32,
     /// Points on the bounding sphere.
-    pub around: Vec<Vec3>,
+    pub on_sphere: Vec<Vec3>,
 }
 
 impl Exterior {
     /// Returns those of [`Self::near`] that remain valid after edits: not too near to a point of `added`, and with a
     /// point left in `surface`, the edited points, from which they may have been made. Given ones are all kept.
-    pub fn beside<'a>(&'a self, surface: &'a [Vec3], added: &'a [Vec3]) -> impl Iterator<Item = Vec3> + 'a {
+    pub fn valid_after_edits<'a>(
+        &'a self,
+        surface: &'a [Vec3],
+        added: &'a [Vec3],
+    ) -> impl Iterator<Item = Vec3> + 'a {
         let cell = if self.offset > 0.0 { self.offset } else { 1.0 };
         let [surface, added] = [surface, added].map(|points| PointGrid::of(points, cell));
         self.near.iter().copied().filter(move |&p| {
             self.offset == 0.0
-                || surface.has_within(p, LOST * self.offset) && !added.has_within(p, CLEAR * self.offset)
+                || surface.has_within(p, MAX_OFFSETS * self.offset)
+                    && !added.has_within(p, MIN_CLEARANCE * self.offset)
         })
     }
 }
 
 /// Exterior points farther than this many offsets from all surface points are dropped: those they were made from were
 /// removed.
-const LOST: f32 = 1.25;
+const MAX_OFFSETS: f32 = 1.25;
 
 /// Returns `given` exterior points, in box units, with those on the bounding sphere.
 pub fn given_exterior(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
-    Exterior { near: given, offset: 0.0, around: sphere_around(&cloud.points) }
+    Exterior { near: given, offset: 0.0, on_sphere: sphere_around(&cloud.points) }
 }
 
 /// Makes exterior points for the surface points `cloud`, of mean distance `spacing`.
@@ -67,46 +72,53 @@ pub fn given_exterior(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
 pub fn made_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: u64) -> Exterior {
     let wanted = (cloud.len() / SURFACE_POINTS).max(LEAST);
     // A few more than wanted, as some will be rejected.
-    let places = wanted + wanted / 4;
-    let ways = ways_out(cloud, cameras, places, spacing, seed);
-    let offset = [OFFSET * spacing, NOISE * ways.noise, LEAST_OFFSET].into_iter().fold(0.0, f32::max);
+    let positions = wanted + wanted / 4;
+    let directions = outward_directions(cloud, cameras, positions, spacing, seed);
+    let offset = [OFFSET * spacing, NOISE * directions.noise, MIN_OFFSET].into_iter().fold(0.0, f32::max);
     let surface = PointGrid::of(&cloud.points, offset);
-    let candidates = ways.directions.iter().map(|&(i, way)| cloud.points[i as usize] + way * offset);
-    let outside: Vec<Vec3> = candidates.filter(|&p| !surface.has_within(p, CLEAR * offset)).collect();
+    let candidates =
+        directions.directions.iter().map(|&(i, direction)| cloud.points[i as usize] + direction * offset);
+    let outside: Vec<Vec3> = candidates.filter(|&p| !surface.has_within(p, MIN_CLEARANCE * offset)).collect();
     let kept = subsampled(&outside, wanted, seed).into_iter().map(|i| outside[i as usize]);
-    Exterior { near: kept.collect(), offset, around: sphere_around(&cloud.points) }
+    Exterior { near: kept.collect(), offset, on_sphere: sphere_around(&cloud.points) }
 }
 
 /// Directions that lead outwards from surface points.
-struct Ways {
+struct OutwardDirections {
     /// Indices of points, each with a direction; a point may have several, or none.
     directions: Vec<(u32, Vec3)>,
     noise: f32,
 }
 
-/// Returns outward directions at no more than `places` surface points.
-fn ways_out(cloud: &Cloud, cameras: &[Camera], places: usize, spacing: f32, seed: u64) -> Ways {
+/// Returns outward directions at no more than `positions` surface points.
+fn outward_directions(
+    cloud: &Cloud,
+    cameras: &[Camera],
+    positions: usize,
+    spacing: f32,
+    seed: u64,
+) -> OutwardDirections {
     let (oriented, normals) = match &cloud.normals {
         Some(given) => {
-            let at = subsampled(&cloud.points, places, seed);
+            let at = subsampled(&cloud.points, positions, seed);
             let directions = at.iter().map(|&i| given[i as usize].normalize_or_zero()).collect();
             (at, Normals { directions, noise: 0.0 })
         }
         None => {
-            let at = subsampled(&cloud.points, if places > ORIENTED { places } else { ORIENTED }, seed);
+            let at = subsampled(&cloud.points, if positions > ORIENTED { positions } else { ORIENTED }, seed);
             let normals = estimated_normals(&cloud.points, &at, spacing);
             (at, normals)
         }
     };
     let points: Vec<Vec3> = oriented.iter().map(|&i| cloud.points[i as usize]).collect();
-    let chosen = subsampled(&points, places, seed).into_iter().map(|k| k as usize);
+    let chosen = subsampled(&points, positions, seed).into_iter().map(|k| k as usize);
     let with_normals = chosen.map(|k| (oriented[k], normals.directions[k]));
     let directions = if cameras.is_empty() {
         with_normals.collect()
     } else {
         towards_cameras(&cloud.points, cameras, with_normals, spacing)
     };
-    Ways { directions, noise: normals.noise }
+    OutwardDirections { directions, noise: normals.noise }
 }
 
 /// Minimum number of points whose normals are estimated: with fewer, neighbours on thin parts lie on different sides.
@@ -119,19 +131,21 @@ const ORIENTED: usize = 3000;
 fn towards_cameras(
     points: &[Vec3],
     cameras: &[Camera],
-    places: impl Iterator<Item = (u32, Vec3)>,
+    positions: impl Iterator<Item = (u32, Vec3)>,
     spacing: f32,
 ) -> Vec<(u32, Vec3)> {
-    let voxels = Voxels::new(points, VOXEL * spacing);
+    let occupancy = OccupancyGrid::new(points, VOXEL * spacing);
     let centres: Vec<Vec3> = cameras.iter().map(|camera| camera.centre().as_vec3()).collect();
-    let mut ways = Vec::new();
-    for (i, normal) in places {
+    let mut directions = Vec::new();
+    for (i, normal) in positions {
         let p = points[i as usize];
         let all = centres.iter().map(|&centre| (centre, (centre - p).normalize_or_zero()));
-        let seen = all.filter(|&(centre, way)| way.dot(normal) > GRAZING && voxels.is_free(p, centre));
-        ways.extend(seen.map(|(_, way)| (i, way)));
+        let seen = all.filter(|&(centre, direction)| {
+            direction.dot(normal) > GRAZING && occupancy.is_unoccluded(p, centre)
+        });
+        directions.extend(seen.map(|(_, direction)| (i, direction)));
     }
-    ways
+    directions
 }
 
 /// Cosine between normal and direction to a camera below which the view is too oblique to tell the outer side.
@@ -144,45 +158,45 @@ fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
     let radius = 0.5 * SPHERE * max.distance(min);
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let place = |i: usize| {
-        let z = 1.0 - (2 * i + 1) as f64 / ON_SPHERE as f64;
+        let z = 1.0 - (2 * i + 1) as f64 / SPHERE_POINTS as f64;
         let (across, angle) = ((1.0 - z * z).sqrt(), golden * i as f64);
         let unit = DVec3::new(across * libm::cos(angle), across * libm::sin(angle), z);
         (0.5 * (min + max) + unit * radius).as_vec3()
     };
-    (0..ON_SPHERE).map(place).collect()
+    (0..SPHERE_POINTS).map(place).collect()
 }
 
 /// Edge length of an occlusion voxel, in mean spacings: with 1.5 rays pass through the gaps of stereo data, with 6 legs
 /// merge.
 const VOXEL: f32 = 3.5;
 /// Length, in voxels, of the start of a ray that is not tested for occlusion: the neighbourhood of its own point.
-const OWN: f32 = 1.5;
+const UNTESTED_VOXELS: f32 = 1.5;
 /// Maximum number of occlusion voxels along an axis.
-const MOST_VOXELS: f32 = 256.0;
+const MAX_VOXELS: f32 = 256.0;
 
 /// Voxels that contain points, to decide whether a camera sees a point.
-struct Voxels {
+struct OccupancyGrid {
     origin: Vec3,
     edge: f32,
     dims: [usize; 3],
     occupied: Vec<bool>,
 }
 
-impl Voxels {
+impl OccupancyGrid {
     fn new(points: &[Vec3], edge: f32) -> Self {
         let bounds = Bounds::of(points);
         let size = bounds.max - bounds.min;
-        let least = size.max_element() / MOST_VOXELS;
+        let least = size.max_element() / MAX_VOXELS;
         let edge = if edge > least { edge } else { least };
         let dims = size.to_array().map(|side| (side / edge) as usize + 1);
-        let mut voxels =
+        let mut occupancy =
             Self { origin: bounds.min, edge, dims, occupied: vec![false; dims.iter().product()] };
         for &p in points {
-            if let Some(at) = voxels.index(p) {
-                voxels.occupied[at] = true;
+            if let Some(at) = occupancy.index(p) {
+                occupancy.occupied[at] = true;
             }
         }
-        voxels
+        occupancy
     }
 
     fn index(&self, p: Vec3) -> Option<usize> {
@@ -194,12 +208,12 @@ impl Voxels {
     }
 
     /// Returns whether the segment from `p` to `camera` crosses no voxel with points, beyond the neighbourhood of `p`.
-    fn is_free(&self, p: Vec3, camera: Vec3) -> bool {
+    fn is_unoccluded(&self, p: Vec3, camera: Vec3) -> bool {
         let length = p.distance(camera);
         let step = (camera - p) / length * (0.5 * self.edge);
-        let mut at = p + step * (2.0 * OWN);
-        let steps = 2.0 * (length / self.edge - OWN);
-        let most = 4.0 * MOST_VOXELS;
+        let mut at = p + step * (2.0 * UNTESTED_VOXELS);
+        let steps = 2.0 * (length / self.edge - UNTESTED_VOXELS);
+        let most = 4.0 * MAX_VOXELS;
         for _ in 0..(if steps < most { steps } else { most }) as usize {
             if self.index(at).is_some_and(|i| self.occupied[i]) {
                 return false;
@@ -252,17 +266,17 @@ mod tests {
         let known = torus(2000);
         let unknown = Cloud { normals: None, ..known.clone() };
         let spacing = mean_spacing(&known.points) as f32;
-        let around: Vec<Camera> =
+        let cameras: Vec<Camera> =
             [DVec3::X, DVec3::Z, -DVec3::X, -DVec3::Z, DVec3::new(0.3, 1.0, 0.0), DVec3::new(0.3, -1.0, 0.0)]
                 .map(|d| camera(d * 6.0))
                 .to_vec();
         for (name, cloud, cameras) in [
             ("normals", &known, &[][..]),
-            ("cameras", &unknown, &around),
-            ("both", &known, &around),
+            ("cameras", &unknown, &cameras),
+            ("both", &known, &cameras),
             ("none", &unknown, &[]),
         ] {
-            let Exterior { near, offset, around } = made_exterior(cloud, cameras, spacing, 1);
+            let Exterior { near, offset, on_sphere } = made_exterior(cloud, cameras, spacing, 1);
             println!(
                 "{name}: {} points, nearest {}",
                 near.len(),
@@ -272,13 +286,13 @@ mod tests {
             for &p in &near {
                 assert!(distance(p) > 0.02 && distance(p) < 0.3, "{name}: {p} is {} outside", distance(p));
             }
-            assert!(around.len() == ON_SPHERE && around.iter().all(|p| p.length() > 1.05));
+            assert!(on_sphere.len() == SPHERE_POINTS && on_sphere.iter().all(|p| p.length() > 1.05));
             let again = made_exterior(cloud, cameras, spacing, 1);
-            assert_eq!((&near, &around, offset), (&again.near, &again.around, again.offset));
+            assert_eq!((&near, &on_sphere, offset), (&again.near, &again.on_sphere, again.offset));
             // Each is kept with the points it was made from, and dropped if a surface point is added in its position.
-            assert_eq!(again.beside(&cloud.points, &[]).count(), near.len());
-            assert_eq!(again.beside(&cloud.points, &near[..1]).count(), near.len() - 1);
-            assert_eq!(again.beside(&[], &[]).count(), 0);
+            assert_eq!(again.valid_after_edits(&cloud.points, &[]).count(), near.len());
+            assert_eq!(again.valid_after_edits(&cloud.points, &near[..1]).count(), near.len() - 1);
+            assert_eq!(again.valid_after_edits(&[], &[]).count(), 0);
         }
     }
 
@@ -288,7 +302,7 @@ mod tests {
         let sphere = sphere_around(&points);
         let middle = 0.5 * (points[0] + points[1]);
         let radius = 0.6 * points[0].distance(points[1]);
-        assert_eq!(sphere.len(), ON_SPHERE);
+        assert_eq!(sphere.len(), SPHERE_POINTS);
         assert!(sphere.iter().all(|p| (p.distance(middle) - radius).abs() < 1e-5));
         let nearest =
             |p: &Vec3| sphere.iter().filter(|q| *q != p).map(|q| q.distance(*p)).fold(9.0, f32::min);
@@ -299,12 +313,12 @@ mod tests {
     #[test]
     fn voxels_hide_what_is_behind_them() {
         let cloud = torus(4000);
-        let voxels = Voxels::new(&cloud.points, 3.5 * mean_spacing(&cloud.points) as f32);
+        let occupancy = OccupancyGrid::new(&cloud.points, 3.5 * mean_spacing(&cloud.points) as f32);
         let right = Vec3::X;
-        assert!(voxels.is_free(right, Vec3::X * 9.0));
-        assert!(!voxels.is_free(right, Vec3::X * -9.0));
+        assert!(occupancy.is_unoccluded(right, Vec3::X * 9.0));
+        assert!(!occupancy.is_unoccluded(right, Vec3::X * -9.0));
         // Through the hole of the torus.
-        assert!(voxels.is_free(Vec3::new(0.0, 0.0, -2.0), Vec3::Z * 9.0));
-        assert!(voxels.is_free(right, right));
+        assert!(occupancy.is_unoccluded(Vec3::new(0.0, 0.0, -2.0), Vec3::Z * 9.0));
+        assert!(occupancy.is_unoccluded(right, right));
     }
 }

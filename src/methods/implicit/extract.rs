@@ -2,7 +2,7 @@
 //! (paper, section VII; Lorensen & Cline, *Marching cubes*, 1987).
 
 use super::cloud::BoxMap;
-use super::edits::REACH;
+use super::edits::MAX_ADDED_DISTANCE;
 use super::fast::FastField;
 use super::field::Field;
 use crate::math::{Bounds, DVec3, Vec3};
@@ -30,12 +30,12 @@ pub struct Extraction {
     field: FastField,
     map: BoxMap,
     level: f64,
-    follower: Follower,
+    extractor: Follower,
     stage: Stage,
 }
 
 enum Stage {
-    Follow,
+    Extract,
     /// The finished mesh, and the normals computed so far.
     Normals(TriangleMesh, Vec<Vec3>),
 }
@@ -44,13 +44,13 @@ enum Stage {
 /// from the origin it is larger, as single precision is coarser there.
 pub fn default_cell(map: &BoxMap, spacing: f64) -> f64 {
     let cell = (CELL * spacing).clamp(2.0 / CELLS[1], 2.0 / CELLS[0]) / map.scale();
-    let around = (f64::from(REACH) + 2.0 * MARGIN) / map.scale();
-    let least = (map.reach() + around) / MOST_EDGES_AWAY;
+    let around = (f64::from(MAX_ADDED_DISTANCE) + 2.0 * MARGIN) / map.scale();
+    let least = (map.max_coordinate() + around) / MAX_DISTANCE_IN_EDGES;
     if cell > least { cell } else { least }
 }
 
 /// Maximum distance of a default lattice from the world's origin, in cell edges: a little less than [`Lattice`] allows.
-const MOST_EDGES_AWAY: f64 = 8100.0;
+const MAX_DISTANCE_IN_EDGES: f64 = 8100.0;
 
 impl Extraction {
     /// Starts extracting the surface on which `field` equals `level`, from the cells around `points`; points and edge
@@ -70,15 +70,15 @@ impl Extraction {
         let low = bounds.min.as_dvec3() - margin;
         let high = bounds.max.as_dvec3() + margin;
         let dims = ((high - low) / cell).to_array().map(|nodes| (nodes.ceil() as usize).saturating_add(1));
-        let mut follower = Follower::new(Lattice { origin: low, edge: cell, dims })
+        let mut extractor = Follower::new(Lattice { origin: low, edge: cell, dims })
             .map_err(|error| MethodError::invalid("cell", error.to_string()))?;
         points.iter().for_each(|p| {
-            follower.seed(p.as_dvec3());
+            extractor.seed(p.as_dvec3());
         });
-        follower.scan(SCAN)?;
-        follower.refine(STEPS);
+        extractor.scan(SCAN)?;
+        extractor.refine(STEPS);
         let field = FastField::new(field.clone(), map.in_box_exactly(low), map.in_box_exactly(high));
-        Ok(Self { field, map, level, follower, stage: Stage::Follow })
+        Ok(Self { field, map, level, extractor, stage: Stage::Extract })
     }
 
     /// Does a slice of work. Returns the surface with its normals, once it is finished.
@@ -87,17 +87,17 @@ impl Extraction {
     /// [`MethodError::Volume`] if memory cannot be allocated.
     pub fn advance(&mut self) -> Result<Option<TriangleMesh>, MethodError> {
         match &mut self.stage {
-            Stage::Follow => {
+            Stage::Extract => {
                 let (field, map, level) = (&mut self.field, &self.map, self.level);
                 let mut places = Vec::new();
-                let done = self.follower.advance(SLICE, &mut |points: &[DVec3], values: &mut [f64]| {
+                let done = self.extractor.advance(SLICE, &mut |points: &[DVec3], values: &mut [f64]| {
                     places.clear();
                     places.extend(points.iter().map(|&p| map.in_box_exactly(p)));
                     field.values(&places, values);
                     values.iter_mut().for_each(|value| *value -= level);
                 })?;
                 if done {
-                    self.stage = Stage::Normals(self.follower.mesh()?, Vec::new());
+                    self.stage = Stage::Normals(self.extractor.mesh()?, Vec::new());
                 }
                 Ok(None)
             }
@@ -118,7 +118,7 @@ impl Extraction {
     /// Returns the approximate share of the work that is done, 0 to 1, for progress bars.
     pub fn progress(&self) -> f64 {
         match &self.stage {
-            Stage::Follow => 0.8 * self.follower.progress(),
+            Stage::Extract => 0.8 * self.extractor.progress(),
             Stage::Normals(mesh, normals) => {
                 0.8 + 0.2 * normals.len() as f64 / (mesh.positions.len() + 1) as f64
             }
@@ -131,13 +131,13 @@ impl Extraction {
     /// [`MethodError::Volume`] if memory cannot be allocated.
     pub fn preview(&self) -> Result<TriangleMesh, MethodError> {
         match &self.stage {
-            Stage::Follow => Ok(self.follower.mesh()?),
+            Stage::Extract => Ok(self.extractor.mesh()?),
             Stage::Normals(mesh, _) => Ok(mesh.clone()),
         }
     }
 
     /// Returns the number of connected components that no point is near; the coarse scan found them.
-    pub fn strays(&self) -> usize {
-        self.follower.found_by_scan()
+    pub fn spurious_components(&self) -> usize {
+        self.extractor.found_by_scan()
     }
 }

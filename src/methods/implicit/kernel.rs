@@ -109,7 +109,7 @@ fn multi_order(delta: f64, tau: f64, r: f64) -> [f64; 2] {
         return near_centre(a, delta / tau, kappa, scale, r);
     }
     let b_squared = (1.0 - product) / (4.0 * tau * tau);
-    let [cosine, sine] = damped(a, b_squared, delta / tau, r);
+    let [cosine, sine] = damped_terms(a, b_squared, delta / tau, r);
     let g = cosine + kappa * sine;
     let g_slope = b_squared * sine + kappa * cosine - a * g;
     let value = scale * (1.0 - g) / r;
@@ -118,7 +118,7 @@ fn multi_order(delta: f64, tau: f64, r: f64) -> [f64; 2] {
 
 /// Returns e^(−ar) C(br) and e^(−ar) r S(br) of [`multi_order`], without overflow and for b² of either sign or 0;
 /// `product` is a² − b².
-fn damped(a: f64, b_squared: f64, product: f64, r: f64) -> [f64; 2] {
+fn damped_terms(a: f64, b_squared: f64, product: f64, r: f64) -> [f64; 2] {
     let b = b_squared.abs().sqrt();
     let x = b * r;
     if x < 0.1 {
@@ -162,7 +162,7 @@ pub struct KernelTable {
     kernel: Kernel,
     /// φ and dφ/ds at the centre.
     centre: [f64; 2],
-    pieces: Vec<[f64; 4]>,
+    cubics: Vec<[f64; 4]>,
 }
 
 /// Base-2 logarithm of the number of intervals in an octave of r². With a quarter of the intervals, the error exceeds
@@ -171,19 +171,19 @@ const PART_BITS: u32 = 5;
 /// Number of low bits of an `f64` that do not affect the choice of its interval.
 const SHIFT: u32 = 52 - PART_BITS;
 /// Lower end of the table, in r²; below it, value and slope at the centre are used. √LEAST is about 1e-6.
-const LEAST: f64 = 1.0 / (1_u64 << 40) as f64;
+const TABLE_START: f64 = 1.0 / (1_u64 << 40) as f64;
 /// Upper end of the table, in r²: beyond the distances between any points in the box and around it. Farther away, the
 /// kernel itself is evaluated.
-const MOST: f64 = 256.0;
+const TABLE_END: f64 = 256.0;
 
 impl KernelTable {
     /// Tabulates `kernel`.
     pub fn new(kernel: Kernel) -> Self {
-        let pieces = (piece(LEAST)..=piece(MOST)).map(|index| {
+        let cubics = (interval(TABLE_START)..=interval(TABLE_END)).map(|index| {
             let [from, to] = [index, index + 1].map(|bits| f64::from_bits(bits << SHIFT));
             cubic(kernel.value_and_slope(from.sqrt()), kernel.value_and_slope(to.sqrt()), to - from)
         });
-        Self { kernel, centre: kernel.value_and_slope(0.0), pieces: pieces.collect() }
+        Self { kernel, centre: kernel.value_and_slope(0.0), cubics: cubics.collect() }
     }
 
     /// Returns the tabulated kernel.
@@ -194,30 +194,30 @@ impl KernelTable {
     /// Returns φ at the squared distance `s`.
     #[inline]
     pub fn value(&self, s: f64) -> f64 {
-        match self.pieces.get(piece(s).wrapping_sub(piece(LEAST)) as usize) {
+        match self.cubics.get(interval(s).wrapping_sub(interval(TABLE_START)) as usize) {
             Some(&[c0, c1, c2, c3]) => {
-                let d = s - knot(s);
+                let d = s - interval_start(s);
                 c0 + d * (c1 + d * (c2 + d * c3))
             }
-            None => self.beyond(s)[0],
+            None => self.outside_table(s)[0],
         }
     }
 
     /// Returns φ and dφ/ds at the squared distance `s`.
     #[inline]
     pub fn value_and_slope(&self, s: f64) -> [f64; 2] {
-        match self.pieces.get(piece(s).wrapping_sub(piece(LEAST)) as usize) {
+        match self.cubics.get(interval(s).wrapping_sub(interval(TABLE_START)) as usize) {
             Some(&[c0, c1, c2, c3]) => {
-                let d = s - knot(s);
+                let d = s - interval_start(s);
                 [c0 + d * (c1 + d * (c2 + d * c3)), c1 + d * (2.0 * c2 + d * 3.0 * c3)]
             }
-            None => self.beyond(s),
+            None => self.outside_table(s),
         }
     }
 
     #[cold]
-    fn beyond(&self, s: f64) -> [f64; 2] {
-        if s < LEAST {
+    fn outside_table(&self, s: f64) -> [f64; 2] {
+        if s < TABLE_START {
             [self.centre[0] + s * self.centre[1], self.centre[1]]
         } else {
             self.kernel.value_and_slope(s.sqrt())
@@ -228,13 +228,13 @@ impl KernelTable {
 /// Returns the number of the interval that contains `s`, counted from that of 0; it consists of the leading bits of
 /// `s`.
 #[inline]
-fn piece(s: f64) -> u64 {
+fn interval(s: f64) -> u64 {
     s.to_bits() >> SHIFT
 }
 
 /// Returns the lower end of the interval that contains `s`.
 #[inline]
-fn knot(s: f64) -> f64 {
+fn interval_start(s: f64) -> f64 {
     f64::from_bits(s.to_bits() >> SHIFT << SHIFT)
 }
 

@@ -1,7 +1,7 @@
 //! Low-rank approximation of kernel blocks between separated clusters, by adaptive cross approximation with partial
 //! pivoting (Bebendorf, *Approximation of boundary element matrices*, 2000).
 
-use super::vectors::{Number, dot};
+use super::vectors::{MatrixScalar, dot};
 
 /// A matrix block as a sum of outer products, Σ uₖ vₖᵀ.
 #[derive(Clone, Debug)]
@@ -13,11 +13,11 @@ pub struct LowRank<T> {
 }
 
 /// Maximum rank of an approximation, whatever its error; blocks between separated clusters stay far below it.
-const MOST_RANK: usize = 64;
+const MAX_RANK: usize = 64;
 
 /// Approximates a block of `height` by `width` entries as a low-rank product, to a relative error of about `tolerance`.
 /// `row` and `column` write the entries of a row or column, given its index.
-pub fn cross_approximation<T: Number>(
+pub fn cross_approximation<T: MatrixScalar>(
     [height, width]: [usize; 2],
     tolerance: f64,
     mut row: impl FnMut(usize, &mut [f64]),
@@ -26,7 +26,7 @@ pub fn cross_approximation<T: Number>(
     let (mut us, mut vs): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
     let mut row_used = vec![false; height];
     let (mut pivot_row, mut norm_squared) = (0, 0.0);
-    let limit = MOST_RANK.min(height).min(width);
+    let limit = MAX_RANK.min(height).min(width);
     while us.len() < limit {
         let mut v = vec![0.0; width];
         row(pivot_row, &mut v);
@@ -57,7 +57,7 @@ pub fn cross_approximation<T: Number>(
             break;
         }
     }
-    LowRank { columns: narrowed(&us), rows: narrowed(&vs) }
+    LowRank { columns: rounded(&us), rows: rounded(&vs) }
 }
 
 /// Subtracts the approximation so far from a row or column of the block.
@@ -78,8 +78,8 @@ fn largest(values: &[f64], allowed: impl Fn(usize) -> bool) -> usize {
     best.0
 }
 
-fn narrowed<T: Number>(parts: &[Vec<f64>]) -> Vec<T> {
-    parts.iter().flatten().map(|&x| T::of(x)).collect()
+fn rounded<T: MatrixScalar>(parts: &[Vec<f64>]) -> Vec<T> {
+    parts.iter().flatten().map(|&x| T::from_f64(x)).collect()
 }
 
 #[cfg(test)]

@@ -55,15 +55,15 @@ mod vectors;
 
 pub use camera::Camera;
 pub use cloud::Cloud;
-pub use edits::Edits;
+pub use edits::PointEdits;
 pub use measure::Fitness;
-pub use params::{ImplicitParams, KernelKind, Level, param_specs};
+pub use params::{ImplicitParams, IsoValue, KernelKind, param_specs};
 
 use super::{MethodError, StepReport, Times};
 use crate::math::Vec3;
 use crate::mesh::{TriangleMesh, measure as measure_mesh};
 use crate::remesh::Changes;
-use cloud::{BoxMap, LEAST_POINTS, MOST_POINTS};
+use cloud::{BoxMap, MAX_POINTS, MIN_POINTS};
 use color::Coloring;
 use exterior::{Exterior, given_exterior, made_exterior};
 use extract::{Extraction, default_cell};
@@ -71,7 +71,7 @@ use field::Field;
 use kernel::{Kernel, KernelTable};
 use point_colors::PointColors;
 use sampling::{Samples, Sampling};
-use solve::{ByPlace, Constraints, Solution, Solver};
+use solve::{Constraints, PositionIndex, Solution, Solver};
 
 /// Options of an [`ImplicitSurface`], beside its points.
 #[derive(Clone, Debug)]
@@ -117,7 +117,7 @@ pub struct ImplicitSurface {
     map: BoxMap,
     options: ImplicitOptions,
     params: ImplicitParams,
-    edits: Edits,
+    edits: PointEdits,
     samples: Option<Samples>,
     exterior: Option<Exterior>,
     /// The current constraints, from samples, exterior points and edits.
@@ -127,7 +127,7 @@ pub struct ImplicitSurface {
     slices: u32,
     solved: Option<Solved>,
     /// The edits at the last full solve, whose system later edits revise.
-    base: Option<Edits>,
+    base_edits: Option<PointEdits>,
     /// The solver of that system, if it is kept.
     solver: Option<Box<Solver>>,
     mesh: TriangleMesh,
@@ -135,7 +135,7 @@ pub struct ImplicitSurface {
     version: u32,
     components: u32,
     euler: i64,
-    strays: usize,
+    spurious_components: usize,
     iteration: u32,
     residual: f64,
     clock: fn() -> f64,
@@ -160,7 +160,7 @@ impl Solved {
 
     /// Returns the weights at the centres of `constraints`, 0 at new ones: the start of a revised solve.
     fn weights_at(&self, constraints: &Constraints) -> Vec<f64> {
-        let known = ByPlace::new(&self.centres);
+        let known = PositionIndex::new(&self.centres);
         let weight = |&centre: &Vec3| known.find(centre).map_or(0.0, |i| self.solution.weights[i]);
         constraints.centres.iter().map(weight).collect()
     }
@@ -172,12 +172,12 @@ enum Stage {
     Constrain,
     Solve(Box<Solver>),
     Extract(Box<Extraction>),
-    Color(Box<Painting>),
+    Color(Box<ColoringState>),
     Done,
 }
 
 /// The extracted mesh while it is being coloured.
-struct Painting {
+struct ColoringState {
     mesh: TriangleMesh,
     coloring: Coloring,
     /// Index of the next camera.
@@ -199,21 +199,21 @@ impl ImplicitSurface {
         let cloud = points.distinct();
         cloud.check_count()?;
         let map = BoxMap::of(&cloud.points);
-        map.check_place()?;
+        map.check_precision()?;
         // Rounding in the box can make distinct points equal.
         let cloud = cloud.mapped(&map).distinct();
         cloud.check_count()?;
         cloud.check_span()?;
-        Ok(Self::begun(original, cloud, map, options))
+        Ok(Self::from_parts(original, cloud, map, options))
     }
 
-    fn begun(original: Vec<Vec3>, cloud: Cloud, map: BoxMap, options: ImplicitOptions) -> Self {
+    fn from_parts(original: Vec<Vec3>, cloud: Cloud, map: BoxMap, options: ImplicitOptions) -> Self {
         Self {
             original,
             cloud,
             map,
             params: options.params.clone(),
-            edits: Edits::default(),
+            edits: PointEdits::default(),
             samples: None,
             exterior: None,
             constraints: Constraints::default(),
@@ -221,13 +221,13 @@ impl ImplicitSurface {
             options,
             slices: 0,
             solved: None,
-            base: None,
+            base_edits: None,
             solver: None,
             mesh: TriangleMesh::default(),
             version: 0,
             components: 0,
             euler: 0,
-            strays: 0,
+            spurious_components: 0,
             iteration: 0,
             residual: f64::NAN,
             clock: || 0.0,
@@ -247,13 +247,13 @@ impl ImplicitSurface {
     /// suit the points, [`MethodError::Volume`] if memory cannot be allocated. The surface is then unchanged, and other
     /// parameters may be set.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
-        let (phase, begun) = (self.stage.phase(), (self.clock)());
+        let (phase, start) = (self.stage.phase(), (self.clock)());
         if !matches!(self.stage, Stage::Done) {
             self.iteration = self.iteration.wrapping_add(1);
             self.advance()?;
         }
         let mut times = Times::default();
-        times.add(phase, (self.clock)() - begun);
+        times.add(phase, (self.clock)() - start);
         Ok(self.report(phase, times))
     }
 
@@ -268,7 +268,7 @@ impl ImplicitSurface {
             Stage::Constrain => self.constrain()?,
             Stage::Solve(solver) => self.solve(solver)?,
             Stage::Extract(extraction) => self.extract(extraction)?,
-            Stage::Color(painting) => self.color(*painting),
+            Stage::Color(state) => self.color(*state),
             Stage::Done => Stage::Done,
         };
         // The solver counts its own slices, and there are none at the end.
@@ -314,7 +314,7 @@ impl ImplicitSurface {
             None => {
                 let cameras = self.options.cameras.iter();
                 let cameras: Vec<Camera> =
-                    cameras.map(|camera| camera.clone().moved(&self.map.affine())).collect();
+                    cameras.map(|camera| camera.clone().transformed(&self.map.affine())).collect();
                 made_exterior(&samples.cloud, &cameras, samples.spacing as f32, SEED)
             }
         };
@@ -331,7 +331,7 @@ impl ImplicitSurface {
 
     /// Starts a full solve.
     fn begin_solve(&mut self) -> Stage {
-        self.base = Some(self.edits.clone());
+        self.base_edits = Some(self.edits.clone());
         self.solver = None;
         Stage::Solve(self.new_solver(&self.constraints))
     }
@@ -353,16 +353,16 @@ impl ImplicitSurface {
             None => self.new_solver(&self.base_constraints()?),
         };
         let kernel = Kernel::new(&self.params, self.constraints.radius());
-        let serves = solver.kernel() == kernel
+        let is_usable = solver.kernel() == kernel
             && solver.revise(&self.constraints, solved.weights_at(&self.constraints));
-        serves.then_some(solver)
+        is_usable.then_some(solver)
     }
 
     /// Returns the constraints of the last full solve.
     fn base_constraints(&self) -> Option<Constraints> {
-        let (base, samples, exterior) =
-            (self.base.as_ref()?, self.samples.as_ref()?, self.exterior.as_ref()?);
-        let constraints = base.constraints(samples, exterior, &self.original, &self.map).ok()?;
+        let (edits, samples, exterior) =
+            (self.base_edits.as_ref()?, self.samples.as_ref()?, self.exterior.as_ref()?);
+        let constraints = edits.constraints(samples, exterior, &self.original, &self.map).ok()?;
         Some(self.regularized(constraints))
     }
 
@@ -380,7 +380,7 @@ impl ImplicitSurface {
 
     /// Returns the error of a failed solve, and discards its system, which cannot be revised.
     fn singular(&mut self) -> MethodError {
-        (self.base, self.solver) = (None, None);
+        (self.base_edits, self.solver) = (None, None);
         let cause = if self.params.lambda_surface == 0.0 {
             "lambdaSurface is 0 and some points lie too close together; give it a value above 0"
         } else {
@@ -392,7 +392,7 @@ impl ImplicitSurface {
     fn begin_extraction(&self) -> Result<Stage, MethodError> {
         let Some(solved) = &self.solved else { return Ok(first_stage(&self.options)) };
         let points = self.in_world(&self.constraints.centres[..self.constraints.surface]);
-        let level = self.level_of(solved);
+        let level = self.iso_value(solved);
         let extraction = Extraction::new(&solved.field, self.map, level, &points, self.cell())?;
         Ok(Stage::Extract(Box::new(extraction)))
     }
@@ -402,36 +402,36 @@ impl ImplicitSurface {
     }
 
     /// Returns the iso-value of f at which the surface is extracted.
-    fn level_of(&self, solved: &Solved) -> f64 {
+    fn iso_value(&self, solved: &Solved) -> f64 {
         match self.params.level {
-            Level::Zero => 0.0,
-            Level::Mean => solved.mean,
+            IsoValue::Zero => 0.0,
+            IsoValue::Mean => solved.mean,
         }
     }
 
     fn extract(&mut self, mut extraction: Box<Extraction>) -> Result<Stage, MethodError> {
         let Some(mesh) = extraction.advance()? else { return Ok(Stage::Extract(extraction)) };
-        self.strays = extraction.strays();
+        self.spurious_components = extraction.spurious_components();
         let coloring = Coloring::new(mesh.positions.len());
-        Ok(Stage::Color(Box::new(Painting { mesh, coloring, camera: 0, points: None })))
+        Ok(Stage::Color(Box::new(ColoringState { mesh, coloring, camera: 0, points: None })))
     }
 
-    fn color(&mut self, mut painting: Painting) -> Stage {
-        if let Some(next) = self.options.cameras.get(painting.camera) {
-            painting.coloring.add(&painting.mesh, next);
-            painting.camera += 1;
-            return Stage::Color(Box::new(painting));
+    fn color(&mut self, mut state: ColoringState) -> Stage {
+        if let Some(next) = self.options.cameras.get(state.camera) {
+            state.coloring.add(&state.mesh, next);
+            state.camera += 1;
+            return Stage::Color(Box::new(state));
         }
-        if painting.points.is_none() && painting.coloring.is_empty() {
-            let cloud = self.edits.left(&self.cloud, &self.original, &self.map);
-            painting.points = PointColors::new(cloud, self.spacing());
+        if state.points.is_none() && state.coloring.is_empty() {
+            let cloud = self.edits.without_removed(&self.cloud, &self.original, &self.map);
+            state.points = PointColors::new(cloud, self.spacing());
         }
-        if let Some(points) = &mut painting.points
-            && !points.advance(&painting.mesh, &self.map, &mut painting.coloring)
+        if let Some(points) = &mut state.points
+            && !points.advance(&state.mesh, &self.map, &mut state.coloring)
         {
-            return Stage::Color(Box::new(painting));
+            return Stage::Color(Box::new(state));
         }
-        let Painting { mut mesh, coloring, .. } = painting;
+        let ColoringState { mut mesh, coloring, .. } = state;
         mesh.colors = coloring.finish(&mesh);
         self.take_mesh(mesh);
         Stage::Done
@@ -492,7 +492,7 @@ impl ImplicitSurface {
     }
 
     /// Returns the current edits of the input points.
-    pub fn edits(&self) -> &Edits {
+    pub fn edits(&self) -> &PointEdits {
         &self.edits
     }
 
@@ -502,12 +502,12 @@ impl ImplicitSurface {
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the list and the entry, or if too few points are left; nothing has
     /// changed then.
-    pub fn set_edits(&mut self, edits: Edits) -> Result<(), MethodError> {
+    pub fn set_edits(&mut self, edits: PointEdits) -> Result<(), MethodError> {
         edits.validate(&self.original, &self.map)?;
-        let left = edits.applied(&self.cloud, &self.original, &self.map);
-        left.check_count()?;
-        left.check_span()?;
-        edits.check_outside(&left, &self.map)?;
+        let remaining = edits.apply_to(&self.cloud, &self.original, &self.map);
+        remaining.check_count()?;
+        remaining.check_span()?;
+        edits.check_outside(&remaining, &self.map)?;
         if edits == self.edits {
             return Ok(());
         }
@@ -544,14 +544,14 @@ impl ImplicitSurface {
     pub fn preview(&self) -> Result<TriangleMesh, MethodError> {
         match &self.stage {
             Stage::Extract(extraction) => extraction.preview(),
-            Stage::Color(painting) => Ok(painting.mesh.clone()),
+            Stage::Color(state) => Ok(state.mesh.clone()),
             _ => Ok(TriangleMesh::default()),
         }
     }
 
     /// Returns the number of connected components of the last surface that no point is near.
-    pub fn strays(&self) -> usize {
-        self.strays
+    pub fn spurious_components(&self) -> usize {
+        self.spurious_components
     }
 
     /// Returns the number of input points that were left out as duplicates of others.
@@ -583,7 +583,7 @@ impl Stage {
             Self::Constrain => 0.0,
             Self::Solve(solver) => solver.progress(),
             Self::Extract(extraction) => extraction.progress(),
-            Self::Color(painting) => painting.camera as f64 / (cameras + 1) as f64,
+            Self::Color(state) => state.camera as f64 / (cameras + 1) as f64,
             Self::Done => 1.0,
         }
     }
@@ -594,14 +594,14 @@ fn first_stage(options: &ImplicitOptions) -> Stage {
 }
 
 fn check_options(options: &ImplicitOptions) -> Result<(), MethodError> {
-    if !(LEAST_POINTS..=MOST_POINTS).contains(&options.max_points) {
-        let problem = format!("{} given, {LEAST_POINTS} to {MOST_POINTS} accepted", options.max_points);
+    if !(MIN_POINTS..=MAX_POINTS).contains(&options.max_points) {
+        let problem = format!("{} given, {MIN_POINTS} to {MAX_POINTS} accepted", options.max_points);
         return Err(MethodError::invalid("maxPoints", problem));
     }
     if options.keep_components == Some(0) {
         return Err(MethodError::invalid("keepComponents", "0 given, at least 1 is needed"));
     }
     let exterior = options.exterior.as_deref().unwrap_or_default();
-    cloud::check_number("exterior", exterior.len())?;
+    cloud::check_max_count("exterior", exterior.len())?;
     cloud::check_finite("exterior", exterior)
 }

@@ -15,7 +15,7 @@ const FLAT: f64 = 0.2;
 /// Number of points, at most, from which the radius is chosen.
 const TRIALS: usize = 200;
 /// Nearest neighbours of a point to which its orientation is propagated.
-const LINKS: usize = 10;
+const NEIGHBOURS: usize = 10;
 
 /// Unit normals at some points of a cloud, and the noise of the cloud.
 pub struct Normals {
@@ -31,14 +31,15 @@ pub struct Normals {
 /// pair with the smallest angle first; then each component is oriented such that it encloses a positive volume.
 pub fn estimated_normals(points: &[Vec3], at: &[u32], spacing: f32) -> Normals {
     let grid = PointGrid::of(points, RADII[0] * spacing);
-    let places: Vec<Vec3> = at.iter().map(|&i| points[i as usize]).collect();
-    let (radius, noise) = flattest_radius(&grid, &places, spacing);
-    let mut directions: Vec<Vec3> = places.iter().map(|&p| Plane::around(&grid, p, radius).normal).collect();
-    let links = links(&places, &directions, radius);
-    let mut turned = vec![false; places.len()];
-    for part in parts(&links) {
-        propagate(part[0], &links, &mut directions, &mut turned);
-        if outflow(&places, &directions, &part) < 0.0 {
+    let positions: Vec<Vec3> = at.iter().map(|&i| points[i as usize]).collect();
+    let (radius, noise) = flattest_radius(&grid, &positions, spacing);
+    let mut directions: Vec<Vec3> =
+        positions.iter().map(|&p| Plane::around(&grid, p, radius).normal).collect();
+    let graph = neighbour_graph(&positions, &directions, radius);
+    let mut oriented = vec![false; positions.len()];
+    for part in connected_components(&graph) {
+        propagate(part[0], &graph, &mut directions, &mut oriented);
+        if outward_flux(&positions, &directions, &part) < 0.0 {
             part.iter().for_each(|&i| directions[i as usize] = -directions[i as usize]);
         }
     }
@@ -78,11 +79,11 @@ impl Plane {
 
 /// Returns the smallest radius whose median neighbourhood is planar, or else the one whose median neighbourhood is
 /// flattest, and the thickness of that neighbourhood.
-fn flattest_radius(grid: &PointGrid, places: &[Vec3], spacing: f32) -> (f32, f64) {
-    let step = places.len().div_ceil(TRIALS);
+fn flattest_radius(grid: &PointGrid, positions: &[Vec3], spacing: f32) -> (f32, f64) {
+    let step = positions.len().div_ceil(TRIALS);
     let mut best = (f64::INFINITY, RADII[0] * spacing, 0.0);
     for radius in RADII.map(|r| r * spacing) {
-        let planes = places.iter().step_by(step).map(|&p| Plane::around(grid, p, radius));
+        let planes = positions.iter().step_by(step).map(|&p| Plane::around(grid, p, radius));
         let mut found: Vec<(f64, f64)> = planes.map(|plane| (plane.flatness(), plane.thickness)).collect();
         sort_by_rank(&mut found, |&(flatness, _)| rank_f64(flatness));
         let (flatness, thickness) = found[found.len() / 2];
@@ -96,39 +97,41 @@ fn flattest_radius(grid: &PointGrid, places: &[Vec3], spacing: f32) -> (f32, f64
     (best.1, best.2)
 }
 
-/// Returns the undirected neighbour graph of `places`: neighbours along the surface, not across a gap or a thin wall.
-fn links(places: &[Vec3], normals: &[Vec3], radius: f32) -> Vec<Vec<u32>> {
-    let grid = PointGrid::of(places, radius);
-    let near = |&p: &Vec3| grid.nearest(p, LINKS + 1, radius).into_iter().map(|(_, i)| i as usize);
-    let mut links: Vec<Vec<u32>> = vec![Vec::new(); places.len()];
-    for (i, p) in places.iter().enumerate() {
+/// Returns the undirected neighbour graph of `positions`: neighbours along the surface, not across a gap or a thin wall.
+fn neighbour_graph(positions: &[Vec3], normals: &[Vec3], radius: f32) -> Vec<Vec<u32>> {
+    let grid = PointGrid::of(positions, radius);
+    let near = |&p: &Vec3| grid.nearest(p, NEIGHBOURS + 1, radius).into_iter().map(|(_, i)| i as usize);
+    let mut graph: Vec<Vec<u32>> = vec![Vec::new(); positions.len()];
+    for (i, p) in positions.iter().enumerate() {
         for j in near(p).filter(|&j| j != i) {
-            let way = (places[j] - *p).normalize_or_zero();
-            if way.dot(normals[i]).abs() < STEEP || way.dot(normals[j]).abs() < STEEP {
-                links[i].push(j as u32);
-                links[j].push(i as u32);
+            let offset = (positions[j] - *p).normalize_or_zero();
+            if offset.dot(normals[i]).abs() < SAME_SHEET_COSINE
+                || offset.dot(normals[j]).abs() < SAME_SHEET_COSINE
+            {
+                graph[i].push(j as u32);
+                graph[j].push(i as u32);
             }
         }
     }
-    for ids in &mut links {
+    for ids in &mut graph {
         ids.sort_unstable();
         ids.dedup();
     }
-    links
+    graph
 }
 
 /// Cosine between a normal and the direction to a neighbour from which the neighbour counts as part of another sheet.
-const STEEP: f32 = 0.7;
+const SAME_SHEET_COSINE: f32 = 0.7;
 
-fn parts(links: &[Vec<u32>]) -> Vec<Vec<u32>> {
-    let mut seen = vec![false; links.len()];
+fn connected_components(graph: &[Vec<u32>]) -> Vec<Vec<u32>> {
+    let mut seen = vec![false; graph.len()];
     let mut found = Vec::new();
-    for start in 0..links.len() as u32 {
+    for start in 0..graph.len() as u32 {
         let (mut part, mut stack) = (Vec::new(), vec![start]);
         while let Some(i) = stack.pop() {
             if !std::mem::replace(&mut seen[i as usize], true) {
                 part.push(i);
-                stack.extend(&links[i as usize]);
+                stack.extend(&graph[i as usize]);
             }
         }
         if !part.is_empty() {
@@ -141,25 +144,25 @@ fn parts(links: &[Vec<u32>]) -> Vec<Vec<u32>> {
 /// Returns Σ (p − middle)·n over a connected component. If the points are spread evenly over a closed surface with
 /// outward normals, it is proportional to the enclosed volume (Gauss's theorem); a negative value shows that all
 /// normals point inwards.
-fn outflow(places: &[Vec3], normals: &[Vec3], part: &[u32]) -> f64 {
-    let place = |i: u32| places[i as usize].as_dvec3();
+fn outward_flux(positions: &[Vec3], normals: &[Vec3], part: &[u32]) -> f64 {
+    let place = |i: u32| positions[i as usize].as_dvec3();
     let middle = part.iter().map(|&i| place(i)).sum::<DVec3>() / part.len() as f64;
     part.iter().map(|&i| (place(i) - middle).dot(normals[i as usize].as_dvec3())).sum()
 }
 
 /// Orients the normals of the connected component of `start` along a minimum spanning tree over the angle between
 /// normals (Prim's algorithm): each is flipped to agree with the one it is reached from.
-fn propagate(start: u32, links: &[Vec<u32>], normals: &mut [Vec3], turned: &mut [bool]) {
+fn propagate(start: u32, graph: &[Vec<u32>], normals: &mut [Vec3], oriented: &mut [bool]) {
     let mut waiting = BinaryHeap::from([Reverse((0_u32, start, start))]);
     while let Some(Reverse((_, i, from))) = waiting.pop() {
-        if std::mem::replace(&mut turned[i as usize], true) {
+        if std::mem::replace(&mut oriented[i as usize], true) {
             continue;
         }
         if normals[i as usize].dot(normals[from as usize]) < 0.0 {
             normals[i as usize] = -normals[i as usize];
         }
         let normal = normals[i as usize];
-        for &j in links[i as usize].iter().filter(|&&j| !turned[j as usize]) {
+        for &j in graph[i as usize].iter().filter(|&&j| !oriented[j as usize]) {
             // Floats of at least 0 have the order of their bits.
             let turn = 1.0 - normal.dot(normals[j as usize]).abs();
             waiting.push(Reverse(((if turn > 0.0 { turn } else { 0.0 }).to_bits(), j, i)));
@@ -245,18 +248,18 @@ mod tests {
     #[test]
     fn turned_from_any_start() {
         let mut random = Random::new(5);
-        let places: Vec<Vec3> = (0..400).map(|_| ball(&mut random).0.as_vec3()).collect();
-        let links = links(&places, &places, 0.3);
-        let all = parts(&links);
+        let positions: Vec<Vec3> = (0..400).map(|_| ball(&mut random).0.as_vec3()).collect();
+        let graph = neighbour_graph(&positions, &positions, 0.3);
+        let all = connected_components(&graph);
         assert_eq!(all.len(), 1);
         for start in [0, 7, 399] {
             // Half of them are wrong, and so is the start.
             let mut normals: Vec<Vec3> =
-                places.iter().zip(0..).map(|(p, i)| *p * [1.0, -1.0][i % 2]).collect();
-            normals[start as usize] = -places[start as usize];
-            propagate(start, &links, &mut normals, &mut vec![false; places.len()]);
-            assert!(places.iter().zip(&normals).all(|(p, n)| p.dot(*n) < 0.0));
-            assert!(outflow(&places, &normals, &all[0]) < 0.0);
+                positions.iter().zip(0..).map(|(p, i)| *p * [1.0, -1.0][i % 2]).collect();
+            normals[start as usize] = -positions[start as usize];
+            propagate(start, &graph, &mut normals, &mut vec![false; positions.len()]);
+            assert!(positions.iter().zip(&normals).all(|(p, n)| p.dot(*n) < 0.0));
+            assert!(outward_flux(&positions, &normals, &all[0]) < 0.0);
         }
     }
 }

@@ -25,7 +25,7 @@ pub struct ImplicitParams {
     /// Edge length of an extraction cell, in world units; 0 derives it from the spacing of the sampled points.
     pub cell: f64,
     /// The iso-value of f at which the surface is extracted.
-    pub level: Level,
+    pub level: IsoValue,
 }
 
 /// Choice of the radial basis function.
@@ -45,7 +45,7 @@ pub enum KernelKind {
 /// Choice of the iso-value of f at which the surface is extracted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Level {
+pub enum IsoValue {
     /// 0, as in the paper.
     Zero,
     /// The mean of f over the surface constraints, which is a little below 0.
@@ -63,7 +63,7 @@ impl Default for ImplicitParams {
             lambda_exterior: 2.0,
             tolerance: 1e-5,
             cell: 0.0,
-            level: Level::Zero,
+            level: IsoValue::Zero,
         }
     }
 }
@@ -95,14 +95,14 @@ impl ImplicitParams {
 
     /// Returns a warning, to be shown to the user, if the values are accepted but may fail.
     pub fn warning(&self) -> Option<&'static str> {
-        (self.kernel == KernelKind::MultiOrder && self.delta >= TIGHT).then_some(
+        (self.kernel == KernelKind::MultiOrder && self.delta >= LARGE_DELTA).then_some(
             "delta is 25 or more: where the points have large gaps the function falls to 0 inside, and the surface breaks up",
         )
     }
 }
 
 /// δ from which surfaces of points with large gaps break up.
-const TIGHT: f64 = 25.0;
+const LARGE_DELTA: f64 = 25.0;
 
 /// Returns the specifications of all parameters, in the order in which a page should show them.
 pub fn param_specs() -> Vec<ParamSpec> {

@@ -9,9 +9,9 @@ use crate::spatial::PointGrid;
 /// Number of nearest points whose colours a vertex blends.
 const BLENDED: usize = 4;
 /// Search radius for coloured points around a vertex, in mean spacings of the sampled points.
-const REACH: f32 = 2.0;
+const SEARCH_RADIUS: f32 = 2.0;
 /// Lower bound of the squared distance that is added in the weights: keeps them finite where points nearly coincide.
-const LEAST_SQUARE: f32 = 1e-20;
+const MIN_SQUARED_DISTANCE: f32 = 1e-20;
 /// Vertices coloured in a slice of work: about ten milliseconds.
 const SLICE: usize = 10_000;
 
@@ -28,7 +28,7 @@ impl PointColors {
     /// colours.
     pub fn new(cloud: Cloud, spacing: f64) -> Option<Self> {
         let spacing = spacing as f32;
-        let grid = PointGrid::of(&cloud.points, REACH * spacing);
+        let grid = PointGrid::of(&cloud.points, SEARCH_RADIUS * spacing);
         Some(Self { grid, colors: cloud.colors?, spacing, next: 0 })
     }
 
@@ -36,18 +36,18 @@ impl PointColors {
     /// with no point near get no colour. Returns whether all vertices are done.
     pub fn advance(&mut self, mesh: &TriangleMesh, map: &BoxMap, coloring: &mut Coloring) -> bool {
         // Half a spacing in quadrature with the distance; without it, each point leaves a spot.
-        let least = (0.25 * self.spacing * self.spacing).clamp(LEAST_SQUARE, 1.0);
+        let least = (0.25 * self.spacing * self.spacing).clamp(MIN_SQUARED_DISTANCE, 1.0);
         let vertices = mesh.positions.iter().enumerate().skip(self.next).take(SLICE);
         for (vertex, &p) in vertices {
             let mut near: Vec<(f32, u32)> = Vec::new();
-            self.grid.within(map.in_box(p), REACH * self.spacing, |i, squared| {
+            self.grid.within(map.in_box(p), SEARCH_RADIUS * self.spacing, |i, squared| {
                 let at = near.partition_point(|&found| found < (squared, i));
                 near.insert(at, (squared, i));
                 near.truncate(BLENDED);
                 true
             });
             for (squared, i) in near {
-                coloring.gather(vertex, self.colors[i as usize], 1.0 / (squared + least));
+                coloring.add_color(vertex, self.colors[i as usize], 1.0 / (squared + least));
             }
         }
         self.next += SLICE;

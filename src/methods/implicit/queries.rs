@@ -17,7 +17,7 @@ impl ImplicitSurface {
     /// [`MethodError::InvalidArgument`] before the system is solved.
     pub fn evaluate(&self, points: &[Vec3]) -> Result<Vec<f64>, MethodError> {
         let solved = self.solved("evaluate")?;
-        let level = self.level_of(solved);
+        let level = self.iso_value(solved);
         Ok(points.iter().map(|p| solved.field.value(self.map.in_box_exactly(p.as_dvec3())) - level).collect())
     }
 
@@ -45,7 +45,7 @@ impl ImplicitSurface {
 
     /// Returns the input points with the edits applied: without those removed, with those added.
     fn points(&self) -> Vec<Vec3> {
-        let removed = self.edits.removed_places(&self.original, &self.map);
+        let removed = self.edits.removed_positions(&self.original, &self.map);
         let stays = |p: &Vec3| removed.find(self.map.in_box(*p)).is_none();
         let left = self.original.iter().copied().filter(stays);
         left.chain(self.edits.added.iter().copied()).collect()
@@ -79,7 +79,7 @@ impl ImplicitSurface {
         let corner = |p: DVec3| self.map.in_box_exactly(map.transform_point3(p));
         let last = DVec3::from_array(dims.map(|n| (n - 1) as f64));
         let mut fast = FastField::new(solved.field.clone(), corner(DVec3::ZERO), corner(last));
-        let level = self.level_of(solved);
+        let level = self.iso_value(solved);
         let values = sampled(dims, |places, row| {
             let places: Vec<DVec3> = places.iter().map(|&p| corner(p)).collect();
             fast.values(&places, row);

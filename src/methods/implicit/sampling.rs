@@ -11,9 +11,9 @@ const CLUSTER_CELL: f64 = 2.0;
 /// Points visited in a slice of work: about ten milliseconds.
 const SLICE: usize = 50_000;
 /// Maximum number of sampling radii that are tried.
-const ROUNDS: u32 = 16;
+const MAX_RADII: u32 = 16;
 /// Share of the wanted number of samples from which a radius is accepted.
-const NEARLY: f64 = 0.97;
+const ACCEPTED_SHARE: f64 = 0.97;
 
 /// The sampled points, which become surface constraints.
 #[derive(Clone, Debug)]
@@ -31,13 +31,13 @@ pub struct Sampling {
     keep: Option<usize>,
     most: usize,
     seed: u64,
-    thinning: Option<(Cloud, Thinning)>,
+    poisson_disc: Option<(Cloud, PoissonDisc)>,
 }
 
 impl Sampling {
     /// Starts the selection of at most `most` points from the `keep` largest clusters, or from all.
     pub fn new(keep: Option<usize>, most: usize, seed: u64) -> Self {
-        Self { keep, most, seed, thinning: None }
+        Self { keep, most, seed, poisson_disc: None }
     }
 
     /// Does a slice of work on `cloud`, which must be the same in all calls. Returns the samples once they are
@@ -46,24 +46,24 @@ impl Sampling {
     /// # Errors
     /// [`MethodError::InvalidArgument`] if too few points are left, or all of them lie in one plane.
     pub fn advance(&mut self, cloud: &Cloud) -> Result<Option<Samples>, MethodError> {
-        let Some((kept, thinning)) = &mut self.thinning else {
+        let Some((kept, poisson_disc)) = &mut self.poisson_disc else {
             let kept = match self.keep {
                 Some(keep) => Self::largest(cloud, keep)?,
                 None => cloud.clone(),
             };
-            let thinning = Thinning::new(&kept.points, self.most, self.seed);
-            self.thinning = Some((kept, thinning));
+            let poisson_disc = PoissonDisc::new(&kept.points, self.most, self.seed);
+            self.poisson_disc = Some((kept, poisson_disc));
             return Ok(None);
         };
-        let Some(chosen) = thinning.advance(&kept.points, SLICE) else { return Ok(None) };
-        let cloud = kept.gathered(&chosen);
+        let Some(chosen) = poisson_disc.advance(&kept.points, SLICE) else { return Ok(None) };
+        let cloud = kept.select(&chosen);
         cloud.check_span()?;
         Ok(Some(Samples { spacing: mean_spacing(&cloud.points), cloud }))
     }
 
     fn largest(cloud: &Cloud, keep: usize) -> Result<Cloud, MethodError> {
         let cell = CLUSTER_CELL * mean_spacing(&cloud.points);
-        let kept = cloud.gathered(&largest_clusters(&cloud.points, cell as f32, keep));
+        let kept = cloud.select(&largest_clusters(&cloud.points, cell as f32, keep));
         kept.check_count()?;
         kept.check_span()?;
         Ok(kept)
@@ -71,7 +71,7 @@ impl Sampling {
 
     /// Returns the approximate share of the work that is done, 0 to 1, for progress bars.
     pub fn progress(&self) -> f64 {
-        self.thinning.as_ref().map_or(0.0, |(_, thinning)| thinning.progress())
+        self.poisson_disc.as_ref().map_or(0.0, |(_, poisson_disc)| poisson_disc.progress())
     }
 }
 
@@ -79,45 +79,45 @@ impl Sampling {
 /// than a radius from all kept before, with the largest radius that leaves nearly `most`. Keeps all points if there are
 /// no more.
 #[derive(Clone, Debug)]
-struct Thinning {
+struct PoissonDisc {
     order: Vec<u32>,
     most: usize,
     round: u32,
     radius: f32,
     /// Bounds of the search for the radius: the largest known to leave too many points, and the smallest known to leave
     /// few enough; 0 if there is none.
-    small: f32,
-    large: f32,
+    lower: f32,
+    upper: f32,
     /// The points kept with the smallest radius known to leave few enough.
     best: Vec<u32>,
     /// Progress with the current radius: number of points visited, points kept, and the positions of the latter.
-    looked_at: usize,
+    visited: usize,
     kept: Vec<u32>,
     grid: PointGrid,
 }
 
-impl Thinning {
+impl PoissonDisc {
     fn new(points: &[Vec3], most: usize, seed: u64) -> Self {
-        let mut thinning = Self {
+        let mut poisson_disc = Self {
             order: Random::new(seed).order(points.len()),
             most,
             round: 0,
             // First guess: n points at a distance r cover an area of about nr², here a square of side 2.
             radius: 2.0 / (most as f32).sqrt(),
-            small: 0.0,
-            large: 0.0,
+            lower: 0.0,
+            upper: 0.0,
             best: Vec::new(),
-            looked_at: 0,
+            visited: 0,
             kept: Vec::new(),
             grid: PointGrid::default(),
         };
-        thinning.begin_round();
-        thinning
+        poisson_disc.begin_round();
+        poisson_disc
     }
 
     fn begin_round(&mut self) {
         let expected = if self.most < self.order.len() { self.most } else { self.order.len() };
-        (self.looked_at, self.grid) = (0, PointGrid::new(self.radius, expected));
+        (self.visited, self.grid) = (0, PointGrid::new(self.radius, expected));
         self.kept.clear();
     }
 
@@ -126,28 +126,28 @@ impl Thinning {
         if self.order.len() <= self.most {
             return Some(self.order.clone());
         }
-        for &i in self.order.iter().skip(self.looked_at).take(count) {
+        for &i in self.order.iter().skip(self.visited).take(count) {
             let p = points[i as usize];
             if !self.grid.has_within(p, self.radius) {
                 self.grid.insert(p);
                 self.kept.push(i);
             }
-            self.looked_at += 1;
+            self.visited += 1;
         }
-        if self.looked_at < self.order.len() { None } else { self.end_round() }
+        if self.visited < self.order.len() { None } else { self.end_round() }
     }
 
     fn end_round(&mut self) -> Option<Vec<u32>> {
         let count = self.kept.len();
         if count > self.most {
-            self.small = self.radius;
+            self.lower = self.radius;
         } else {
-            self.large = self.radius;
+            self.upper = self.radius;
             self.best = std::mem::take(&mut self.kept);
         }
         self.round += 1;
-        let near_enough = count <= self.most && count as f64 >= NEARLY * self.most as f64;
-        if near_enough || self.round == ROUNDS {
+        let near_enough = count <= self.most && count as f64 >= ACCEPTED_SHARE * self.most as f64;
+        if near_enough || self.round == MAX_RADII {
             let none = self.best.is_empty();
             return Some(if none {
                 self.order[..self.most].to_vec()
@@ -163,29 +163,29 @@ impl Thinning {
     /// Returns the next radius to try. On a surface the number of samples falls with the square of the radius; if the
     /// radius predicted by that is outside the bounds, their midpoint is used, or twice the lower one if there is no upper.
     fn next_radius(&self, count: usize) -> f32 {
-        let wanted = 0.5 * (1.0 + NEARLY as f32) * self.most as f32;
+        let wanted = 0.5 * (1.0 + ACCEPTED_SHARE as f32) * self.most as f32;
         let guess = self.radius * (count as f32 / wanted).sqrt();
-        if guess > self.small && (self.large == 0.0 || guess < self.large) {
+        if guess > self.lower && (self.upper == 0.0 || guess < self.upper) {
             guess
-        } else if self.large > 0.0 {
-            0.5 * (self.small + self.large)
+        } else if self.upper > 0.0 {
+            0.5 * (self.lower + self.upper)
         } else {
-            2.0 * self.small
+            2.0 * self.lower
         }
     }
 
     /// Returns the approximate share of the work that is done, as if a handful of rounds were needed.
     fn progress(&self) -> f64 {
-        let rounds = f64::from(self.round) + self.looked_at as f64 / self.order.len() as f64;
+        let rounds = f64::from(self.round) + self.visited as f64 / self.order.len() as f64;
         rounds / (rounds + 2.0)
     }
 }
 
 /// Returns the indices of at most `most` points by Poisson-disc sampling, as [`Sampling`] selects them, in one call.
 pub fn subsampled(points: &[Vec3], most: usize, seed: u64) -> Vec<u32> {
-    let mut thinning = Thinning::new(points, most, seed);
+    let mut poisson_disc = PoissonDisc::new(points, most, seed);
     loop {
-        if let Some(chosen) = thinning.advance(points, points.len()) {
+        if let Some(chosen) = poisson_disc.advance(points, points.len()) {
             return chosen;
         }
     }
@@ -202,15 +202,15 @@ mod tests {
     fn thinned_points_keep_their_distance_and_leave_no_gap() {
         let points = on_ball(4000);
         for most in [10, 200, 3000] {
-            let mut thinning = Thinning::new(&points, most, 1);
+            let mut poisson_disc = PoissonDisc::new(&points, most, 1);
             let kept = loop {
-                if let Some(kept) = thinning.advance(&points, 777) {
+                if let Some(kept) = poisson_disc.advance(&points, 777) {
                     break kept;
                 }
-                assert!((0.0..1.0).contains(&thinning.progress()));
+                assert!((0.0..1.0).contains(&poisson_disc.progress()));
             };
             assert_eq!(kept, subsampled(&points, most, 1));
-            let radius = thinning.large;
+            let radius = poisson_disc.upper;
             for (k, &i) in kept.iter().enumerate() {
                 assert!(kept[..k].iter().all(|&j| points[i as usize].distance(points[j as usize]) > radius));
             }

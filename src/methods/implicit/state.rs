@@ -5,8 +5,8 @@
 //! the first edit.
 
 use super::kernel::Kernel;
-use super::solve::{Position, Solution};
-use super::{Edits, ImplicitParams, ImplicitSurface, Solved, Stage};
+use super::solve::{Solution, SolverPosition};
+use super::{ImplicitParams, ImplicitSurface, PointEdits, Solved, Stage};
 use crate::math::Vec3;
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
@@ -17,11 +17,11 @@ const MAGIC: Magic = *b"VSCLIMP\x02";
 
 /// The stage a saved run had reached, without the data of [`Stage`].
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
-enum Reached {
+enum SavedStage {
     Subsample,
     Constrain,
     /// Position of the solver, and whether it revises the system of the last full solve.
-    Solve(Position, bool),
+    Solve(SolverPosition, bool),
     Extract,
     Color,
     Done,
@@ -32,9 +32,9 @@ enum Reached {
 struct State {
     fingerprint: u64,
     params: ImplicitParams,
-    edits: Edits,
-    base: Option<Edits>,
-    reached: Reached,
+    edits: PointEdits,
+    base: Option<PointEdits>,
+    saved_stage: SavedStage,
     slices: u32,
     iteration: u32,
     residual: f64,
@@ -71,12 +71,12 @@ impl ImplicitSurface {
                 fingerprint: self.fingerprint(),
                 params: self.params.clone(),
                 edits: self.edits.clone(),
-                base: self.base.clone(),
-                reached: self.stage.reached(),
+                base: self.base_edits.clone(),
+                saved_stage: self.stage.reached(),
                 slices: self.slices,
                 iteration: self.iteration,
                 residual: self.residual,
-                strays: self.strays as u32,
+                strays: self.spurious_components as u32,
                 solved: self.solved.as_ref().map(|solved| Function {
                     kernel: solved.kernel,
                     centres: solved.centres.clone(),
@@ -116,14 +116,14 @@ impl ImplicitSurface {
         let Surface { positions, triangles, normals, colors } = state.surface;
         let mesh = TriangleMesh { positions, triangles, normals, colors, ..TriangleMesh::default() };
         mesh.validate()?;
-        if state.reached.needs_solution() && state.solved.is_none() {
+        if state.saved_stage.needs_solution() && state.solved.is_none() {
             return bad("solution", "it is missing");
         }
         for edits in std::iter::once(&state.edits).chain(&state.base) {
             edits.validate(&self.original, &self.map)?;
         }
-        let mut next = self.begun_anew();
-        (next.params, next.edits, next.base) = (state.params, state.edits, state.base);
+        let mut next = self.restarted();
+        (next.params, next.edits, next.base_edits) = (state.params, state.edits, state.base);
         if let Some(Function { kernel, centres, solution, mean }) = state.solved {
             if solution.weights.len() != centres.len() || solution.coefficients.len() != kernel.polynomials()
             {
@@ -131,8 +131,8 @@ impl ImplicitSurface {
             }
             next.solved = Some(Solved::new(kernel, centres, solution, mean));
         }
-        next.repeat(state.reached, state.slices)?;
-        next.strays = state.strays as usize;
+        next.replay(state.saved_stage, state.slices)?;
+        next.spurious_components = state.strays as usize;
         next.iteration = state.iteration;
         next.residual = state.residual;
         next.version = self.version;
@@ -156,48 +156,48 @@ impl ImplicitSurface {
         self.cloud.confidence.iter().flatten().for_each(|c| hash.mix(u64::from(c.to_bits())));
         hash.mix(self.options.max_points as u64);
         hash.mix(self.options.keep_components.map_or(0, |n| n as u64));
-        self.options.cameras.iter().for_each(|camera| camera.mix_into(&mut hash));
+        self.options.cameras.iter().for_each(|camera| camera.hash_into(&mut hash));
         hash.value()
     }
 
-    fn begun_anew(&self) -> Self {
+    fn restarted(&self) -> Self {
         let (original, cloud) = (self.original.clone(), self.cloud.clone());
-        Self { clock: self.clock, ..Self::begun(original, cloud, self.map, self.options.clone()) }
+        Self { clock: self.clock, ..Self::from_parts(original, cloud, self.map, self.options.clone()) }
     }
 
-    /// Recomputes everything up to the stage `reached`, and its first `slices` slices of work.
-    fn repeat(&mut self, reached: Reached, slices: u32) -> Result<(), MethodError> {
-        while reached != Reached::Subsample && matches!(self.stage, Stage::Subsample(_)) {
+    /// Recomputes everything up to the stage `saved_stage`, and its first `slices` slices of work.
+    fn replay(&mut self, saved_stage: SavedStage, slices: u32) -> Result<(), MethodError> {
+        while saved_stage != SavedStage::Subsample && matches!(self.stage, Stage::Subsample(_)) {
             self.advance()?;
         }
-        if !matches!(reached, Reached::Subsample | Reached::Constrain) {
+        if !matches!(saved_stage, SavedStage::Subsample | SavedStage::Constrain) {
             self.make_constraints()?;
         }
-        self.stage = match reached {
-            Reached::Solve(position, revised) => {
+        self.stage = match saved_stage {
+            SavedStage::Solve(position, revised) => {
                 let mut solver = if revised { self.revised_solver() } else { None }
                     .unwrap_or_else(|| self.new_solver(&self.constraints));
                 solver.advance_to(position).map_err(|_| self.singular())?;
                 Stage::Solve(solver)
             }
-            Reached::Extract | Reached::Color => self.begin_extraction()?,
-            Reached::Done => Stage::Done,
-            Reached::Subsample | Reached::Constrain => return self.repeat_slices(reached, slices),
+            SavedStage::Extract | SavedStage::Color => self.begin_extraction()?,
+            SavedStage::Done => Stage::Done,
+            SavedStage::Subsample | SavedStage::Constrain => return self.replay_slices(saved_stage, slices),
         };
-        while reached == Reached::Color && matches!(self.stage, Stage::Extract(_)) {
+        while saved_stage == SavedStage::Color && matches!(self.stage, Stage::Extract(_)) {
             self.advance()?;
         }
-        self.repeat_slices(reached, slices)
+        self.replay_slices(saved_stage, slices)
     }
 
-    fn repeat_slices(&mut self, reached: Reached, slices: u32) -> Result<(), MethodError> {
+    fn replay_slices(&mut self, saved_stage: SavedStage, slices: u32) -> Result<(), MethodError> {
         self.slices = 0;
-        if matches!(reached, Reached::Solve(..) | Reached::Done) {
+        if matches!(saved_stage, SavedStage::Solve(..) | SavedStage::Done) {
             return Ok(());
         }
         while self.slices < slices {
             self.advance()?;
-            if self.stage.reached() != reached {
+            if self.stage.reached() != saved_stage {
                 let problem = format!("{slices} given; the stage is over before");
                 return Err(MethodError::BadState { field: "slices", problem });
             }
@@ -206,21 +206,21 @@ impl ImplicitSurface {
     }
 }
 
-impl Reached {
+impl SavedStage {
     fn needs_solution(self) -> bool {
         matches!(self, Self::Extract | Self::Color | Self::Done | Self::Solve(_, true))
     }
 }
 
 impl Stage {
-    fn reached(&self) -> Reached {
+    fn reached(&self) -> SavedStage {
         match self {
-            Self::Subsample(_) => Reached::Subsample,
-            Self::Constrain => Reached::Constrain,
-            Self::Solve(solver) => Reached::Solve(solver.position(), solver.is_revised()),
-            Self::Extract(_) => Reached::Extract,
-            Self::Color(_) => Reached::Color,
-            Self::Done => Reached::Done,
+            Self::Subsample(_) => SavedStage::Subsample,
+            Self::Constrain => SavedStage::Constrain,
+            Self::Solve(solver) => SavedStage::Solve(solver.position(), solver.is_revised()),
+            Self::Extract(_) => SavedStage::Extract,
+            Self::Color(_) => SavedStage::Color,
+            Self::Done => SavedStage::Done,
         }
     }
 }

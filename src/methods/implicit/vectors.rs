@@ -1,25 +1,25 @@
 //! Vector operations with a fixed order of summation, so that results are bit-identical natively and in wasm.
 
 /// A floating-point type for matrix entries, `f32` or `f64`; sums over them are taken in `f64`.
-pub trait Number: Copy + Into<f64> {
+pub trait MatrixScalar: Copy + Into<f64> {
     /// Rounds `x` to this type.
-    fn of(x: f64) -> Self;
+    fn from_f64(x: f64) -> Self;
 }
 
-impl Number for f32 {
-    fn of(x: f64) -> Self {
+impl MatrixScalar for f32 {
+    fn from_f64(x: f64) -> Self {
         x as f32
     }
 }
 
-impl Number for f64 {
-    fn of(x: f64) -> Self {
+impl MatrixScalar for f64 {
+    fn from_f64(x: f64) -> Self {
         x
     }
 }
 
 /// Returns the dot product Σ aᵢbᵢ, accumulated in four independent partial sums that the compiler can vectorise.
-pub fn dot<T: Number>(a: &[T], b: &[f64]) -> f64 {
+pub fn dot<T: MatrixScalar>(a: &[T], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (fours, rest) = a.as_chunks::<4>();
     let (other_fours, other_rest) = b.as_chunks::<4>();
@@ -33,7 +33,7 @@ pub fn dot<T: Number>(a: &[T], b: &[f64]) -> f64 {
 }
 
 /// Adds `weight` times `from` to `to`.
-pub fn add<T: Number>(weight: f64, from: &[T], to: &mut [f64]) {
+pub fn add<T: MatrixScalar>(weight: f64, from: &[T], to: &mut [f64]) {
     to.iter_mut().zip(from).for_each(|(x, &y)| *x += weight * y.into());
 }
 

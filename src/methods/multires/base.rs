@@ -3,7 +3,7 @@
 
 use super::TOLERANCE;
 use super::correspondence::{BasePoint, normal_at};
-use super::detail::{Band, MOST_BANDS, reach};
+use super::detail::{Band, MAX_BANDS, reach};
 use super::ellipsoid::Ellipsoid;
 use super::membrane::{residual, solve};
 use super::params::MultiresParams;
@@ -51,7 +51,7 @@ pub(super) fn decomposition(
         }
         // The last surface with a graph over it becomes a band of its own, and smoothing continues from it.
         match last_good.take() {
-            Some((band, before)) if bands.len() < MOST_BANDS => {
+            Some((band, before)) if bands.len() < MAX_BANDS => {
                 bands.push(band);
                 mesh = before;
             }
@@ -120,9 +120,9 @@ fn union_of(ellipsoids: &[Ellipsoid], edge: f64) -> Result<TriangleMesh, MethodE
     let reach = |e: &Ellipsoid| e.center.distance(centre) + e.lengths.max_element();
     let radius = ellipsoids.iter().map(reach).fold(0.0, f64::max) + 2.0 * cell;
     let nodes = (2.0 * radius / cell).ceil() + 1.0;
-    if nodes > MOST_NODES {
+    if nodes > MAX_NODES {
         let problem = format!(
-            "they span {} and are {shortest_axis} thin: {MOST_NODES} edges across are accepted; make edgeMax longer or the thinnest thicker",
+            "they span {} and are {shortest_axis} thin: {MAX_NODES} edges across are accepted; make edgeMax longer or the thinnest thicker",
             2.0 * radius
         );
         return Err(MethodError::invalid("ellipsoids", problem));
@@ -154,7 +154,7 @@ const CELL: f64 = 0.4;
 
 /// Maximum number of lattice nodes along an axis: a surface across the whole lattice then has some ten million
 /// triangles.
-const MOST_NODES: f64 = 1024.0;
+const MAX_NODES: f64 = 1024.0;
 
 /// Returns the edge length of equilateral triangles of which `triangles` have the total area `area`.
 pub(super) fn edge_for(area: f64, triangles: f64) -> f64 {

@@ -86,12 +86,12 @@ pub(super) fn reach(from: &Band, to: &Band) -> f64 {
 }
 
 /// Maximum number of bands above the base.
-pub(super) const MOST_BANDS: usize = 8;
+pub(super) const MAX_BANDS: usize = 8;
 
 /// The detail at a point of the base: the signed distances of all bands.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Detail {
-    lambdas: [f32; MOST_BANDS],
+    lambdas: [f32; MAX_BANDS],
     /// Whether a normal did not hit its surface and the closest point was used instead.
     pub missed: bool,
     /// The corresponding point on the finest surface.
@@ -288,7 +288,7 @@ struct Sample {
 }
 
 /// The entry of a free slot.
-const NOTHING: Detail = Detail { lambdas: [0.0; MOST_BANDS], missed: false, last: UNSET };
+const NOTHING: Detail = Detail { lambdas: [0.0; MAX_BANDS], missed: false, last: UNSET };
 
 #[cfg(test)]
 mod tests {

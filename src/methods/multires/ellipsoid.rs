@@ -18,7 +18,7 @@ pub struct ControlEllipsoid {
 const ORTHOGONAL: f64 = 1e-3;
 
 /// Largest ratio of two semi-axes: more slender ellipsoids are thinner than any triangle could follow.
-const MOST_SLENDER: f64 = 1e3;
+const MAX_AXIS_RATIO: f64 = 1e3;
 
 /// Accepted range of semi-axes, in units of the mesh: squares and cubes stay within the range of `f32`.
 const SHORTEST: f64 = 1e-9;
@@ -42,9 +42,9 @@ impl ControlEllipsoid {
         }
         let (least, most) =
             (lengths.into_iter().fold(f64::MAX, f64::min), lengths.into_iter().fold(0.0, f64::max));
-        if most > MOST_SLENDER * least {
+        if most > MAX_AXIS_RATIO * least {
             return refuse(format!(
-                "one semi-axis is {} times another; up to {MOST_SLENDER} is accepted",
+                "one semi-axis is {} times another; up to {MAX_AXIS_RATIO} is accepted",
                 most / least
             ));
         }

@@ -6,7 +6,7 @@ use super::ellipsoid::{Ellipsoid, move_with};
 use super::guarded::{cut_threads, displacements_to, move_guarded};
 use super::membrane::{pushed_positions, refresh, residual, solve};
 use super::setup::check_size;
-use super::{MOST_VERTICES, MultiresParams, MultiresolutionModel, TOLERANCE, area, mean_edge, typical_edge};
+use super::{MAX_VERTICES, MultiresParams, MultiresolutionModel, TOLERANCE, area, mean_edge, typical_edge};
 use crate::mesh::{Mesh, VertexId, measure};
 use crate::methods::{MethodError, Times};
 use crate::remesh::{Changes, EdgeBounds, Resolver};
@@ -14,7 +14,7 @@ use crate::spatial::SurfaceWalker;
 
 /// Largest factor by which the mean edge changes in one frame: a mesh much finer or coarser than its bounds can neither
 /// be guarded nor solved in bounded time.
-const MOST_CHANGE: f64 = 2.0;
+const MAX_CHANGE: f64 = 2.0;
 
 /// While ellipsoids move, a membrane with at most this residual is only refreshed on one level: three times as fast as
 /// a solve on all levels.
@@ -31,10 +31,10 @@ impl MultiresolutionModel {
     /// Returns the parameters with edge bounds that one frame can reach: within a factor of 2 of the current mean edge.
     pub(super) fn params_now(&self) -> MultiresParams {
         let ratio = self.params.target() / mean_edge(&self.surface);
-        let factor = if ratio > MOST_CHANGE {
-            MOST_CHANGE / ratio
-        } else if ratio * MOST_CHANGE < 1.0 {
-            1.0 / (ratio * MOST_CHANGE)
+        let factor = if ratio > MAX_CHANGE {
+            MAX_CHANGE / ratio
+        } else if ratio * MAX_CHANGE < 1.0 {
+            1.0 / (ratio * MAX_CHANGE)
         } else {
             1.0
         };
@@ -171,7 +171,7 @@ impl MultiresolutionModel {
 
     fn move_guarded(&self, prediction: &Prediction) -> (Mesh, Changes) {
         let mut next = self.surface.clone();
-        let resolver = &mut Resolver::with_room_for(MOST_VERTICES);
+        let resolver = &mut Resolver::with_room_for(MAX_VERTICES);
         let changes = move_guarded(
             &mut next,
             prediction.predicted.positions(),
@@ -202,7 +202,7 @@ impl MultiresolutionModel {
         if !self.guard.is_embedded(&mesh) {
             return None;
         }
-        changes += cut_threads(&mut mesh, &prediction.params, MOST_VERTICES);
+        changes += cut_threads(&mut mesh, &prediction.params, MAX_VERTICES);
         Some((mesh, changes))
     }
 }

@@ -16,7 +16,7 @@ const MAX_EDGE_PER_AXIS: f64 = 0.8;
 const LEVEL_TOLERANCE: f64 = 0.025;
 
 /// Minimum number of vertices of a coarse level: fewer do not represent the shape.
-const LEAST_VERTICES: f64 = 60.0;
+const MIN_VERTICES: f64 = 60.0;
 
 /// Solves the membrane on meshes from coarse to fine, with up to `levels` coarse levels before the target resolution;
 /// the last one is left in `mesh`.
@@ -92,7 +92,7 @@ fn coarsest(mesh: &Mesh, ellipsoids: &[Ellipsoid], params: &MultiresParams, leve
     let fits = |level: u32| {
         let coarser = libm::pow(params.refine_factor, -f64::from(level));
         let vertices = mesh.vertex_count() as f64 / (coarser * coarser);
-        params.edge_max * coarser <= MAX_EDGE_PER_AXIS * thinnest && vertices >= LEAST_VERTICES
+        params.edge_max * coarser <= MAX_EDGE_PER_AXIS * thinnest && vertices >= MIN_VERTICES
     };
     (0..=levels).rev().find(|&level| level == 0 || fits(level)).unwrap_or(0)
 }

@@ -66,7 +66,7 @@ pub struct MultiresOptions {
 const TOLERANCE: f64 = 0.01;
 
 /// The largest number of vertices of the deformed base.
-const MOST_VERTICES: usize = 200_000;
+const MAX_VERTICES: usize = 200_000;
 
 /// A surface that is deformed by control ellipsoids and keeps its detail.
 pub struct MultiresolutionModel {

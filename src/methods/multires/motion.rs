@@ -50,8 +50,8 @@ impl MovingEllipsoids {
         let mut moving: Vec<MovingEllipsoid> = Vec::with_capacity(given.len().max(self.0.len()));
         for (k, given) in given.iter().enumerate() {
             let target = Ellipsoid::new(given);
-            let known = self.0.get(k).filter(|moving| moving.target.is_some());
-            let now = known.map_or_else(|| self.initial_state(&target, &holds), |moving| moving.now);
+            let known = self.0.get(k).filter(|ellipsoid| ellipsoid.target.is_some());
+            let now = known.map_or_else(|| self.initial_state(&target, &holds), |ellipsoid| ellipsoid.now);
             moving.push(MovingEllipsoid { now, target: Some(target) });
         }
         // Includes those that were being removed before.
@@ -66,7 +66,7 @@ impl MovingEllipsoids {
     /// Returns the state in which a new ellipsoid starts. Growing outside of the membrane, it would push the membrane
     /// away instead of being covered by it.
     fn initial_state(&self, target: &Ellipsoid, holds: impl Fn(&Ellipsoid) -> bool) -> Ellipsoid {
-        let away = |moving: &MovingEllipsoid| moving.now.ray_distance(target.center);
+        let away = |ellipsoid: &MovingEllipsoid| ellipsoid.now.ray_distance(target.center);
         let nearest = self.0.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
         match nearest {
             Some(MovingEllipsoid { now: host, .. }) if !holds(target) => {
@@ -79,30 +79,30 @@ impl MovingEllipsoids {
 
     /// Whether all are valid ellipsoids; those of a saved state may not be.
     pub fn are_valid(&self) -> bool {
-        let all = self.0.iter().flat_map(|moving| std::iter::once(moving.now).chain(moving.target));
+        let all = self.0.iter().flat_map(|ellipsoid| std::iter::once(ellipsoid.now).chain(ellipsoid.target));
         !self.0.is_empty() && all.into_iter().all(|e| e.to_control().validate(0).is_ok())
     }
 
     /// Returns all ellipsoids in their current state.
     pub fn now(&self) -> Vec<Ellipsoid> {
-        self.0.iter().map(|moving| moving.now).collect()
+        self.0.iter().map(|ellipsoid| ellipsoid.now).collect()
     }
 
     /// Returns the targets, without the ellipsoids that are being removed.
     pub fn targets(&self) -> Vec<Ellipsoid> {
-        self.0.iter().filter_map(|moving| moving.target).collect()
+        self.0.iter().filter_map(|ellipsoid| ellipsoid.target).collect()
     }
 
     /// Whether all ellipsoids are at their targets, and none is being removed.
     pub fn have_arrived(&self) -> bool {
-        self.0.iter().all(|moving| moving.target == Some(moving.now))
+        self.0.iter().all(|ellipsoid| ellipsoid.target == Some(ellipsoid.now))
     }
 
     /// Returns the number of steps, possibly fractional, that the slowest ellipsoid needs to reach its target.
     pub fn steps_left(&self) -> f64 {
         self.0
             .iter()
-            .map(|moving| moving.target.map_or(1.0, |target| steps_between(&moving.now, &target)))
+            .map(|ellipsoid| ellipsoid.target.map_or(1.0, |target| steps_between(&ellipsoid.now, &target)))
             .fold(0.0, f64::max)
     }
 
@@ -121,12 +121,12 @@ impl MovingEllipsoids {
 
     /// Removes ellipsoids that were being removed and have become small.
     pub fn drop_vanished(&mut self) {
-        let is_kept = |moving: &MovingEllipsoid, all: f64| {
-            moving.target.is_some() || moving.now.shortest_axis() > START_SIZE * all
+        let is_kept = |ellipsoid: &MovingEllipsoid, all: f64| {
+            ellipsoid.target.is_some() || ellipsoid.now.shortest_axis() > START_SIZE * all
         };
         let usual =
             self.0.iter().filter_map(|m| m.target).map(|target| target.shortest_axis()).fold(0.0, f64::max);
-        self.0.retain(|moving| is_kept(moving, usual));
+        self.0.retain(|ellipsoid| is_kept(ellipsoid, usual));
     }
 }
 

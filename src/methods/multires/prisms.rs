@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1e-5;
 
 /// Smallest cosine between the normals at two corners: with more divergent normals the prism would be much too wide,
 /// and the tree is used.
-const LEAST_COSINE: f32 = 0.1;
+const MIN_COSINE: f32 = 0.1;
 
 impl PrismLookup {
     /// Builds the lists for the triangles of `from` among those of `to`, with prisms no deeper than `reach`.
@@ -72,7 +72,7 @@ fn depth(from: &Band, to: &Band, reach: f64, t: u32) -> f64 {
         to.walker.tree().line_hit(at.point, normal, reach).map(|hit| hit.distance.abs())
     });
     let normals = corner_normals(from, t);
-    let bends = (0..3).any(|k| normals[k].dot(normals[(k + 1) % 3]) < LEAST_COSINE);
+    let bends = (0..3).any(|k| normals[k].dot(normals[(k + 1) % 3]) < MIN_COSINE);
     if bends { 0.0 } else { DEPTH * farthest.fold(0.0, f64::max) }
 }
 

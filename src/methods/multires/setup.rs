@@ -4,7 +4,7 @@ use super::base::{check_embedded, decomposition, edge_for, membrane_around};
 use super::correspondence::{BasePoint, UNSET};
 use super::detail::Band;
 use super::ellipsoid::{Ellipsoid, check_tips};
-use super::{MOST_VERTICES, MultiresParams};
+use super::{MAX_VERTICES, MultiresParams};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::methods::MethodError;
@@ -79,13 +79,13 @@ fn check_touching(ellipsoids: &[Ellipsoid], base: &SurfaceWalker, target: f64) -
     Err(MethodError::invalid("ellipsoids", "none touches the base; at least one has to, or nothing holds it"))
 }
 
-/// Checks that a surface of this area has at most [`MOST_VERTICES`] vertices at the target edge length.
+/// Checks that a surface of this area has at most [`MAX_VERTICES`] vertices at the target edge length.
 pub(super) fn check_size(area: f64, params: &MultiresParams) -> Result<(), MethodError> {
     let triangle = 0.25 * 3.0_f64.sqrt() * params.target() * params.target();
-    if area / triangle <= 2.0 * MOST_VERTICES as f64 {
+    if area / triangle <= 2.0 * MAX_VERTICES as f64 {
         return Ok(());
     }
-    Err(MethodError::TooManyVertices { most: MOST_VERTICES })
+    Err(MethodError::TooManyVertices { most: MAX_VERTICES })
 }
 
 /// Returns the identity map from the base to itself, as the map T of every vertex.

@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 
 /// Maximum number of rounds that search for vertices without a boundary, and the minimum if there are any.
 const ROUNDS: usize = 10;
-const LEAST_ROUNDS: usize = 2;
+const MIN_ROUNDS: usize = 2;
 
 /// Rounds end when at least this share of the vertices without a boundary remains from the round before.
 const LITTLE_PROGRESS: f64 = 0.9;
@@ -49,7 +49,7 @@ impl FrameTracker {
                 facts.without_boundary = without_boundary.len();
             }
             let progresses = (without_boundary.len() as f64) < LITTLE_PROGRESS * before as f64;
-            if without_boundary.is_empty() || round >= LEAST_ROUNDS && !progresses {
+            if without_boundary.is_empty() || round >= MIN_ROUNDS && !progresses {
                 break;
             }
             before = without_boundary.len();

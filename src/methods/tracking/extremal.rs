@@ -18,7 +18,7 @@ pub(super) struct PlaneFit {
 }
 
 /// Smallest total weight of points that a plane is fitted to.
-const LEAST_WEIGHT: f64 = 1e-3;
+const MIN_WEIGHT: f64 = 1e-3;
 
 /// Points whose variance in time is at most this share of their variance in space are fitted in space only.
 const MIN_TIME_SPREAD: f64 = 1e-6;
@@ -53,7 +53,7 @@ pub(super) fn hyperplane(sums: &Sums) -> Option<PlaneFit> {
 /// Returns the mean and the covariance, with products in the order of [`Sums::second`]; `None` if there are too few
 /// points.
 fn mean_and_covariance(sums: &Sums) -> Option<[[f64; 10]; 2]> {
-    if sums.weight < LEAST_WEIGHT {
+    if sums.weight < MIN_WEIGHT {
         return None;
     }
     let mut mean = [0.0; 10];

@@ -2,7 +2,7 @@
 //! marching cubes.
 
 use super::extremal::plane;
-use super::labelling::{LEAST_WEIGHT, VoxelBox, label_bright};
+use super::labelling::{MIN_WEIGHT, VoxelBox, label_bright};
 use super::region::Region;
 use super::samples::{Falloff, SampleField};
 use super::vote::{Faces, X, Y, Z};
@@ -53,7 +53,7 @@ fn oriented(region: &Region, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
     let field = SampleField::single_frame(region, falloff, faces);
     let mut points = Vec::new();
     for direction in [X, Y, Z] {
-        for face in faces[direction].iter().filter(|face| face.weight >= LEAST_WEIGHT) {
+        for face in faces[direction].iter().filter(|face| face.weight >= MIN_WEIGHT) {
             let (at, _) = region.face(direction, face.voxel);
             let Some(fit) = plane(&field.sums(at)) else { continue };
             let out = region

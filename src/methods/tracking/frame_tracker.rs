@@ -23,7 +23,7 @@ const UNFOLDINGS: usize = 3;
 const FIRST_SETTLINGS: usize = 3;
 
 /// A vertex is on a boundary if intensity falls along its normal by at least this share of τ.
-const LEAST_STEP: f64 = 0.3;
+const MIN_STEP: f64 = 0.3;
 
 /// Share of the tangential displacement to the mean of the neighbours by which vertices are spaced in each frame.
 const SPACING: f32 = 0.5;
@@ -88,7 +88,7 @@ impl FrameContext<'_> {
         }
         let [inside, outside] = [position - displacement, position + displacement]
             .map(|position| region.sample(self.frame, position));
-        if inside - outside >= LEAST_STEP * region.threshold {
+        if inside - outside >= MIN_STEP * region.threshold {
             return Support::Boundary;
         }
         let level = self.voting.level_at(region, self.frame, region.nearest(position + displacement));

@@ -10,7 +10,7 @@ use super::region::Region;
 use super::vote::{Faces, X, Y, Z};
 
 /// Smallest weight, as a share of votes, with which a face is part of a wall.
-pub(super) const LEAST_WEIGHT: f32 = 0.3;
+pub(super) const MIN_WEIGHT: f32 = 0.3;
 
 /// Relative residual at which conjugate gradients stop.
 const TOLERANCE: f64 = 1e-3;
@@ -67,7 +67,7 @@ pub(super) fn label_bright(
     let reconstructed = solve_poisson(dims, source);
     // Weighted means of the middles of the steps, at voxels adjacent to walls.
     let mut middles = vec![(0.0, 0.0); reconstructed.len()];
-    for &(i, j, step) in steps.iter().filter(|(.., step)| step.abs() >= LEAST_WEIGHT) {
+    for &(i, j, step) in steps.iter().filter(|(.., step)| step.abs() >= MIN_WEIGHT) {
         let (weight, middle) = (f64::from(step.abs()), (reconstructed[i] + reconstructed[j]) / 2.0);
         for k in [i, j] {
             middles[k].0 += weight * middle;
@@ -94,7 +94,7 @@ pub(super) fn label_bright_by_level(
     };
     let mut known = vec![None; voxels.len()];
     for (i, j, _) in
-        face_steps(region, frame, faces, voxels).into_iter().filter(|step| step.2.abs() >= LEAST_WEIGHT)
+        face_steps(region, frame, faces, voxels).into_iter().filter(|step| step.2.abs() >= MIN_WEIGHT)
     {
         let middle = (level(i) + level(j)) / 2.0;
         (known[i], known[j]) = (Some(middle), Some(middle));

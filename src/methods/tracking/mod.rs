@@ -100,7 +100,7 @@ pub struct SurfaceTracker {
     voting: BoundaryVoting,
     /// The boundary votes by frame, for the frames processed so far.
     faces: Vec<Faces>,
-    tracker: Option<FrameTracker>,
+    frame_tracker: Option<FrameTracker>,
     /// The boundary points around the newest frame.
     samples: Option<SpaceTimeSamples>,
     mesh: Mesh,
@@ -156,7 +156,7 @@ impl SurfaceTracker {
             params: TrackingParams::default(),
             image,
             faces: Vec::new(),
-            tracker: None,
+            frame_tracker: None,
             samples: None,
             meshes: Vec::new(),
             facts: Vec::new(),
@@ -197,7 +197,7 @@ impl SurfaceTracker {
         };
         self.voting = BoundaryVoting::new(window, self.frames());
         self.faces.clear();
-        (self.tracker, self.samples, self.closure_error) = (None, None, None);
+        (self.frame_tracker, self.samples, self.closure_error) = (None, None, None);
         self.meshes.clear();
         self.facts.clear();
         let replaced = std::mem::replace(&mut self.mesh, self.start.clone());
@@ -329,7 +329,7 @@ impl SurfaceTracker {
     /// Tracks the surface into the next frame. If it fails, nothing has changed.
     fn next_frame(&mut self) -> Result<Changes, MethodError> {
         let frame = self.meshes.len();
-        let mut tracker = match self.tracker.take() {
+        let mut tracker = match self.frame_tracker.take() {
             Some(tracker) => tracker,
             None => {
                 self.find_first_mesh()?;
@@ -348,7 +348,7 @@ impl SurfaceTracker {
             voting: &self.voting,
         };
         let (changes, facts) = tracker.track_frame(&mut self.mesh, from.as_ref(), &context);
-        (self.tracker, self.samples) = (Some(tracker), Some(samples));
+        (self.frame_tracker, self.samples) = (Some(tracker), Some(samples));
         self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
         self.facts.push(facts);
         Ok(changes)
@@ -356,7 +356,9 @@ impl SurfaceTracker {
 
     /// Tracks the surface of the last frame on to the first, and measures how far it is from where it began.
     fn close_cycle(&mut self) {
-        let (Some(mut tracker), Some(first)) = (self.tracker.clone(), self.meshes.first()) else { return };
+        let (Some(mut tracker), Some(first)) = (self.frame_tracker.clone(), self.meshes.first()) else {
+            return;
+        };
         let mut mesh = self.mesh.clone();
         let samples = self.samples_around(0);
         self.voting.ensure_levels(&self.region, 0);

@@ -52,7 +52,7 @@ impl Default for TrackingParams {
 const THRESHOLD_IN_NOISE: f64 = 4.0;
 
 /// Smallest default τ, as a share of the intensity range: images without noise need a threshold as well.
-const LEAST_THRESHOLD: f64 = 0.05;
+const MIN_THRESHOLD: f64 = 0.05;
 
 /// Default radius in the shortest side of a voxel, about two voxels and a half: a smaller one follows noise, a larger
 /// one rounds off details of that thickness.
@@ -102,7 +102,7 @@ impl TrackingParams {
     pub(super) fn with_volume(mut self, image: &ImageFacts) -> Self {
         let ImageFacts { shortest_side, longest_side, noise, range } = *image;
         let or = |value: f64, usual: f64| if value == 0.0 { usual } else { value };
-        self.threshold = or(self.threshold, (THRESHOLD_IN_NOISE * noise).max(LEAST_THRESHOLD * range));
+        self.threshold = or(self.threshold, (THRESHOLD_IN_NOISE * noise).max(MIN_THRESHOLD * range));
         self.radius =
             or(self.radius, (RADIUS_IN_PIXELS * shortest_side).max(RADIUS_IN_SLICES * longest_side));
         self.time_scale = or(self.time_scale, TIME_SCALE_IN_RADIUS * self.radius);

@@ -6,7 +6,7 @@ use super::samples::SampleField;
 use crate::math::DVec3;
 
 /// Smallest damping factor of a projection step; that of the i-th step is β^i until then.
-const LEAST_DAMPING: f64 = 0.2;
+const MIN_DAMPING: f64 = 0.2;
 
 /// Maximum number of steps of one projection.
 const STEPS: usize = 30;
@@ -73,7 +73,7 @@ impl SpaceTimeSamples {
             if change < self.tolerance {
                 return Some((x, step + 1));
             }
-            damping = (damping * self.damping).max(LEAST_DAMPING);
+            damping = (damping * self.damping).max(MIN_DAMPING);
         }
         Some((x, STEPS))
     }

@@ -19,14 +19,14 @@ const BINS: usize = 4096;
 const PADDING: usize = 2;
 
 /// Minimum number of voxels along at least two axes; a single slice is accepted.
-const LEAST_VOXELS: usize = 5;
+const MIN_VOXELS: usize = 5;
 
 /// Upper bounds of the memory per voxel, in bytes: in total, for the weights around two frames, and per frame, for
 /// intensity and level.
 const BYTES: [u64; 2] = [140, 2];
 
 /// Maximum memory for a region, in bytes: what a browser gives to one page, less the volume.
-const MOST_BYTES: u64 = 3_000_000_000;
+const MAX_BYTES: u64 = 3_000_000_000;
 
 /// Largest cosine between two voxel axes that counts as a right angle: rounding in headers stays far below.
 const ORTHOGONAL: f64 = 1e-3;
@@ -209,14 +209,14 @@ impl Region {
 fn check_size(dims: [usize; 3], frames: usize) -> Result<(), MethodError> {
     let voxels = dims.iter().fold(1u64, |product, &n| product.saturating_mul(n as u64));
     let bytes = voxels.saturating_mul(BYTES[0] + BYTES[1] * frames as u64);
-    if bytes <= MOST_BYTES {
+    if bytes <= MAX_BYTES {
         return Ok(());
     }
     let problem = format!(
         "{dims:?} voxels, with those around, in {frames} frames need {} MB and {} are accepted; a smaller box, or means of \
          several voxels (binned), need less",
         bytes / 1_000_000,
-        MOST_BYTES / 1_000_000
+        MAX_BYTES / 1_000_000
     );
     Err(MethodError::invalid("box", problem))
 }
@@ -257,8 +257,8 @@ fn voxel_bounds(volume: &Volume, bounds: Option<Bounds>) -> Result<[[usize; 3]; 
         }
     };
     let counts = [0, 1, 2].map(|k| high[k] - low[k] + 1);
-    if counts.iter().filter(|&&count| count >= LEAST_VOXELS).count() < 2 {
-        let problem = format!("{counts:?} voxels; {LEAST_VOXELS} or more along two axes are needed");
+    if counts.iter().filter(|&&count| count >= MIN_VOXELS).count() < 2 {
+        let problem = format!("{counts:?} voxels; {MIN_VOXELS} or more along two axes are needed");
         return Err(MethodError::invalid(parameter, problem));
     }
     Ok([low, high])

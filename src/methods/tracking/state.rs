@@ -39,7 +39,7 @@ impl SurfaceTracker {
                 params: self.params.clone(),
                 faces: self.faces.clone(),
                 mesh: self.mesh.clone(),
-                edge: self.tracker.as_ref().map(|tracker| tracker.edge),
+                edge: self.frame_tracker.as_ref().map(|tracker| tracker.edge),
                 meshes: self.meshes.iter().map(plain).collect(),
                 facts: self.facts.clone(),
                 closing: self.closure_error,
@@ -93,7 +93,7 @@ impl SurfaceTracker {
         self.faces = state.faces;
         (self.meshes, self.facts) = (meshes, state.facts);
         (self.closure_error, self.steps) = (state.closing, state.steps);
-        self.tracker = state.edge.map(FrameTracker::new);
+        self.frame_tracker = state.edge.map(FrameTracker::new);
         self.samples = self.newest_samples();
         Ok(())
     }

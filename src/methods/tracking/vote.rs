@@ -12,7 +12,7 @@ const NONE: u8 = u8::MAX;
 const LANES: usize = u8x16::LANES as usize;
 
 /// Smallest share of its window that a cluster must exceed.
-const LEAST_SHARE: f64 = 0.1;
+const MIN_SHARE: f64 = 0.1;
 
 /// Maximum number of Lloyd iterations; two to five are usual.
 const ITERATIONS: usize = 50;
@@ -138,7 +138,7 @@ impl BoundaryVoting {
     /// clusters do not pass.
     fn level(&mut self, counts: &Histogram) -> u8 {
         let Some((low, high)) = counts.two_means(self.window.threshold) else { return NONE };
-        let enough = LEAST_SHARE * f64::from(low.count + high.count);
+        let enough = MIN_SHARE * f64::from(low.count + high.count);
         if f64::from(low.count) <= enough || f64::from(high.count) <= enough {
             return NONE;
         }

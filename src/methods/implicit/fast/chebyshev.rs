@@ -41,7 +41,7 @@ impl Chebyshev {
 
     /// Returns the position of node `index` in the cube [−1, 1]³.
     pub fn node(&self, index: usize) -> DVec3 {
-        let [i, j, k] = split(index);
+        let [i, j, k] = node_coords(index);
         DVec3::new(self.nodes[i], self.nodes[j], self.nodes[k])
     }
 
@@ -80,20 +80,20 @@ impl Chebyshev {
 
     /// Interpolates values at the nodes of a cube at the nodes of one of its octants (the local-to-local translation);
     /// `half` is the side of the octant, 0 or 1, along each axis.
-    pub fn to_half(&self, whole: &Nodal, half: [usize; 3]) -> Nodal {
+    pub fn to_octant(&self, whole: &Nodal, half: [usize; 3]) -> Nodal {
         let mut values = whole.map(f64::from);
         for (axis, side) in half.into_iter().enumerate() {
-            values = along(&values, axis, |to, from| self.halves[side][to][from]);
+            values = apply_along(&values, axis, |to, from| self.halves[side][to][from]);
         }
         values.map(|x| x as f32)
     }
 
     /// Moves sources at the nodes of an octant to the nodes of the whole cube (the multipole-to-multipole translation),
-    /// by the transpose of [`Self::to_half`].
-    pub fn to_whole(&self, part: &Nodal, half: [usize; 3]) -> Nodal {
+    /// by the transpose of [`Self::to_octant`].
+    pub fn from_octant(&self, part: &Nodal, half: [usize; 3]) -> Nodal {
         let mut values = part.map(f64::from);
         for (axis, side) in half.into_iter().enumerate() {
-            values = along(&values, axis, |to, from| self.halves[side][from][to]);
+            values = apply_along(&values, axis, |to, from| self.halves[side][from][to]);
         }
         values.map(|x| x as f32)
     }
@@ -117,34 +117,34 @@ impl Chebyshev {
     }
 
     /// Spreads a source of strength `weight`, at a point in [−1, 1]³, to the nodes.
-    pub fn spread(&self, nodal: &mut Nodal, at: DVec3, weight: f64) {
+    pub fn spread_source(&self, nodal: &mut Nodal, at: DVec3, weight: f64) {
         let [x, y, z] = at.to_array().map(|t| self.weights(t));
         for (index, value) in nodal.iter_mut().enumerate() {
-            let [i, j, k] = split(index);
+            let [i, j, k] = node_coords(index);
             *value += (weight * x[i] * y[j] * z[k]) as f32;
         }
     }
 }
 
 /// Returns the index of a node along each axis.
-pub fn split(index: usize) -> [usize; 3] {
+pub fn node_coords(index: usize) -> [usize; 3] {
     [index % NODES, index / NODES % NODES, index / (NODES * NODES)]
 }
 
 /// Returns the number of the node with the given index along each axis.
-pub fn joined([i, j, k]: [usize; 3]) -> usize {
+pub fn node_index([i, j, k]: [usize; 3]) -> usize {
     (k * NODES + j) * NODES + i
 }
 
 /// Applies a matrix to nodal values along one axis.
-fn along(values: &[f64; CUBE], axis: usize, entry: impl Fn(usize, usize) -> f64) -> [f64; CUBE] {
+fn apply_along(values: &[f64; CUBE], axis: usize, entry: impl Fn(usize, usize) -> f64) -> [f64; CUBE] {
     std::array::from_fn(|index| {
-        let place = split(index);
-        let mut from = place;
+        let node = node_coords(index);
+        let mut from = node;
         let mut sum = 0.0;
         for k in 0..NODES {
             from[axis] = k;
-            sum += entry(place[axis], k) * values[joined(from)];
+            sum += entry(node[axis], k) * values[node_index(from)];
         }
         sum
     })

@@ -13,24 +13,24 @@ mod translate;
 use super::field::Field;
 use crate::math::DVec3;
 use chebyshev::{CUBE, Chebyshev, Nodal};
-use translate::{Translations, Turns};
+use translate::{CubeSymmetries, Translations};
 
 /// Approximate number of terms in a finest cube. With more, sums of near terms take longer; with fewer, there are more
 /// cubes.
 const TERMS_A_CUBE: usize = 24;
 /// Maximum depth of the octree of cubes: tables of the finest level have 8^this entries.
-const MOST_LEVELS: usize = 6;
+const MAX_LEVELS: usize = 6;
 /// Marks a cube that does not exist or is not computed yet, in place of its number.
 const NONE: u32 = u32::MAX;
 /// Cube coordinates outside the range of all points, for a cache that is still empty.
-const NOWHERE: Place = [i32::MIN; 3];
+const NO_CUBE: CubeCoords = [i32::MIN; 3];
 
 /// An implicit function prepared for fast evaluation at many points; used to extract the surface and to sample volumes.
 #[derive(Clone, Debug)]
 pub struct FastField {
     field: Field,
     chebyshev: Chebyshev,
-    turns: Turns,
+    turns: CubeSymmetries,
     /// Lowest corner and edge length of the root cube, in box units.
     origin: DVec3,
     edge: f64,
@@ -42,14 +42,14 @@ pub struct FastField {
     /// Whether all terms are summed directly.
     direct: bool,
     /// The cube of the last evaluation, with its near terms: consecutive points often share a cube.
-    near: Near,
+    cached: CachedCube,
 }
 
 /// A cube, and the ranges of the terms near it.
 #[derive(Clone, Debug)]
-struct Near {
+struct CachedCube {
     level: usize,
-    cube: Place,
+    cube: CubeCoords,
     number: usize,
     ranges: Vec<[usize; 2]>,
 }
@@ -60,36 +60,36 @@ struct Level {
     /// Number of cubes along a side.
     side: i32,
     /// Index in `sources` of each cube, or [`NONE`] if it contains no terms.
-    with_sources: Vec<u32>,
+    source_ids: Vec<u32>,
     sources: Vec<Nodal>,
-    /// Index in `places` of each cube, or [`NONE`] until it is computed.
-    with_places: Vec<u32>,
-    places: Vec<Nodal>,
+    /// Index in `targets` of each cube, or [`NONE`] until it is computed.
+    target_ids: Vec<u32>,
+    targets: Vec<Nodal>,
     translations: Option<Translations>,
 }
 
-type Place = [i32; 3];
+type CubeCoords = [i32; 3];
 
 impl Level {
     fn new(side: i32) -> Self {
         let empty = vec![NONE; (side * side * side) as usize];
         Self {
             side,
-            with_sources: empty.clone(),
+            source_ids: empty.clone(),
             sources: Vec::new(),
-            with_places: empty,
-            places: Vec::new(),
+            target_ids: empty,
+            targets: Vec::new(),
             translations: None,
         }
     }
 
-    fn index(&self, place: Place) -> Option<usize> {
-        let inside = place.iter().all(|&k| k >= 0 && k < self.side);
-        inside.then(|| ((place[2] * self.side + place[1]) * self.side + place[0]) as usize)
+    fn index(&self, cube: CubeCoords) -> Option<usize> {
+        let inside = cube.iter().all(|&k| k >= 0 && k < self.side);
+        inside.then(|| ((cube[2] * self.side + cube[1]) * self.side + cube[0]) as usize)
     }
 
-    fn sources_at(&self, place: Place) -> Option<usize> {
-        let number = self.with_sources[self.index(place)?];
+    fn sources_at(&self, cube: CubeCoords) -> Option<usize> {
+        let number = self.source_ids[self.index(cube)?];
         (number != NONE).then_some(number as usize)
     }
 }
@@ -105,14 +105,14 @@ impl FastField {
         let origin = (low + high) * 0.5 - DVec3::splat(0.5 * edge);
         let mut fast = Self {
             chebyshev: Chebyshev::new(),
-            turns: Turns::new(),
+            turns: CubeSymmetries::new(),
             origin,
             edge,
             levels: Vec::new(),
             terms: terms.to_vec(),
             ranges: Vec::new(),
             direct: field.table().kernel().is_conditional(),
-            near: Near { level: 0, cube: NOWHERE, number: 0, ranges: Vec::new() },
+            cached: CachedCube { level: 0, cube: NO_CUBE, number: 0, ranges: Vec::new() },
             field,
         };
         if !fast.direct {
@@ -122,9 +122,9 @@ impl FastField {
         fast
     }
 
-    /// Writes f at each of `places` to `out`.
-    pub fn values(&mut self, places: &[DVec3], out: &mut [f64]) {
-        for (p, value) in places.iter().zip(out) {
+    /// Writes f at each of `targets` to `out`.
+    pub fn values(&mut self, targets: &[DVec3], out: &mut [f64]) {
+        for (p, value) in targets.iter().zip(out) {
             *value = self.value(*p);
         }
     }
@@ -132,7 +132,7 @@ impl FastField {
     fn value(&mut self, p: DVec3) -> f64 {
         let Some(at) = self.local(p) else { return self.field.value(p) };
         let mut sum = self.chebyshev.value(self.nodal(), at);
-        for &[from, to] in &self.near.ranges {
+        for &[from, to] in &self.cached.ranges {
             for term in &self.terms[from..to] {
                 sum += self.field.term(term, p);
             }
@@ -144,8 +144,8 @@ impl FastField {
     pub fn value_and_gradient(&mut self, p: DVec3) -> (f64, DVec3) {
         let Some(at) = self.local(p) else { return self.field.value_and_gradient(p) };
         let (mut sum, slope) = self.chebyshev.value_and_gradient(self.nodal(), at);
-        let mut gradient = slope * (2.0 / self.cube_edge(self.near.level));
-        for &[from, to] in &self.near.ranges {
+        let mut gradient = slope * (2.0 / self.cube_edge(self.cached.level));
+        for &[from, to] in &self.cached.ranges {
             for term in &self.terms[from..to] {
                 let (value, slope) = self.field.term_and_gradient(term, p);
                 sum += value;
@@ -157,31 +157,32 @@ impl FastField {
 
     /// Returns the sum of all far terms at the nodes of the cached cube.
     fn nodal(&self) -> &Nodal {
-        &self.levels[self.near.level].places[self.near.number]
+        &self.levels[self.cached.level].targets[self.cached.number]
     }
 
     fn cube_edge(&self, level: usize) -> f64 {
         self.edge / f64::from(self.levels[level].side)
     }
 
-    fn place_of(&self, p: DVec3, level: usize) -> Place {
+    fn cube_of(&self, p: DVec3, level: usize) -> CubeCoords {
         ((p - self.origin) / self.cube_edge(level)).floor().to_array().map(|x| x as i32)
     }
 
-    /// Returns the position of `p` in the cube at `place`, as coordinates in [−1, 1]³.
-    fn within(&self, p: DVec3, place: Place, level: usize) -> DVec3 {
-        let middle = DVec3::from_array(place.map(|k| f64::from(k) + 0.5));
+    /// Returns the position of `p` in the cube at `cube`, as coordinates in [−1, 1]³.
+    fn within(&self, p: DVec3, cube: CubeCoords, level: usize) -> DVec3 {
+        let middle = DVec3::from_array(cube.map(|k| f64::from(k) + 0.5));
         ((p - self.origin) / self.cube_edge(level) - middle) * 2.0
     }
 
     /// Adds levels until the finest cubes that contain terms contain few each.
     fn choose_levels(&mut self) {
-        for depth in 0..=MOST_LEVELS {
+        for depth in 0..=MAX_LEVELS {
             self.levels.push(Level::new(1 << depth));
-            let mut places: Vec<Place> = self.terms.iter().map(|(c, _)| self.place_of(*c, depth)).collect();
-            places.sort_unstable();
-            places.dedup();
-            if depth >= 2 && self.terms.len() <= TERMS_A_CUBE * places.len() {
+            let mut cubes: Vec<CubeCoords> =
+                self.terms.iter().map(|(c, _)| self.cube_of(*c, depth)).collect();
+            cubes.sort_unstable();
+            cubes.dedup();
+            if depth >= 2 && self.terms.len() <= TERMS_A_CUBE * cubes.len() {
                 break;
             }
         }
@@ -192,19 +193,19 @@ impl FastField {
     fn gather_sources(&mut self) {
         let finest = self.levels.len() - 1;
         let index =
-            |i: u32| self.levels[finest].index(self.place_of(self.terms[i as usize].0, finest)).unwrap_or(0);
+            |i: u32| self.levels[finest].index(self.cube_of(self.terms[i as usize].0, finest)).unwrap_or(0);
         let mut keyed: Vec<(u64, u32)> = (0..self.terms.len() as u32).map(|i| (index(i) as u64, i)).collect();
         keyed.sort_unstable();
         self.terms = keyed.iter().map(|&(_, i)| self.terms[i as usize]).collect();
         let mut start = 0;
         for same in keyed.chunk_by(|a, b| a.0 == b.0) {
             let range = [start, start + same.len()];
-            let place = self.place_of(self.terms[start].0, finest);
+            let cube = self.cube_of(self.terms[start].0, finest);
             let mut nodal = [0.0; CUBE];
             for &(c, w) in &self.terms[range[0]..range[1]] {
-                self.chebyshev.spread(&mut nodal, self.within(c, place, finest), w);
+                self.chebyshev.spread_source(&mut nodal, self.within(c, cube, finest), w);
             }
-            self.levels[finest].with_sources[same[0].0 as usize] = self.ranges.len() as u32;
+            self.levels[finest].source_ids[same[0].0 as usize] = self.ranges.len() as u32;
             self.levels[finest].sources.push(nodal);
             self.ranges.push(range);
             start = range[1];
@@ -222,16 +223,16 @@ impl FastField {
     fn gather_from_below(&mut self, level: usize) {
         let (upper, lower) = self.levels.split_at_mut(level + 1);
         let (here, below) = (&mut upper[level], &lower[0]);
-        for (at, &number) in below.with_sources.iter().enumerate().filter(|(_, number)| **number != NONE) {
+        for (at, &number) in below.source_ids.iter().enumerate().filter(|(_, number)| **number != NONE) {
             let side = below.side as usize;
-            let place = [at % side, at / side % side, at / (side * side)];
-            let moved = self.chebyshev.to_whole(&below.sources[number as usize], place.map(|k| k % 2));
-            let Some(slot) = here.index(place.map(|k| (k / 2) as i32)) else { continue };
-            if here.with_sources[slot] == NONE {
-                here.with_sources[slot] = here.sources.len() as u32;
+            let cube = [at % side, at / side % side, at / (side * side)];
+            let moved = self.chebyshev.from_octant(&below.sources[number as usize], cube.map(|k| k % 2));
+            let Some(slot) = here.index(cube.map(|k| (k / 2) as i32)) else { continue };
+            if here.source_ids[slot] == NONE {
+                here.source_ids[slot] = here.sources.len() as u32;
                 here.sources.push([0.0; CUBE]);
             }
-            let sum = &mut here.sources[here.with_sources[slot] as usize];
+            let sum = &mut here.sources[here.source_ids[slot] as usize];
             sum.iter_mut().zip(moved).for_each(|(x, y)| *x += y);
         }
     }
@@ -243,61 +244,61 @@ impl FastField {
             return None;
         }
         let finest = self.levels.len() - 1;
-        self.levels[finest].index(self.place_of(p, finest))?;
-        if self.place_of(p, self.near.level) != self.near.cube {
+        self.levels[finest].index(self.cube_of(p, finest))?;
+        if self.cube_of(p, self.cached.level) != self.cached.cube {
             let is_far = |&level: &usize| {
-                around(self.place_of(p, level)).all(|near| self.levels[level].sources_at(near).is_none())
+                around(self.cube_of(p, level)).all(|near| self.levels[level].sources_at(near).is_none())
             };
             let level = (2..finest).find(is_far).unwrap_or(finest);
-            let cube = self.place_of(p, level);
-            let number = self.fill(level, cube);
+            let cube = self.cube_of(p, level);
+            let number = self.target(level, cube);
             // In cubes larger than the finest, this finds none.
-            let sources = around(cube).filter_map(|place| self.levels[level].sources_at(place));
+            let sources = around(cube).filter_map(|cube| self.levels[level].sources_at(cube));
             let ranges = sources.map(|source| self.ranges[source]).collect();
-            self.near = Near { level, cube, number, ranges };
+            self.cached = CachedCube { level, cube, number, ranges };
         }
-        Some(self.within(p, self.near.cube, self.near.level))
+        Some(self.within(p, self.cached.cube, self.cached.level))
     }
 
     /// Downward pass: computes the sum of all far terms at the nodes of a cube, unless it exists. Returns the cube's
-    /// index in `places`.
-    fn fill(&mut self, level: usize, place: Place) -> usize {
-        let Some(slot) = self.levels[level].index(place) else { return 0 };
-        let number = self.levels[level].with_places[slot];
+    /// index in `targets`.
+    fn target(&mut self, level: usize, cube: CubeCoords) -> usize {
+        let Some(slot) = self.levels[level].index(cube) else { return 0 };
+        let number = self.levels[level].target_ids[slot];
         if number != NONE {
             return number as usize;
         }
         let mut nodal = [0.0; CUBE];
         if level > 2 {
-            let parent = self.fill(level - 1, place.map(|k| k / 2));
+            let parent = self.target(level - 1, cube.map(|k| k / 2));
             nodal = self
                 .chebyshev
-                .to_half(&self.levels[level - 1].places[parent], place.map(|k| (k % 2) as usize));
+                .to_octant(&self.levels[level - 1].targets[parent], cube.map(|k| (k % 2) as usize));
         }
         let here = &self.levels[level];
-        for offset in far_offsets(place) {
-            let from = [0, 1, 2].map(|axis| place[axis] + offset[axis]);
+        for offset in far_offsets(cube) {
+            let from = [0, 1, 2].map(|axis| cube[axis] + offset[axis]);
             if let (Some(sources), Some(translations)) = (here.sources_at(from), &here.translations) {
                 translations.add(&self.turns, offset, &here.sources[sources], &mut nodal);
             }
         }
-        let number = here.places.len();
-        self.levels[level].with_places[slot] = number as u32;
-        self.levels[level].places.push(nodal);
+        let number = here.targets.len();
+        self.levels[level].target_ids[slot] = number as u32;
+        self.levels[level].targets.push(nodal);
         number
     }
 }
 
 /// Returns the cube and its 26 neighbours.
-fn around(cube: Place) -> impl Iterator<Item = Place> {
+fn around(cube: CubeCoords) -> impl Iterator<Item = CubeCoords> {
     (0..27).map(move |k| [cube[0] + k % 3 - 1, cube[1] + k / 3 % 3 - 1, cube[2] + k / 9 - 1])
 }
 
-/// Returns the offsets to the cubes in the interaction list of the cube at `place`: they do not touch it, but their
+/// Returns the offsets to the cubes in the interaction list of the cube at `cube`: they do not touch it, but their
 /// parents touch its parent.
-fn far_offsets(place: Place) -> impl Iterator<Item = Place> {
+fn far_offsets(cube: CubeCoords) -> impl Iterator<Item = CubeCoords> {
     // The children of the parent's neighbours extend two cubes to one side, and three to the other.
-    let lowest = place.map(|k| -2 - k.rem_euclid(2));
+    let lowest = cube.map(|k| -2 - k.rem_euclid(2));
     let all = (0..216).map(move |k| [lowest[0] + k % 6, lowest[1] + k / 6 % 6, lowest[2] + k / 36]);
     all.filter(|offset| offset.iter().any(|d| d.abs() > 1))
 }

@@ -1,7 +1,7 @@
 //! Multipole-to-local translations: from the sources at the nodes of one cube to the values at the nodes of another, by
 //! a low-rank matrix for each relative position.
 
-use super::chebyshev::{CUBE, Chebyshev, NODES, Nodal, joined, split};
+use super::chebyshev::{CUBE, Chebyshev, NODES, Nodal, node_coords, node_index};
 use crate::math::DVec3;
 use crate::methods::implicit::kernel::KernelTable;
 use crate::methods::implicit::low_rank::{LowRank, cross_approximation};
@@ -24,8 +24,8 @@ pub type Offset = [i32; 3];
 impl Translations {
     /// Computes the matrices for cubes with edges of length `edge`, in box units.
     pub fn new(table: &KernelTable, chebyshev: &Chebyshev, edge: f64) -> Self {
-        let matrices = (0..4 * 4 * 4).map(|way| {
-            let offset = [way / 16, way / 4 % 4, way % 4];
+        let matrices = (0..4 * 4 * 4).map(|index| {
+            let offset = [index / 16, index / 4 % 4, index % 4];
             if offset[0] < 2 || offset[0] < offset[1] || offset[1] < offset[2] {
                 return None;
             }
@@ -45,13 +45,13 @@ impl Translations {
         Self { matrices: matrices.collect() }
     }
 
-    /// Adds the values that `sources`, in a cube at `offset`, produce at the nodes of the target cube to `places`.
-    pub fn add(&self, turns: &Turns, offset: Offset, sources: &Nodal, places: &mut Nodal) {
-        let (turn, canonical) = turns.find(offset);
-        let way = (canonical[0] * 16 + canonical[1] * 4 + canonical[2]) as usize;
-        let Some(matrix) = self.matrices.get(way).and_then(Option::as_ref) else { return };
+    /// Adds the values that `sources`, in a cube at `offset`, produce at the nodes of the target cube to `targets`.
+    pub fn add(&self, symmetries: &CubeSymmetries, offset: Offset, sources: &Nodal, targets: &mut Nodal) {
+        let (symmetry, canonical) = symmetries.find(offset);
+        let index = (canonical[0] * 16 + canonical[1] * 4 + canonical[2]) as usize;
+        let Some(matrix) = self.matrices.get(index).and_then(Option::as_ref) else { return };
         let (mut turned, mut sums) = ([0.0_f32; CUBE], [0.0_f32; CUBE]);
-        for (&to, strength) in turn.iter().zip(sources) {
+        for (&to, strength) in symmetry.iter().zip(sources) {
             turned[usize::from(to)] = *strength;
         }
         let (columns, _) = matrix.columns.as_chunks::<CUBE>();
@@ -60,8 +60,8 @@ impl Translations {
             let strength = dot(row, &turned);
             sums.iter_mut().zip(column).for_each(|(sum, value)| *sum += value * strength);
         }
-        for (&from, place) in turn.iter().zip(places) {
-            *place += sums[usize::from(from)];
+        for (&from, target) in symmetry.iter().zip(targets) {
+            *target += sums[usize::from(from)];
         }
     }
 }
@@ -83,7 +83,7 @@ fn dot(a: &Nodal, b: &Nodal) -> f32 {
 /// Permutations of a cube's nodes under reflections and permutations of the axes; they reduce the number of translation
 /// matrices.
 #[derive(Clone, Debug)]
-pub struct Turns {
+pub struct CubeSymmetries {
     /// By signs (three bits) and order of the axes (six): the new number of each node.
     nodes: Vec<[u8; CUBE]>,
 }
@@ -91,22 +91,22 @@ pub struct Turns {
 /// The permutations of three axes.
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
-impl Turns {
+impl CubeSymmetries {
     /// Computes all 48 permutations.
     pub fn new() -> Self {
-        let turn = |number: usize| {
+        let symmetry = |number: usize| {
             let (signs, order) = (number / 6, ORDERS[number % 6]);
             std::array::from_fn(|index| {
-                let mut place = split(index);
-                for (axis, along) in place.iter_mut().enumerate() {
+                let mut target = node_coords(index);
+                for (axis, along) in target.iter_mut().enumerate() {
                     if signs >> axis & 1 == 1 {
                         *along = NODES - 1 - *along;
                     }
                 }
-                joined(order.map(|axis| place[axis])) as u8
+                node_index(order.map(|axis| target[axis])) as u8
             })
         };
-        Self { nodes: (0..48).map(turn).collect() }
+        Self { nodes: (0..48).map(symmetry).collect() }
     }
 
     /// Returns the permutation that makes the components of an offset non-negative and descending, and the resulting

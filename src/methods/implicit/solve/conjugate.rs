@@ -10,7 +10,7 @@ use crate::methods::implicit::vectors::{add, dot};
 #[derive(Clone, Debug)]
 pub struct Polynomials {
     columns: Vec<Vec<f64>>,
-    images: Vec<Vec<f64>>,
+    preconditioned: Vec<Vec<f64>>,
     /// Inverse of BᵀMB, row by row.
     inverse: Vec<f64>,
 }
@@ -18,17 +18,17 @@ pub struct Polynomials {
 impl Polynomials {
     /// Prepares the projection for the columns of B; `None` if they are linearly dependent.
     pub fn new(columns: Vec<Vec<f64>>, inverse: &SparseInverse) -> Option<Self> {
-        let images: Vec<Vec<f64>> = columns.iter().map(|column| inverse.product(column)).collect();
-        let gram = columns.iter().flat_map(|a| images.iter().map(|b| dot(a, b))).collect();
+        let preconditioned: Vec<Vec<f64>> = columns.iter().map(|column| inverse.product(column)).collect();
+        let gram = columns.iter().flat_map(|a| preconditioned.iter().map(|b| dot(a, b))).collect();
         let inverse = inverted(gram, columns.len())?;
-        Some(Self { columns, images, inverse })
+        Some(Self { columns, preconditioned, inverse })
     }
 
     /// Projects `weights` onto those orthogonal to the polynomials, by the smallest change in the norm of M⁻¹.
-    pub fn orthogonal(&self, mut weights: Vec<f64>) -> Vec<f64> {
+    pub fn project(&self, mut weights: Vec<f64>) -> Vec<f64> {
         let moments: Vec<f64> = self.columns.iter().map(|column| dot(column, &weights)).collect();
-        for (row, image) in self.inverse.chunks_exact(moments.len()).zip(&self.images) {
-            add(-dot(row, &moments), image, &mut weights);
+        for (row, preconditioned) in self.inverse.chunks_exact(moments.len()).zip(&self.preconditioned) {
+            add(-dot(row, &moments), preconditioned, &mut weights);
         }
         weights
     }
@@ -38,9 +38,9 @@ impl Polynomials {
         self.columns.iter().zip(coefficients).map(|(column, c)| c * column[centre]).sum()
     }
 
-    /// Returns the coefficients c that minimise r − Bc in the norm of M; `image` is Mr.
-    fn coefficients(&self, image: &[f64]) -> Vec<f64> {
-        let moments: Vec<f64> = self.columns.iter().map(|column| dot(column, image)).collect();
+    /// Returns the coefficients c that minimise r − Bc in the norm of M; `preconditioned` is Mr.
+    fn coefficients(&self, preconditioned: &[f64]) -> Vec<f64> {
+        let moments: Vec<f64> = self.columns.iter().map(|column| dot(column, preconditioned)).collect();
         self.inverse.chunks_exact(moments.len()).map(|row| dot(row, &moments)).collect()
     }
 }
@@ -69,9 +69,9 @@ impl ConjugateGradients {
     ) -> Self {
         let coefficients = vec![0.0; polynomials.columns.len()];
         let mut start = Self { weights, coefficients, residual, direction: Vec::new(), energy: 0.0 };
-        let image = start.take_out_polynomials(polynomials, inverse);
-        start.energy = dot(&start.residual, &image);
-        start.direction = image;
+        let preconditioned = start.project_residual(polynomials, inverse);
+        start.energy = dot(&start.residual, &preconditioned);
+        start.direction = preconditioned;
         start
     }
 
@@ -82,34 +82,34 @@ impl ConjugateGradients {
         polynomials: &Polynomials,
         inverse: &SparseInverse,
     ) -> bool {
-        let image = product(&self.direction);
-        let curvature = dot(&self.direction, &image);
+        let preconditioned = product(&self.direction);
+        let curvature = dot(&self.direction, &preconditioned);
         if curvature <= 0.0 || self.energy <= 0.0 {
             return false;
         }
         let step = self.energy / curvature;
         add(step, &self.direction, &mut self.weights);
-        add(-step, &image, &mut self.residual);
-        let image = self.take_out_polynomials(polynomials, inverse);
-        let energy = dot(&self.residual, &image);
+        add(-step, &preconditioned, &mut self.residual);
+        let preconditioned = self.project_residual(polynomials, inverse);
+        let energy = dot(&self.residual, &preconditioned);
         let ratio = energy / self.energy;
         self.energy = energy;
-        self.direction.iter_mut().zip(&image).for_each(|(d, z)| *d = z + ratio * *d);
+        self.direction.iter_mut().zip(&preconditioned).for_each(|(d, z)| *d = z + ratio * *d);
         true
     }
 
     /// Moves the part of the residual that polynomials explain to their coefficients. Returns M times the rest, which
     /// is orthogonal to the polynomials.
-    fn take_out_polynomials(&mut self, polynomials: &Polynomials, inverse: &SparseInverse) -> Vec<f64> {
-        let mut image = inverse.product(&self.residual);
-        let more = polynomials.coefficients(&image);
-        let columns = polynomials.columns.iter().zip(&polynomials.images);
+    fn project_residual(&mut self, polynomials: &Polynomials, inverse: &SparseInverse) -> Vec<f64> {
+        let mut preconditioned = inverse.product(&self.residual);
+        let more = polynomials.coefficients(&preconditioned);
+        let columns = polynomials.columns.iter().zip(&polynomials.preconditioned);
         for ((c, &extra), (column, column_image)) in self.coefficients.iter_mut().zip(&more).zip(columns) {
             *c += extra;
             add(-extra, column, &mut self.residual);
-            add(-extra, column_image, &mut image);
+            add(-extra, column_image, &mut preconditioned);
         }
-        image
+        preconditioned
     }
 }
 

@@ -48,7 +48,7 @@ impl Constraints {
 
     /// Returns a centre that two constraints share, if any.
     pub fn shared_centre(&self) -> Option<Vec3> {
-        let found = ByPlace::new(&self.centres).0;
+        let found = PositionIndex::new(&self.centres).0;
         let shared = found.windows(2).find(|pair| pair[0].0 == pair[1].0);
         shared.map(|pair| self.centres[pair[0].1 as usize])
     }
@@ -70,9 +70,9 @@ impl Constraints {
 const USUAL_POINTS: f64 = 3000.0;
 
 /// Points sorted by position, to find equal ones.
-pub struct ByPlace(Vec<([u32; 3], u32)>);
+pub struct PositionIndex(Vec<([u32; 3], u32)>);
 
-impl ByPlace {
+impl PositionIndex {
     /// Sorts `points` for [`Self::find`].
     pub fn new(points: &[Vec3]) -> Self {
         let mut all: Vec<([u32; 3], u32)> = points.iter().map(|&p| bits(p)).zip(0..).collect();

@@ -5,12 +5,12 @@ use super::clusters::{Cluster, ClusterTree};
 use crate::math::DVec3;
 use crate::methods::implicit::kernel::KernelTable;
 use crate::methods::implicit::low_rank::{LowRank, cross_approximation};
-use crate::methods::implicit::vectors::{Number, add, dot};
+use crate::methods::implicit::vectors::{MatrixScalar, add, dot};
 use std::ops::Range;
 
 /// Admissibility: two clusters are far if the smaller one's diameter is at most this many times their distance. Above 2
 /// ranks grow, below 1 more is stored in full.
-const SEPARATION: f32 = 3.0;
+const ADMISSIBILITY: f32 = 3.0;
 
 /// A block on or above the diagonal, which also represents its mirror image.
 #[derive(Clone, Debug)]
@@ -78,19 +78,19 @@ pub struct HierarchicalMatrix<T> {
     tree: ClusterTree,
     tolerance: f64,
     /// Pairs of clusters whose blocks are still to be computed, and whether they are far; the next pair is last.
-    waiting: Vec<(usize, usize, bool)>,
+    pending: Vec<(usize, usize, bool)>,
     blocks: Vec<Block>,
     store: Store<T>,
 }
 
-impl<T: Number> HierarchicalMatrix<T> {
+impl<T: MatrixScalar> HierarchicalMatrix<T> {
     /// Creates the matrix between `centres`, which are in the order of `tree`. It is empty until [`Self::build`] has
     /// computed all blocks, far ones to a relative error of `tolerance`.
     pub fn new(tree: ClusterTree, centres: Vec<DVec3>, tolerance: f64) -> Self {
-        let mut waiting = Vec::new();
-        divide(&tree.clusters, 0, 0, &mut waiting);
-        waiting.reverse();
-        Self { store: Store::new(centres.len()), centres, tree, tolerance, waiting, blocks: Vec::new() }
+        let mut pending = Vec::new();
+        divide(&tree.clusters, 0, 0, &mut pending);
+        pending.reverse();
+        Self { store: Store::new(centres.len()), centres, tree, tolerance, pending, blocks: Vec::new() }
     }
 
     /// Computes blocks until about `work` values of the kernel have been evaluated. Returns the share of blocks
@@ -98,7 +98,7 @@ impl<T: Number> HierarchicalMatrix<T> {
     pub fn build(&mut self, table: &KernelTable, work: usize) -> f64 {
         let mut done = 0;
         while done < work
-            && let Some((rows, columns, far)) = self.waiting.pop()
+            && let Some((rows, columns, far)) = self.pending.pop()
         {
             let [a, b] = [rows, columns].map(|c| &self.tree.clusters[c]);
             let content = if far {
@@ -118,7 +118,7 @@ impl<T: Number> HierarchicalMatrix<T> {
     /// Returns the share of blocks computed.
     pub fn progress(&self) -> f64 {
         let made = self.blocks.len();
-        made as f64 / (made + self.waiting.len()) as f64
+        made as f64 / (made + self.pending.len()) as f64
     }
 
     /// Returns the size of all blocks, in bytes.
@@ -129,7 +129,7 @@ impl<T: Number> HierarchicalMatrix<T> {
     fn full_block(&self, a: &Cluster, b: &Cluster, table: &KernelTable) -> Vec<T> {
         let columns = &self.centres[b.start..b.end];
         let rows = self.centres[a.start..a.end].iter();
-        rows.flat_map(|x| columns.iter().map(|y| T::of(table.value(x.distance_squared(*y))))).collect()
+        rows.flat_map(|x| columns.iter().map(|y| T::from_f64(table.value(x.distance_squared(*y))))).collect()
     }
 
     fn far_block(&self, a: &Cluster, b: &Cluster, table: &KernelTable) -> LowRank<T> {
@@ -169,7 +169,7 @@ fn divide(clusters: &[Cluster], a: usize, b: usize, out: &mut Vec<(usize, usize,
     let [size, other] = [first, second].map(Cluster::diameter);
     let smaller = if size < other { size } else { other };
     let distance = first.distance(second);
-    if distance > 0.0 && smaller <= SEPARATION * distance {
+    if distance > 0.0 && smaller <= ADMISSIBILITY * distance {
         out.push((a, b, true));
         return;
     }
@@ -188,7 +188,7 @@ fn divide(clusters: &[Cluster], a: usize, b: usize, out: &mut Vec<(usize, usize,
     }
 }
 
-fn full_product<T: Number>(values: &[T], [a, b]: [&Cluster; 2], x: &[f64], out: &mut [f64]) {
+fn full_product<T: MatrixScalar>(values: &[T], [a, b]: [&Cluster; 2], x: &[f64], out: &mut [f64]) {
     let own = a.start == b.start;
     for (i, row) in (a.start..a.end).zip(values.chunks_exact(b.len())) {
         out[i] += dot(row, &x[b.start..b.end]);
@@ -198,7 +198,12 @@ fn full_product<T: Number>(values: &[T], [a, b]: [&Cluster; 2], x: &[f64], out: 
     }
 }
 
-fn far_product<T: Number>([columns, rows]: [&[T]; 2], [a, b]: [&Cluster; 2], x: &[f64], out: &mut [f64]) {
+fn far_product<T: MatrixScalar>(
+    [columns, rows]: [&[T]; 2],
+    [a, b]: [&Cluster; 2],
+    x: &[f64],
+    out: &mut [f64],
+) {
     for (u, v) in columns.chunks_exact(a.len()).zip(rows.chunks_exact(b.len())) {
         let (from_rows, from_columns) = (dot(u, &x[a.start..a.end]), dot(v, &x[b.start..b.end]));
         add(from_columns, u, &mut out[a.start..a.end]);

@@ -14,7 +14,7 @@ mod hierarchical;
 mod precondition;
 mod system;
 
-pub use constraints::{ByPlace, Constraints};
+pub use constraints::{Constraints, PositionIndex};
 
 use super::kernel::Kernel;
 use super::vectors::norm;
@@ -38,12 +38,12 @@ pub struct Singular;
 /// Share of the tolerance at which iterations stop, since the true residual is a little larger than theirs.
 const ITERATE_TO: f64 = 0.5;
 /// Maximum number of iterations in a round. A system that can be solved needs a few dozen.
-const MOST_ITERATIONS: u32 = 500;
+const MAX_ITERATIONS: u32 = 500;
 /// Share of the residual that a round of iterations may leave; if it leaves more, rounding limits it, and the solve
 /// fails.
-const LEAST_GAIN: f64 = 0.7;
+const MAX_REMAINING: f64 = 0.7;
 /// Maximum number of rounds of iterations, each from a recomputed residual.
-const MOST_ROUNDS: u32 = 6;
+const MAX_ROUNDS: u32 = 6;
 /// Maximum number of rows from which the true residual is estimated. From a thousand, it is known to some 3 %.
 const CHECKED_ROWS: usize = 1024;
 
@@ -61,7 +61,7 @@ pub struct Solver {
     rounds: u32,
     residual: f64,
     /// The true residual after the round before.
-    reached: f64,
+    previous_residual: f64,
 }
 
 #[derive(Clone, Debug)]
@@ -71,7 +71,7 @@ enum Stage {
     /// Recomputing the residual of some rows; holds those done so far.
     Check(Box<Polynomials>, ConjugateGradients, Vec<f64>),
     /// Recomputing all of y − (Φ+Λ)w; holds the rows done so far.
-    Renew(Box<Polynomials>, ConjugateGradients, Vec<f64>),
+    RecomputeResidual(Box<Polynomials>, ConjugateGradients, Vec<f64>),
     Done(ConjugateGradients),
 }
 
@@ -87,7 +87,7 @@ impl Solver {
             iterations: 0,
             rounds: 0,
             residual: 1.0,
-            reached: f64::INFINITY,
+            previous_residual: f64::INFINITY,
         }
     }
 
@@ -95,13 +95,13 @@ impl Solver {
     /// starts from `weights`, in the order of the new ones. The result depends on the first constraints, these and the
     /// weights, not on others in between. Returns false, and does nothing, if too many differ.
     pub fn revise(&mut self, constraints: &Constraints, weights: Vec<f64>) -> bool {
-        if !self.system.is_near(constraints) {
+        if !self.system.can_revise(constraints) {
             return false;
         }
         self.revision = Some((constraints.clone(), weights));
         self.stage = Stage::Build;
         (self.slices, self.iterations, self.rounds) = (0, 0, 0);
-        (self.residual, self.reached) = (1.0, f64::INFINITY);
+        (self.residual, self.previous_residual) = (1.0, f64::INFINITY);
         true
     }
 
@@ -116,7 +116,9 @@ impl Solver {
             Stage::Build => self.build()?,
             Stage::Iterate(polynomials, gradients) => self.iterate(polynomials, gradients)?,
             Stage::Check(polynomials, gradients, found) => self.check(polynomials, gradients, found)?,
-            Stage::Renew(polynomials, gradients, found) => self.renew(polynomials, gradients, found),
+            Stage::RecomputeResidual(polynomials, gradients, found) => {
+                self.recompute_residual(polynomials, gradients, found)
+            }
             Stage::Done(gradients) => Stage::Done(gradients),
         };
         Ok(matches!(self.stage, Stage::Done(_)))
@@ -128,15 +130,15 @@ impl Solver {
     }
 
     /// Returns the progress as a position for [`Self::advance_to`], to be saved with a run.
-    pub fn position(&self) -> Position {
-        Position { built: !matches!(self.stage, Stage::Build), slices: self.slices }
+    pub fn position(&self) -> SolverPosition {
+        SolverPosition { built: !matches!(self.stage, Stage::Build), slices: self.slices }
     }
 
     /// Repeats the slices of work up to a position, to restore a saved run.
     ///
     /// # Errors
     /// As [`Self::advance`].
-    pub fn advance_to(&mut self, to: Position) -> Result<(), Singular> {
+    pub fn advance_to(&mut self, to: SolverPosition) -> Result<(), Singular> {
         while to.built && !self.position().built {
             self.advance()?;
         }
@@ -147,7 +149,7 @@ impl Solver {
     /// Returns the solution, once [`Self::advance`] has returned true.
     pub fn solution(&self) -> Option<Solution> {
         let Stage::Done(gradients) = &self.stage else { return None };
-        let weights = self.system.by_constraint(&gradients.weights);
+        let weights = self.system.to_constraints(&gradients.weights);
         Some(Solution { weights, coefficients: gradients.coefficients.clone() })
     }
 
@@ -169,7 +171,7 @@ impl Solver {
                 let wanted = libm::log(ITERATE_TO * self.tolerance);
                 0.7 + 0.25 * (libm::log(self.residual) / wanted).clamp(0.0, 1.0)
             }
-            Stage::Check(..) | Stage::Renew(..) => 0.95,
+            Stage::Check(..) | Stage::RecomputeResidual(..) => 0.95,
             Stage::Done(_) => 1.0,
         }
     }
@@ -187,13 +189,13 @@ impl Solver {
         let start = match self.revision.take() {
             Some((constraints, weights)) => {
                 self.system.revise(&constraints);
-                self.system.by_place(&weights)
+                self.system.to_rows(&weights)
             }
             None => vec![0.0; self.system.len()],
         };
         let columns = self.system.polynomials();
         let polynomials = Polynomials::new(columns, self.system.inverse()).ok_or(Singular)?;
-        let start = polynomials.orthogonal(start);
+        let start = polynomials.project(start);
         let mut residual = self.system.product(&start);
         residual.iter_mut().zip(self.system.values()).for_each(|(r, y)| *r = y - *r);
         let gradients = ConjugateGradients::new(start, residual, &polynomials, self.system.inverse());
@@ -208,8 +210,7 @@ impl Solver {
         let system = &self.system;
         let size = norm(system.values());
         self.residual = norm(&gradients.residual) / size;
-        if self.residual > ITERATE_TO * self.tolerance
-            && self.iterations < MOST_ITERATIONS * (self.rounds + 1)
+        if self.residual > ITERATE_TO * self.tolerance && self.iterations < MAX_ITERATIONS * (self.rounds + 1)
         {
             let moved = gradients.iterate(|x| system.product(x), &polynomials, system.inverse());
             self.iterations += 1;
@@ -247,15 +248,15 @@ impl Solver {
         }
         self.rounds += 1;
         // NaN counts as no gain.
-        let gained = self.residual <= LEAST_GAIN * self.reached;
-        if self.rounds >= MOST_ROUNDS || !gained {
+        let gained = self.residual <= MAX_REMAINING * self.previous_residual;
+        if self.rounds >= MAX_ROUNDS || !gained {
             return Err(Singular);
         }
-        self.reached = self.residual;
-        Ok(Stage::Renew(polynomials, gradients, Vec::new()))
+        self.previous_residual = self.residual;
+        Ok(Stage::RecomputeResidual(polynomials, gradients, Vec::new()))
     }
 
-    fn renew(
+    fn recompute_residual(
         &mut self,
         polynomials: Box<Polynomials>,
         gradients: ConjugateGradients,
@@ -265,7 +266,7 @@ impl Solver {
         let rows = (found.len()..count).take(WORK / count + 1);
         found.extend(rows.map(|i| self.system.row_residual(i, &gradients.weights)));
         if found.len() < count {
-            return Stage::Renew(polynomials, gradients, found);
+            return Stage::RecomputeResidual(polynomials, gradients, found);
         }
         let inverse = self.system.inverse();
         let gradients = ConjugateGradients::new(gradients.weights, found, &polynomials, inverse);
@@ -275,7 +276,7 @@ impl Solver {
 
 /// Progress of a solver, in slices of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Position {
+pub struct SolverPosition {
     /// Whether matrix and preconditioner are complete.
     built: bool,
     /// Slices since then, or, before that, since the start.
@@ -516,7 +517,7 @@ mod tests {
 
     /// Returns the weights of `solution` at those centres that are also in `to`, and 0 at others.
     fn carried(from: &Constraints, solution: &Solution, to: &Constraints) -> Vec<f64> {
-        let known = ByPlace::new(&from.centres);
+        let known = PositionIndex::new(&from.centres);
         to.centres.iter().map(|&c| known.find(c).map_or(0.0, |i| solution.weights[i])).collect()
     }
 

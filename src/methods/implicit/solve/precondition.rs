@@ -18,9 +18,9 @@ pub struct SparseInverse {
     /// The order of the centres, with the predecessors of each.
     rows: Rows,
     /// The part of the ordering that is still to be done.
-    plan: Plan,
+    ordering: MaximinOrdering,
     /// Number of rows computed.
-    made: usize,
+    computed: usize,
     /// Entries of gᵢ for each row computed, one row after the other: for the centre itself, then for its neighbours.
     weights: Vec<f64>,
 }
@@ -52,32 +52,37 @@ impl SparseInverse {
     /// Starts the inverse for `centres`. Those with indices in `first` come before those in `last`; together these
     /// lists name each centre once. Nothing is computed yet.
     pub fn new(centres: &[Vec3], first: Vec<u32>, last: Vec<u32>) -> Self {
-        let plan = Plan::new(centres, first, last);
-        Self { rows: Rows::default(), plan, made: 0, weights: Vec::new() }
+        let ordering = MaximinOrdering::new(centres, first, last);
+        Self { rows: Rows::default(), ordering, computed: 0, weights: Vec::new() }
     }
 
     /// Orders or computes up to `count` more rows. Returns whether all are computed.
     ///
     /// If a local system is singular to rounding, its diagonal is raised: that costs iterations, never accuracy.
     pub fn build(&mut self, centres: &[DVec3], lambda: &[f64], table: &KernelTable, count: usize) -> bool {
-        if self.plan.extend(count, &mut self.rows) {
-            for (centre, near) in self.rows.iter().skip(self.made).take(count) {
+        if self.ordering.extend(count, &mut self.rows) {
+            for (centre, near) in self.rows.iter().skip(self.computed).take(count) {
                 row(centre, near, centres, lambda, table, &mut self.weights);
-                self.made += 1;
+                self.computed += 1;
             }
         }
-        self.made == centres.len()
+        self.computed == centres.len()
     }
 
     /// Returns the share of the work that is done: of rows ordered and computed.
     pub fn progress(&self) -> f64 {
-        0.5 * (self.rows.centres.len() + self.made) as f64 / self.plan.centres.len() as f64
+        0.5 * (self.rows.centres.len() + self.computed) as f64 / self.ordering.centres.len() as f64
     }
 
     /// Returns the inverse for edited centres, from one that is complete: without those flagged in `gone`, and with
     /// those appended to `centres`, each predicted from the nearest of all before it that remain.
     pub fn revised(&self, gone: &[bool], centres: &[DVec3], lambda: &[f64], table: &KernelTable) -> Self {
-        let mut revised = Self { rows: Rows::default(), plan: Plan::default(), made: 0, weights: Vec::new() };
+        let mut revised = Self {
+            rows: Rows::default(),
+            ordering: MaximinOrdering::default(),
+            computed: 0,
+            weights: Vec::new(),
+        };
         let mut rest = &self.weights[..];
         let is_gone = |i: &u32| gone[*i as usize];
         for (centre, near) in self.rows.iter() {
@@ -98,7 +103,7 @@ impl SparseInverse {
             let near = nearest(&centres[..added], centres[added], |i| i >= gone.len() || !gone[i]);
             revised.add(added as u32, &near, centres, lambda, table);
         }
-        revised.made = revised.rows.centres.len();
+        revised.computed = revised.rows.centres.len();
         revised
     }
 
@@ -111,7 +116,7 @@ impl SparseInverse {
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; x.len()];
         let mut rest = &self.weights[..];
-        for (centre, neighbours) in self.rows.iter().take(self.made) {
+        for (centre, neighbours) in self.rows.iter().take(self.computed) {
             let (weights, after) = rest.split_at(neighbours.len() + 1);
             rest = after;
             let others = neighbours.iter().zip(&weights[1..]);
@@ -163,13 +168,13 @@ fn row(
     let diagonal = own + lambda[centre];
     let variance = diagonal - b.iter().map(|x| x * x).sum::<f64>();
     backward(&factor, &mut b);
-    let scale = 1.0 / larger(variance, LEAST_PIVOT * diagonal).sqrt();
+    let scale = 1.0 / max(variance, MIN_PIVOT * diagonal).sqrt();
     out.push(scale);
     out.extend(b.iter().map(|x| -x * scale));
 }
 
 /// Smallest pivot of a Cholesky factorisation, as a share of its diagonal entry: anything less is rounding.
-const LEAST_PIVOT: f64 = 1e-12;
+const MIN_PIVOT: f64 = 1e-12;
 
 /// Replaces the lower triangle of a positive definite `n` by `n` matrix by its Cholesky factor.
 fn cholesky(a: &mut [f64], n: usize) {
@@ -182,7 +187,7 @@ fn cholesky(a: &mut [f64], n: usize) {
             row[j] = (row[j] - sum) / other[j];
         }
         let squares: f64 = row[..i].iter().map(|x| x * x).sum();
-        row[i] = larger(row[i] - squares, LEAST_PIVOT * row[i]).sqrt();
+        row[i] = max(row[i] - squares, MIN_PIVOT * row[i]).sqrt();
     }
 }
 
@@ -206,7 +211,7 @@ fn backward(factor: &[f64], b: &mut [f64]) {
 }
 
 /// Returns the larger number, by a comparison: `f64::max` is a function call in wasm.
-fn larger(a: f64, b: f64) -> f64 {
+fn max(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
@@ -215,37 +220,37 @@ const FIRST_SPACING: f32 = 2.0;
 /// Ratio of the minimum distance of one round of the ordering to that of the round before.
 const RATIO: f32 = std::f32::consts::FRAC_1_SQRT_2;
 /// Minimum distance of a round below which centres are taken in their given order.
-const LEAST_SPACING: f32 = 1e-6;
+const MIN_SPACING: f32 = 1e-6;
 /// Edge length of the cells of the grid of taken centres, in minimum distances of the round.
 const CELL: f32 = 3.6;
 /// Radius in which predecessors are searched first, in minimum distances of the round.
-const REACH: f32 = 3.6;
+const SEARCH_RADIUS: f32 = 3.6;
 
 /// An ordering of centres from coarse to fine (approximately maximin), in progress, each with its nearest predecessors.
 /// Each centre is as far from its predecessors as any of its successors is, within a factor of √2: every round takes
 /// the centres that are farther than some distance from all taken before, and the distance falls from round to round.
 #[derive(Clone, Debug, Default)]
-struct Plan {
+struct MaximinOrdering {
     centres: Vec<Vec3>,
     /// The centres taken so far, in order.
     grid: PointGrid,
     spacing: f32,
     /// Centres to be tested in this round, the next one last, and those left for the next round.
-    waiting: Vec<u32>,
-    others: Vec<u32>,
+    pending: Vec<u32>,
+    deferred: Vec<u32>,
     /// Centres that are ordered after all others.
     last: Vec<u32>,
 }
 
-impl Plan {
+impl MaximinOrdering {
     fn new(centres: &[Vec3], mut first: Vec<u32>, last: Vec<u32>) -> Self {
         first.reverse();
         Self {
             centres: centres.to_vec(),
             grid: PointGrid::new(CELL * FIRST_SPACING, centres.len()),
             spacing: FIRST_SPACING,
-            waiting: first,
-            others: Vec::new(),
+            pending: first,
+            deferred: Vec::new(),
             last,
         }
     }
@@ -253,38 +258,38 @@ impl Plan {
     /// Tests up to `count` centres for the rounds of the ordering. Returns whether all are ordered.
     fn extend(&mut self, count: usize, rows: &mut Rows) -> bool {
         for _ in 0..count {
-            while self.waiting.is_empty() {
-                if self.others.is_empty() && self.last.is_empty() {
+            while self.pending.is_empty() {
+                if self.deferred.is_empty() && self.last.is_empty() {
                     return true;
                 }
                 self.begin_round(rows);
             }
-            if let Some(i) = self.waiting.pop() {
-                self.look_at(i, rows);
+            if let Some(i) = self.pending.pop() {
+                self.visit(i, rows);
             }
         }
         rows.centres.len() == self.centres.len()
     }
 
     fn begin_round(&mut self, rows: &Rows) {
-        let of_others = !self.others.is_empty();
-        self.waiting = std::mem::take(if of_others { &mut self.others } else { &mut self.last });
-        self.waiting.reverse();
+        let of_others = !self.deferred.is_empty();
+        self.pending = std::mem::take(if of_others { &mut self.deferred } else { &mut self.last });
+        self.pending.reverse();
         self.spacing = if of_others { self.spacing * RATIO } else { FIRST_SPACING };
-        let cell = if self.spacing > LEAST_SPACING { self.spacing } else { LEAST_SPACING };
+        let cell = if self.spacing > MIN_SPACING { self.spacing } else { MIN_SPACING };
         let taken = rows.centres.iter().map(|&i| self.centres[i as usize]);
         let mut grid = PointGrid::new(CELL * cell, self.centres.len());
         taken.for_each(|p| grid.insert(p));
         self.grid = grid;
     }
 
-    fn look_at(&mut self, i: u32, rows: &mut Rows) {
+    fn visit(&mut self, i: u32, rows: &mut Rows) {
         let p = self.centres[i as usize];
-        if self.spacing > LEAST_SPACING && self.grid.has_within(p, self.spacing) {
-            self.others.push(i);
+        if self.spacing > MIN_SPACING && self.grid.has_within(p, self.spacing) {
+            self.deferred.push(i);
             return;
         }
-        let near = self.grid.nearest(p, NEIGHBOURS, REACH * self.spacing);
+        let near = self.grid.nearest(p, NEIGHBOURS, SEARCH_RADIUS * self.spacing);
         let near: Vec<u32> = near.into_iter().map(|(_, at)| rows.centres[at as usize]).collect();
         rows.push(i, near);
         self.grid.insert(p);

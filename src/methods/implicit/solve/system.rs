@@ -1,7 +1,7 @@
 //! The matrix of the linear system and its preconditioner, and their revision for a few changed constraints.
 
 use super::clusters::ClusterTree;
-use super::constraints::{ByPlace, Constraints};
+use super::constraints::{Constraints, PositionIndex};
 use super::hierarchical::HierarchicalMatrix;
 use super::precondition::SparseInverse;
 use crate::math::{DVec3, Random, Vec3};
@@ -24,9 +24,9 @@ const CONDITIONAL_ERROR: f64 = 1e-11;
 const DOUBLE_BELOW: usize = 6000;
 /// Maximum number of constraints added, and of constraints removed, for which the system is revised and not rebuilt.
 /// Each added one costs a row of the full matrix.
-const MOST_CHANGES: usize = 256;
+const MAX_CHANGES: usize = 256;
 /// Marks a row whose constraint was removed, in place of the constraint's index.
-const GONE: u32 = u32::MAX;
+const REMOVED: u32 = u32::MAX;
 
 /// The linear system of some constraints, [Φ+Λ B; Bᵀ 0] [w; p] = [y; 0].
 ///
@@ -39,8 +39,8 @@ pub struct System {
     centres: Vec<DVec3>,
     values: Vec<f64>,
     lambda: Vec<f64>,
-    /// For each row, the index of its constraint, or [`GONE`].
-    order: Vec<u32>,
+    /// For each row, the index of its constraint, or [`REMOVED`].
+    constraint_of_row: Vec<u32>,
     matrix: Matrix,
     inverse: SparseInverse,
     revision: Option<Revision>,
@@ -50,7 +50,7 @@ pub struct System {
 #[derive(Clone, Debug)]
 struct Revision {
     /// For each row of the matrix, whether its constraint was removed.
-    gone: Vec<bool>,
+    removed: Vec<bool>,
     /// For each added row, its entries of Φ, up to the diagonal.
     rows: Vec<Vec<f64>>,
     inverse: SparseInverse,
@@ -67,21 +67,22 @@ impl System {
     /// residual of `tolerance` requires.
     pub fn new(constraints: &Constraints, kernel: Kernel, tolerance: f64, seed: u64) -> Self {
         let tree = ClusterTree::new(&constraints.centres);
-        let order = tree.order.clone();
-        let places: Vec<Vec3> = order.iter().map(|&i| constraints.centres[i as usize]).collect();
-        let centres: Vec<DVec3> = places.iter().map(|p| p.as_dvec3()).collect();
-        let values = at_places(&order, &constraints.values);
-        let shuffled = Random::new(seed).order(places.len());
+        let constraint_of_row = tree.order.clone();
+        let positions: Vec<Vec3> =
+            constraint_of_row.iter().map(|&i| constraints.centres[i as usize]).collect();
+        let centres: Vec<DVec3> = positions.iter().map(|p| p.as_dvec3()).collect();
+        let values = gather_rows(&constraint_of_row, &constraints.values);
+        let shuffled = Random::new(seed).order(positions.len());
         let (surface, outside): (Vec<u32>, Vec<u32>) =
             shuffled.iter().partition(|&&i| values[i as usize] == 0.0);
         Self {
             table: KernelTable::new(kernel),
             matrix: Matrix::new(tree, &centres, kernel, tolerance),
-            inverse: SparseInverse::new(&places, surface, outside),
+            inverse: SparseInverse::new(&positions, surface, outside),
             centres,
             values,
-            lambda: at_places(&order, &constraints.lambda),
-            order,
+            lambda: gather_rows(&constraint_of_row, &constraints.lambda),
+            constraint_of_row,
             revision: None,
         }
     }
@@ -109,35 +110,35 @@ impl System {
 
     /// Returns whether [`Self::revise`] is worthwhile: only a few of the constraints differ from those for which the
     /// matrix was computed.
-    pub fn is_near(&self, constraints: &Constraints) -> bool {
-        let known = ByPlace::new(&constraints.centres);
-        let own = self.own_centres();
+    pub fn can_revise(&self, constraints: &Constraints) -> bool {
+        let known = PositionIndex::new(&constraints.centres);
+        let own = self.base_centres();
         let kept = own.iter().filter(|c| known.find(c.as_vec3()).is_some()).count();
-        own.len() - kept <= MOST_CHANGES && constraints.centres.len() - kept <= MOST_CHANGES
+        own.len() - kept <= MAX_CHANGES && constraints.centres.len() - kept <= MAX_CHANGES
     }
 
     /// Revises the system to other constraints, reusing the matrix, which must be complete.
     pub fn revise(&mut self, constraints: &Constraints) {
-        let own = self.own_centres().len();
+        let own = self.base_centres().len();
         self.centres.truncate(own);
-        let known = ByPlace::new(&constraints.centres);
+        let known = PositionIndex::new(&constraints.centres);
         let mut is_new = vec![true; constraints.centres.len()];
         let mut find = |centre: &DVec3| {
             let found = known.find(centre.as_vec3())?;
             is_new[found] = false;
             Some(found as u32)
         };
-        self.order = self.centres.iter().map(|centre| find(centre).unwrap_or(GONE)).collect();
-        let gone: Vec<bool> = self.order.iter().map(|&i| i == GONE).collect();
+        self.constraint_of_row = self.centres.iter().map(|centre| find(centre).unwrap_or(REMOVED)).collect();
+        let removed: Vec<bool> = self.constraint_of_row.iter().map(|&i| i == REMOVED).collect();
         for i in (0..is_new.len()).filter(|&i| is_new[i]) {
-            self.order.push(i as u32);
+            self.constraint_of_row.push(i as u32);
             self.centres.push(constraints.centres[i].as_dvec3());
         }
-        self.values = at_places(&self.order, &constraints.values);
-        self.lambda = at_places(&self.order, &constraints.lambda);
+        self.values = gather_rows(&self.constraint_of_row, &constraints.values);
+        self.lambda = gather_rows(&self.constraint_of_row, &constraints.lambda);
         let rows = (own..self.centres.len()).map(|i| self.row(i, i + 1).collect()).collect();
-        let inverse = self.inverse.revised(&gone, &self.centres, &self.lambda, &self.table);
-        self.revision = Some(Revision { gone, rows, inverse });
+        let inverse = self.inverse.revised(&removed, &self.centres, &self.lambda, &self.table);
+        self.revision = Some(Revision { removed, rows, inverse });
     }
 
     /// Returns whether the system was revised.
@@ -146,8 +147,8 @@ impl System {
     }
 
     /// Returns the centres for which the matrix was computed.
-    fn own_centres(&self) -> &[DVec3] {
-        &self.centres[..self.revision.as_ref().map_or(self.centres.len(), |revision| revision.gone.len())]
+    fn base_centres(&self) -> &[DVec3] {
+        &self.centres[..self.revision.as_ref().map_or(self.centres.len(), |revision| revision.removed.len())]
     }
 
     /// Returns the entries of Φ between row `i` and the first `count` rows.
@@ -184,13 +185,13 @@ impl System {
     }
 
     /// Reorders a vector over constraints into one over rows; removed rows are 0.
-    pub fn by_place(&self, of_constraints: &[f64]) -> Vec<f64> {
-        at_places(&self.order, of_constraints)
+    pub fn to_rows(&self, of_constraints: &[f64]) -> Vec<f64> {
+        gather_rows(&self.constraint_of_row, of_constraints)
     }
 
     /// Reorders a vector over rows into one over constraints.
-    pub fn by_constraint(&self, of_places: &[f64]) -> Vec<f64> {
-        let present = || self.order.iter().zip(of_places).filter(|(i, _)| **i != GONE);
+    pub fn to_constraints(&self, of_rows: &[f64]) -> Vec<f64> {
+        let present = || self.constraint_of_row.iter().zip(of_rows).filter(|(i, _)| **i != REMOVED);
         let mut all = vec![0.0; present().count()];
         present().for_each(|(&i, &x)| all[i as usize] = x);
         all
@@ -200,29 +201,29 @@ impl System {
     pub fn polynomials(&self) -> Vec<Vec<f64>> {
         let column = |power: usize| {
             let entry = |(centre, &i): (&DVec3, &u32)| match power {
-                _ if i == GONE => 0.0,
+                _ if i == REMOVED => 0.0,
                 0 => 1.0,
                 axis => centre[axis - 1],
             };
-            self.centres.iter().zip(&self.order).map(entry).collect()
+            self.centres.iter().zip(&self.constraint_of_row).map(entry).collect()
         };
         (0..self.kernel().polynomials()).map(column).collect()
     }
 
     /// Returns (Φ+Λ)x with the approximated Φ.
     pub fn product(&self, x: &[f64]) -> Vec<f64> {
-        let own = self.own_centres().len();
+        let own = self.base_centres().len();
         let mut out = match &self.matrix {
             Matrix::Single(matrix) => matrix.product(&x[..own]),
             Matrix::Double(matrix) => matrix.product(&x[..own]),
         };
         out.resize(x.len(), 0.0);
-        if let Some(Revision { gone, rows, .. }) = &self.revision {
+        if let Some(Revision { removed, rows, .. }) = &self.revision {
             for (at, row) in (own..).zip(rows) {
                 out[at] += dot(row, &x[..=at]);
                 add(x[at], &row[..at], &mut out[..at]);
             }
-            out.iter_mut().zip(gone).filter(|(_, gone)| **gone).for_each(|(y, _)| *y = 0.0);
+            out.iter_mut().zip(removed).filter(|(_, removed)| **removed).for_each(|(y, _)| *y = 0.0);
         }
         out.iter_mut().zip(&self.lambda).zip(x).for_each(|((y, l), x)| *y += l * x);
         out
@@ -230,7 +231,7 @@ impl System {
 
     /// Returns yᵢ − ((Φ+Λ)w)ᵢ for row `i`, from the kernel itself.
     pub fn row_residual(&self, i: usize, weights: &[f64]) -> f64 {
-        if self.order[i] == GONE {
+        if self.constraint_of_row[i] == REMOVED {
             return 0.0;
         }
         let sum: f64 = self.row(i, self.len()).zip(weights).map(|(phi, w)| phi * w).sum();
@@ -238,8 +239,8 @@ impl System {
     }
 }
 
-fn at_places(order: &[u32], all: &[f64]) -> Vec<f64> {
-    order.iter().map(|&i| if i == GONE { 0.0 } else { all[i as usize] }).collect()
+fn gather_rows(constraint_of_row: &[u32], all: &[f64]) -> Vec<f64> {
+    constraint_of_row.iter().map(|&i| if i == REMOVED { 0.0 } else { all[i as usize] }).collect()
 }
 
 impl Matrix {
