@@ -8,7 +8,7 @@ use vesicle::methods::deformable::{
     Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Seeding, Start,
 };
 use vesicle::methods::implicit::{
-    Camera, Cloud, Edits, ImplicitOptions, ImplicitParams, ImplicitSurface, KernelKind, Level,
+    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits,
 };
 use vesicle::methods::multires::{
     ControlEllipsoid, Energy, MultiresOptions, MultiresParams, MultiresolutionModel, Topology,
@@ -224,7 +224,7 @@ fn implicit_change(
             let mut places = |most| (0..bytes.below(most)).map(|_| bytes.place(2.0).as_vec3()).collect();
             let (added, outside) = (places(6), places(3));
             let removed = (0..bytes.below(4)).map(|_| bytes.below(count + 1) as u32).collect();
-            surface.set_edits(Edits { added, removed, outside })
+            surface.set_edits(PointEdits { added, removed, outside })
         }
     }
 }
@@ -283,7 +283,7 @@ fn implicit_params(bytes: &mut Bytes, size: f64) -> ImplicitParams {
         lambda_exterior: bytes.one_of(&[0.0, 2.0, 1000.0]),
         tolerance: bytes.one_of(&[1e-2, 1e-5, 1e-8, 1e-12]),
         cell: if bytes.chance(16) { 0.0 } else { size * bytes.within(0.1, 0.4) },
-        level: bytes.one_of(&[Level::Zero, Level::Mean]),
+        level: bytes.one_of(&[IsoValue::Zero, IsoValue::Mean]),
         kernel: if bytes.chance(2) {
             bytes.one_of(&[KernelKind::ThinPlate, KernelKind::Biharmonic, KernelKind::Gaussian])
         } else {
