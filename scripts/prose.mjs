@@ -1,6 +1,8 @@
 // Reports phrases that are not plain English or not the field's terms, in Markdown, comments, messages and the interface's texts.
 // `npm run prose -- src/mesh docs` reads these files and folders only. docs/glossary.md says which term is used for what.
+import { existsSync, statSync } from 'node:fs';
 import { readFile } from 'node:fs/promises';
+import { relative, resolve } from 'node:path';
 import { TextlintKernel } from '@textlint/kernel';
 import markdown from '@textlint/textlint-plugin-markdown';
 import text from '@textlint/textlint-plugin-text';
@@ -9,12 +11,10 @@ import { literalRules, ruledOut } from './prose/glossary.mjs';
 import { PHRASES } from './prose/phrases.mjs';
 import { phraseRule } from './prose/rule.mjs';
 import { must, root, script, startedAs } from './shell.mjs';
-import { relative, resolve } from 'node:path';
 
-/** Files without prose of ours: generated, or data. */
-const SKIPPED = /^(tests\/data|www\/public\/data\/.*\.json|LICENSE|Cargo\.lock|package-lock\.json)/;
+/** Files that have prose. */
 const ENDINGS = /\.(md|rs|[mc]?[jt]s|py|css|toml)$|^www\/src\/texts\/.*\.json$/;
-/** The rules name the phrases that they find. */
+/** Files that consist of examples for the rules. */
 const OWN = /^(scripts\/prose\/phrases\.mjs|tests\/js\/prose\.test\.mjs)$/;
 
 const PLUGINS = [
@@ -32,8 +32,9 @@ export async function lint(path, source, phrases) {
   return found.flat().sort((a, b) => a.line - b.line);
 }
 
-async function lintDocument(path, { kind, ext, text: prose }, phrases) {
-  const applied = phrases.filter(({ only = kind }) => only === kind);
+/** Lints one document of `proseOf`. */
+export async function lintDocument(path, { kind, ext, text: prose }, phrases) {
+  const applied = phrases.filter(({ only = kind, files }) => only === kind && (files?.test(path) ?? true));
   const options = { phrases: applied };
   const rules = [{ ruleId: 'phrases', rule: phraseRule, options }];
   const { messages } = await kernel.lintText(prose, { ext, filePath: path, plugins: PLUGINS, rules });
@@ -43,20 +44,24 @@ async function lintDocument(path, { kind, ext, text: prose }, phrases) {
   });
 }
 
-/** Returns the files under git, or not yet, that are one of `paths` or within one; all without any. */
+/** Returns the files that are one of `paths`, and those under git, or not yet, that are in a folder of them; all without any. */
 async function filesIn(paths) {
-  const listed = await must('git', ['ls-files', '--cached', '--others', '--exclude-standard', '--', ...paths]);
-  const files = [...new Set(listed.split('\n'))];
-  return files.filter((file) => ENDINGS.test(file) && !SKIPPED.test(file) && !OWN.test(file));
+  const given = paths.map((path) => relative(root, resolve(path)) || '.');
+  const isFile = (path) => statSync(resolve(root, path)).isFile();
+  const named = given.filter(isFile);
+  const folders = given.filter((path) => !isFile(path));
+  if (named.length > 0 && folders.length === 0) return named;
+  const listed = await must('git', ['ls-files', '--cached', '--others', '--exclude-standard', '--', ...folders]);
+  const found = listed.split('\n').filter((file) => ENDINGS.test(file) && !OWN.test(file));
+  return [...new Set([...named, ...found])];
 }
 
 /** Lints files and folders, by default the whole repository. */
 export async function lintFiles(paths = []) {
   const phrases = await allPhrases();
-  const read = (file) => readFile(resolve(root, file), 'utf8').catch(() => '');
-  const files = await filesIn(paths.map((path) => relative(root, resolve(path)) || '.'));
+  const files = (await filesIn(paths)).filter((file) => existsSync(resolve(root, file)));
   const findings = [];
-  for (const file of files) findings.push(...(await lint(file, await read(file), phrases)));
+  for (const file of files) findings.push(...(await lint(file, await readFile(resolve(root, file), 'utf8'), phrases)));
   return { files: files.length, findings };
 }
 

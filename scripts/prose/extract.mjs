@@ -63,7 +63,10 @@ const TOKENS = [
       ['string', JS_STRING],
       ['template', /`/y],
       // An expression follows none of the characters after which `/` divides.
-      ['skip', /(?<=(?:^|[(,=:[!&|?{};+>~\n]|\breturn)\s*)\/(?![/*])(?:[^/\\[\n]|\\.|\[(?:[^\]\\\n]|\\.)*\])+\/[a-z]*/y],
+      [
+        'skip',
+        /(?<=(?:^|[(,=:[!&|?{};+>~\n]|\breturn)\s*)\/(?![/*])(?:[^/\\[\n]|\\.|\[(?:[^\]\\\n]|\\.)*\])+\/[a-z]*/y,
+      ],
       ['skip', /[\w$]+/y],
     ],
   ],
@@ -76,8 +79,20 @@ const TOKENS = [
       ['skip', /\w+/y],
     ],
   ],
-  [/\.css$/, [['comment', /\/\*[\s\S]*?\*\//y], ['skip', JS_STRING]]],
-  [/\.(toml|ya?ml)$|(^|\/)run$/, [['skip', JS_STRING], ['comment', /(?<=^|\s)#[^\n]*/y]]],
+  [
+    /\.css$/,
+    [
+      ['comment', /\/\*[\s\S]*?\*\//y],
+      ['skip', JS_STRING],
+    ],
+  ],
+  [
+    /\.(toml|ya?ml)$|(^|\/)run$/,
+    [
+      ['skip', JS_STRING],
+      ['comment', /(?<=^|\s)#[^\n]*/y],
+    ],
+  ],
 ];
 
 /** Sorts the text of a source file into comments and strings. */
@@ -91,7 +106,8 @@ function read(text, tokens) {
   };
   while (at < text.length) {
     const [kind, found] = next(text, at, tokens);
-    if (kind === 'comment') found.split('\n').forEach((part, i) => add(pages.comment, line + i, bare(part)));
+    if (kind === 'comment')
+      for (const [i, part] of found.split('\n').entries()) add(pages.comment, line + i, bare(part));
     if (kind === 'string' && isProse(found)) add(pages.string, line, literal(found));
     advance(found.length);
   }
@@ -128,7 +144,8 @@ function add(lines, index, text) {
 }
 
 /** A line of a comment without its mark and, so that it is no block of code in Markdown, without the indentation before it. */
-const bare = (line) => line.replace(/^\s*(\/\/[/!]?|\/\*[*!]?|\*\/|\*(?!\*)|#+|""")? ?/, '').replace(/\s*(\*\/|""")$/, '');
+const bare = (line) =>
+  line.replace(/^\s*(\/\/[/!]?|\/\*[*!]?|\*\/|\*(?!\*)|#+|""")? ?/, '').replace(/\s*(\*\/|""")$/, '');
 
 /** The text of a string on one line; code in it and escapes are left out. */
 const literal = (found) =>

@@ -31,4 +31,5 @@ function entry(written, use) {
 export const literalRules = (entries) =>
   entries.filter(({ meaning }) => !meaning).map(({ word, use }) => ({ word, use, find: literal(word) }));
 
-const literal = (word) => new RegExp(`(?<![\\w-])${word.replace(/[.*+?^\${}()|[\]\\]/g, '\\$&')}(?:e?s)?(?![\\w-])`, 'i');
+const literal = (word) =>
+  new RegExp(`(?<![\\w-])${word.replace(/[.*+?^${}()|[\]\\]/g, '\\$&')}(?:e?s)?(?![\\w-])`, 'i');

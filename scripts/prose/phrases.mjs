@@ -1,7 +1,7 @@
 // Phrases that make a reader translate, with the better wording. `find` is matched in running text: code spans, links' addresses and
 // code are left out, and a space matches a line break, too. `bad` is found by its rule and `good` passes all of them; the tests see to that.
 // `word` names the entry of the glossary's column "not" that the rule is for, where the word alone has legitimate meanings.
-// `except` are legitimate uses, each with a reason.
+// `only` is the kind of text that the rule is for, `files` their paths; `except` are legitimate uses, each with a reason and an example.
 
 /** Rules of words that have a legitimate meaning besides the one that is not used. */
 const WORDS = [
@@ -109,7 +109,13 @@ const WORDS = [
     use: 'self-intersections (their count), crossing pairs of triangles',
     bad: 'The mesh has no crossings.',
     good: 'The mesh has no self-intersections. Crossing pairs of triangles are counted. Iso crossings of an edge.',
-    except: [{ find: /\b(iso|zero|edge|contour|parity)[- ]crossings|crossings of (a|the) (line|lattice|edge|edges)/i, because: 'a line or an edge crosses a level or a surface' }],
+    except: [
+      {
+        find: /\b(iso|zero|edge|contour|parity)[- ]crossings|crossings of (a|the) (line|lattice|edge|edges)/i,
+        because: 'an edge or a line crosses a surface',
+        good: 'A cell has three zero crossings.',
+      },
+    ],
   },
   {
     word: 'crosses itself',
@@ -124,7 +130,13 @@ const WORDS = [
     use: 'membrane, surface (of the model); the paper’s S',
     bad: 'The skin is solved on coarse levels first; a bare skin has no detail.',
     good: 'The membrane is solved on coarse levels first. Skull or skin, as the iso-value says. A skin of 4 % of the ordinary edge.',
-    except: [{ find: /\bskin (is|was) (not )?(used up|renewed|searched)|\bskin of the broad phase|\bwider skin|\bskin of \d/i, because: 'the skin distance of the broad phase' }],
+    except: [
+      {
+        find: /\bskin (is|was) (not )?(used up|renewed|searched)|\bskin of the broad phase|\bwider skin|\bskin of \d/i,
+        because: 'the skin distance of the broad phase',
+        good: 'Vertices whose skin is used up are searched for.',
+      },
+    ],
   },
   {
     word: 'votes',
@@ -137,6 +149,7 @@ const WORDS = [
     word: 'residual',
     find: /\bResidual to (reach|come to)\b|^Residual$/,
     only: 'strings',
+    files: /params\.rs$/,
     use: 'Tolerance (the parameter); residual is what is measured',
     bad: 'Residual',
     good: 'Relative residual of the solve',
@@ -216,11 +229,17 @@ const SENTENCES = [
     good: 'Normals and colours. It gives something like the original.',
   },
   {
-    find: /\b(come|comes|came|coming|has come|have come) to rest\b|\b(is|are|was|were|be|been|not|vertices|surface|model|all|everything|missing) at rest\b|\bits rest\b|\bat rest (again|after|on)\b|\blets? rest\b|^At rest\b/i,
+    find: /\b(come|comes|came|coming|has come|have come) to rest\b|\b(vertex|surface|mesh|model|membrane) rests\b|\b(is|are|was|were|be|been|not|vertices|surface|model|all|everything|missing) at rest\b|\bits rest\b|\bat rest (again|after|on)\b|\blets? rest\b|^At rest\b/i,
     use: 'converges, has converged (a level, a run); settles, has settled (a vertex)',
     bad: 'The surface comes to rest: vertices at rest sleep.',
     good: 'The run converges: settled vertices sleep. The rest of them is tested.',
-    except: [{ find: /\bsprings? (is|are) at rest|length at rest/i, because: 'the rest length of a spring' }],
+    except: [
+      {
+        find: /\bsprings? (is|are) at rest|length at rest/i,
+        because: 'the rest length of a spring',
+        good: 'The length at which springs are at rest.',
+      },
+    ],
   },
   {
     find: /\bstands? (\w+ )?(above|below|up to|beyond) \d/i,
@@ -258,14 +277,26 @@ const SENTENCES = [
     find: /\b(is|are|was|were|be) taken for\b|\b(takes?|took|taking) (it|them|this|that|these|those) for (a|an|the|noise|one)\b/i,
     use: '"treats as", "is treated as"',
     bad: 'Small parts are taken for noise.',
-    good: 'Small parts are treated as noise. The average is taken for each frame.',
-    except: [{ find: /\btaken for (each|every|granted)\b/i, because: '"taken" in its own sense' }],
+    good: 'Small parts are treated as noise.',
+    except: [
+      {
+        find: /\btaken for (each|every|granted|\d+)\b/i,
+        because: '"taken" in its own sense',
+        good: 'An average is taken for each frame.',
+      },
+    ],
   },
   {
     find: /\blies? (side )?by (a|an|the|its|their|each)\b/i,
     use: '"is beside", "is near"',
     bad: 'The header lies by the data.',
     good: 'The header is beside the data.',
+  },
+  {
+    find: /\b(mesh|surface|vertex|vertice|solver|pass|edit|test|level|triangle|edge|filter|loop|function|kernel)e?s? (asks?|wants?|longs?|wishes|goes home|go home)\b/i,
+    use: 'tests, queries, needs, returns: "The pass tests …"',
+    bad: 'The filter asks whether it is near; the surface wants to grow.',
+    good: 'The filter tests whether it is near; the page asks for a file.',
   },
   {
     find: /\bin their own units\b/i,
@@ -290,7 +321,13 @@ const SENTENCES = [
     use: '"undoes", "rolls back", "discards"',
     bad: 'The edit is taken back.',
     good: 'The edit is rolled back.',
-    except: [{ find: /\btaken back (to|into) (the |its )?(first|frame|contour|host)/i, because: 'it moves there' }],
+    except: [
+      {
+        find: /\btaken back (to|into) (the |its )?(first|frame|contour|host)/i,
+        because: 'a movement',
+        good: 'The surface is taken back to the first frame.',
+      },
+    ],
   },
   {
     find: /\b(drawn?|draws|drew|drawing) together\b/i,
@@ -323,7 +360,7 @@ const SENTENCES = [
     good: 'Once it is fixed it gets a test. We recommend the default.',
   },
   {
-    find: /\bmore (\w+ )?than (can be had|there (is|are))\b(?! \w+s\b)/i,
+    find: /\bmore (\w+ )?than (can be had|there (is|are))\b(?! \w)/i,
     use: '"more than is available"',
     bad: 'It needs 8 GB, more than there is.',
     good: 'It needs 8 GB, more than is available. There are no more frames than there are vertices.',
@@ -402,7 +439,13 @@ const SENTENCES = [
     use: '"on average", "at most", "at least"',
     bad: 'Half a pixel in the mean, and 3 at the most.',
     good: 'Half a pixel on average, and at most 3.',
-    except: [{ find: /\bin the mean square\b|in the mean curvature/i, because: 'mean square and mean curvature are quantities' }],
+    except: [
+      {
+        find: /\bin the mean square\b|in the mean curvature/i,
+        because: 'mean square and mean curvature are quantities',
+        good: 'Errors in the mean square.',
+      },
+    ],
   },
 ];
 

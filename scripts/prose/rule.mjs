@@ -10,7 +10,15 @@ export function phraseRule({ Syntax, RuleError, report, getSource, locator }, { 
     const text = runningText(node, getSource);
     for (const [start, end, use] of findings(text, phrases)) {
       const padding = locator.range([start, end]);
-      report(node, new RuleError(`${getSource(node).slice(start, end).replace(/\s+/g, ' ')}\t${use}`, { padding }));
+      report(
+        node,
+        new RuleError(
+          `${getSource(node)
+            .slice(start, end)
+            .replace(/\n[ \t>]*/g, ' ')}\t${use}`,
+          { padding },
+        ),
+      );
     }
   };
   return { [Syntax.Paragraph]: check, [Syntax.Header]: check, [Syntax.TableCell]: check };

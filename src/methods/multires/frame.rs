@@ -83,8 +83,8 @@ impl MultiresolutionModel {
         Ok(Ahead { were, are, carried: carried_along, unrest, params })
     }
 
-    /// Returns the membrane moved along with the ellipsoids, if nothing else has to be done: it is at rest and its
-    /// edges are within bounds. This makes rigid motions exact. `None` if the membrane has to be solved.
+    /// Returns the membrane moved along with the ellipsoids, if nothing else has to be done: its residual is small
+    /// and its edges are within bounds. This makes rigid motions exact. `None` if the membrane has to be solved.
     fn followed(&mut self, ahead: &Ahead) -> Option<Mesh> {
         // A membrane that was only refreshed is solved when the ellipsoids stop, even if its residual is small.
         let is_due = !ahead.moves() && self.passing > 0;
