@@ -392,7 +392,7 @@ const SENTENCES = [
     good: 'Not a saved state of this version.',
   },
   {
-    find: /\btake (fewer|shorter|longer|larger|smaller|less) (pyramid|levels?|edges?|steps?|volumes?|ellipsoids?|points?)\b/i,
+    find: /\btake (fewer|shorter|longer|larger|smaller|less) (pyramid|levels?|edges?|volumes?|ellipsoids?|points?)\b/i,
     use: '"use", "reduce", "increase"',
     bad: 'None fits: take fewer pyramid levels.',
     good: 'No bubble fits: reduce the pyramid levels. Long edges take longer.',
