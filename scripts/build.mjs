@@ -20,7 +20,7 @@ const PLAIN = {
 
 const compiled = ({ target }) => at(target, 'wasm32-unknown-unknown/release/vesicle.wasm');
 
-// The README, and everything it links to.
+// Documents that the README links to.
 const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md', 'CHANGELOG.md', 'docs'];
 
 // Between the package and other people's: `vesicle/three` and so on.

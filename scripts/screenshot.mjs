@@ -1,4 +1,4 @@
-// Takes docs/*, the images of README and docs, from the running app: examples of the labs when they are done.
+// Takes docs/*, the pictures of README and docs, from the running app: examples of the labs when they are done.
 import { mkdir } from 'node:fs/promises';
 import { launchChromium } from './chromium.mjs';
 import { serve } from './serve.mjs';
