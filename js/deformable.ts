@@ -161,7 +161,7 @@ export class DeformableModel implements Stepper {
 
   /**
    * Current sampling distance δ, world units: edge lengths are between δ and 2.5 δ. With anisotropic voxels, both
-   * bounds hold in the mean over all directions.
+   * bounds hold on average over all directions.
    */
   get delta(): number {
     return this.#handle.use((raw) => raw.delta());

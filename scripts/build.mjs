@@ -20,23 +20,8 @@ const PLAIN = {
 
 const compiled = ({ target }) => at(target, 'wasm32-unknown-unknown/release/vesicle.wasm');
 
-// What the README links to comes along.
-const PAPERS = [
-  'LICENSE-MIT',
-  'LICENSE-APACHE',
-  'README.md',
-  'ARCHITECTURE.md',
-  'CHANGELOG.md',
-  'docs/extract.png',
-  'docs/reconstruct.jpg',
-  'docs/track.jpg',
-  'docs/sculpt.jpg',
-  'docs/start.md',
-  'docs/hosts.md',
-  'docs/evidence.md',
-  'docs/access.md',
-  'docs/fuzzing.md',
-];
+// Documents that the README links to.
+const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md', 'CHANGELOG.md', 'docs'];
 
 // Between the package and other people's: `vesicle/three` and so on.
 const ADAPTERS = ['three', 'niivue', 'vtk'];
@@ -101,7 +86,7 @@ async function assemble() {
   await makeInline();
   await makeElement();
   await writeNotices('pkg/licences.txt', 'element');
-  for (const file of PAPERS) await cp(at(file), at('pkg', file));
+  for (const file of PAPERS) await cp(at(file), at('pkg', file), { recursive: true });
   await writeFile(at('pkg/package.json'), `${JSON.stringify(await manifest(), null, 2)}\n`);
 }
 

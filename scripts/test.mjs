@@ -88,6 +88,7 @@ const GROUPS = [
     [
       ['build', works(build)],
       ['biome', check(tool('biome'), ['ci', '--colors=off'])],
+      ['prose', check(process.execPath, [at('scripts/prose.mjs')])],
       ['types', check(tool('tsc'), ['-p', at('tests/js')])],
       ['publint', check(tool('publint'), ['run', '--strict', at('pkg')])],
       ['package', vitest('tests/js')],

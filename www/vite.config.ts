@@ -48,13 +48,13 @@ function reached(bundle: Rolldown.OutputBundle, entries: Rolldown.OutputChunk[])
   return found;
 }
 
-/** Names the built files of the app, for the service worker to keep: without other people's libraries in the live pages, and one module of the two. */
+/** Names the built files of the app, for the service worker to keep: without third-party libraries of the live pages, and with one of the two modules. */
 function listFiles(): Plugin {
   const isEmbed = ({ facadeModuleId }: Rolldown.OutputChunk) => facadeModuleId?.includes('/embed/') === true;
   return {
     name: 'list-files',
     apply: 'build',
-    // Late: Vite takes out scripts that only stood for styles.
+    // Late: after Vite has removed the scripts that only represent styles.
     enforce: 'post',
     generateBundle(_, bundle) {
       const entries = Object.values(bundle)

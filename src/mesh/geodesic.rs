@@ -27,7 +27,7 @@ const LEAST_GAIN: f64 = 1e-12;
 ///
 /// Exact up to rounding on flat regions, and across folds if the shortest path is unique. On curved surfaces, and where
 /// shortest paths from two sides meet, a distance may be up to half an edge too short: on a ball of radius 1 with edges
-/// of 0.1, 0.03 at the far end and 0.003 in the mean. Never shorter than the straight line, nor longer than the
+/// of 0.1, 0.03 at the far end and 0.003 on average. Never shorter than the straight line, nor longer than the
 /// shortest path along edges. O(n log n). Indices must be valid, see [`TriangleMesh::validate`].
 ///
 /// # Errors

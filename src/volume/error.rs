@@ -8,7 +8,7 @@ pub enum VolumeError {
     InvalidArgument {
         /// Name of the argument.
         parameter: &'static str,
-        /// What was wrong and what is accepted.
+        /// The reason, and the accepted values.
         problem: String,
     },
     /// An allocation failed.

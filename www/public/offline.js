@@ -1,8 +1,8 @@
-// A service worker: keeps the page's own files, so that what was opened once opens without a network.
+// Service worker that caches the page's own files, so that pages and data that were opened once open without a network.
 //
-// Files with a hash in their name never change and are kept as they are; all others are asked for anew and kept for when
-// nobody answers. A new deployment is therefore there at the next visit: its index.html comes from the server and names
-// other files. Where the browser refuses to keep anything, every request goes to the server as if this were not here.
+// Files with a hash in their name never change and are served from the cache; all others are requested from the server,
+// and from the cache if it does not respond. So a new deployment is loaded at the next visit: its index.html comes from
+// the server and refers to other files. If the browser refuses to store anything, every request goes to the server.
 
 const CACHE = 'vesicle';
 const HASHED = /\/assets\/[^/]+-[\w-]{8}\.\w+$/;
@@ -11,11 +11,11 @@ const scope = self.registration.scope;
 const isOwn = (url) => url.startsWith(scope);
 const withoutHash = (url) => url.replace(/#.*$/, '');
 
-/** What is kept, or nothing where keeping is refused. */
+/** Returns the cached response, or undefined if there is none or the cache is not available. */
 async function kept(request) {
   try {
     const cache = await caches.open(CACHE);
-    // Two addresses of one page differ in what follows its name.
+    // Addresses of one page differ in their query.
     return await cache.match(request, { ignoreSearch: request.mode === 'navigate', ignoreVary: true });
   } catch {
     return undefined;
@@ -28,11 +28,11 @@ async function keep(request, response) {
     const cache = await caches.open(CACHE);
     await cache.put(request, response);
   } catch {
-    // No room, or not allowed: the page works without.
+    // The storage is full or not permitted: the page works without it.
   }
 }
 
-/** From the server, and kept; where nobody answers, as it was kept. */
+/** Returns the server's response and caches it; returns the cached one if the server does not respond. */
 async function fromServer(event) {
   const { request } = event;
   try {
@@ -57,12 +57,12 @@ async function keepUrl(url) {
   if (response) await keep(url, response);
 }
 
-/** All hashed files of the deployment that is there now, also those nobody has asked for yet; those of older ones go. */
+/** Caches all hashed files of the current deployment, also those not requested yet; deletes those of older ones. */
 async function renew() {
   const response = await fetch(new URL('files.json', scope)).catch(() => undefined);
   if (!response?.ok) return;
   const files = (await response.json()).map((name) => new URL(name, scope).href);
-  // One after the other: the page that is open needs the network more.
+  // One after the other: the requests of the open page take precedence.
   for (const url of files) await keepUrl(url);
   const cache = await caches.open(CACHE);
   for (const { url } of await cache.keys()) if (HASHED.test(url) && !files.includes(url)) await cache.delete(url);
@@ -83,7 +83,7 @@ self.addEventListener('fetch', (event) => {
   if (mode === 'navigate') event.waitUntil(renewQuietly());
 });
 
-/** The page tells what it had loaded before this worker was there. */
+/** Caches the files that the page had loaded before this worker was active; the page sends their addresses. */
 self.addEventListener('message', (event) => {
   const urls = event.data.filter(isOwn).map(withoutHash);
   event.waitUntil(Promise.all(urls.map(keepUrl)));

@@ -5,10 +5,10 @@ export const DOCUMENTATION = `${DOCS}index.html`;
 
 /** Documentation pages that introduce each lab to readers who are new to its method. */
 export const GUIDES = {
-  extract: `${DOCS}documents/A_surface_out_of_a_volume.html`,
-  reconstruct: `${DOCS}documents/A_surface_out_of_points.html`,
-  track: `${DOCS}documents/A_surface_through_time.html`,
-  sculpt: `${DOCS}documents/A_surface_under_your_hand.html`,
+  extract: `${DOCS}documents/Surface_extraction_from_volumes.html`,
+  reconstruct: `${DOCS}documents/Surface_reconstruction_from_points.html`,
+  track: `${DOCS}documents/Surface_tracking_through_time.html`,
+  sculpt: `${DOCS}documents/Freeform_deformation_of_detailed_surfaces.html`,
 };
 
 /** Section of the documentation on what an extracted surface can miss. */

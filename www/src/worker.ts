@@ -45,7 +45,7 @@ const TELL_EVERY = 100;
 /** Step reports per progress message. With fewer, sending the messages costs more than making the reports. */
 const MOST_REPORTS = 50;
 
-/** What a snapshot includes besides the surface: nothing, its measures, or measures and mesh checks. */
+/** The contents of a snapshot besides the surface: none, its measures, or measures and mesh checks. */
 type Detail = 'plain' | 'measured' | 'checked';
 
 type Handlers = {

@@ -83,8 +83,8 @@ impl MultiresolutionModel {
         Ok(Prediction { ellipsoids_before: before, ellipsoids_after, predicted, residual, params })
     }
 
-    /// Returns the membrane moved along with the ellipsoids, if nothing else has to be done: it is at rest and its
-    /// edges are within bounds. This makes rigid motions exact. `None` if the membrane has to be solved.
+    /// Returns the membrane moved along with the ellipsoids, if nothing else has to be done: its residual is small
+    /// and its edges are within bounds. This makes rigid motions exact. `None` if the membrane has to be solved.
     fn predict_only(&mut self, prediction: &Prediction) -> Option<Mesh> {
         // A membrane that was only refreshed is solved when the ellipsoids stop, even if its residual is small.
         let is_due = !prediction.moves() && self.refreshed_frames > 0;

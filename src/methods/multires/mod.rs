@@ -61,8 +61,8 @@ pub struct MultiresOptions {
     pub params: MultiresParams,
 }
 
-/// Convergence threshold: the model is at rest when one more iteration moves the surface along its normals by at most
-/// this share of the target edge, as a root mean square.
+/// Convergence threshold: the model has converged when one more iteration moves the surface along its normals by at
+/// most this share of the target edge, as a root mean square.
 const TOLERANCE: f64 = 0.01;
 
 /// The largest number of vertices of the deformed base.

@@ -195,7 +195,7 @@ export class SculptParts {
     this.#params?.complain(name, message);
   }
 
-  /** With `canPlay`, a model at rest can be played, since there is a film. */
+  /** With `canPlay`, a converged model can be played, since there is a film. */
   showState(state: LabState, ready: boolean, canPlay: boolean): void {
     this.transport.showState(state === 'done' && canPlay ? 'paused' : state, ready);
     this.#exports.enabled = ready && state !== 'loading';

@@ -176,7 +176,7 @@ export class ModelSettings {
     this.#ui.ellipsoids.complain(why);
   }
 
-  /** Sets parameters of the live model; a run continues, and a model at rest is resumed. */
+  /** Sets parameters of the live model; a run continues, and a converged model is resumed. */
   setParams(values: ParamValues, what: string): Promise<void> {
     return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return this.show();

@@ -134,10 +134,10 @@ export interface Requests {
   film: { body: { film: Film | undefined; frame: number }; reply: undefined };
   /**
    * Plays the film from its present frame, or from the start if it is at its end; without a film, runs until the model
-   * is at rest.
+   * has converged.
    */
   play: { body: undefined; reply: undefined };
-  /** Runs until the model is at rest, without playing the film. */
+  /** Runs until the model has converged, without playing the film. */
   settle: { body: undefined; reply: undefined };
   pause: { body: undefined; reply: undefined };
   step: { body: { count: number }; reply: undefined };
@@ -199,7 +199,7 @@ export interface FrameEvent {
    */
   coarse: boolean;
 }
-/** Measures and facts, sent when the model is at rest or stopped. */
+/** Measures and facts, sent when the model has converged or was stopped. */
 export interface MeasuredEvent {
   event: 'measured';
   measures: Measures;
