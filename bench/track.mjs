@@ -51,9 +51,9 @@ function summary(tracker) {
   const checks = meshes.map((mesh) => mesh.check());
   for (const mesh of meshes) mesh.free();
   return {
-    triangles: Math.max(...tracker.facts.map((facts) => facts.triangles)),
-    folded: Math.max(...tracker.facts.map((facts) => facts.folded / facts.triangles)),
-    closing: tracker.closing,
+    triangles: Math.max(...tracker.statistics.map((facts) => facts.triangles)),
+    folded: Math.max(...tracker.statistics.map((facts) => facts.folded / facts.triangles)),
+    closing: tracker.cycleClosureError,
     ejection: ejected(tracker.volumes()),
     closed: checks.every((check) => check.closed && check.oriented),
     selfIntersections: sum(checks.map((check) => check.selfIntersections)),
@@ -67,7 +67,7 @@ function wholeRun(volume) {
   const params = { threshold: THRESHOLD, cyclic: true };
   const made = timed(() => new SurfaceTracker({ volume: enriched.value, box: BOX, params }));
   const tracker = made.value;
-  const { boundary, surface, closing } = steps(tracker);
+  const { boundary, surface, closure } = steps(tracker);
   const milliseconds = performance.now() - started;
   const [first, ...others] = surface;
   const result = {
@@ -79,7 +79,7 @@ function wholeRun(volume) {
     frame: middle(others),
     worst: Math.max(...others),
     tracked: sum(surface),
-    closingTime: sum(closing),
+    closingTime: sum(closure),
     ...summary(tracker),
   };
   tracker.free();

@@ -107,8 +107,8 @@ fn track(cine: &Cine) {
         if tracker.meshes().is_empty() {
             all.votes += took;
         }
-        let (Some(mesh), None) = (tracker.meshes().last(), tracker.closure_error()) else { continue };
-        let (frame, facts) = (tracker.frame(), tracker.facts()[tracker.frame()]);
+        let (Some(mesh), None) = (tracker.meshes().last(), tracker.cycle_closure_error()) else { continue };
+        let (frame, facts) = (tracker.frame(), tracker.statistics()[tracker.frame()]);
         let truth = cine.truth(frame as f64, 0.8);
         let (a, b) = (measure(mesh), measure(&truth));
         let off = surface_distance(mesh, &truth).unwrap();
@@ -139,7 +139,7 @@ fn track(cine: &Cine) {
         all.times.push(took);
     }
     all.tell();
-    println!("closes with {:.3} mm", tracker.closure_error().unwrap_or(f64::NAN));
+    println!("closes with {:.3} mm", tracker.cycle_closure_error().unwrap_or(f64::NAN));
     println!("tracked in {:.1} s", began.elapsed().as_secs_f64());
 }
 
@@ -217,8 +217,8 @@ fn follow_file(volume: &Volume, voxel: DVec3, reach: f64) {
     while !tracker.is_done() {
         let began = Instant::now();
         tracker.step().unwrap();
-        let (Some(mesh), None) = (tracker.meshes().last(), tracker.closure_error()) else { continue };
-        let (m, facts) = (measure(mesh), tracker.facts()[tracker.frame()]);
+        let (Some(mesh), None) = (tracker.meshes().last(), tracker.cycle_closure_error()) else { continue };
+        let (m, facts) = (measure(mesh), tracker.statistics()[tracker.frame()]);
         println!(
             "{} {:.0} ms, {} triangles, volume {:.2}, area {:.1}, chi {}, crossings {}, folds {:.2} %, {:?}",
             tracker.frame(),
@@ -236,7 +236,7 @@ fn follow_file(volume: &Volume, voxel: DVec3, reach: f64) {
             std::fs::write(format!("{folder}/frame{}.ply", tracker.frame()), bytes).unwrap();
         }
     }
-    println!("closes with {:.3}", tracker.closure_error().unwrap_or(f64::NAN));
+    println!("closes with {:.3}", tracker.cycle_closure_error().unwrap_or(f64::NAN));
 }
 
 fn main() {

@@ -13,17 +13,17 @@ export interface Coverage {
   /** Fraction of the surface's area within one voxel of the iso-surface, 0..1; 1 if there is no surface. */
   precision: number;
   /** Connected regions of the iso-surface farther than one voxel from the surface, largest first. */
-  uncovered: UncoveredPart[];
+  uncovered: UncoveredRegion[];
 }
 
 /** A connected region of the iso-surface that the surface does not cover. */
-export interface UncoveredPart {
+export interface UncoveredRegion {
   /** A point of the region near its middle, in world space. */
   position: Vec3;
   /** Area of the region, world units squared. */
   area: number;
-  /** 'matter': part of the object lies outside the surface; 'hollow': background lies inside it. */
-  kind: 'matter' | 'hollow';
+  /** 'matter': part of the object lies outside the surface; 'cavity': background lies inside it. */
+  kind: 'matter' | 'cavity';
 }
 
 /** Options of {@link DeformableModel.coverage}. */

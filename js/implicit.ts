@@ -97,11 +97,11 @@ export interface Fitness {
 }
 
 /** Figures of an {@link ImplicitSurface} that are not part of the {@link StepReport}. */
-interface Facts {
+interface Statistics {
   cell: number;
   spacing: number;
   duplicates: number;
-  strays: number;
+  spuriousComponents: number;
   warning?: string;
 }
 
@@ -171,7 +171,7 @@ export class ImplicitSurface implements Stepper {
 
   /** Edge of an extraction cell in the points' units; 0 until it is derived from their spacing. */
   get cell(): number {
-    return this.#facts().cell;
+    return this.#statistics().cell;
   }
 
   /**
@@ -179,28 +179,28 @@ export class ImplicitSurface implements Stepper {
    * constraints are chosen.
    */
   get spacing(): number {
-    return this.#facts().spacing;
+    return this.#statistics().spacing;
   }
 
   /** Number of points left out as duplicates of others. */
   get duplicates(): number {
-    return this.#facts().duplicates;
+    return this.#statistics().duplicates;
   }
 
   /** Number of spurious components of the last surface: those with no point near. */
-  get strays(): number {
-    return this.#facts().strays;
+  get spuriousComponents(): number {
+    return this.#statistics().spuriousComponents;
   }
 
   /**
    * Warning about a likely problem with the current parameters, though they are accepted; `undefined` if none is known.
    */
   get warning(): string | undefined {
-    return this.#facts().warning;
+    return this.#statistics().warning;
   }
 
-  #facts(): Facts {
-    return this.#handle.use((raw) => raw.facts() as Facts);
+  #statistics(): Statistics {
+    return this.#handle.use((raw) => raw.statistics() as Statistics);
   }
 
   /**

@@ -10,7 +10,7 @@ import { call } from './runtime.js';
 import { version as rawVersion } from './vesicle.js';
 
 export { animationGlb } from './animation.js';
-export type { Coverage, CoverageOptions, UncoveredPart } from './coverage.js';
+export type { Coverage, CoverageOptions, UncoveredRegion } from './coverage.js';
 export {
   type Attractor,
   DeformableModel,
@@ -51,7 +51,7 @@ export { type ParamSpec, paramSpecs } from './params.js';
 export { type InitInput, init as default, initSync } from './runtime.js';
 export type { RunOptions, Stepper, StepReport } from './stepper.js';
 export {
-  type FrameFacts,
+  type FrameStatistics,
   SurfaceTracker,
   type TrackingOptions,
   type TrackingParams,

@@ -2,7 +2,7 @@ import { invalid, knownOnly, list, plain, typed, vec3, whole } from './check.js'
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
-import { RawMultires, TrianglesOf } from './vesicle.js';
+import { RawMultires, TriangleCopy } from './vesicle.js';
 import type { Vec3 } from './volume.js';
 
 /**
@@ -59,11 +59,11 @@ export interface MultiresOptions {
 }
 
 /** Figures of a {@link MultiresolutionModel} that are not part of the {@link StepReport}. */
-interface Facts {
-  bands: number;
+interface Counts {
+  bandCount: number;
   folded: number;
-  missed: number;
-  held: number;
+  unmatchedVertices: number;
+  heldVertices: number;
 }
 
 const OPTIONS = ['detail', 'base', 'ellipsoids', 'params'];
@@ -73,9 +73,9 @@ const OPTIONS = ['detail', 'base', 'ellipsoids', 'params'];
  * connectivity.
  *
  * After Kobbelt, Bareuther and Seidel, "Multiresolution shape deformations for meshes with dynamic vertex
- * connectivity". A step is one frame: the ellipsoids move towards their goals as far as the low-frequency surface can
+ * connectivity". A step is one frame: the ellipsoids move towards their targets as far as the low-frequency surface can
  * follow, that surface is solved for, and the detail is reconstructed on it. The model is done when the ellipsoids have
- * reached their goals and the surface has settled.
+ * reached their targets and the surface has settled.
  *
  * @throws All methods: {@link VesicleError} `freed` after {@link MultiresolutionModel.free}.
  */
@@ -133,46 +133,46 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * Current ellipsoids, between their previous positions and their goals; a copy. Removed ones that are still shrinking
+   * Current ellipsoids, between their previous positions and their targets; a copy. Removed ones that are still shrinking
    * come last.
    */
   get ellipsoids(): ControlEllipsoid[] {
     return unpackedEllipsoids(this.#handle.use((raw) => raw.ellipsoids()));
   }
 
-  /** Goals of the ellipsoids; a copy. */
-  get goals(): ControlEllipsoid[] {
-    return unpackedEllipsoids(this.#handle.use((raw) => raw.goals()));
+  /** Targets of the ellipsoids; a copy. */
+  get targets(): ControlEllipsoid[] {
+    return unpackedEllipsoids(this.#handle.use((raw) => raw.targets()));
   }
 
   /** Number of surfaces in the multiresolution decomposition, from the base to the detail, both included. */
-  get bands(): number {
-    return this.#facts().bands;
+  get bandCount(): number {
+    return this.#counts().bandCount;
   }
 
   /** Number of triangles of the base surface whose image under T is flipped. */
   get folded(): number {
-    return this.#facts().folded;
+    return this.#counts().folded;
   }
 
   /**
    * Number of vertices of the mesh whose normal on the base did not hit the detail; the closest point is used instead.
    */
-  get missed(): number {
-    return this.#facts().missed;
+  get unmatchedVertices(): number {
+    return this.#counts().unmatchedVertices;
   }
 
   /** Number of vertices of the mesh whose detail was reduced to avoid self-intersections. */
-  get held(): number {
-    return this.#facts().held;
+  get heldVertices(): number {
+    return this.#counts().heldVertices;
   }
 
-  #facts(): Facts {
-    return this.#handle.use((raw) => raw.facts() as Facts);
+  #counts(): Counts {
+    return this.#handle.use((raw) => raw.counts() as Counts);
   }
 
   /**
-   * Sets new goals for the ellipsoids, by index; each step moves them by at most half of their shortest semi-axis.
+   * Sets new targets for the ellipsoids, by index; each step moves them by at most half of their shortest semi-axis.
    * Additional ellipsoids grow from a fraction of their size, or out of the nearest existing one if they lie outside the
    * surface; those omitted shrink and vanish.
    *
@@ -269,8 +269,8 @@ export class MultiresolutionModel implements Stepper {
   }
 }
 
-function triangles(parameter: string, mesh: Mesh | undefined): TrianglesOf | undefined {
-  return mesh === undefined ? undefined : meshHandle(parameter, mesh).use((raw) => new TrianglesOf(raw));
+function triangles(parameter: string, mesh: Mesh | undefined): TriangleCopy | undefined {
+  return mesh === undefined ? undefined : meshHandle(parameter, mesh).use((raw) => new TriangleCopy(raw));
 }
 
 function packedEllipsoids(ellipsoids: readonly ControlEllipsoid[]): Float64Array<ArrayBuffer> {

@@ -2,7 +2,7 @@ import { invalid, knownOnly, plain, typed, vec3, whole } from './check.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
-import { RawTracker, TrianglesOf } from './vesicle.js';
+import { RawTracker, TriangleCopy } from './vesicle.js';
 import { type Vec3, type Volume, volumeHandle } from './volume.js';
 
 /** Parameters of the tracker; `paramSpecs('tracking')` has their ranges, defaults and descriptions. */
@@ -62,7 +62,7 @@ export interface TrackingOptions {
 }
 
 /** Statistics of one tracked frame. */
-export interface FrameFacts {
+export interface FrameStatistics {
   /** Enclosed volume, world units cubed. */
   volume: number;
   /** Surface area, world units squared. */
@@ -75,22 +75,22 @@ export interface FrameFacts {
    */
   rejected: number;
   /** Number of displacements reduced to avoid self-intersections. */
-  held: number;
+  heldMoves: number;
   /**
    * Number of vertices without boundary points: collapsed where a narrow gap has closed, grown where one has opened,
    * else smoothed.
    */
-  retracted: number;
+  withoutBoundary: number;
   /** Mean number of projection steps of a vertex, onto space-time and onto the frame. */
   steps: number;
   /** Mean displacement of the vertices by the last projection, world units. */
-  correction: number;
+  meanFinalCorrection: number;
 }
 
-interface Facts {
+interface Statistics {
   noise: number;
-  closing?: number;
-  frames: FrameFacts[];
+  cycleClosureError?: number;
+  frames: FrameStatistics[];
 }
 
 const OPTIONS = ['volume', 'box', 'voxels', 'component', 'start', 'params'];
@@ -159,20 +159,20 @@ export class SurfaceTracker implements Stepper {
    * boundary.
    */
   get noise(): number {
-    return this.#facts().noise;
+    return this.#statistics().noise;
   }
 
   /**
    * Cycle closure error of a cyclic sequence, when all frames are done: the mean distance between the last frame's
    * surface, tracked on into the first frame, and the first frame's surface, world units.
    */
-  get closing(): number | undefined {
-    return this.#facts().closing;
+  get cycleClosureError(): number | undefined {
+    return this.#statistics().cycleClosureError;
   }
 
   /** Statistics of the frames tracked so far, in order. */
-  get facts(): FrameFacts[] {
-    return this.#facts().frames;
+  get statistics(): FrameStatistics[] {
+    return this.#statistics().frames;
   }
 
   /** Current values of all parameters; a copy. */
@@ -180,8 +180,8 @@ export class SurfaceTracker implements Stepper {
     return this.#handle.use((raw) => raw.params() as Required<TrackingParams>);
   }
 
-  #facts(): Facts {
-    return this.#handle.use((raw) => raw.facts() as Facts);
+  #statistics(): Statistics {
+    return this.#handle.use((raw) => raw.statistics() as Statistics);
   }
 
   #counts(): [number, number, number] {
@@ -325,6 +325,6 @@ function point(component: TrackingOptions['component']): Float64Array | undefine
   return vec3('component', component);
 }
 
-function triangles(mesh: Mesh | undefined): TrianglesOf | undefined {
-  return mesh === undefined ? undefined : meshHandle('start', mesh).use((raw) => new TrianglesOf(raw));
+function triangles(mesh: Mesh | undefined): TriangleCopy | undefined {
+  return mesh === undefined ? undefined : meshHandle('start', mesh).use((raw) => new TriangleCopy(raw));
 }

@@ -20,7 +20,7 @@ extern "C" {
 }
 
 /// Returns an array of `length` elements that `copy` fills; a `too-large` failure if there is not enough memory.
-pub fn copied<T: Clone + Default>(length: u32, copy: impl FnOnce(&mut [T])) -> Result<Vec<T>, Failure> {
+pub fn copy_array<T: Clone + Default>(length: u32, copy: impl FnOnce(&mut [T])) -> Result<Vec<T>, Failure> {
     let mut values = Vec::new();
     let bytes = u64::from(length).saturating_mul(size_of::<T>() as u64);
     values.try_reserve_exact(length as usize).map_err(|_| Failure::too_large(bytes))?;
@@ -31,17 +31,17 @@ pub fn copied<T: Clone + Default>(length: u32, copy: impl FnOnce(&mut [T])) -> R
 
 /// Copies the bytes of a file.
 pub fn bytes(array: &Uint8Array) -> Result<Vec<u8>, Failure> {
-    copied(array.length(), |out| array.copy_to(out))
+    copy_array(array.length(), |out| array.copy_to(out))
 }
 
 /// Copies the numbers of a `Float32Array`.
 pub fn floats(array: &Float32Array) -> Result<Vec<f32>, Failure> {
-    copied(array.length(), |out| array.copy_to(out))
+    copy_array(array.length(), |out| array.copy_to(out))
 }
 
 /// Copies the numbers of a `Float64Array`.
 pub fn doubles(array: &Float64Array) -> Result<Vec<f64>, Failure> {
-    copied(array.length(), |out| array.copy_to(out))
+    copy_array(array.length(), |out| array.copy_to(out))
 }
 
 /// Converts packed xyz to points.
@@ -56,7 +56,7 @@ pub fn coordinates(array: &Float32Array) -> Result<Vec<Vec2>, Failure> {
 
 /// Converts packed abc to triangles.
 pub fn triangles(array: &Uint32Array) -> Result<Vec<[u32; 3]>, Failure> {
-    let indices = copied(array.length(), |out| array.copy_to(out))?;
+    let indices = copy_array(array.length(), |out| array.copy_to(out))?;
     let (triangles, _) = indices.as_chunks::<3>();
     Ok(triangles.to_vec())
 }
@@ -87,7 +87,7 @@ pub fn to_js<T: Serialize>(value: &T) -> Result<JsValue, Failure> {
 ///
 /// # Errors
 /// A name that `current` does not have, or a value of the wrong type: `invalid-argument` with the name.
-pub fn merged<T: Serialize + DeserializeOwned>(current: &T, given: &JsValue) -> Result<T, Failure> {
+pub fn with_overrides<T: Serialize + DeserializeOwned>(current: &T, given: &JsValue) -> Result<T, Failure> {
     let all = to_js(current)?;
     for name in js_sys::Object::keys(given.unchecked_ref::<js_sys::Object>()).iter() {
         let value = property(given, &name);

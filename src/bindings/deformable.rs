@@ -7,9 +7,9 @@ use js_sys::{Float32Array, Float64Array, Uint8Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, doubles, merged, now, points, to_js};
+use super::convert::{bytes, doubles, now, points, to_js, with_overrides};
 use super::error::Failure;
-use super::mesh::{Body, RawMesh};
+use super::mesh::{MeshKind, RawMesh};
 use super::volume::RawVolume;
 use crate::math::DVec3;
 use crate::methods::deformable::{
@@ -73,7 +73,7 @@ impl RawDeformable {
         edge: Option<f64>,
         params: &JsValue,
     ) -> Result<RawDeformable, JsValue> {
-        let params = merged(&DeformableParams::for_volume(&volume.0), params)?;
+        let params = with_overrides(&DeformableParams::for_volume(&volume.0), params)?;
         let options = DeformableOptions { frame, start: start.0, levels, edge, params: Some(params) };
         let mut model = DeformableModel::new(&volume.0, options).map_err(Failure::from)?;
         model.set_clock(now);
@@ -82,7 +82,7 @@ impl RawDeformable {
 
     /// Returns the surface as a live mesh, which changes with the model.
     pub fn mesh(&self) -> RawMesh {
-        RawMesh(Body::Live(Rc::<RefCell<DeformableModel>>::clone(&self.0)))
+        RawMesh(MeshKind::Live(Rc::<RefCell<DeformableModel>>::clone(&self.0)))
     }
 
     /// Makes `iterations` steps, fewer if the model is done; returns the report of the last step, with the events of
@@ -124,7 +124,7 @@ impl RawDeformable {
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
         let mut model = self.0.borrow_mut();
-        let params = merged(model.params(), params)?;
+        let params = with_overrides(model.params(), params)?;
         model.set_params(params).map_err(Failure::from)?;
         Ok(())
     }
@@ -184,33 +184,33 @@ impl RawCoverageSurvey {
     /// Returns the result, after all triangles have been tested.
     pub fn finish(&mut self) -> Result<JsValue, JsValue> {
         let survey = self.0.take().ok_or_else(|| Failure::invalid("coverage", "has been measured"))?;
-        Ok(to_js(&Measured::from(survey.finish()))?)
+        Ok(to_js(&CoverageResult::from(survey.finish()))?)
     }
 }
 
 /// [`Coverage`] as it is passed to JavaScript.
 #[derive(Serialize)]
-struct Measured {
+struct CoverageResult {
     recall: f64,
     precision: f64,
-    uncovered: Vec<Part>,
+    uncovered: Vec<UncoveredRegion>,
 }
 
 #[derive(Serialize)]
-struct Part {
+struct UncoveredRegion {
     position: [f64; 3],
     area: f64,
     kind: &'static str,
 }
 
-impl From<Coverage> for Measured {
+impl From<Coverage> for CoverageResult {
     fn from(Coverage { recall, precision, uncovered }: Coverage) -> Self {
-        let parts = uncovered.into_iter().map(|part| Part {
+        let parts = uncovered.into_iter().map(|part| UncoveredRegion {
             position: part.position.to_array(),
             area: part.area,
             kind: match part.kind {
                 Missing::Matter => "matter",
-                Missing::Cavity => "hollow",
+                Missing::Cavity => "cavity",
             },
         });
         Self { recall, precision, uncovered: parts.collect() }

@@ -7,9 +7,9 @@ use js_sys::{Float32Array, Uint8Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, floats, merged, now, packed, points, to_js};
+use super::convert::{bytes, floats, now, packed, points, to_js, with_overrides};
 use super::error::Failure;
-use super::mesh::{Body, RawMesh};
+use super::mesh::{MeshKind, RawMesh};
 use super::volume::RawVolume;
 use crate::io::{PointCloud, parse_points};
 use crate::math::Vec3;
@@ -109,7 +109,7 @@ impl RawImplicit {
             cameras: cameras.0,
             max_points: max_points.unwrap_or(defaults.max_points),
             keep_components,
-            params: merged(&ImplicitParams::default(), params)?,
+            params: with_overrides(&ImplicitParams::default(), params)?,
         };
         let mut surface = ImplicitSurface::new(cloud, options).map_err(Failure::from)?;
         surface.set_clock(now);
@@ -118,13 +118,13 @@ impl RawImplicit {
 
     /// Returns the surface as a live mesh, which changes with the model.
     pub fn mesh(&self) -> RawMesh {
-        RawMesh(Body::Live(Rc::<RefCell<ImplicitSurface>>::clone(&self.0)))
+        RawMesh(MeshKind::Live(Rc::<RefCell<ImplicitSurface>>::clone(&self.0)))
     }
 
     /// Returns a copy of the part of the surface that has been extracted so far.
     pub fn preview(&self) -> Result<RawMesh, JsValue> {
         let mesh = self.0.borrow().preview().map_err(Failure::from)?;
-        Ok(RawMesh(Body::Triangles(Rc::new(mesh))))
+        Ok(RawMesh(MeshKind::Triangles(Rc::new(mesh))))
     }
 
     /// Makes `iterations` steps, fewer if the model is done; returns the report of the last.
@@ -149,7 +149,7 @@ impl RawImplicit {
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
         let mut surface = self.0.borrow_mut();
-        let params = merged(surface.params(), params)?;
+        let params = with_overrides(surface.params(), params)?;
         surface.set_params(params).map_err(Failure::from)?;
         Ok(())
     }
@@ -223,13 +223,13 @@ impl RawImplicit {
 
     /// Returns further results: cell size, point spacing, numbers of duplicates and outliers, and a warning about the
     /// parameters.
-    pub fn facts(&self) -> Result<JsValue, JsValue> {
+    pub fn statistics(&self) -> Result<JsValue, JsValue> {
         let surface = self.0.borrow();
-        Ok(to_js(&Facts {
+        Ok(to_js(&Statistics {
             cell: surface.cell(),
             spacing: surface.spacing(),
             duplicates: surface.duplicates(),
-            strays: surface.spurious_components(),
+            spurious_components: surface.spurious_components(),
             warning: surface.params().warning(),
         })?)
     }
@@ -247,11 +247,12 @@ impl RawImplicit {
 }
 
 #[derive(Serialize)]
-struct Facts {
+#[serde(rename_all = "camelCase")]
+struct Statistics {
     cell: f64,
     spacing: f64,
     duplicates: usize,
-    strays: usize,
+    spurious_components: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     warning: Option<&'static str>,
 }

@@ -23,17 +23,17 @@ use crate::spatial::{SurfaceDistance, SurfacePoint, TriangleTree, cross_section,
 use crate::volume::marching_cubes_world;
 
 /// The content of a JavaScript `Mesh`.
-pub(super) enum Body {
+pub(super) enum MeshKind {
     /// A closed mesh that can be edited.
     Surface(Box<Mesh>),
     /// A list of triangles as given, which may be open or intersect itself.
     Triangles(Rc<TriangleMesh>),
     /// The live surface of a model.
-    Live(Rc<RefCell<dyn Live>>),
+    Live(Rc<RefCell<dyn LiveSurface>>),
 }
 
 /// A model with a surface that a JavaScript `Mesh` can follow.
-pub(super) trait Live {
+pub(super) trait LiveSurface {
     /// Returns a copy of the current surface.
     fn surface(&self) -> TriangleMesh;
     /// Returns the numbers of vertices and triangles.
@@ -43,7 +43,7 @@ pub(super) trait Live {
     fn versions(&self) -> [u32; 2];
 }
 
-impl Live for DeformableModel {
+impl LiveSurface for DeformableModel {
     fn surface(&self) -> TriangleMesh {
         self.surface()
     }
@@ -57,7 +57,7 @@ impl Live for DeformableModel {
     }
 }
 
-impl Live for ImplicitSurface {
+impl LiveSurface for ImplicitSurface {
     fn surface(&self) -> TriangleMesh {
         self.surface().clone()
     }
@@ -73,7 +73,7 @@ impl Live for ImplicitSurface {
 
 /// A mesh of any kind: editable, a list of triangles, or live.
 #[wasm_bindgen]
-pub struct RawMesh(pub(super) Body);
+pub struct RawMesh(pub(super) MeshKind);
 
 /// A snapshot of a mesh's arrays, to be copied out.
 #[wasm_bindgen]
@@ -84,7 +84,7 @@ impl RawMesh {
     /// Creates a sphere of nearly equilateral triangles with edges of at most `max_edge`.
     pub fn icosphere(center: &[f64], radius: f64, max_edge: f64) -> Result<RawMesh, JsValue> {
         let mesh = Mesh::icosphere(point(center)?.as_vec3(), radius as f32, max_edge as f32);
-        Ok(RawMesh(Body::Surface(Box::new(mesh.map_err(Failure::from)?))))
+        Ok(RawMesh(MeshKind::Surface(Box::new(mesh.map_err(Failure::from)?))))
     }
 
     /// Creates a mesh from packed arrays, which are copied.
@@ -102,7 +102,7 @@ impl RawMesh {
             texture: texture.map(|texture| texture.0),
             ..TriangleMesh::default()
         };
-        Ok(RawMesh(loose(mesh)))
+        Ok(RawMesh(triangle_list(mesh)))
     }
 
     /// Reads a mesh from the bytes of a file, with a texture from a separate image if one is given.
@@ -112,23 +112,23 @@ impl RawMesh {
             Some(texture) => parse_textured_mesh(&file, texture.0),
             None => parse_mesh(&file),
         };
-        Ok(RawMesh(loose(mesh.map_err(Failure::from)?)))
+        Ok(RawMesh(triangle_list(mesh.map_err(Failure::from)?)))
     }
 
     /// Returns the iso-surface of one frame of a volume, in world space.
     #[wasm_bindgen(js_name = marchingCubes)]
     pub fn marching_cubes(volume: &RawVolume, iso: f64, frame: usize) -> Result<RawMesh, JsValue> {
         let mesh = marching_cubes_world(&volume.0, iso, frame).map_err(Failure::from)?;
-        Ok(RawMesh(loose(mesh)))
+        Ok(RawMesh(triangle_list(mesh)))
     }
 
     /// Returns the number of vertices.
     #[wasm_bindgen(js_name = vertexCount)]
     pub fn vertex_count(&self) -> usize {
         match &self.0 {
-            Body::Surface(mesh) => mesh.vertex_count(),
-            Body::Triangles(mesh) => mesh.positions.len(),
-            Body::Live(model) => model.borrow().counts()[0],
+            MeshKind::Surface(mesh) => mesh.vertex_count(),
+            MeshKind::Triangles(mesh) => mesh.positions.len(),
+            MeshKind::Live(model) => model.borrow().counts()[0],
         }
     }
 
@@ -136,9 +136,9 @@ impl RawMesh {
     #[wasm_bindgen(js_name = triangleCount)]
     pub fn triangle_count(&self) -> usize {
         match &self.0 {
-            Body::Surface(mesh) => mesh.triangle_count(),
-            Body::Triangles(mesh) => mesh.triangles.len(),
-            Body::Live(model) => model.borrow().counts()[1],
+            MeshKind::Surface(mesh) => mesh.triangle_count(),
+            MeshKind::Triangles(mesh) => mesh.triangles.len(),
+            MeshKind::Live(model) => model.borrow().counts()[1],
         }
     }
 
@@ -146,9 +146,9 @@ impl RawMesh {
     #[wasm_bindgen(js_name = topologyVersion)]
     pub fn topology_version(&self) -> u32 {
         match &self.0 {
-            Body::Surface(mesh) => mesh.topology_version(),
-            Body::Triangles(_) => 0,
-            Body::Live(model) => model.borrow().versions()[0],
+            MeshKind::Surface(mesh) => mesh.topology_version(),
+            MeshKind::Triangles(_) => 0,
+            MeshKind::Live(model) => model.borrow().versions()[0],
         }
     }
 
@@ -156,9 +156,9 @@ impl RawMesh {
     #[wasm_bindgen(js_name = geometryVersion)]
     pub fn geometry_version(&self) -> u32 {
         match &self.0 {
-            Body::Surface(mesh) => mesh.geometry_version(),
-            Body::Triangles(_) => 0,
-            Body::Live(model) => model.borrow().versions()[1],
+            MeshKind::Surface(mesh) => mesh.geometry_version(),
+            MeshKind::Triangles(_) => 0,
+            MeshKind::Live(model) => model.borrow().versions()[1],
         }
     }
 
@@ -187,8 +187,8 @@ impl RawMesh {
     pub fn texture(&self) -> Option<RawTexture> {
         let texture = match &self.0 {
             // Editable meshes have no texture.
-            Body::Surface(_) => None,
-            Body::Triangles(_) | Body::Live(_) => self.triangles().texture.clone(),
+            MeshKind::Surface(_) => None,
+            MeshKind::Triangles(_) | MeshKind::Live(_) => self.triangles().texture.clone(),
         };
         texture.map(RawTexture)
     }
@@ -196,12 +196,12 @@ impl RawMesh {
     /// Returns the mesh with vertices duplicated along the seams of the texture; see [`TriangleMesh::split_at_seams`].
     #[wasm_bindgen(js_name = splitAtSeams)]
     pub fn split_at_seams(&self) -> RawMesh {
-        RawMesh(loose(self.triangles().split_at_seams()))
+        RawMesh(triangle_list(self.triangles().split_at_seams()))
     }
 
     /// Returns one mesh per connected component.
     pub fn components(&self) -> Vec<RawMesh> {
-        self.triangles().components().into_iter().map(|part| RawMesh(loose(part))).collect()
+        self.triangles().components().into_iter().map(|part| RawMesh(triangle_list(part))).collect()
     }
 
     /// Refines the mesh by one sqrt(3) pass.
@@ -233,7 +233,7 @@ impl RawMesh {
     pub fn decimate(&mut self, target_triangles: f64) -> Result<(), JsValue> {
         // Truncates a fraction, and saturates a count that no mesh can have.
         let target = target_triangles as usize;
-        if let Body::Triangles(mesh) = &self.0
+        if let MeshKind::Triangles(mesh) = &self.0
             && mesh.triangles.len() <= target
         {
             // Already small enough: nothing changes, but an open mesh is still rejected.
@@ -254,18 +254,18 @@ impl RawMesh {
     /// Returns the mean curvature at each vertex.
     #[wasm_bindgen(js_name = meanCurvature)]
     pub fn mean_curvature(&self) -> Vec<f32> {
-        narrowed(&curvature(&self.triangles()).mean)
+        to_f32(&curvature(&self.triangles()).mean)
     }
 
     /// Returns the Gaussian curvature at each vertex.
     #[wasm_bindgen(js_name = gaussianCurvature)]
     pub fn gaussian_curvature(&self) -> Vec<f32> {
-        narrowed(&curvature(&self.triangles()).gaussian)
+        to_f32(&curvature(&self.triangles()).gaussian)
     }
 
     /// Returns the geodesic distance of each vertex from vertex `from_vertex`.
     pub fn geodesic(&self, from_vertex: u32) -> Result<Vec<f32>, JsValue> {
-        Ok(narrowed(&geodesic(&self.triangles(), from_vertex).map_err(Failure::from)?))
+        Ok(to_f32(&geodesic(&self.triangles(), from_vertex).map_err(Failure::from)?))
     }
 
     /// Returns the distances to another surface, per vertex and in summary, as `Mesh.distanceTo` documents them.
@@ -273,7 +273,7 @@ impl RawMesh {
     pub fn distance_to(&self, other: &RawMesh) -> Result<JsValue, JsValue> {
         let found = surface_distance(&self.triangles(), &other.triangles()).map_err(Failure::from)?;
         let summaries = to_js(&Summaries::from(&found))?;
-        let per_vertex = Float32Array::from(narrowed(&found.per_vertex).as_slice());
+        let per_vertex = Float32Array::from(to_f32(&found.per_vertex).as_slice());
         // Setting a property of a new plain object cannot fail.
         Reflect::set(&summaries, &"perVertex".into(), &per_vertex).ok();
         Ok(summaries)
@@ -306,8 +306,8 @@ impl RawMesh {
     #[wasm_bindgen(js_name = clone)]
     pub fn duplicate(&self) -> RawMesh {
         match &self.0 {
-            Body::Surface(mesh) => RawMesh(Body::Surface(mesh.clone())),
-            Body::Triangles(_) | Body::Live(_) => RawMesh(Body::Triangles(self.triangles())),
+            MeshKind::Surface(mesh) => RawMesh(MeshKind::Surface(mesh.clone())),
+            MeshKind::Triangles(_) | MeshKind::Live(_) => RawMesh(MeshKind::Triangles(self.triangles())),
         }
     }
 
@@ -324,19 +324,19 @@ impl RawMesh {
     /// Returns the triangles of the current mesh.
     pub(super) fn triangles(&self) -> Rc<TriangleMesh> {
         match &self.0 {
-            Body::Surface(mesh) => Rc::new(mesh.to_triangles()),
-            Body::Triangles(mesh) => Rc::clone(mesh),
-            Body::Live(model) => Rc::new(model.borrow().surface()),
+            MeshKind::Surface(mesh) => Rc::new(mesh.to_triangles()),
+            MeshKind::Triangles(mesh) => Rc::clone(mesh),
+            MeshKind::Live(model) => Rc::new(model.borrow().surface()),
         }
     }
 
     /// Returns the mesh for editing. A list of triangles becomes an editable mesh first; an error if it is not closed.
     fn editable(&mut self) -> Result<&mut Mesh, Failure> {
-        if let Body::Triangles(triangles) = &self.0 {
-            self.0 = Body::Surface(Box::new(Mesh::from_triangles(triangles)?));
+        if let MeshKind::Triangles(triangles) = &self.0 {
+            self.0 = MeshKind::Surface(Box::new(Mesh::from_triangles(triangles)?));
         }
         match &mut self.0 {
-            Body::Surface(mesh) => Ok(mesh),
+            MeshKind::Surface(mesh) => Ok(mesh),
             _ => Err(Failure::invalid("mesh", "it belongs to a model that moves it: clone() it first")),
         }
     }
@@ -385,12 +385,12 @@ impl RawArrays {
 
     /// Copies the positions to `out`, as packed xyz.
     pub fn positions(&self, out: &Float32Array) {
-        fill(out, &packed(&self.0.positions));
+        copy_into(out, &packed(&self.0.positions));
     }
 
     /// Copies the normals to `out`, as packed xyz.
     pub fn normals(&self, out: &Float32Array) {
-        fill(out, &packed(self.0.normals.as_deref().unwrap_or_default()));
+        copy_into(out, &packed(self.0.normals.as_deref().unwrap_or_default()));
     }
 
     /// Copies the triangles to `out`, as packed abc.
@@ -411,15 +411,15 @@ impl RawArrays {
     }
 }
 
-fn fill(out: &Float32Array, values: &[f32]) {
+fn copy_into(out: &Float32Array, values: &[f32]) {
     out.subarray(0, values.len() as u32).copy_from(values);
 }
 
-fn loose(mesh: TriangleMesh) -> Body {
-    Body::Triangles(Rc::new(mesh))
+fn triangle_list(mesh: TriangleMesh) -> MeshKind {
+    MeshKind::Triangles(Rc::new(mesh))
 }
 
-fn narrowed(values: &[f64]) -> Vec<f32> {
+fn to_f32(values: &[f64]) -> Vec<f32> {
     values.iter().map(|&value| value as f32).collect()
 }
 
@@ -540,13 +540,13 @@ fn direction_of(values: &[f64]) -> Result<Vec3, Failure> {
 
 /// A copy of the triangles of a mesh, for a model to keep.
 #[wasm_bindgen]
-pub struct TrianglesOf(pub(super) TriangleMesh);
+pub struct TriangleCopy(pub(super) TriangleMesh);
 
 #[wasm_bindgen]
-impl TrianglesOf {
+impl TriangleCopy {
     /// Copies the current triangles of `mesh`.
     #[wasm_bindgen(constructor)]
-    pub fn new(mesh: &RawMesh) -> TrianglesOf {
-        TrianglesOf((*mesh.triangles()).clone())
+    pub fn new(mesh: &RawMesh) -> TriangleCopy {
+        TriangleCopy((*mesh.triangles()).clone())
     }
 }

@@ -7,9 +7,9 @@ use js_sys::{Float64Array, Uint8Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, doubles, merged, now, to_js};
+use super::convert::{bytes, doubles, now, to_js, with_overrides};
 use super::error::Failure;
-use super::mesh::{Body, Live, RawMesh, TrianglesOf};
+use super::mesh::{LiveSurface, MeshKind, RawMesh, TriangleCopy};
 use crate::mesh::TriangleMesh;
 use crate::methods::multires::{
     ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, param_specs,
@@ -20,38 +20,38 @@ use crate::methods::multires::{
 pub struct RawMultires(Rc<RefCell<MultiresolutionModel>>);
 
 /// One of the live surfaces of a model.
-struct View {
+struct LiveView {
     model: Rc<RefCell<MultiresolutionModel>>,
-    which: Which,
+    surface: Surface,
 }
 
 /// The surfaces of a model: detailed, deformed base, and link mesh.
 #[derive(Clone, Copy)]
-enum Which {
+enum Surface {
     Detailed,
     Base,
     Link,
 }
 
-impl Live for View {
+impl LiveSurface for LiveView {
     fn surface(&self) -> TriangleMesh {
         let model = self.model.borrow();
-        match self.which {
-            Which::Detailed => model.surface(),
-            Which::Base => model.base_mesh().to_triangles(),
-            Which::Link => model.base_correspondence(),
+        match self.surface {
+            Surface::Detailed => model.surface(),
+            Surface::Base => model.base_mesh().to_triangles(),
+            Surface::Link => model.link_mesh(),
         }
     }
 
     fn counts(&self) -> [usize; 2] {
         let model = self.model.borrow();
-        let mesh = if let Which::Detailed = self.which { model.mesh() } else { model.base_mesh() };
+        let mesh = if let Surface::Detailed = self.surface { model.mesh() } else { model.base_mesh() };
         [mesh.vertex_count(), mesh.triangle_count()]
     }
 
     fn versions(&self) -> [u32; 2] {
         let model = self.model.borrow();
-        let mesh = if let Which::Detailed = self.which { model.mesh() } else { model.base_mesh() };
+        let mesh = if let Surface::Detailed = self.surface { model.mesh() } else { model.base_mesh() };
         [mesh.topology_version(), mesh.geometry_version()]
     }
 }
@@ -61,8 +61,8 @@ impl RawMultires {
     /// Creates a model of meshes and packed ellipsoids; `params` are written over the defaults.
     #[wasm_bindgen(constructor)]
     pub fn new(
-        detail: Option<TrianglesOf>,
-        base: Option<TrianglesOf>,
+        detail: Option<TriangleCopy>,
+        base: Option<TriangleCopy>,
         ellipsoids: &Float64Array,
         params: &JsValue,
     ) -> Result<RawMultires, JsValue> {
@@ -70,7 +70,7 @@ impl RawMultires {
             detail: detail.map(|mesh| mesh.0),
             base: base.map(|mesh| mesh.0),
             ellipsoids: unpacked(ellipsoids)?,
-            params: merged(&MultiresParams::default(), params)?,
+            params: with_overrides(&MultiresParams::default(), params)?,
         };
         let mut model = MultiresolutionModel::new(options).map_err(Failure::from)?;
         model.set_clock(now);
@@ -79,19 +79,19 @@ impl RawMultires {
 
     /// Returns a live mesh of the model: the detailed surface (0), the deformed base (1) or the link mesh (2).
     pub fn mesh(&self, which: u32) -> RawMesh {
-        let which = match which {
-            0 => Which::Detailed,
-            1 => Which::Base,
-            _ => Which::Link,
+        let surface = match which {
+            0 => Surface::Detailed,
+            1 => Surface::Base,
+            _ => Surface::Link,
         };
-        RawMesh(Body::Live(Rc::new(RefCell::new(View { model: Rc::clone(&self.0), which }))))
+        RawMesh(MeshKind::Live(Rc::new(RefCell::new(LiveView { model: Rc::clone(&self.0), surface }))))
     }
 
     /// Returns the meshes of the multi-level solver, from coarse to fine.
     #[wasm_bindgen(js_name = levelMeshes)]
     pub fn level_meshes(&self) -> Vec<RawMesh> {
         let levels = self.0.borrow().levels();
-        levels.into_iter().map(|mesh| RawMesh(Body::Triangles(Rc::new(mesh)))).collect()
+        levels.into_iter().map(|mesh| RawMesh(MeshKind::Triangles(Rc::new(mesh)))).collect()
     }
 
     /// Makes `iterations` steps, fewer if the model is done; returns the report of the last step, with the events of
@@ -123,7 +123,7 @@ impl RawMultires {
     }
 
     /// Returns the target ellipsoids, packed.
-    pub fn goals(&self) -> Vec<f64> {
+    pub fn targets(&self) -> Vec<f64> {
         packed(&self.0.borrow().targets())
     }
 
@@ -143,17 +143,22 @@ impl RawMultires {
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
         let mut model = self.0.borrow_mut();
-        let params = merged(model.params(), params)?;
+        let params = with_overrides(model.params(), params)?;
         model.set_params(params).map_err(Failure::from)?;
         Ok(())
     }
 
     /// Returns further counts: surfaces in the decomposition, folded triangles of the map T, vertices whose normal
     /// missed the finer surface, and vertices held back to avoid self-intersections.
-    pub fn facts(&self) -> Result<JsValue, JsValue> {
+    pub fn counts(&self) -> Result<JsValue, JsValue> {
         let model = self.0.borrow();
         let [missed, held] = model.detail_counts();
-        Ok(to_js(&Facts { bands: model.bands(), folded: model.folded(), missed, held })?)
+        Ok(to_js(&Counts {
+            band_count: model.band_count(),
+            folded: model.folded(),
+            unmatched_vertices,
+            held_vertices,
+        })?)
     }
 
     /// Returns the complete state of the run, for `restore`.
@@ -169,11 +174,12 @@ impl RawMultires {
 }
 
 #[derive(Serialize)]
-struct Facts {
-    bands: usize,
+#[serde(rename_all = "camelCase")]
+struct Counts {
+    band_count: usize,
     folded: usize,
-    missed: usize,
-    held: usize,
+    unmatched_vertices: usize,
+    held_vertices: usize,
 }
 
 /// Unpacks ellipsoids of twelve numbers each: centre and three semi-axes.

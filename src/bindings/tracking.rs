@@ -7,15 +7,15 @@ use js_sys::{Float64Array, Uint8Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, doubles, merged, now, to_js};
+use super::convert::{bytes, doubles, now, to_js, with_overrides};
 use super::error::Failure;
-use super::mesh::{Body, Live, RawMesh, TrianglesOf};
+use super::mesh::{LiveSurface, MeshKind, RawMesh, TriangleCopy};
 use super::volume::RawVolume;
 use crate::io::write_animation;
 use crate::math::DVec3;
 use crate::mesh::TriangleMesh;
 use crate::methods::tracking::{
-    Bounds, Component, FrameFacts, SurfaceTracker, TrackingOptions, TrackingParams, param_specs,
+    Bounds, Component, FrameStatistics, SurfaceTracker, TrackingOptions, TrackingParams, param_specs,
 };
 
 /// Handle of a surface tracker, which it shares with its live mesh.
@@ -23,9 +23,9 @@ use crate::methods::tracking::{
 pub struct RawTracker(Rc<RefCell<SurfaceTracker>>);
 
 /// The live surface of the current frame.
-struct Newest(Rc<RefCell<SurfaceTracker>>);
+struct CurrentFrame(Rc<RefCell<SurfaceTracker>>);
 
-impl Live for Newest {
+impl LiveSurface for CurrentFrame {
     fn surface(&self) -> TriangleMesh {
         self.0.borrow().mesh().to_triangles()
     }
@@ -52,7 +52,7 @@ impl RawTracker {
         corners: Option<Float64Array>,
         voxels: Option<Vec<u32>>,
         nearest: Option<Float64Array>,
-        start: Option<TrianglesOf>,
+        start: Option<TriangleCopy>,
         params: &JsValue,
     ) -> Result<RawTracker, JsValue> {
         let numbers = |array: Option<Float64Array>| array.as_ref().map(doubles).transpose();
@@ -64,7 +64,7 @@ impl RawTracker {
             component: numbers(nearest)?
                 .map_or(Component::Largest, |n| Component::Nearest(DVec3::from_slice(&n))),
             start: start.map(|mesh| mesh.0),
-            params: merged(&TrackingParams::default(), params)?,
+            params: with_overrides(&TrackingParams::default(), params)?,
         };
         let mut tracker = SurfaceTracker::new(options).map_err(Failure::from)?;
         tracker.set_clock(now);
@@ -73,14 +73,14 @@ impl RawTracker {
 
     /// Returns a live mesh of the current frame's surface.
     pub fn mesh(&self) -> RawMesh {
-        RawMesh(Body::Live(Rc::new(RefCell::new(Newest(Rc::clone(&self.0))))))
+        RawMesh(MeshKind::Live(Rc::new(RefCell::new(CurrentFrame(Rc::clone(&self.0))))))
     }
 
     /// Returns the surface of a finished frame; undefined for other frames.
     #[wasm_bindgen(js_name = meshAt)]
     pub fn mesh_at(&self, frame: usize) -> Option<RawMesh> {
         let tracker = self.0.borrow();
-        tracker.meshes().get(frame).map(|mesh| RawMesh(Body::Triangles(Rc::new(mesh.clone()))))
+        tracker.meshes().get(frame).map(|mesh| RawMesh(MeshKind::Triangles(Rc::new(mesh.clone()))))
     }
 
     /// Makes `iterations` steps, fewer if the tracker is done; returns the report of the last step, with the events of
@@ -121,11 +121,14 @@ impl RawTracker {
     }
 
     /// Returns further results: the image noise, the closure error of a cycle, and the statistics of each frame.
-    pub fn facts(&self) -> Result<JsValue, JsValue> {
+    pub fn statistics(&self) -> Result<JsValue, JsValue> {
         let tracker = self.0.borrow();
-        let facts =
-            Facts { noise: tracker.noise(), closing: tracker.closure_error(), frames: tracker.facts() };
-        Ok(to_js(&facts)?)
+        let statistics = Statistics {
+            noise: tracker.noise(),
+            cycle_closure_error: tracker.cycle_closure_error(),
+            frames: tracker.statistics(),
+        };
+        Ok(to_js(&statistics)?)
     }
 
     /// Returns the finished frames as an animated GLB.
@@ -144,7 +147,7 @@ impl RawTracker {
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
         let mut tracker = self.0.borrow_mut();
-        let params = merged(tracker.params(), params)?;
+        let params = with_overrides(tracker.params(), params)?;
         tracker.set_params(params).map_err(Failure::from)?;
         Ok(())
     }
@@ -162,11 +165,12 @@ impl RawTracker {
 }
 
 #[derive(Serialize)]
-struct Facts<'a> {
+#[serde(rename_all = "camelCase")]
+struct Statistics<'a> {
     noise: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
-    closing: Option<f64>,
-    frames: &'a [FrameFacts],
+    cycle_closure_error: Option<f64>,
+    frames: &'a [FrameStatistics],
 }
 
 /// Returns the specifications of the tracker's parameters, from which user interfaces build their controls.

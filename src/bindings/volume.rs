@@ -6,7 +6,7 @@ use js_sys::{
 use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, copied, point};
+use super::convert::{bytes, copy_array, point};
 use super::error::Failure;
 use crate::io::{parse_volume, write_nifti};
 use crate::math::DAffine3;

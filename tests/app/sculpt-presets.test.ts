@@ -47,7 +47,7 @@ const POSED = CASES.filter(([, , { outcome }]) => outcome);
 
 test.each(POSED)('figure %s ends as the page says', async (_, preset, { pose, outcome }) => {
   const model = await modelOf(preset);
-  for (const way of pose ? glide(model.goals, pose) : []) {
+  for (const way of pose ? glide(model.targets, pose) : []) {
     model.setEllipsoids(way);
     model.step(1);
   }

@@ -95,7 +95,7 @@ async function stepsIn(prediction: boolean): Promise<number> {
   const image = prepared(film, setup.preparation, () => undefined);
   const { tracker } = buildTracker(image, { ...setup, params: { ...setup.params, prediction } });
   tracker.step(tracker.frames + 5);
-  const later = tracker.facts.slice(1);
+  const later = tracker.statistics.slice(1);
   for (const one of [tracker, image, film]) one.free();
   return later.reduce((sum, { steps }) => sum + steps, 0) / later.length;
 }

@@ -1,7 +1,7 @@
 /** Parts of the Track lab that need no browser. */
 import { readFile } from 'node:fs/promises';
 import { beforeAll, describe, expect, test } from 'vitest';
-import init, { type FrameFacts, Mesh, Volume } from '../../pkg/index.js';
+import init, { type FrameStatistics, Mesh, Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import { fromHash, linkOf, setupOf, toHash } from '../../www/src/labs/track-link';
 import { framesCsv } from '../../www/src/labs/track-measures';
@@ -85,8 +85,8 @@ describe('a heartbeat', () => {
   });
 
   test('is a table with a line a frame', () => {
-    const facts: FrameFacts = {
-      ...{ volume: 2, area: 3, triangles: 4, folded: 5, rejected: 6, held: 7, retracted: 8, steps: 9, correction: 10 },
+    const facts: FrameStatistics = {
+      ...{ volume: 2, area: 3, triangles: 4, folded: 5, rejected: 6, heldMoves: 7, withoutBoundary: 8, steps: 9, meanFinalCorrection: 10 },
     };
     const frame = { facts, surface: {}, measures: {}, error: { mean: 0.5, most: 1 } };
     const lines = framesCsv([frame] as unknown as Parameters<typeof framesCsv>[0], [2.5]).split('\n');

@@ -229,7 +229,7 @@ fn the_map_keeps_areas_and_does_not_fold_before_a_pinch() {
         assert!(low > 0.4 && high < 2.2, "{low} {high} at {x}");
         // The link lies on the base.
         let on_base = |p: &Vec3| (f64::from(p.length()) - 1.0).abs() < 0.01;
-        assert!(model.base_correspondence().positions.iter().all(on_base));
+        assert!(model.link_mesh().positions.iter().all(on_base));
     }
 }
 

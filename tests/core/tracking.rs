@@ -110,7 +110,7 @@ fn crevices_behind_papillary_muscles_close_and_open_without_sheets_or_folds() {
         Cine { papillary: true, dims: [52; 3], spacing: fine, frames: 12, size: 30.0, ..Cine::small() };
     let tracker = tracked(options(&cine, cine.volume()));
     let mut retracted = 0;
-    for (frame, (mesh, facts)) in tracker.meshes().iter().zip(tracker.facts()).enumerate() {
+    for (frame, (mesh, facts)) in tracker.meshes().iter().zip(tracker.statistics()).enumerate() {
         let (found, truth) = (measure(mesh), measure(&cine.truth(frame as f64, 0.7)));
         assert_eq!((found.components, count_crossings(mesh)), (1, 0), "{frame}");
         let [area, volume] = [found.area / truth.area, found.volume / truth.volume];
@@ -194,7 +194,7 @@ fn a_side_of_the_box_that_no_wall_goes_through_closes_the_surface_as_well() {
     // Half of the cavity, cut where it is widest and narrower than it is.
     let bounds = Some(Bounds::Voxels([[18, 14, 10], [35, 21, 20]]));
     let tracker = tracked(TrackingOptions { bounds, volume, ..open_ended(&cine) });
-    for (frame, (mesh, facts)) in tracker.meshes().iter().zip(tracker.facts()).enumerate() {
+    for (frame, (mesh, facts)) in tracker.meshes().iter().zip(tracker.statistics()).enumerate() {
         let found = measure(mesh);
         assert_eq!((found.euler, found.components, count_crossings(mesh)), (2, 1, 0), "{frame}");
         let x = mesh.positions.iter().map(|p| p.x).fold(f32::MAX, f32::min);
@@ -226,15 +226,15 @@ fn a_cycle_closes_and_volumes_come_with_the_frames() {
     let mut tracker = SurfaceTracker::new(options(&cine, cine.volume())).unwrap();
     let mut progress = 0.0;
     while !tracker.is_done() {
-        assert!(tracker.closure_error().is_none());
+        assert!(tracker.cycle_closure_error().is_none());
         let report = tracker.step().unwrap();
         assert!(report.progress > progress, "{} {progress}", report.progress);
         progress = report.progress;
     }
     assert!((progress - 1.0).abs() < 1e-12);
-    let closing = tracker.closure_error().unwrap();
+    let closing = tracker.cycle_closure_error().unwrap();
     assert!(closing > 0.0 && closing < 0.3 * cine.spacing.x, "{closing}");
-    for (facts, mesh) in tracker.facts().iter().zip(tracker.meshes()) {
+    for (facts, mesh) in tracker.statistics().iter().zip(tracker.meshes()) {
         let found = measure(mesh);
         assert_eq!((facts.volume, facts.area, facts.triangles), (found.volume, found.area, found.triangles));
     }
@@ -267,7 +267,7 @@ fn a_saved_run_goes_on_with_the_same_bits() {
         while !second.is_done() {
             second.step().unwrap();
         }
-        assert_eq!(second.facts(), whole.facts(), "{before}");
+        assert_eq!(second.statistics(), whole.statistics(), "{before}");
         assert!(second.meshes() == whole.meshes(), "{before}");
     }
     let saved = whole.save();

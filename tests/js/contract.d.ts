@@ -248,12 +248,12 @@ export interface DeformableParams {
 export interface Coverage {
   recall: number; // share of its area that the surface covers
   precision: number; // share of the surface's area that it covers
-  uncovered: UncoveredPart[]; // largest first
+  uncovered: UncoveredRegion[]; // largest first
 }
-export interface UncoveredPart {
+export interface UncoveredRegion {
   position: Vec3; // world
   area: number; // square world units
-  kind: 'matter' | 'hollow';
+  kind: 'matter' | 'cavity';
 }
 export interface CoverageOptions {
   signal?: AbortSignal; // rejects with signal.reason
@@ -376,16 +376,16 @@ export interface TrackingOptions {
   start?: Mesh; // instead of meshing the first frame
   params?: TrackingParams;
 }
-export interface FrameFacts {
+export interface FrameStatistics {
   volume: number;
   area: number;
   triangles: number;
   folded: number;
   rejected: number;
-  held: number;
-  retracted: number;
+  heldMoves: number;
+  withoutBoundary: number;
   steps: number;
-  correction: number;
+  meanFinalCorrection: number;
 }
 export class SurfaceTracker implements Stepper {
   constructor(options: TrackingOptions);
@@ -395,8 +395,8 @@ export class SurfaceTracker implements Stepper {
   readonly frame: number;
   readonly frames: number;
   readonly noise: number; // standard deviation, intensity units
-  readonly closing: number | undefined; // of a cycle: how far it is from its beginning, world units
-  readonly facts: FrameFacts[];
+  readonly cycleClosureError: number | undefined; // of a cycle: how far it is from its beginning, world units
+  readonly statistics: FrameStatistics[];
   readonly params: Required<TrackingParams>;
   setParams(params: TrackingParams): void;
   /** Boundary votes as weighted space-time points: x, y, z, t, w. */

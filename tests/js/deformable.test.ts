@@ -267,7 +267,7 @@ test('an attractor pulls the surface', () => {
 /** The defaults of the method. */
 const ADAPTING: DeformableParams = { iso: 100 };
 
-test('from the contour, the default, nothing of a ball with a hollow and a thin plate is missing', async () => {
+test('from the contour, the default, nothing of a ball with a cavity and a thin plate is missing', async () => {
   const fitted = new DeformableModel({ volume: ballWithHollowAndPlate(), params: ADAPTING });
   models.push(fitted);
   expect(await fitted.run()).toMatchObject({ done: true, components: 3, euler: 6 });
@@ -277,17 +277,17 @@ test('from the contour, the default, nothing of a ball with a hollow and a thin 
   expect(precision).toBeGreaterThan(0.99);
 });
 
-test('a hollow that an enclosing surface cannot reach is reported, and seeding adds it', async () => {
+test('a cavity that an enclosing surface cannot reach is reported, and seeding adds it', async () => {
   const apart = ballWithHollowAndPlate();
   const fitted = model({ volume: apart, params: { ...ADAPTING, seeding: 'off' } });
   expect((await fitted.run()).events.seeds).toBe(0);
   const shares: number[] = [];
   const { recall, precision, uncovered } = await fitted.coverage({ onProgress: (share) => shares.push(share) });
   expect(precision).toBeGreaterThan(0.99);
-  const hollow = 4 * Math.PI * 6 ** 2;
+  const cavity = 4 * Math.PI * 6 ** 2;
   expect(recall).toBeLessThan(0.93);
-  expect(uncovered[0]?.kind).toBe('hollow');
-  expect(Math.abs((uncovered[0]?.area ?? 0) / hollow - 1)).toBeLessThan(0.1);
+  expect(uncovered[0]?.kind).toBe('cavity');
+  expect(Math.abs((uncovered[0]?.area ?? 0) / cavity - 1)).toBeLessThan(0.1);
   const { position = [0, 0, 0] } = uncovered[0] ?? {};
   expect(Math.abs(Math.hypot(position[0] - 22, position[1] - 24, position[2] - 24) - 6)).toBeLessThan(1);
   expect(shares.at(-1)).toBe(1);
@@ -318,8 +318,8 @@ test('matter that a surface leaves out is reported as such, and small parts are 
     const { uncovered } = await model({ ...given, params: { ...ADAPTING, ...params } }).coverage();
     return uncovered.map(({ kind }) => kind);
   };
-  expect(await kinds({})).toEqual(['matter', 'hollow']);
-  // The hollow has 904 voxels, the plate 1250.
+  expect(await kinds({})).toEqual(['matter', 'cavity']);
+  // The cavity has 904 voxels, the plate 1250.
   expect(await kinds({ smallestPart: 1100 })).toEqual(['matter']);
   expect(await kinds({ smallestPart: 1500 })).toEqual([]);
 });

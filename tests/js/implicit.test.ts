@@ -49,7 +49,7 @@ test('a ball is found', async () => {
   expect(mean).toBeLessThan(0.01);
   expect(rms).toBeGreaterThanOrEqual(mean);
   expect(max).toBeGreaterThanOrEqual(rms);
-  expect([found.duplicates, found.strays, found.warning]).toEqual([0, 0, undefined]);
+  expect([found.duplicates, found.spuriousComponents, found.warning]).toEqual([0, 0, undefined]);
   expect(found.spacing).toBeGreaterThan(0);
   expect(found.cell).toBeGreaterThan(0);
 });

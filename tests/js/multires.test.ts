@@ -47,7 +47,7 @@ test('a bare skin comes to rest over its ellipsoids', async () => {
   expect(report.residual).toBeLessThanOrEqual(report.tolerance);
   for (const mesh of [skin.mesh, skin.baseMesh]) expect(mesh.check()).toEqual(HEALTHY);
   expect(skin.linkMesh.triangleCount).toBe(skin.baseMesh.triangleCount);
-  expect(skin.bands).toBe(1);
+  expect(skin.bandCount).toBe(1);
 });
 
 test('pulled apart it splits, and each frame is sound', () => {
@@ -83,8 +83,8 @@ test('detail is kept, and told how far it is distorted', () => {
   const { area, angle } = deformed.distortion();
   expect(area).toHaveLength(deformed.baseMesh.vertexCount);
   expect(angle.every((ratio) => ratio >= 0.999)).toBe(true);
-  expect(deformed.bands).toBe(2);
-  expect([deformed.folded, deformed.missed]).toEqual([0, 0]);
+  expect(deformed.bandCount).toBe(2);
+  expect([deformed.folded, deformed.unmatchedVertices]).toEqual([0, 0]);
 });
 
 test('texture travels with the surface', () => {
@@ -113,13 +113,13 @@ test('a state is restored bit for bit', () => {
   skin.setEllipsoids([ball(-0.5, 1), ball(1.4, 0.8)]);
   skin.step();
   const state = skin.save();
-  const goals = skin.goals;
+  const targets = skin.targets;
   skin.step(3);
   const expected = Buffer.from(skin.mesh.arrays().positions.buffer);
   skin.setEllipsoids([ball(0, 1)]);
   skin.step();
   skin.restore(state);
-  expect(skin.goals).toEqual(goals);
+  expect(skin.targets).toEqual(targets);
   skin.step(3);
   expect(Buffer.from(skin.mesh.arrays().positions.buffer).equals(expected)).toBe(true);
   expect(failure(() => skin.restore(state.slice(0, 100))).code).toBe('bad-file');

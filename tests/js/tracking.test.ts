@@ -61,12 +61,12 @@ test('the ball is followed through its beat: sound, in its place, and as large a
 
 test('volumes fall and rise once, and a cycle closes', () => {
   const one = tracker({ params: { cyclic: true } });
-  expect(one.closing).toBeUndefined();
+  expect(one.cycleClosureError).toBeUndefined();
   one.step(2 * FRAMES);
-  expect(one.closing).toBeUndefined();
+  expect(one.cycleClosureError).toBeUndefined();
   expect(one.step()).toMatchObject({ done: true, iteration: 2 * FRAMES + 1 });
-  expect(one.closing).toBeGreaterThan(0);
-  expect(one.closing).toBeLessThan(0.3);
+  expect(one.cycleClosureError).toBeGreaterThan(0);
+  expect(one.cycleClosureError).toBeLessThan(0.3);
   const volumes = [...one.volumes()];
   const rises = volumes.map((value, frame) => (volumes[(frame + 1) % FRAMES] as number) > value);
   expect(rises).toEqual(volumes.map((_, frame) => frame >= FRAMES / 2));
@@ -84,7 +84,7 @@ test('steps tell how far it is: boundaries first, then surfaces, then back to th
   expect(frames).toEqual([0, 0, 0, 0, 1, 2, 2]);
   for (const [at, { progress }] of reports.entries()) expect(progress).toBeCloseTo((at + 1) / 7, 12);
   const parts = reports.map(({ times }) => Object.keys(times).join());
-  expect(parts).toEqual([...Array(3).fill('boundary'), ...Array(3).fill('surface'), 'closing']);
+  expect(parts).toEqual([...Array(3).fill('boundary'), ...Array(3).fill('surface'), 'closure']);
   for (const { phase, times, tolerance } of reports) {
     expect(phase).toMatch(/boundary|surface/);
     expect(tolerance).toBeGreaterThan(0);
@@ -100,7 +100,7 @@ test('steps tell how far it is: boundaries first, then surfaces, then back to th
 test('without a cycle it ends with the last frame', () => {
   const one = tracked({ volume: short });
   expect(one.step(0x7fffffff).progress).toBe(1);
-  expect(one.closing).toBeUndefined();
+  expect(one.cycleClosureError).toBeUndefined();
   expect(one.volumes()).toHaveLength(3);
 });
 
@@ -158,13 +158,13 @@ test('every frame tells what happened in it, and the volume how noisy it is', ()
   // Of two uniform numbers from -5 to 5 together.
   expect(one.noise / (10 / Math.sqrt(6))).toBeGreaterThan(0.8);
   expect(one.noise / (10 / Math.sqrt(6))).toBeLessThan(1.4);
-  expect(one.facts).toHaveLength(3);
-  for (const [frame, facts] of one.facts.entries()) {
+  expect(one.statistics).toHaveLength(3);
+  for (const [frame, facts] of one.statistics.entries()) {
     const { area, triangles } = one.meshAt(frame).info();
     expect(facts).toMatchObject({ area, triangles, folded: 0, volume: one.volumes()[frame] });
-    for (const count of [facts.rejected, facts.held, facts.retracted]) expect(Number.isInteger(count)).toBe(true);
+    for (const count of [facts.rejected, facts.heldMoves, facts.withoutBoundary]) expect(Number.isInteger(count)).toBe(true);
     expect(facts.steps).toBeGreaterThan(0);
-    expect(facts.correction).toBeLessThan(1);
+    expect(facts.meanFinalCorrection).toBeLessThan(1);
   }
 });
 
@@ -215,7 +215,7 @@ test.each([0, 2, 3, 4, 5, 6])('a state after %i steps goes on bit for bit', (ste
   const reports = [saved, resumed].map((one) => ({ ...one.step(100), times: {} }));
   expect(reports[1]).toEqual(reports[0]);
   expect(bytesOfAll(resumed).equals(bytesOfAll(saved))).toBe(true);
-  expect(resumed.closing).toBe(saved.closing);
+  expect(resumed.cycleClosureError).toBe(saved.cycleClosureError);
 });
 
 test('a state brings its parameters along', () => {
@@ -379,7 +379,7 @@ test.each(AGAIN)('%o begins everything again', (params) => {
   one.step(5);
   const { topologyVersion, geometryVersion } = one.mesh;
   one.setParams(params);
-  expect([one.frame, one.volumes().length, one.facts.length, one.boundary().length]).toEqual([0, 0, 0, 0]);
+  expect([one.frame, one.volumes().length, one.statistics.length, one.boundary().length]).toEqual([0, 0, 0, 0]);
   expect(one.mesh.triangleCount).toBe(0);
   expect(one.mesh.topologyVersion).toBeGreaterThan(topologyVersion);
   expect(one.mesh.geometryVersion).toBeGreaterThan(geometryVersion);
@@ -584,8 +584,8 @@ test('the volume may go, the tracker stays; a freed tracker is gone', () => {
   one.free();
   one.free();
   const uses = [
-    ...[() => one.step(), () => one.params, () => one.frame, () => one.frames, () => one.noise, () => one.facts],
-    ...[() => one.closing, () => one.boundary(), () => one.meshAt(0), () => one.volumes(), () => one.toGlb()],
+    ...[() => one.step(), () => one.params, () => one.frame, () => one.frames, () => one.noise, () => one.statistics],
+    ...[() => one.cycleClosureError, () => one.boundary(), () => one.meshAt(0), () => one.volumes(), () => one.toGlb()],
     ...[() => one.save(), () => one.restore(new Uint8Array(9)), () => one.setParams({}), () => mesh.info()],
   ];
   for (const use of uses) expect(failure(use).code).toBe('freed');

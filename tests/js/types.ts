@@ -22,13 +22,13 @@ same<Same<built.RunOptions, contract.RunOptions>>(true);
 same<Same<built.ParamSpec, contract.ParamSpec>>(true);
 same<Same<built.DeformableParams, contract.DeformableParams>>(true);
 same<Same<built.Coverage, contract.Coverage>>(true);
-same<Same<built.UncoveredPart, contract.UncoveredPart>>(true);
+same<Same<built.UncoveredRegion, contract.UncoveredRegion>>(true);
 same<Same<built.CoverageOptions, contract.CoverageOptions>>(true);
 same<Same<built.Attractor, contract.Attractor>>(true);
 same<Same<built.Camera, contract.Camera>>(true);
 same<Same<built.ImplicitParams, contract.ImplicitParams>>(true);
 same<Same<built.TrackingParams, contract.TrackingParams>>(true);
-same<Same<built.FrameFacts, contract.FrameFacts>>(true);
+same<Same<built.FrameStatistics, contract.FrameStatistics>>(true);
 same<Same<built.ControlEllipsoid, contract.ControlEllipsoid>>(true);
 same<Same<built.MultiresParams, contract.MultiresParams>>(true);
 

@@ -13,13 +13,13 @@ import type {
   MeshReport,
   ParamSpec,
   StepReport,
-  UncoveredPart,
+  UncoveredRegion,
   Vec3,
 } from 'vesicle';
 
 import type { Shape } from './shapes';
 
-export type { Attractor, Coverage, MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, UncoveredPart, Vec3 };
+export type { Attractor, Coverage, MeshFormat, MeshInfo, MeshReport, ParamSpec, StepReport, UncoveredRegion, Vec3 };
 
 export type ParamValues = Record<string, unknown>;
 

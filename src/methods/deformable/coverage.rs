@@ -28,12 +28,12 @@ pub struct Coverage {
     /// The share of the model's area within one voxel of the iso-surface; 1 if the model is empty.
     pub precision: f64,
     /// Connected parts of the iso-surface whose triangles are not fully covered, largest first.
-    pub uncovered: Vec<Uncovered>,
+    pub uncovered: Vec<UncoveredRegion>,
 }
 
 /// A connected part of the iso-surface that the model does not cover.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Uncovered {
+pub struct UncoveredRegion {
     /// A point on the part near its centroid, in world space.
     pub position: DVec3,
     /// The area of the part in square world units.
@@ -141,11 +141,11 @@ impl CoverageSurvey {
         Coverage {
             recall: share(self.areas[0]),
             precision: share(self.areas[1]),
-            uncovered: self.uncovered_parts(),
+            uncovered: self.uncovered_regions(),
         }
     }
 
-    fn uncovered_parts(&self) -> Vec<Uncovered> {
+    fn uncovered_regions(&self) -> Vec<UncoveredRegion> {
         let uncovered =
             self.iso_surface.triangles.iter().zip(&self.is_covered).filter(|(_, covered)| !**covered);
         let rest = TriangleMesh {
@@ -179,9 +179,9 @@ impl CoverageSurvey {
         let found = nearest.into_iter().zip(&sums).filter_map(|(nearest, (_, area))| {
             let (_, local, position) = nearest?;
             let kind = if self.is_inside_model(local) { Missing::Cavity } else { Missing::Matter };
-            Some(Uncovered { position, area: *area, kind })
+            Some(UncoveredRegion { position, area: *area, kind })
         });
-        let mut parts: Vec<Uncovered> = found.collect();
+        let mut parts: Vec<UncoveredRegion> = found.collect();
         parts.sort_by(|a, b| b.area.total_cmp(&a.area));
         parts
     }

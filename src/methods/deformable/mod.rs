@@ -59,7 +59,7 @@ mod sizes;
 mod start;
 mod state;
 
-pub use coverage::{Coverage, CoverageSurvey, Missing, Uncovered};
+pub use coverage::{Coverage, CoverageSurvey, Missing, UncoveredRegion};
 pub use params::{DeformableParams, Integrator, RestLength, Seeding, Topology, param_specs};
 pub use start::Start;
 

@@ -71,7 +71,7 @@ impl Bands {
                 || to.closest_fallback(detail.last.point, normal),
                 |found| (found.distance as f32, found.into()),
             );
-            detail.missed |= met.is_none();
+            detail.is_missed |= met.is_none();
         }
         detail
     }
@@ -93,7 +93,7 @@ pub(super) const MAX_BANDS: usize = 8;
 pub(super) struct Detail {
     lambdas: [f32; MAX_BANDS],
     /// Whether a normal did not hit its surface and the closest point was used instead.
-    pub missed: bool,
+    pub is_missed: bool,
     /// The corresponding point on the finest surface.
     pub last: BasePoint,
 }
@@ -124,9 +124,9 @@ pub(super) struct Detailed {
     /// The corresponding point on the finest surface for each vertex, by slot; for texture coordinates.
     pub points: Correspondence,
     /// Number of vertices whose normal hit no surface.
-    pub missed: usize,
+    pub unmatched_vertices: usize,
     /// Number of vertices that moved by less than their displacement, to avoid self-intersections.
-    pub held_back: usize,
+    pub held_vertices: usize,
 }
 
 /// How finely the deformed base is sampled for the detail.
@@ -162,7 +162,7 @@ pub(super) fn detailed(
 /// Displaces the samples by their detail, band by band, guarded against self-intersections.
 fn displace(samples: DetailSamples, bands: &Bands, guard: &mut Embedding) -> Detailed {
     let DetailSamples { mut mesh, normals, details: detail, .. } = samples;
-    let mut held = 0;
+    let mut held_vertices = 0;
     for k in 0..bands.lookups.len() {
         let mut displacements = vec![Vec3::ZERO; mesh.slots()];
         for v in mesh.vertices() {
@@ -172,14 +172,19 @@ fn displace(samples: DetailSamples, bands: &Bands, guard: &mut Embedding) -> Det
         guard.follow_with(&mesh, super::typical_edge(&mesh));
         let wanted = displacements.clone();
         let back = guard.carry(&mut mesh, &mut displacements);
-        held += back.len();
+        held_vertices += back.len();
         if !back.is_empty() {
             let mut displacements = spread_hold_back(&mesh, &wanted, &back);
             guard.carry(&mut mesh, &mut displacements);
         }
     }
-    let missed = mesh.vertices().filter(|v| detail[v.index()].missed).count();
-    Detailed { mesh, points: detail.into_iter().map(|detail| detail.last).collect(), missed, held_back: held }
+    let missed = mesh.vertices().filter(|v| detail[v.index()].is_missed).count();
+    Detailed {
+        mesh,
+        points: detail.into_iter().map(|detail| detail.last).collect(),
+        unmatched_vertices: missed,
+        held_vertices,
+    }
 }
 
 /// Number of one-rings around a held-back vertex that are moved back partly as well; without them, the surface has a
@@ -288,7 +293,7 @@ struct Sample {
 }
 
 /// The entry of a free slot.
-const NOTHING: Detail = Detail { lambdas: [0.0; MAX_BANDS], missed: false, last: UNSET };
+const NOTHING: Detail = Detail { lambdas: [0.0; MAX_BANDS], is_missed: false, last: UNSET };
 
 #[cfg(test)]
 mod tests {

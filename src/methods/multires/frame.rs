@@ -60,7 +60,7 @@ impl MultiresolutionModel {
         moving.drop_vanished();
         self.ellipsoids = moving;
         self.residual = self.residual_of(&self.surface, &self.ellipsoids.now());
-        lap.end("rest");
+        lap.end("residual");
         self.reconstruct_detail();
         lap.end("detail");
         Ok(changes)

@@ -188,7 +188,7 @@ impl MultiresolutionModel {
 
     /// Returns the mesh T: the triangles of [`Self::base_mesh`] with each vertex at its position on the undeformed base
     /// M₀.
-    pub fn base_correspondence(&self) -> TriangleMesh {
+    pub fn link_mesh(&self) -> TriangleMesh {
         let mut mesh = self.surface.to_triangles();
         mesh.positions = self.surface.vertices().map(|v| self.correspondence[v.index()].point).collect();
         mesh.normals = None;
@@ -260,14 +260,14 @@ impl MultiresolutionModel {
     }
 
     /// Returns the number of surfaces in the decomposition, including the base.
-    pub fn bands(&self) -> usize {
+    pub fn band_count(&self) -> usize {
         self.bands.all.len()
     }
 
     /// Returns two counts of vertices from the last reconstruction of the detail: those whose normal did not hit the
     /// finer surface, and those held back to avoid self-intersections.
     pub fn detail_counts(&self) -> [usize; 2] {
-        [self.detailed.missed, self.detailed.held_back]
+        [self.detailed.unmatched_vertices, self.detailed.held_vertices]
     }
 
     /// Advances by one frame: moves the ellipsoids as far as the membrane can follow, and updates the membrane and its

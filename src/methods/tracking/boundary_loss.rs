@@ -3,7 +3,7 @@
 //! causes folds, so it is collapsed. Where a gap opens, the bright region advances faster than boundary points can
 //! attract the surface, so the surface grows into it.
 
-use super::frame_tracker::{FrameContext, FrameFacts, FrameTracker, Support, neighbour_mean};
+use super::frame_tracker::{FrameContext, FrameStatistics, FrameTracker, Support, neighbour_mean};
 use super::project::Onto;
 use crate::math::Vec3;
 use crate::math::order::{by_both, rank, sort_by_rank};
@@ -33,12 +33,12 @@ const SMOOTHING: f32 = 0.5;
 
 impl FrameTracker {
     /// Collapses sheets between walls that have met, grows the surface into bright regions, and smooths the other
-    /// vertices without a boundary. Counts them in `facts`, and returns the edits.
+    /// vertices without a boundary. Counts them in `statistics`, and returns the edits.
     pub fn resolve_boundary_loss(
         &mut self,
         mesh: &mut Mesh,
         context: &FrameContext,
-        facts: &mut FrameFacts,
+        statistics: &mut FrameStatistics,
     ) -> Changes {
         let mut changes = Changes::default();
         let mut grown = BTreeSet::new();
@@ -46,7 +46,7 @@ impl FrameTracker {
         for round in 0..ROUNDS {
             let without_boundary = without_boundary(mesh, context);
             if round == 0 {
-                facts.without_boundary = without_boundary.len();
+                statistics.without_boundary = without_boundary.len();
             }
             let progresses = (without_boundary.len() as f64) < LITTLE_PROGRESS * before as f64;
             if without_boundary.is_empty() || round >= MIN_ROUNDS && !progresses {
@@ -66,7 +66,7 @@ impl FrameTracker {
         let grown: Vec<VertexId> = grown.into_iter().filter(|&v| mesh.is_live(v)).collect();
         if !grown.is_empty() {
             let no_offsets = vec![Vec3::ZERO; mesh.slots()];
-            self.project(mesh, &grown, &no_offsets, context, Onto::Frame, facts);
+            self.project(mesh, &grown, &no_offsets, context, Onto::Frame, statistics);
         }
         changes
     }

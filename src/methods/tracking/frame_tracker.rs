@@ -30,7 +30,8 @@ const SPACING: f32 = 0.5;
 
 /// Measurements of the surface in one frame, and counts of what tracking did there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct FrameFacts {
+#[serde(rename_all = "camelCase")]
+pub struct FrameStatistics {
     /// Volume enclosed by the surface, in cubed world units.
     pub volume: f64,
     /// Area of the surface, in squared world units.
@@ -42,14 +43,14 @@ pub struct FrameFacts {
     /// Number of projections that found no points or moved too far.
     pub rejected: usize,
     /// Number of vertex moves in projections and curvature corrections that were shortened to avoid self-intersections.
-    pub held: usize,
+    pub held_moves: usize,
     /// Number of vertices without a boundary: collapsed between walls that have met, grown into gaps that open, else
     /// smoothed.
     pub without_boundary: usize,
     /// Mean number of projection steps per vertex, over the projections onto space-time and onto the frame together.
     pub steps: f64,
     /// Mean displacement of the vertices by the last projection, in world units.
-    pub correction: f64,
+    pub mean_final_correction: f64,
 }
 
 /// The frame that the mesh is tracked into, with its image and parameters.
@@ -117,8 +118,8 @@ impl FrameTracker {
         mesh: &mut Mesh,
         from: Option<&SpaceTimeSamples>,
         context: &FrameContext,
-    ) -> (Changes, FrameFacts) {
-        let mut facts = FrameFacts::default();
+    ) -> (Changes, FrameStatistics) {
+        let mut statistics = FrameStatistics::default();
         let bound = |share: f64| (share * self.edge) as f32;
         self.bounds = EdgeBounds { min: bound(context.params.edge_min), max: bound(context.params.edge_max) };
         let mut changes = Changes::default();
@@ -127,14 +128,15 @@ impl FrameTracker {
             _ => vec![Vec3::ZERO; mesh.slots()],
         };
         for _ in 0..if from.is_some() { 1 } else { FIRST_SETTLINGS } {
-            changes += self.settle(mesh, predicted, context, &mut facts);
+            changes += self.settle(mesh, predicted, context, &mut statistics);
             predicted = vec![Vec3::ZERO; mesh.slots()];
         }
-        self.correct_curvature_bias(mesh, context, &mut facts);
-        facts.folded = self.unfold(mesh);
+        self.correct_curvature_bias(mesh, context, &mut statistics);
+        statistics.folded = self.unfold(mesh);
         let measured = measure(&mesh.to_triangles());
-        (facts.volume, facts.area, facts.triangles) = (measured.volume, measured.area, measured.triangles);
-        (changes, facts)
+        (statistics.volume, statistics.area, statistics.triangles) =
+            (measured.volume, measured.area, measured.triangles);
+        (changes, statistics)
     }
 
     /// Projects the mesh, displaced by `offsets`, onto the surface of a frame, and restores its edge bounds.
@@ -143,20 +145,25 @@ impl FrameTracker {
         mesh: &mut Mesh,
         offsets: Vec<Vec3>,
         context: &FrameContext,
-        facts: &mut FrameFacts,
+        statistics: &mut FrameStatistics,
     ) -> Changes {
         let mut changes = Changes::default();
-        self.project_all(mesh, &offsets, context, Onto::SpaceTime, facts);
+        self.project_all(mesh, &offsets, context, Onto::SpaceTime, statistics);
         changes += restructure(mesh, self.bounds, &mut self.guard);
-        self.project_all(mesh, &tangential_displacements(mesh), context, Onto::Frame, facts);
-        changes += self.resolve_boundary_loss(mesh, context, facts);
+        self.project_all(mesh, &tangential_displacements(mesh), context, Onto::Frame, statistics);
+        changes += self.resolve_boundary_loss(mesh, context, statistics);
         changes
     }
 
     /// Corrects the bias of the fitted planes on curved surfaces: a plane lies on the inner side by the variance of the
     /// points along it, R²/8 for θ = exp(−4r²/R²), times the mean curvature. Vertices move along their normals by as
     /// much, outwards where the surface is convex.
-    fn correct_curvature_bias(&mut self, mesh: &mut Mesh, context: &FrameContext, facts: &mut FrameFacts) {
+    fn correct_curvature_bias(
+        &mut self,
+        mesh: &mut Mesh,
+        context: &FrameContext,
+        statistics: &mut FrameStatistics,
+    ) {
         let spread = (context.params.radius * context.params.radius / 8.0) as f32;
         let limit = (MAX_CURVATURE_CORRECTION * context.region.spacing.min_element()) as f32;
         let bends = curvature(&mesh.to_triangles()).mean;
@@ -169,7 +176,7 @@ impl FrameTracker {
         displacements
             .iter_mut()
             .for_each(|displacement| *displacement = displacement.clamp_length_max(limit));
-        facts.held += self.move_vertices(mesh, displacements);
+        statistics.held_moves += self.move_vertices(mesh, displacements);
     }
 
     /// Moves the vertices of folded triangles to the mean of their neighbours. Returns the number of triangles that
@@ -190,20 +197,20 @@ impl FrameTracker {
         folds.len()
     }
 
-    /// Projects all vertices, and adds the mean number of steps and the mean displacement to `facts`.
+    /// Projects all vertices, and adds the mean number of steps and the mean displacement to `statistics`.
     fn project_all(
         &mut self,
         mesh: &mut Mesh,
         offsets: &[Vec3],
         context: &FrameContext,
         onto: Onto,
-        facts: &mut FrameFacts,
+        statistics: &mut FrameStatistics,
     ) {
         let all: Vec<VertexId> = mesh.vertices().collect();
-        let (steps, displacement) = self.project(mesh, &all, offsets, context, onto, facts);
+        let (steps, displacement) = self.project(mesh, &all, offsets, context, onto, statistics);
         let count = all.len().max(1) as f64;
-        facts.steps += steps as f64 / count;
-        facts.correction = displacement / count;
+        statistics.steps += steps as f64 / count;
+        statistics.mean_final_correction = displacement / count;
     }
 
     /// Projects vertices onto the surface of a frame, each displaced by `offsets` first. All move at once, with one
@@ -215,7 +222,7 @@ impl FrameTracker {
         offsets: &[Vec3],
         context: &FrameContext,
         onto: Onto,
-        facts: &mut FrameFacts,
+        statistics: &mut FrameStatistics,
     ) -> (usize, f64) {
         let mut displacements: Vec<Option<Vec3>> = vec![None; mesh.slots()];
         let mut rejected = Vec::new();
@@ -231,9 +238,9 @@ impl FrameTracker {
             steps += count;
             sum += f64::from(to.distance(from));
         }
-        facts.rejected += rejected.len();
+        statistics.rejected += rejected.len();
         let filled_displacements = fill_rejected(mesh, &displacements, &rejected);
-        facts.held += self.move_vertices(mesh, filled_displacements);
+        statistics.held_moves += self.move_vertices(mesh, filled_displacements);
         (steps, sum)
     }
 

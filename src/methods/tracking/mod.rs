@@ -30,7 +30,7 @@ mod start;
 mod state;
 mod vote;
 
-pub use frame_tracker::FrameFacts;
+pub use frame_tracker::FrameStatistics;
 pub use params::{TrackingParams, param_specs};
 
 use super::{MethodError, StepReport, Times};
@@ -96,7 +96,7 @@ pub struct SurfaceTracker {
     start: Mesh,
     params: TrackingParams,
     /// Properties of the image that default parameters are derived from.
-    image: ImageFacts,
+    image: ImageStatistics,
     voting: BoundaryVoting,
     /// The boundary votes by frame, for the frames processed so far.
     faces: Vec<Faces>,
@@ -106,15 +106,15 @@ pub struct SurfaceTracker {
     mesh: Mesh,
     /// The surface of each frame so far, in world coordinates.
     meshes: Vec<TriangleMesh>,
-    facts: Vec<FrameFacts>,
-    closure_error: Option<f64>,
+    statistics: Vec<FrameStatistics>,
+    cycle_closure_error: Option<f64>,
     steps: u32,
     clock: fn() -> f64,
 }
 
 /// Properties of the image that default parameters are derived from.
 #[derive(Clone, Copy, Debug)]
-struct ImageFacts {
+struct ImageStatistics {
     /// The shortest side of a voxel, in world units.
     shortest_side: f64,
     /// The longest side of a voxel among axes with more than one voxel, in world units.
@@ -143,8 +143,12 @@ impl SurfaceTracker {
         let shortest_side = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         let region = Region::new(&volume, bounds)?;
         let noise = region.noise() * region.quantum;
-        let image =
-            ImageFacts { shortest_side, longest_side: region.longest_side(), noise, range: region.span() };
+        let image = ImageStatistics {
+            shortest_side,
+            longest_side: region.longest_side(),
+            noise,
+            range: region.span(),
+        };
         let start =
             start.as_ref().map_or(Ok(Mesh::default()), |mesh| start::validate_start(mesh, &region))?;
         let mut tracker = Self {
@@ -159,8 +163,8 @@ impl SurfaceTracker {
             frame_tracker: None,
             samples: None,
             meshes: Vec::new(),
-            facts: Vec::new(),
-            closure_error: None,
+            statistics: Vec::new(),
+            cycle_closure_error: None,
             steps: 0,
             clock: || 0.0,
         };
@@ -197,9 +201,9 @@ impl SurfaceTracker {
         };
         self.voting = BoundaryVoting::new(window, self.frames());
         self.faces.clear();
-        (self.frame_tracker, self.samples, self.closure_error) = (None, None, None);
+        (self.frame_tracker, self.samples, self.cycle_closure_error) = (None, None, None);
         self.meshes.clear();
-        self.facts.clear();
+        self.statistics.clear();
         let replaced = std::mem::replace(&mut self.mesh, self.start.clone());
         self.mesh.count_on_from(&replaced);
     }
@@ -247,8 +251,8 @@ impl SurfaceTracker {
     }
 
     /// Returns measurements and counts for each frame so far.
-    pub fn facts(&self) -> &[FrameFacts] {
-        &self.facts
+    pub fn statistics(&self) -> &[FrameStatistics] {
+        &self.statistics
     }
 
     /// Returns the index of the frame that [`Self::mesh`] belongs to; 0 before the first frame is done, too.
@@ -258,13 +262,13 @@ impl SurfaceTracker {
 
     /// Returns the volume enclosed by the surface in each frame so far, in cubed world units.
     pub fn volumes(&self) -> Vec<f64> {
-        self.facts.iter().map(|facts| facts.volume).collect()
+        self.statistics.iter().map(|statistics| statistics.volume).collect()
     }
 
     /// Returns the cycle closure error: the mean distance of the last frame's surface, tracked on to the first frame,
     /// from the surface there, in world units. `None` until it is known, and for sequences that are not cyclic.
-    pub fn closure_error(&self) -> Option<f64> {
-        self.closure_error
+    pub fn cycle_closure_error(&self) -> Option<f64> {
+        self.cycle_closure_error
     }
 
     /// Returns the number of frames, from the first on, whose boundary has been found.
@@ -289,7 +293,7 @@ impl SurfaceTracker {
 
     /// Whether all frames are done, and the closure error of a cyclic sequence is known.
     pub fn is_done(&self) -> bool {
-        self.meshes.len() == self.frames() && (self.closure_error.is_some() || !self.params.cyclic)
+        self.meshes.len() == self.frames() && (self.cycle_closure_error.is_some() || !self.params.cyclic)
     }
 
     /// Processes one more frame: first finds the boundary in every frame, then tracks the surface through them, and
@@ -315,7 +319,7 @@ impl SurfaceTracker {
             times.add("surface", (self.clock)() - began);
         } else {
             self.close_cycle();
-            times.add("closing", (self.clock)() - began);
+            times.add("closure", (self.clock)() - began);
         }
         self.steps = self.steps.saturating_add(1);
         Ok(self.report(changes, times))
@@ -347,10 +351,10 @@ impl SurfaceTracker {
             samples: &samples,
             voting: &self.voting,
         };
-        let (changes, facts) = tracker.track_frame(&mut self.mesh, from.as_ref(), &context);
+        let (changes, statistics) = tracker.track_frame(&mut self.mesh, from.as_ref(), &context);
         (self.frame_tracker, self.samples) = (Some(tracker), Some(samples));
         self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
-        self.facts.push(facts);
+        self.statistics.push(statistics);
         Ok(changes)
     }
 
@@ -371,7 +375,7 @@ impl SurfaceTracker {
         };
         tracker.track_frame(&mut mesh, self.samples.as_ref(), &context);
         let distance = surface_distance(&mesh.to_triangles(), first);
-        self.closure_error = Some(distance.map_or(f64::INFINITY, |distance| distance.mean));
+        self.cycle_closure_error = Some(distance.map_or(f64::INFINITY, |distance| distance.mean));
     }
 
     /// Collects the boundary points around the newest frame; `None` before the first.
@@ -413,7 +417,7 @@ impl SurfaceTracker {
     fn report(&self, events: Changes, times: Times) -> StepReport {
         let frames = self.frames();
         let (found, done) = (self.faces.len(), self.meshes.len());
-        let phase = if self.closure_error.is_some() {
+        let phase = if self.cycle_closure_error.is_some() {
             "surface, back in the first frame".into()
         } else if done > 0 {
             format!("surface, frame {done} of {frames}")
@@ -421,13 +425,13 @@ impl SurfaceTracker {
             format!("boundary, frame {found} of {frames}")
         };
         let closing_steps = usize::from(self.params.cyclic);
-        let steps_done = found + done + usize::from(self.closure_error.is_some());
+        let steps_done = found + done + usize::from(self.cycle_closure_error.is_some());
         StepReport {
             iteration: self.steps,
             done: self.is_done(),
             phase,
             progress: steps_done as f64 / (2 * frames + closing_steps) as f64,
-            residual: self.facts.last().map_or(f64::NAN, |facts| facts.correction),
+            residual: self.statistics.last().map_or(f64::NAN, |statistics| statistics.mean_final_correction),
             tolerance: CONVERGED_STEP * self.region.spacing.min_element(),
             vertices: self.mesh.vertex_count() as u32,
             triangles: self.mesh.triangle_count() as u32,

@@ -1,6 +1,6 @@
 //! Parameters of the tracker, their ranges, defaults and labels.
 
-use super::ImageFacts;
+use super::ImageStatistics;
 use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, ParamSpec};
 use serde::{Deserialize, Serialize};
 
@@ -99,8 +99,8 @@ impl TrackingParams {
     }
 
     /// Replaces parameters that are 0 by values derived from the volume.
-    pub(super) fn with_volume(mut self, image: &ImageFacts) -> Self {
-        let ImageFacts { shortest_side, longest_side, noise, range } = *image;
+    pub(super) fn with_volume(mut self, image: &ImageStatistics) -> Self {
+        let ImageStatistics { shortest_side, longest_side, noise, range } = *image;
         let or = |value: f64, usual: f64| if value == 0.0 { usual } else { value };
         self.threshold = or(self.threshold, (THRESHOLD_IN_NOISE * noise).max(MIN_THRESHOLD * range));
         self.radius =

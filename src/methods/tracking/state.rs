@@ -1,7 +1,7 @@
 //! Saves a run and restores it bit for bit. A state holds the boundary votes and the surfaces; the image comes from the
 //! same volume, and sums around the newest frame are computed again.
 
-use super::frame_tracker::{FrameFacts, FrameTracker};
+use super::frame_tracker::{FrameStatistics, FrameTracker};
 use super::vote::{Faces, TIME};
 use super::{Component, SurfaceTracker, TrackingParams};
 use crate::math::Vec3;
@@ -23,8 +23,8 @@ struct State {
     edge: Option<f64>,
     /// Positions and triangles by frame.
     meshes: Vec<(Vec<Vec3>, Vec<[u32; 3]>)>,
-    facts: Vec<FrameFacts>,
-    closing: Option<f64>,
+    statistics: Vec<FrameStatistics>,
+    cycle_closure_error: Option<f64>,
     steps: u32,
 }
 
@@ -41,8 +41,8 @@ impl SurfaceTracker {
                 mesh: self.mesh.clone(),
                 edge: self.frame_tracker.as_ref().map(|tracker| tracker.edge),
                 meshes: self.meshes.iter().map(plain).collect(),
-                facts: self.facts.clone(),
-                closing: self.closure_error,
+                statistics: self.statistics.clone(),
+                cycle_closure_error: self.cycle_closure_error,
                 steps: self.steps,
             },
         )
@@ -67,11 +67,12 @@ impl SurfaceTracker {
         let meshes: Vec<TriangleMesh> = (state.meshes.into_iter())
             .map(|(positions, triangles)| TriangleMesh { positions, triangles, ..TriangleMesh::default() })
             .collect();
-        let frames_fit = meshes.len() <= self.frames() && meshes.len() == state.facts.len();
+        let frames_fit = meshes.len() <= self.frames() && meshes.len() == state.statistics.len();
         let boundary_fits = meshes.is_empty() || state.faces.len() == self.frames();
         let pixel = self.image.shortest_side;
         let edge_fits = state.edge.is_none_or(|edge| (1e-3 * pixel..1e3 * pixel).contains(&edge));
-        let closure_fits = state.closing.is_none() || params.cyclic && meshes.len() == self.frames();
+        let closure_fits =
+            state.cycle_closure_error.is_none() || params.cyclic && meshes.len() == self.frames();
         let begins_well = !meshes.is_empty() || state.mesh.to_triangles() == self.start.to_triangles();
         if !edge_fits || !closure_fits || !begins_well {
             return bad("frames", "they are none of this tracker's");
@@ -91,8 +92,8 @@ impl SurfaceTracker {
         let replaced = std::mem::replace(&mut self.mesh, state.mesh);
         self.mesh.count_on_from(&replaced);
         self.faces = state.faces;
-        (self.meshes, self.facts) = (meshes, state.facts);
-        (self.closure_error, self.steps) = (state.closing, state.steps);
+        (self.meshes, self.statistics) = (meshes, state.statistics);
+        (self.cycle_closure_error, self.steps) = (state.cycle_closure_error, state.steps);
         self.frame_tracker = state.edge.map(FrameTracker::new);
         self.samples = self.newest_samples();
         Ok(())

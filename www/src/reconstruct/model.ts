@@ -84,7 +84,7 @@ export function cubicDims(points: Float32Array, size: number): Vec3 {
 /** Collects the facts about the fit that the page displays; `whole` if there is a complete surface to measure. */
 export function fitOf(model: ImplicitSurface, residual: number, whole: boolean): Fit {
   const { surface, exterior } = model.constraints();
-  const { cell, spacing, duplicates, strays, warning } = model;
+  const { cell, spacing, duplicates, spuriousComponents, warning } = model;
   return {
     ...(whole && { fitness: model.fitness() }),
     surfaceConstraints: surface.length / 3,
@@ -92,7 +92,7 @@ export function fitOf(model: ImplicitSurface, residual: number, whole: boolean):
     cell,
     spacing,
     duplicates,
-    strays,
+    strays: spuriousComponents,
     residual,
     ...(warning !== undefined && { warning }),
   };

@@ -27,7 +27,7 @@ export class Course {
 
   /** Returns the final pose of the glide, or else the model's present target. */
   goalOf(model: MultiresolutionModel): Pose {
-    return this.#way.at(-1) ?? model.goals;
+    return this.#way.at(-1) ?? model.targets;
   }
 
   /** Loads a film at a frame, without playing it. */
@@ -72,7 +72,7 @@ export class Course {
 
   /** Starts a glide to a pose, frame by frame. If the model rejects the pose, it throws now. */
   glideTo(model: MultiresolutionModel, pose: Pose): void {
-    const from = model.goals;
+    const from = model.targets;
     model.setEllipsoids(pose);
     model.setEllipsoids(from);
     this.#way = glide(from, pose);

@@ -109,7 +109,7 @@ export function valuesFor(model: MultiresolutionModel, shade: SculptShade): Floa
 
 /** Collects the facts about the correspondence and the detail that the page displays. */
 export function factsOf(model: MultiresolutionModel): Facts {
-  const { bands, folded, missed, held } = model;
+  const { bandCount: bands, folded, unmatchedVertices: missed, heldVertices: held } = model;
   const { area, angle } = model.distortion();
   return {
     ...{ bands, folded, missed, held },

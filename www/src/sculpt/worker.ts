@@ -120,7 +120,7 @@ class Session {
       const ready = this.#adopt(model, start, setup.pose);
       freeScene(this.#scene);
       this.#scene = scene;
-      const { bands, mesh } = this.#current();
+      const { bandCount: bands, mesh } = this.#current();
       const detail = scene.detail?.triangleCount;
       const { texture } = mesh;
       return { ...ready, box: mesh.info().bounds, detail, bands, texture, made: performance.now() - began };
@@ -337,7 +337,7 @@ class Session {
     this.#preview = new Preview();
     this.#course.rewind(frame);
     this.#forget();
-    return { params: { ...model.params }, start: this.#start, pose: model.goals };
+    return { params: { ...model.params }, start: this.#start, pose: model.targets };
   }
 }
 

@@ -49,7 +49,7 @@ async function followed(
     }
     const mean = (of: 'mean' | 'most') => errors.reduce((sum, error) => sum + error[of], 0) / errors.length;
     const error = errors.length > 0 ? { mean: mean('mean'), most: mean('most') } : undefined;
-    return { facts: tracker.facts, closing: tracker.closing, error, took, crossings };
+    return { facts: tracker.statistics, closing: tracker.cycleClosureError, error, took, crossings };
   } finally {
     tracker.free();
   }

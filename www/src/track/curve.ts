@@ -1,5 +1,5 @@
 /** Evaluates the volume curve of a heartbeat, and warns of suspicious frames. */
-import type { FrameFacts } from './protocol';
+import type { FrameStatistics } from './protocol';
 
 export interface Beat {
   /** Frames of the largest and of the smallest volume. */
@@ -34,7 +34,7 @@ export interface Warned {
   share: number;
 }
 
-type Suspect = Pick<FrameFacts, 'folded' | 'triangles' | 'area' | 'volume'>;
+type Suspect = Pick<FrameStatistics, 'folded' | 'triangles' | 'area' | 'volume'>;
 
 /** Returns the frames that are suspicious even if their volume and error are plausible. */
 export function warningsOf(facts: readonly Suspect[]): Warned[] {

@@ -9,7 +9,7 @@ export function trackedFrame(tracker: SurfaceTracker, index: number, spec: CineS
   const mesh = tracker.meshAt(index);
   try {
     const surface = surfaceIn(noArrays(), mesh);
-    const facts = tracker.facts[index];
+    const facts = tracker.statistics[index];
     if (!facts) throw new Error(`frame ${index} has no facts`);
     const error = spec && errorOf(spec, index, surface.positions.subarray(0, 3 * surface.vertices));
     return { surface, facts, measures: { info: mesh.info(), report: mesh.check() }, error };

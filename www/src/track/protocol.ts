@@ -4,7 +4,7 @@
  * As in the other labs: each request gets exactly one reply, the worker sends events of its own accord, and a
  * cancellation is not an error.
  */
-import type { FrameFacts } from 'vesicle';
+import type { FrameStatistics } from 'vesicle';
 import type {
   Failure,
   FailureEvent,
@@ -24,7 +24,7 @@ import type { CineSpec } from './cine';
 export type {
   CineSpec,
   Failure,
-  FrameFacts,
+  FrameStatistics,
   Measures,
   MeshFormat,
   NamedBytes,
@@ -135,7 +135,7 @@ export type Alternative = 'prediction' | Enrichment;
 
 /** Result of a run through all frames, for comparison. */
 export interface ComparedTrack {
-  facts: FrameFacts[];
+  facts: FrameStatistics[];
   closing: number | undefined;
   /** Mean over all frames, if the true surface is known. */
   error: SurfaceError | undefined;
@@ -179,7 +179,7 @@ export type ToWorker = RequestMessage;
 /** The surface of a frame, with its facts and measures. */
 export interface TrackedFrame {
   surface: Surface;
-  facts: FrameFacts;
+  facts: FrameStatistics;
   measures: Measures;
   error: SurfaceError | undefined;
 }

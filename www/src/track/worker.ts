@@ -150,7 +150,7 @@ class Session {
   #standAt(iteration: number, done: boolean): void {
     this.#iteration = iteration;
     this.#done = done;
-    this.#sent = this.#current().facts.length;
+    this.#sent = this.#current().statistics.length;
   }
 
   #view(): VolumeView {
@@ -199,14 +199,14 @@ class Session {
     const tracker = this.#current();
     this.#iteration = report.iteration;
     this.#done = report.done;
-    const { length } = tracker.facts;
+    const { length } = tracker.statistics;
     if (length === 0 && report.iteration === tracker.frames)
       this.#bounded = { state: tracker.save(), iteration: report.iteration };
     const index = length > this.#sent ? length - 1 : undefined;
     this.#sent = length;
     const frame = index === undefined ? undefined : trackedFrame(tracker, index, this.#image().spec);
     const transfer = frame ? transferOf(frame.surface) : [];
-    send({ event: 'step', report, index, frame, closing: tracker.closing }, transfer);
+    send({ event: 'step', report, index, frame, closing: tracker.cycleClosureError }, transfer);
   }
 
   async #pause(): Promise<undefined> {

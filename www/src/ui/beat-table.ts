@@ -1,5 +1,5 @@
 import { warningsOf } from '../track/curve';
-import type { FrameFacts, SurfaceError } from '../track/protocol';
+import type { FrameStatistics, SurfaceError } from '../track/protocol';
 import { h } from './dom';
 import { count, figure, plural } from './format';
 
@@ -7,7 +7,7 @@ import { count, figure, plural } from './format';
 interface Column {
   head: string;
   help: string;
-  text: (facts: FrameFacts) => string;
+  text: (facts: FrameStatistics) => string;
 }
 
 const COLUMNS: Column[] = [
@@ -17,15 +17,15 @@ const COLUMNS: Column[] = [
   {
     head: 'rest',
     help: 'How far the last projection still moved the vertices, in the mean',
-    text: ({ correction }) => figure(round(correction)),
+    text: ({ meanFinalCorrection }) => figure(round(meanFinalCorrection)),
   },
   { head: 'steps', help: 'Of the projections, in the mean', text: ({ steps }) => figure(round(steps)) },
-  { head: 'held', help: 'Moves held back, so that nothing crosses', text: ({ held }) => count(held) },
+  { head: 'held', help: 'Moves held back, so that nothing crosses', text: ({ heldMoves }) => count(heldMoves) },
   { head: 'rejected', help: 'Projections that led nowhere or too far', text: ({ rejected }) => count(rejected) },
   {
     head: 'retracted',
     help: 'Vertices without a boundary: drawn together where a crevice closed, grown where one opened',
-    text: ({ retracted }) => count(retracted),
+    text: ({ withoutBoundary }) => count(withoutBoundary),
   },
 ];
 
@@ -38,7 +38,7 @@ export class BeatTable {
   readonly warnings = h('p', { class: 'warning', role: 'status', 'data-warnings': '0' });
   readonly element: HTMLElement;
   readonly #table = h('table', { class: 'times' });
-  #facts: readonly FrameFacts[] = [];
+  #facts: readonly FrameStatistics[] = [];
   #rows: HTMLElement[] = [];
 
   constructor() {
@@ -55,7 +55,7 @@ export class BeatTable {
     );
   }
 
-  show(facts: readonly FrameFacts[], errors: readonly (SurfaceError | undefined)[], frame: number): void {
+  show(facts: readonly FrameStatistics[], errors: readonly (SurfaceError | undefined)[], frame: number): void {
     const isNew = facts.length !== this.#facts.length || facts.some((one, i) => one !== this.#facts[i]);
     this.#facts = facts;
     if (isNew) this.#fill(facts, errors);
@@ -65,7 +65,7 @@ export class BeatTable {
     }
   }
 
-  #fill(facts: readonly FrameFacts[], errors: readonly (SurfaceError | undefined)[]): void {
+  #fill(facts: readonly FrameStatistics[], errors: readonly (SurfaceError | undefined)[]): void {
     this.#warn(facts);
     const known = errors.some((error) => error);
     const heads = ['frame', ...COLUMNS.map(({ head }) => head), ...(known ? ['error'] : [])];
@@ -79,7 +79,7 @@ export class BeatTable {
     this.#table.replaceChildren(h('thead', {}, h('tr', {}, ...head)), h('tbody', {}, ...this.#rows));
   }
 
-  #warn(facts: readonly FrameFacts[]): void {
+  #warn(facts: readonly FrameStatistics[]): void {
     const found = warningsOf(facts);
     const frames = (kind: 'folded' | 'area') => found.filter((one) => one.kind === kind);
     const [folded, jumped] = [frames('folded'), frames('area')];

@@ -1,11 +1,11 @@
-import type { CoveringEvent, MeasuredCoverage, UncoveredPart, Vec3 } from '../protocol';
+import type { CoveringEvent, MeasuredCoverage, UncoveredRegion, Vec3 } from '../protocol';
 import { h } from './dom';
 import { count, figure, plural } from './format';
 
 /** Largest number of uncovered regions listed and marked; the sentence above them counts all. */
 const MOST_PARTS = 20;
 
-const KINDS: Record<UncoveredPart['kind'], string> = { matter: 'Missing matter', hollow: 'Missing hollow' };
+const KINDS: Record<UncoveredRegion['kind'], string> = { matter: 'Missing matter', cavity: 'Missing cavity' };
 
 export interface CoverageEvents {
   onStart: () => void;
@@ -14,7 +14,7 @@ export interface CoverageEvents {
   /** Called to show a position in the slices and in the 3D view. */
   onGoTo: (point: Vec3) => void;
   /** Called with the regions to mark in the views. */
-  onMark: (parts: readonly UncoveredPart[]) => void;
+  onMark: (parts: readonly UncoveredRegion[]) => void;
 }
 
 /** Shows how much of the iso-surface the surface covers, and lists the regions it does not cover. */
@@ -128,7 +128,7 @@ export class CoveragePanel {
     this.#events.onMark(parts);
   }
 
-  #item({ kind, area, position }: UncoveredPart): HTMLElement {
+  #item({ kind, area, position }: UncoveredRegion): HTMLElement {
     const where = position.map((x) => figure(Number(x.toPrecision(4)))).join(', ');
     const size = `${figure(Number(area.toPrecision(3)))} ${this.unit ? `${this.unit}²` : ''}`.trim();
     const label = `${KINDS[kind]}, area ${size}, at ${where}: show it in the views`;

@@ -1,5 +1,5 @@
 import { beatOf } from '../track/curve';
-import type { ComparedTrack, FrameFacts, Preparation, SurfaceError } from '../track/protocol';
+import type { ComparedTrack, FrameStatistics, Preparation, SurfaceError } from '../track/protocol';
 import { h, uniqueId } from './dom';
 import { count, figure, milliseconds } from './format';
 
@@ -16,7 +16,7 @@ const OTHERS: { value: Other; label: string }[] = [
 /** One of the two runs of a comparison. */
 export interface ComparedRun {
   name: string;
-  facts: readonly FrameFacts[];
+  facts: readonly FrameStatistics[];
   closing: number | undefined;
   error: SurfaceError | undefined;
   /** Duration in milliseconds, if known. */
@@ -122,9 +122,9 @@ export class TrackComparePanel {
 
 /** Returns the figures of the table, also for other programs. */
 function summary({ name, facts, closing, error, took }: ComparedRun) {
-  const mean = (of: (one: FrameFacts) => number) => facts.reduce((sum, one) => sum + of(one), 0) / (facts.length || 1);
+  const mean = (of: (one: FrameStatistics) => number) => facts.reduce((sum, one) => sum + of(one), 0) / (facts.length || 1);
   const later = facts.slice(1);
-  const rest = later.reduce((sum, { correction }) => sum + correction, 0) / (later.length || 1);
+  const rest = later.reduce((sum, { meanFinalCorrection }) => sum + meanFinalCorrection, 0) / (later.length || 1);
   const steps = later.reduce((sum, one) => sum + one.steps, 0) / (later.length || 1);
   const beat = beatOf(facts.map(({ volume }) => volume));
   return {

@@ -7,7 +7,7 @@ import {
   SphereGeometry,
   WireframeGeometry,
 } from 'three';
-import type { Attractor, UncoveredPart } from '../protocol';
+import type { Attractor, UncoveredRegion } from '../protocol';
 
 /** Radius of an attractor's point, as a fraction of its radius of influence. */
 const POINT = 0.12;
@@ -24,19 +24,19 @@ export class UncoveredMarks {
   readonly #ball = new SphereGeometry(1, 16, 10);
   readonly #net = new WireframeGeometry(new SphereGeometry(1, 8, 6));
   readonly #matter = new MeshBasicMaterial({ depthTest: false, transparent: true, opacity: 0.8 });
-  readonly #hollow = new LineBasicMaterial({ depthTest: false, transparent: true });
+  readonly #cavity = new LineBasicMaterial({ depthTest: false, transparent: true });
 
-  set colors({ matter, hollow }: Record<UncoveredPart['kind'], string>) {
+  set colors({ matter, cavity }: Record<UncoveredRegion['kind'], string>) {
     this.#matter.color.set(matter);
-    this.#hollow.color.set(hollow);
+    this.#cavity.color.set(cavity);
   }
 
   /** Shows a mark for each region, sized by its area, within bounds relative to `side`, the volume's smallest side. */
-  show(parts: readonly UncoveredPart[], side: number): void {
+  show(parts: readonly UncoveredRegion[], side: number): void {
     this.object.clear();
     const [least, most] = MARK_RADII;
     for (const { position, area, kind } of parts) {
-      const mark = kind === 'matter' ? new Mesh(this.#ball, this.#matter) : new LineSegments(this.#net, this.#hollow);
+      const mark = kind === 'matter' ? new Mesh(this.#ball, this.#matter) : new LineSegments(this.#net, this.#cavity);
       mark.scale.setScalar(Math.min(most * side, Math.max(least * side, Math.sqrt(area / Math.PI) / 2)));
       mark.position.set(...position);
       mark.renderOrder = 1;

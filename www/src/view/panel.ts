@@ -1,4 +1,4 @@
-import type { Attractor, LevelView, UncoveredPart, Vec3, VolumeView } from '../protocol';
+import type { Attractor, LevelView, UncoveredRegion, Vec3, VolumeView } from '../protocol';
 import { h, pen, token, uniqueId } from '../ui/dom';
 import type { SliceFrame } from './anatomy';
 import { discOf, paintLevel, paintSlice, pictureSize, projectSegments } from './slicing';
@@ -50,7 +50,7 @@ export class SlicePanel {
   readonly #observer = new ResizeObserver(() => this.draw());
   #outline: Float32Array = new Float32Array(0);
   #attractors: Attractor[] = [];
-  #uncovered: readonly UncoveredPart[] = [];
+  #uncovered: readonly UncoveredRegion[] = [];
   /** The coarser level that is shown instead of the volume. */
   #level: LevelView | undefined;
   #crosshair: Vec3 = [0, 0, 0];
@@ -104,7 +104,7 @@ export class SlicePanel {
     this.draw();
   }
 
-  setUncovered(parts: readonly UncoveredPart[]): void {
+  setUncovered(parts: readonly UncoveredRegion[]): void {
     this.#uncovered = parts;
     this.draw();
   }
@@ -242,7 +242,7 @@ export class SlicePanel {
       if (!disc?.near) continue;
       context.beginPath();
       context.arc(disc.x * scaleX, disc.y * scaleY, 4, 0, 2 * Math.PI);
-      context.strokeStyle = context.fillStyle = token(kind === 'matter' ? '--matter' : '--hollow');
+      context.strokeStyle = context.fillStyle = token(kind === 'matter' ? '--matter' : '--cavity');
       if (kind === 'matter') context.fill();
       else context.stroke();
     }

@@ -1,5 +1,5 @@
 import type { Raycaster, Vector3 } from 'three';
-import type { Attractor, LevelView, Plane, Surface, UncoveredPart, Vec3, VolumeView } from '../protocol';
+import type { Attractor, LevelView, Plane, Surface, UncoveredRegion, Vec3, VolumeView } from '../protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import type { ViewOptions } from '../ui/view-options';
@@ -127,7 +127,7 @@ export class Stage {
   }
 
   /** Marks the regions of the iso-surface that the surface does not cover. */
-  showUncovered(parts: readonly UncoveredPart[]): void {
+  showUncovered(parts: readonly UncoveredRegion[]): void {
     const { dims = [1, 1, 1], spacing = [1, 1, 1] } = this.#scene?.volume ?? {};
     this.#uncoveredMarks.show(parts, Math.min(...dims.map((n, axis) => n * (spacing[axis] ?? 1))));
     for (const panel of this.#scene?.panels ?? []) panel.setUncovered(parts);
@@ -231,7 +231,7 @@ export class Stage {
   #recolor(): void {
     this.#surface.edgeColor = token('--wire');
     this.#marks.color = token('--attractor');
-    this.#uncoveredMarks.colors = { matter: token('--matter'), hollow: token('--hollow') };
+    this.#uncoveredMarks.colors = { matter: token('--matter'), cavity: token('--cavity') };
     for (const panel of this.#scene?.panels ?? []) panel.draw();
     this.#viewport.invalidate();
   }
