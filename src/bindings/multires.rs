@@ -152,7 +152,7 @@ impl RawMultires {
     /// missed the finer surface, and vertices held back to avoid self-intersections.
     pub fn counts(&self) -> Result<JsValue, JsValue> {
         let model = self.0.borrow();
-        let [missed, held] = model.detail_counts();
+        let [unmatched_vertices, held_vertices] = model.detail_counts();
         Ok(to_js(&Counts {
             band_count: model.band_count(),
             folded: model.folded(),

@@ -165,7 +165,7 @@ fn voxels(data: &JsValue) -> Result<Voxels, Failure> {
     macro_rules! of {
         ($($array:ty => $voxels:ident),*) => {
             $(if let Some(array) = data.dyn_ref::<$array>() {
-                return Ok(Voxels::$voxels(copied(array.length(), |out| array.copy_to(out))?));
+                return Ok(Voxels::$voxels(copy_array(array.length(), |out| array.copy_to(out))?));
             })*
         };
     }
