@@ -65,7 +65,7 @@ pub fn triangles(array: &Uint32Array) -> Result<Vec<[u32; 3]>, Failure> {
 pub fn point(values: &[f64]) -> Result<DVec3, Failure> {
     match values {
         [x, y, z] => Ok(DVec3::new(*x, *y, *z)),
-        _ => Err(Failure::invalid("point", &format!("{} numbers; 3 are needed", values.len()))),
+        _ => Err(Failure::invalid("point", &format!("must be 3 numbers, got {}", values.len()))),
     }
 }
 
@@ -124,5 +124,5 @@ fn read<T: DeserializeOwned>(parameter: &str, object: &JsValue) -> Result<T, Fai
 fn unknown(parameter: &str, all: &JsValue) -> Failure {
     let names = js_sys::Object::keys(all.unchecked_ref::<js_sys::Object>());
     let names: Vec<String> = names.iter().filter_map(|name| name.as_string()).collect();
-    Failure::invalid(parameter, &format!("no parameter has this name; there are {}", names.join(", ")))
+    Failure::invalid(parameter, &format!("unknown parameter; must be one of {}", names.join(", ")))
 }

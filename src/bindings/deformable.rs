@@ -183,7 +183,7 @@ impl RawCoverageSurvey {
 
     /// Returns the result, after all triangles have been tested.
     pub fn finish(&mut self) -> Result<JsValue, JsValue> {
-        let survey = self.0.take().ok_or_else(|| Failure::invalid("coverage", "has been measured"))?;
+        let survey = self.0.take().ok_or_else(|| Failure::invalid("coverage", "already finished"))?;
         Ok(to_js(&CoverageResult::from(survey.finish()))?)
     }
 }

@@ -29,10 +29,7 @@ impl Failure {
 
     /// Creates a `too-large` failure: more memory is needed than there is.
     pub fn too_large(bytes: u64) -> Self {
-        Self::new(
-            "too-large",
-            format!("{bytes} bytes are needed, more than there is in this page or process"),
-        )
+        Self::new("too-large", format!("{bytes} bytes are needed, more than is available"))
     }
 }
 

@@ -67,7 +67,7 @@ impl RawCameras {
         image: Option<Uint8Array>,
     ) -> Result<(), JsValue> {
         let projection: [f64; 12] =
-            projection.try_into().map_err(|_| Failure::invalid("projection", "12 numbers are needed"))?;
+            projection.try_into().map_err(|_| Failure::invalid("projection", "must be 12 numbers"))?;
         let image = image.as_ref().map(bytes).transpose()?;
         self.0.push(Camera::new(projection, width, height, image).map_err(Failure::from)?);
         Ok(())
@@ -84,7 +84,7 @@ impl RawImplicit {
     #[wasm_bindgen(constructor)]
     #[expect(
         clippy::too_many_arguments,
-        reason = "the face names them; an object would be taken apart again here"
+        reason = "the TypeScript class names them; an object would have to be unpacked here"
     )]
     pub fn new(
         positions: &Float32Array,
@@ -209,8 +209,7 @@ impl RawImplicit {
     /// Returns f sampled on a grid of `dims` voxels around the object.
     #[wasm_bindgen(js_name = toVolume)]
     pub fn to_volume(&self, dims: &[u32]) -> Result<RawVolume, JsValue> {
-        let dims: [u32; 3] =
-            dims.try_into().map_err(|_| Failure::invalid("dims", "3 whole numbers are needed"))?;
+        let dims: [u32; 3] = dims.try_into().map_err(|_| Failure::invalid("dims", "must be 3 integers"))?;
         let volume = self.0.borrow().to_volume(dims.map(|n| n as usize)).map_err(Failure::from)?;
         Ok(RawVolume(volume))
     }

@@ -298,7 +298,7 @@ impl RawMesh {
     #[wasm_bindgen(js_name = toBytes)]
     pub fn to_bytes(&self, format: &str) -> Result<Vec<u8>, JsValue> {
         let format = MeshFormat::from_extension(format)
-            .ok_or_else(|| Failure::invalid("format", "not one of glb, ply, stl, obj, vtp, mz3"))?;
+            .ok_or_else(|| Failure::invalid("format", "must be one of glb, ply, stl, obj, vtp, mz3"))?;
         Ok(write_mesh(&self.with_normals(), format).map_err(Failure::from)?)
     }
 
@@ -337,7 +337,7 @@ impl RawMesh {
         }
         match &mut self.0 {
             MeshKind::Surface(mesh) => Ok(mesh),
-            _ => Err(Failure::invalid("mesh", "it belongs to a model that moves it: clone() it first")),
+            _ => Err(Failure::invalid("mesh", "belongs to a model and is read-only: clone() it first")),
         }
     }
 }
@@ -354,7 +354,7 @@ impl RawTexture {
         let texture = Texture::new(bytes(file)?).map_err(Failure::from)?;
         let found = texture.kind().media_type();
         if found != kind {
-            let problem = format!("is said to be {kind}; the bytes are of {found}");
+            let problem = format!("declared as {kind}, but the bytes are {found}");
             return Err(Failure::invalid("texture", &problem).into());
         }
         Ok(RawTexture(Arc::new(texture)))

@@ -171,13 +171,12 @@ fn voxels(data: &JsValue) -> Result<Voxels, Failure> {
     }
     of!(Uint8Array => U8, Int8Array => I8, Uint16Array => U16, Int16Array => I16);
     of!(Uint32Array => U32, Int32Array => I32, Float32Array => F32, Float64Array => F64);
-    Err(Failure::invalid("data", "not a typed array of numbers of at most 32 bits, or of 64-bit floats"))
+    Err(Failure::invalid("data", "must be a typed array of numbers of at most 32 bits, or of 64-bit floats"))
 }
 
 /// Converts the four dimensions.
 fn four(dims: &[u32]) -> Result<[usize; 4], Failure> {
-    let dims: [u32; 4] =
-        dims.try_into().map_err(|_| Failure::invalid("dims", "3 or 4 whole numbers are needed"))?;
+    let dims: [u32; 4] = dims.try_into().map_err(|_| Failure::invalid("dims", "must be 3 or 4 integers"))?;
     Ok(dims.map(|n| n as usize))
 }
 
@@ -186,7 +185,7 @@ fn world(affine: &[f64]) -> Result<DAffine3, Failure> {
     let (columns, _) = affine.as_chunks::<4>();
     let last_row: Vec<f64> = columns.iter().map(|column| column[3]).collect();
     if last_row != [0.0, 0.0, 0.0, 1.0] {
-        let problem = "16 numbers are needed, column-major: every fourth is 0, the last of all 1";
+        let problem = "must be 16 numbers, column-major, with last row 0, 0, 0, 1";
         return Err(Failure::invalid("affine", problem));
     }
     let columns: Vec<f64> = columns.iter().flat_map(|&[x, y, z, _]| [x, y, z]).collect();

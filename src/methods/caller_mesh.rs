@@ -10,12 +10,12 @@ const MIN_MEAN_EDGE: f64 = 1e-12;
 /// itself. `parameter` is the name used in errors.
 pub(super) fn checked_mesh(parameter: &'static str, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
     if mesh.triangles.is_empty() {
-        return Err(MethodError::invalid(parameter, "the mesh is empty; a closed surface is needed"));
+        return Err(MethodError::invalid(parameter, "the mesh is empty; it must be a closed surface"));
     }
     let surface = Mesh::from_triangles(mesh)?;
     check_edges(parameter, mesh)?;
     if measure(mesh).volume <= 0.0 {
-        let problem = "the triangles face inwards; counter-clockwise seen from outside is needed";
+        let problem = "the triangles face inwards; they must be counter-clockwise seen from outside";
         return Err(MethodError::invalid(parameter, problem));
     }
     match count_crossings(mesh) {
@@ -28,8 +28,7 @@ pub(super) fn checked_mesh(parameter: &'static str, mesh: &TriangleMesh) -> Resu
 pub(super) fn check_edges(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MethodError> {
     let edge = measure(mesh).edge_mean;
     if edge < MIN_MEAN_EDGE {
-        let problem =
-            format!("its edges are {edge:.1e} long in the mean; {MIN_MEAN_EDGE:e} and more are accepted");
+        let problem = format!("the mean edge length must be ≥ {MIN_MEAN_EDGE:e}, got {edge:.1e}");
         return Err(MethodError::invalid(parameter, problem));
     }
     Ok(())

@@ -22,14 +22,14 @@ pub enum MethodError {
     Volume(#[from] VolumeError),
     /// The surface exceeds the largest number of vertices that the image and the sampling allow.
     #[error(
-        "the surface would have more than {most} vertices: take longer edges, a smaller volume or ellipsoids, or forces that do not inflate it"
+        "the surface would have more than {most} vertices: use longer edges, a smaller volume or smaller ellipsoids, or forces that do not inflate it"
     )]
     TooManyVertices {
         /// The largest number of vertices accepted.
         most: usize,
     },
     /// A linear system could not be solved.
-    #[error("the system of {constraints} constraints cannot be solved to the tolerance asked for: {cause}")]
+    #[error("the system of {constraints} constraints cannot be solved to the requested tolerance: {cause}")]
     Singular {
         /// The number of equations in the system.
         constraints: usize,

@@ -31,15 +31,15 @@ pub fn encode<T: Serialize>(magic: &Magic, state: &T) -> Vec<u8> {
 pub fn decode<T: DeserializeOwned>(magic: &Magic, bytes: &[u8]) -> Result<T, MethodError> {
     let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
     let Some((sum, body)) = bytes.strip_prefix(magic).and_then(|rest| rest.split_first_chunk::<8>()) else {
-        return bad("header", "these bytes are no saved state of this version");
+        return bad("header", "not a saved state of this version");
     };
     if u64::from_le_bytes(*sum) != Hash::of(body) {
-        return bad("contents", "the bytes are cut off or damaged");
+        return bad("contents", "truncated or corrupt");
     }
     match postcard::take_from_bytes::<T>(body) {
         Ok((state, [])) => Ok(state),
-        Ok(_) => bad("contents", "there are bytes after the end"),
-        Err(_) => bad("contents", "the bytes are cut off or damaged"),
+        Ok(_) => bad("contents", "trailing bytes after the state"),
+        Err(_) => bad("contents", "truncated or corrupt"),
     }
 }
 

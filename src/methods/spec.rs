@@ -71,7 +71,7 @@ impl ParamSpec {
             (Some(low), Some(high)) => format!("a number from {low} to {high}"),
             _ => "a finite number".into(),
         };
-        Err(MethodError::invalid(self.name, format!("{value} given, {range} accepted")))
+        Err(MethodError::invalid(self.name, format!("must be {range}, got {value}")))
     }
 }
 

@@ -280,7 +280,7 @@ describe('points by hand', () => {
     // In the middle a point was added before.
     await view.press('Enter');
     // Between two of the clicks a run may have come to its end.
-    await expect.poll(() => text('[data-error]')).toMatch(/outside.*where a point of the surface is/);
+    await expect.poll(() => text('[data-error]')).toMatch(/outside.*also a surface point/);
     await expect.poll(() => text('.edit-tools [role=status]')).toBe('4 points added.');
     await expect.poll(measured).toMatchObject({ surfaceConstraints: 1604, closed: true });
     expect(await address()).not.toContain('outside');

@@ -371,7 +371,7 @@ fn refusals_name_the_option_and_what_is_accepted() {
     let of = |start| refusal(DeformableOptions { start, ..Default::default() });
     assert!(
         refusal(DeformableOptions { start: Start::Enclosing, levels: 40, ..Default::default() })
-            .contains("levels: 40 given, 0 to")
+            .contains("levels: must be from 0 to")
     );
     assert!(
         refusal(DeformableOptions { start: Start::Enclosing, edge: Some(1e-9), ..Default::default() })
@@ -389,10 +389,12 @@ fn refusals_name_the_option_and_what_is_accepted() {
     assert!(of(Start::Bubbles(500)).contains("1 to"));
     assert!(of(Start::MarchingCubes(1e9)).contains("no surface"));
     let near = vec![DVec3::splat(12.0), DVec3::splat(13.0)];
-    assert!(of(Start::Seeds { points: near, radius: 3.0 }).contains("too near"));
-    assert!(of(Start::Seeds { points: vec![], radius: 3.0 }).contains("0 points"));
-    assert!(of(Start::Seeds { points: vec![DVec3::NAN], radius: 3.0 }).contains("not in or near the image"));
-    assert!(of(Start::Seeds { points: vec![DVec3::ONE], radius: 0.1 }).contains("accepted"));
+    assert!(of(Start::Seeds { points: near, radius: 3.0 }).contains("too close"));
+    assert!(of(Start::Seeds { points: vec![], radius: 3.0 }).contains("got 0"));
+    assert!(
+        of(Start::Seeds { points: vec![DVec3::NAN], radius: 3.0 }).contains("outside the image's domain")
+    );
+    assert!(of(Start::Seeds { points: vec![DVec3::ONE], radius: 0.1 }).contains("must be from"));
 
     let open = TriangleMesh {
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
@@ -494,7 +496,10 @@ fn a_start_mesh_far_from_the_image_is_refused() {
     let far = Mesh::icosphere(Vec3::splat(1e6), 6.0, 1.5).unwrap().to_triangles();
     let options = DeformableOptions { start: Start::Mesh(far), ..Default::default() };
     let refusal = DeformableModel::new(&volume, options).unwrap_err().to_string();
-    assert!(refusal.starts_with("start.mesh: vertex 0") && refusal.contains("near the image"), "{refusal}");
+    assert!(
+        refusal.starts_with("start.mesh: vertex 0") && refusal.contains("outside the image's domain"),
+        "{refusal}"
+    );
 }
 
 #[test]

@@ -386,18 +386,21 @@ fn bad_input_is_named() {
         ..Default::default()
     };
     let message = |options: MultiresOptions| refusal(options).to_string();
-    assert!(message(MultiresOptions { ellipsoids: vec![], ..good() }).starts_with("ellipsoids: none given"));
+    assert!(
+        message(MultiresOptions { ellipsoids: vec![], ..good() })
+            .starts_with("ellipsoids: must have at least one")
+    );
     assert!(
         message(MultiresOptions { ellipsoids: vec![ball(9.0, 0.0, 0.0, 0.5)], ..good() })
-            .contains("none touches the base")
+            .contains("at least one must touch the base")
     );
     assert!(
         message(MultiresOptions { ellipsoids: vec![ball(0.0, 0.0, 0.0, 0.0)], ..good() })
-            .contains("a semi-axis is 0 long")
+            .contains("semi-axes must be")
     );
     assert!(
         message(MultiresOptions { ellipsoids: vec![ball(f64::NAN, 0.0, 0.0, 1.0)], ..good() })
-            .contains("its center")
+            .contains("center must be finite")
     );
     let sharp = ellipsoid([0.0; 3], [1.0, 0.2, 0.2]);
     assert!(
@@ -405,7 +408,10 @@ fn bad_input_is_named() {
             .contains("number 0 has tips of radius 0.040")
     );
     let narrow = MultiresParams { edge_min: 0.1, edge_max: 0.2, ..Default::default() };
-    assert!(message(MultiresOptions { params: narrow, ..good() }).starts_with("edgeMax: 0.2 given"));
+    assert!(
+        message(MultiresOptions { params: narrow, ..good() })
+            .starts_with("edgeMax: must be > 2 × edgeMin (0.1), got 0.2")
+    );
     let mut open = bumpy(0.2);
     open.triangles.pop();
     let not_closed = |error| matches!(error, MethodError::Mesh(MeshError::NotClosed { .. }));
@@ -414,9 +420,9 @@ fn bad_input_is_named() {
     let mut speck = bumpy(0.2);
     speck.positions.iter_mut().for_each(|p| *p *= 1e-42);
     let detail = message(MultiresOptions { detail: Some(speck.clone()), ..good() });
-    assert!(detail.starts_with("detail: its edges are"), "{detail}");
+    assert!(detail.starts_with("detail: the mean edge length"), "{detail}");
     let base = message(MultiresOptions { base: Some(speck), ..good() });
-    assert!(base.starts_with("base: its edges are"), "{base}");
+    assert!(base.starts_with("base: the mean edge length"), "{base}");
     let mut crossing = bumpy(0.2);
     crossing.positions[0] *= -3.0;
     let error = refusal(MultiresOptions { base: Some(crossing), ..good() });

@@ -376,7 +376,7 @@ fn what_cannot_be_tracked_is_refused_by_name() {
     assert_eq!(refused(TrackingOptions { start: Some(TriangleMesh::default()), ..good() }).0, "start");
     let far = crate::common::torus_around(Vec3::splat(-500.0), [24, 12], [3.0, 1.0]);
     let (parameter, problem) = refused(TrackingOptions { start: Some(far), ..good() });
-    assert!(parameter == "start" && problem.contains("in the box"), "{problem}");
+    assert!(parameter == "start" && problem.contains("inside the box"), "{problem}");
     let mut turned = crate::common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
     turned.triangles.iter_mut().for_each(|corners| corners.reverse());
     let (parameter, problem) = refused(TrackingOptions { start: Some(turned), ..good() });
@@ -384,7 +384,7 @@ fn what_cannot_be_tracked_is_refused_by_name() {
     let mut speck = crate::common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
     speck.positions.iter_mut().for_each(|p| *p *= 1e-42);
     let (parameter, problem) = refused(TrackingOptions { start: Some(speck), ..good() });
-    assert!(parameter == "start" && problem.contains("1e-12 and more"), "{problem}");
+    assert!(parameter == "start" && problem.contains("≥ 1e-12"), "{problem}");
     let mut fine = crate::common::torus_around(Vec3::ZERO, [24, 12], [3.0, 1.0]);
     fine.positions.iter_mut().for_each(|p| *p *= 1e-6);
     let (parameter, problem) = refused(TrackingOptions { start: Some(fine), ..good() });

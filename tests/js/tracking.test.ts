@@ -86,7 +86,7 @@ test('steps tell how far it is: boundaries first, then surfaces, then back to th
   const parts = reports.map(({ times }) => Object.keys(times).join());
   expect(parts).toEqual([...Array(3).fill('boundary'), ...Array(3).fill('surface'), 'closure']);
   for (const { phase, times, tolerance } of reports) {
-    expect(phase).toMatch(/boundary|surface/);
+    expect(phase).toMatch(/finding boundary|tracking surface|closing the cycle/);
     expect(tolerance).toBeGreaterThan(0);
     for (const milliseconds of Object.values(times)) expect(milliseconds).toBeGreaterThanOrEqual(0);
   }

@@ -147,8 +147,7 @@ impl Pyramid {
         let possible = volume.max_pyramid_levels(REDUCTION)? - 1;
         if above > possible {
             let [nx, ny, nz] = volume.dims();
-            let problem =
-                format!("{above} given, 0 to {possible} are possible for {nx} × {ny} × {nz} voxels");
+            let problem = format!("must be from 0 to {possible} for {nx} × {ny} × {nz} voxels, got {above}");
             return Err(MethodError::invalid("levels", problem));
         }
         let mut grid = volume.normalised_grid(frame)?;

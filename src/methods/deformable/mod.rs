@@ -455,8 +455,8 @@ impl DeformableModel {
             let fits = local.abs().max_element() <= 1.0 && a.strength.abs() <= MAX_STRENGTH;
             if !(fits && local.is_finite() && radius > 0.0 && radius <= 1.0) {
                 let problem = format!(
-                    "attractor {i} needs a strength of {MAX_STRENGTH} at most, a positive radius, and both radius and \
-                     point within {MAX_ATTRACTOR_DISTANCE} voxels"
+                    "attractor {i}: |strength| must be ≤ {MAX_STRENGTH}, the radius > 0, and point and radius within \
+                     {MAX_ATTRACTOR_DISTANCE} voxels"
                 );
                 return Err(MethodError::invalid("attractors", problem));
             }
@@ -546,7 +546,7 @@ fn finest_delta(edge: Option<f64>, voxel: f64) -> Result<f64, MethodError> {
     let [low, high] = [DELTA_RANGE.start(), DELTA_RANGE.end()].map(|d| d * MEAN_EDGE * voxel);
     Err(MethodError::invalid(
         "edge",
-        format!("{edge} given, {low:.3} to {high:.3} accepted for these voxels"),
+        format!("must be from {low:.3} to {high:.3} for these voxels, got {edge}"),
     ))
 }
 

@@ -195,7 +195,7 @@ const SPECS: [ParamSpec; 18] = [
     ParamSpec {
         name: "iso",
         label: "Iso value",
-        help: "The intensity the surface settles on; everything beyond it counts as the object.",
+        help: "Intensity at which the surface settles; the object is on one side of it.",
         symbol: Some("πI"),
         default: ParamDefault::FromData,
         unit: Some("intensity"),
@@ -204,7 +204,7 @@ const SPECS: [ParamSpec; 18] = [
     ParamSpec {
         name: "isoForce",
         label: "Image force",
-        help: "How strongly the image inflates or deflates the surface; negative where the object is brighter than the iso value.",
+        help: "Strength with which the image inflates or deflates the surface; negative if the object is brighter than the iso value.",
         symbol: Some("αI"),
         default: ParamDefault::Number(-1.0),
         min: Some(-10.0),
@@ -214,7 +214,7 @@ const SPECS: [ParamSpec; 18] = [
     },
     ParamSpec {
         name: "gradientNormal",
-        label: "Ridge force, normal",
+        label: "Gradient force, normal component",
         help: "Pulls the surface along its normal to where the image is brightest.",
         symbol: Some("αg"),
         min: Some(-10.0),
@@ -224,7 +224,7 @@ const SPECS: [ParamSpec; 18] = [
     },
     ParamSpec {
         name: "gradientTangent",
-        label: "Ridge force, tangent",
+        label: "Gradient force, tangential component",
         help: "Lets vertices slide within the surface to where the image is brightest.",
         symbol: Some("βg"),
         min: Some(-10.0),
@@ -234,8 +234,8 @@ const SPECS: [ParamSpec; 18] = [
     },
     ParamSpec {
         name: "gradientBound",
-        label: "Ridge force, bound",
-        help: "Steeper image gradients count as this one, so that one sharp edge does not outweigh all others.",
+        label: "Gradient force, bound",
+        help: "Image gradients are clamped to this length, so that one sharp edge does not outweigh all others.",
         default: ParamDefault::Number(1.0),
         min: Some(1e-4),
         max: Some(1.0),
@@ -257,7 +257,7 @@ const SPECS: [ParamSpec; 18] = [
     ParamSpec {
         name: "stiffness",
         label: "Stiffness",
-        help: "Makes edges springs: a little evens out the triangles, much of it shrinks the surface.",
+        help: "Makes edges springs: small values even out the triangles, large values shrink the surface.",
         symbol: Some("αe"),
         min: Some(0.0),
         max: Some(1.0),
@@ -267,7 +267,7 @@ const SPECS: [ParamSpec; 18] = [
     ParamSpec {
         name: "restLength",
         label: "Rest length",
-        help: "The edge length at which the springs are at rest: zero, the mean edge, or a given length.",
+        help: "Rest length of the springs: zero, the mean edge, or a given length.",
         symbol: Some("d"),
         kind: ParamKind::Choice,
         default: ParamDefault::Choice("zero"),
@@ -292,7 +292,7 @@ const SPECS: [ParamSpec; 18] = [
     ParamSpec {
         name: "damping",
         label: "Damping",
-        help: "Friction: too little and the surface swings about its rest, too much and it creeps.",
+        help: "Friction: with too little the surface oscillates, with too much it creeps.",
         symbol: Some("γ"),
         default: ParamDefault::Number(0.4),
         min: Some(0.01),
@@ -303,7 +303,7 @@ const SPECS: [ParamSpec; 18] = [
     ParamSpec {
         name: "integrator",
         label: "Integrator",
-        help: "Implicit takes long steps and needs the fewest; Euler is the paper's and moves as a mass would; Runge–Kutta evaluates the forces four times and remains stable for rigidity above 0.4.",
+        help: "Implicit takes long steps and converges in the fewest iterations; Euler is the paper's; Runge–Kutta evaluates the forces four times per step and remains stable for rigidity above 0.4.",
         kind: ParamKind::Choice,
         default: ParamDefault::Choice("implicit"),
         scale: None,
@@ -323,8 +323,8 @@ const SPECS: [ParamSpec; 18] = [
     },
     ParamSpec {
         name: "maxMove",
-        label: "Largest move",
-        help: "How far a vertex may go in one iteration, as a fraction of δ; contact is found safely up to about 0.3.",
+        label: "Largest displacement",
+        help: "Largest displacement of a vertex in one iteration, as a fraction of δ; contact is found safely up to about 0.3.",
         default: ParamDefault::Number(0.3),
         min: Some(0.01),
         max: Some(0.5),
@@ -334,8 +334,8 @@ const SPECS: [ParamSpec; 18] = [
     },
     ParamSpec {
         name: "energyTolerance",
-        label: "Rest energy",
-        help: "A level is finished when the mean kinetic energy along the normals stays below this.",
+        label: "Tolerance",
+        help: "A level has converged when the mean kinetic energy along the normals stays below this.",
         symbol: Some("ε"),
         default: ParamDefault::Number(1e-6),
         min: Some(1e-12),
@@ -356,7 +356,7 @@ const SPECS: [ParamSpec; 18] = [
     ParamSpec {
         name: "adaptivity",
         label: "Adaptivity",
-        help: "How far the surface adapts to the image locally: it keeps walls and gaps that the image shows, however thin. 0 is the paper: whatever comes nearer than the contact distance is joined.",
+        help: "Local adaptation to the image: keeps walls and gaps that the image shows, however thin, and varies edge lengths with curvature; 0 is the paper, in which parts nearer than the contact distance are joined.",
         default: ParamDefault::Number(1.0),
         min: Some(0.0),
         max: Some(1.0),
@@ -366,7 +366,7 @@ const SPECS: [ParamSpec; 18] = [
     ParamSpec {
         name: "seeding",
         label: "Seeding",
-        help: "Adds parts and hollows that a level shows and the surface has not reached; automatic in runs that start from the contour.",
+        help: "Adds parts and cavities of the contour that the surface has not reached; automatic in runs that start from the contour.",
         kind: ParamKind::Choice,
         default: ParamDefault::Choice("auto"),
         scale: None,
@@ -376,7 +376,7 @@ const SPECS: [ParamSpec; 18] = [
     ParamSpec {
         name: "smallestPart",
         label: "Smallest part",
-        help: "Separate parts and hollows that enclose less than this are taken for noise and left out.",
+        help: "Separate parts and cavities that enclose less than this are treated as noise and left out.",
         default: ParamDefault::Number(64.0),
         min: Some(0.0),
         max: Some(1e9),

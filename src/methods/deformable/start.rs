@@ -277,12 +277,12 @@ fn bubble_grid(context: &StartContext, n: u32) -> Result<Mesh, MethodError> {
     let fitting = (smallest_axis * BUBBLE_SHARE / (SMALLEST_RADIUS * context.sampling.shortest())) as u32;
     let most = fitting.min(MAX_BUBBLES);
     if n == 0 || n > most {
-        let hint = if most == 0 {
-            "none fits: take fewer pyramid levels or shorter edges".into()
+        let problem = if most == 0 {
+            "no bubble fits: reduce pyramid levels or edge length".into()
         } else {
-            format!("1 to {most} fit this image and sampling")
+            format!("must be from 1 to {most} for this image and sampling, got {n}")
         };
-        return Err(MethodError::invalid("start.bubbles", format!("{n} given, {hint}")));
+        return Err(MethodError::invalid("start.bubbles", problem));
     }
     let cell = Vec3::from(context.dims.map(|m| m as f32 / n as f32));
     let radius = BUBBLE_SHARE * cell.min_element();
@@ -296,7 +296,7 @@ fn bubble_grid(context: &StartContext, n: u32) -> Result<Mesh, MethodError> {
 
 fn spheres_at(context: &StartContext, points: &[DVec3], radius: f64) -> Result<Mesh, MethodError> {
     if points.is_empty() || points.len() > MAX_SEEDS {
-        let problem = format!("{} points given, 1 to {MAX_SEEDS} accepted", points.len());
+        let problem = format!("must be from 1 to {MAX_SEEDS} points, got {}", points.len());
         return Err(MethodError::invalid("start.seeds", problem));
     }
     let ball = world_ball(context, radius)?;
@@ -308,14 +308,15 @@ fn spheres_at(context: &StartContext, points: &[DVec3], radius: f64) -> Result<M
         domain_bounds.contains(ball_bounds.min + c) && domain_bounds.contains(ball_bounds.max + c)
     };
     if let Some(i) = centres.iter().position(|c| !fits(c)) {
-        let problem = format!("the sphere at point {i}, {}, is not in or near the image", points[i]);
+        let problem = format!("the sphere at point {i}, {}, is outside the image's domain", points[i]);
         return Err(MethodError::invalid("start.seeds", problem));
     }
     let min_distance = 2.0 * radius + f64::from(context.sampling.contact()) * largest(context.spacing);
     let mut mesh = Mesh::default();
     for (i, point) in points.iter().enumerate() {
         if let Some(j) = points[..i].iter().position(|other| other.distance(*point) < min_distance) {
-            let problem = format!("points {j} and {i} are too near: spheres of radius {radius} would touch");
+            let problem =
+                format!("points {j} and {i} are too close: spheres of radius {radius} would be in contact");
             return Err(MethodError::invalid("start.seeds", problem));
         }
         let mut copy = ball.clone();
@@ -333,7 +334,7 @@ fn world_ball(context: &StartContext, radius: f64) -> Result<Mesh, MethodError> 
         * largest(context.spacing);
     if !(radius >= least && radius <= most) {
         let problem = format!(
-            "{radius} given, {least:.3} to {most:.3} accepted (smaller ones with fewer pyramid levels or shorter edges)"
+            "must be from {least:.3} to {most:.3}, got {radius} (use fewer pyramid levels or shorter edges for smaller spheres)"
         );
         return Err(MethodError::invalid("start.radius", problem));
     }
@@ -378,7 +379,7 @@ fn iso_surface(context: &StartContext, iso: f32) -> Result<Mesh, MethodError> {
 fn caller_mesh(context: &StartContext, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
     let local = mesh.transformed(&context.from_world);
     if let Some(far) = local.positions.iter().position(|&p| !context.domain.bounds.contains(p)) {
-        let problem = format!("vertex {far} at {} is not in or near the image", mesh.positions[far]);
+        let problem = format!("vertex {far} at {} is outside the image's domain", mesh.positions[far]);
         return Err(MethodError::invalid("start.mesh", problem));
     }
     checked_mesh("start.mesh", &local)

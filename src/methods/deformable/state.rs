@@ -76,7 +76,7 @@ impl DeformableModel {
             return bad("mesh", flaw.to_string());
         }
         if state.mesh.attribute_counts() != self.mesh.attribute_counts() {
-            return bad("mesh", "the vertices do not carry the data of this method".into());
+            return bad("mesh", "the vertex attributes are not those of this method".into());
         }
         if state.level >= self.pyramid.levels.len() || !super::DELTA_RANGE.contains(&state.finest_delta) {
             return bad("level", "level or edge is out of range".into());
@@ -84,7 +84,7 @@ impl DeformableModel {
         let domain = self.domain_for(state.finest_delta);
         let lost = |v: &VertexId| !domain.bounds.contains(state.mesh.position(*v));
         if let Some(v) = state.mesh.vertices().find(lost) {
-            return bad("mesh", format!("{v:?} is not in or near the image"));
+            return bad("mesh", format!("{v:?} is outside the image's domain"));
         }
         let named = state.waiting.queue.iter().chain(&state.waiting.stirred);
         if let Some(v) = named.into_iter().find(|v| v.index() >= state.mesh.slots()) {

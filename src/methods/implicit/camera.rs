@@ -64,8 +64,8 @@ impl Camera {
             return Err(MethodError::invalid("cameras", problem));
         }
         let to_view = normalized_projection(projection).ok_or_else(|| {
-            let problem = "the left 3×3 block of the projection is singular; a perspective camera is needed, which has \
-                           a centre";
+            let problem = "the left 3×3 block of the projection is singular; it must be that of a perspective camera, \
+                           which has a centre";
             MethodError::invalid("cameras", problem)
         })?;
         Ok(Self { to_view, from_view: to_view.inverse(), width, height, image })
@@ -179,18 +179,14 @@ impl ColorMean {
 fn problem(projection: &[f64; 12], width: u32, height: u32, length: Option<usize>) -> Option<String> {
     if let Some(i) = projection.iter().position(|entry| !entry.is_finite()) {
         let (row, column, entry) = (i / 4 + 1, i % 4 + 1, projection[i]);
-        return Some(format!(
-            "row {row}, column {column} of the projection is {entry}; finite numbers are accepted"
-        ));
+        return Some(format!("row {row}, column {column} of the projection must be finite, got {entry}"));
     }
     if [width, height].iter().any(|side| !(1..=MAX_PIXELS).contains(side)) {
-        return Some(format!("{width} × {height} pixels; 1 to {MAX_PIXELS} a side are accepted"));
+        return Some(format!("must have 1 to {MAX_PIXELS} pixels per side, got {width} × {height}"));
     }
     let expected = 4 * width as usize * height as usize;
     let found = length.filter(|&found| found != expected)?;
-    Some(format!(
-        "the image has {found} bytes; {expected}, four for each of {width} × {height} pixels, are accepted"
-    ))
+    Some(format!("the image must have {expected} bytes, four per pixel of {width} × {height}, got {found}"))
 }
 
 /// Returns the projection with the scale that makes its last coordinate the depth; `None` if it has no centre.
@@ -323,7 +319,10 @@ mod tests {
     fn invalid_cameras() {
         let mut missing = AHEAD;
         missing[6] = f64::NAN;
-        assert!(problem(missing, 9, 9, None).starts_with("row 2, column 3 of the projection is NaN"));
+        assert!(
+            problem(missing, 9, 9, None)
+                .starts_with("row 2, column 3 of the projection must be finite, got NaN")
+        );
         let parallel = [100.0, 0.0, 0.0, 40.0, 0.0, 100.0, 0.0, 30.0, 0.0, 0.0, 0.0, 1.0];
         let mut shifted = parallel;
         // A third of each of the other rows: rounding leaves a small determinant.
@@ -335,6 +334,9 @@ mod tests {
             assert!(problem(AHEAD, width, height, None).contains("1 to 16384"));
         }
         let message = problem(AHEAD, 4, 3, Some(vec![0; 47]));
-        assert!(message.starts_with("the image has 47 bytes; 48, four for each of 4 × 3"), "{message}");
+        assert!(
+            message.starts_with("the image must have 48 bytes, four per pixel of 4 × 3, got 47"),
+            "{message}"
+        );
     }
 }

@@ -37,7 +37,7 @@ impl Cloud {
             ("colors", self.colors.as_ref().map(Vec::len)),
         ] {
             if let Some(found) = found.filter(|&found| found != count) {
-                let problem = format!("{found} entries for {count} points; one a point is needed");
+                let problem = format!("must have one entry per point, {count}, got {found}");
                 return Err(MethodError::invalid(name, problem));
             }
         }
@@ -46,7 +46,7 @@ impl Cloud {
         let confidence = self.confidence.as_deref().unwrap_or_default();
         match confidence.iter().position(|&c| !(c > 0.0 && c <= 1.0)) {
             Some(i) => {
-                let problem = format!("{} at point {i}; above 0, and at most 1, is accepted", confidence[i]);
+                let problem = format!("must be > 0 and ≤ 1, got {} at point {i}", confidence[i]);
                 Err(MethodError::invalid("confidence", problem))
             }
             None => Ok(()),
@@ -94,7 +94,7 @@ impl Cloud {
         if self.len() >= MIN_POINTS {
             return Ok(());
         }
-        let problem = format!("{} different ones; at least {MIN_POINTS} are needed", self.len());
+        let problem = format!("must have at least {MIN_POINTS} distinct points, got {}", self.len());
         Err(MethodError::invalid("points", problem))
     }
 
@@ -131,7 +131,7 @@ pub fn check_max_count(name: &'static str, count: usize) -> Result<(), MethodErr
     if count <= MAX_POINTS {
         return Ok(());
     }
-    Err(MethodError::invalid(name, format!("{count} points; at most {MAX_POINTS} are accepted")))
+    Err(MethodError::invalid(name, format!("must have at most {MAX_POINTS} points, got {count}")))
 }
 
 /// Checks that all values are finite.
@@ -140,10 +140,7 @@ pub fn check_max_count(name: &'static str, count: usize) -> Result<(), MethodErr
 /// [`MethodError::InvalidArgument`] naming the first that is not.
 pub fn check_finite(name: &'static str, values: &[Vec3]) -> Result<(), MethodError> {
     match values.iter().position(|p| !p.is_finite()) {
-        Some(i) => Err(MethodError::invalid(
-            name,
-            format!("point {i} is {}; finite numbers are accepted", values[i]),
-        )),
+        Some(i) => Err(MethodError::invalid(name, format!("point {i} must be finite, got {}", values[i]))),
         None => Ok(()),
     }
 }
@@ -186,18 +183,18 @@ impl BoxMap {
         let largest = self.max_coordinate() + size;
         let bad = |problem| Err(MethodError::invalid("points", problem));
         if !(MIN_SIZE..=MAX_SIZE).contains(&size) {
-            return bad(format!("their longest side is {size:e}; {MIN_SIZE:e} to {MAX_SIZE:e} is accepted"));
+            return bad(format!("the longest side must be from {MIN_SIZE:e} to {MAX_SIZE:e}, got {size:e}"));
         }
         let away = self.max_coordinate() / size;
         if largest > f64::from(f32::MAX) {
-            return bad(format!("they reach to {largest:e} with some room, beyond single precision"));
+            return bad(format!("coordinates with margin reach {largest:e}, beyond single precision"));
         }
         if away <= MAX_SIZES_FROM_ORIGIN {
             return Ok(());
         }
         bad(format!(
-            "they lie {away:.0} times their size from the origin, where single precision has too few digits left; \
-             {MAX_SIZES_FROM_ORIGIN} times is accepted: move them nearer"
+            "they lie {away:.0} times their size from the origin, but single precision is sufficient for at most \
+             {MAX_SIZES_FROM_ORIGIN} times: translate them"
         ))
     }
 

@@ -36,14 +36,16 @@ impl PointEdits {
             if let Some(i) =
                 points.iter().position(|&p| map.in_box(p).abs().max_element() > MAX_ADDED_DISTANCE)
             {
-                let problem =
-                    format!("point {i} is {}, more than the size of the others away from them", points[i]);
+                let problem = format!(
+                    "point {i}, {}, is more than 3 half sides from the centre of the input points",
+                    points[i]
+                );
                 return Err(MethodError::invalid(name, problem));
             }
         }
         match self.removed.iter().find(|&&i| i as usize >= original.len()) {
             Some(i) => {
-                let problem = format!("{i} given; indices below {} are accepted", original.len());
+                let problem = format!("must be indices below {}, got {i}", original.len());
                 Err(MethodError::invalid("removed", problem))
             }
             None => Ok(()),
@@ -58,7 +60,7 @@ impl PointEdits {
         let known = PositionIndex::new(&surface.points);
         match self.outside.iter().position(|&p| known.find(map.in_box(p)).is_some()) {
             Some(i) => {
-                let problem = format!("point {i} is {}, where a point of the surface is", self.outside[i]);
+                let problem = format!("point {i} is {}, which is also a surface point", self.outside[i]);
                 Err(MethodError::invalid("outside", problem))
             }
             None => Ok(()),
@@ -119,8 +121,8 @@ impl PointEdits {
             Some(p) => {
                 let is_added = self.added.iter().any(|&added| map.in_box(added) == p);
                 let [name, other] =
-                    if is_added { ["added", "a point outside"] } else { ["exterior", "a surface point"] };
-                let problem = format!("{} is {other}, too", map.in_world(p.as_dvec3()));
+                    if is_added { ["added", "an exterior point"] } else { ["exterior", "a surface point"] };
+                let problem = format!("{} is also {other}", map.in_world(p.as_dvec3()));
                 Err(MethodError::invalid(name, problem))
             }
             None => Ok(constraints),

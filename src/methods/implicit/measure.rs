@@ -30,7 +30,10 @@ impl Fitness {
         let distances: Vec<f64> =
             points.iter().filter_map(|&p| tree.closest(p)).map(|hit| hit.distance).collect();
         if distances.is_empty() {
-            return Err(MethodError::invalid("fitness", "there is no surface yet: step to the end first"));
+            return Err(MethodError::invalid(
+                "fitness",
+                "there is no surface yet; step until the run is done",
+            ));
         }
         let count = distances.len() as f64;
         let curvatures = curvature(surface).mean;

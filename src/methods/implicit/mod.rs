@@ -382,9 +382,9 @@ impl ImplicitSurface {
     fn singular(&mut self) -> MethodError {
         (self.base_edits, self.solver) = (None, None);
         let cause = if self.params.lambda_surface == 0.0 {
-            "lambdaSurface is 0 and some points lie too close together; give it a value above 0"
+            "lambdaSurface is 0 and some points are too close together; set it above 0"
         } else {
-            "rounding is larger than the tolerance; take a larger tolerance or lambda, or a narrower kernel"
+            "rounding errors exceed the tolerance; use a larger tolerance or lambda, or a narrower kernel"
         };
         MethodError::Singular { constraints: self.constraints.centres.len(), cause }
     }
@@ -595,11 +595,11 @@ fn first_stage(options: &ImplicitOptions) -> Stage {
 
 fn check_options(options: &ImplicitOptions) -> Result<(), MethodError> {
     if !(MIN_POINTS..=MAX_POINTS).contains(&options.max_points) {
-        let problem = format!("{} given, {MIN_POINTS} to {MAX_POINTS} accepted", options.max_points);
+        let problem = format!("must be from {MIN_POINTS} to {MAX_POINTS}, got {}", options.max_points);
         return Err(MethodError::invalid("maxPoints", problem));
     }
     if options.keep_components == Some(0) {
-        return Err(MethodError::invalid("keepComponents", "0 given, at least 1 is needed"));
+        return Err(MethodError::invalid("keepComponents", "must be at least 1, got 0"));
     }
     let exterior = options.exterior.as_deref().unwrap_or_default();
     cloud::check_max_count("exterior", exterior.len())?;

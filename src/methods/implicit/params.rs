@@ -96,7 +96,7 @@ impl ImplicitParams {
     /// Returns a warning, to be shown to the user, if the values are accepted but may fail.
     pub fn warning(&self) -> Option<&'static str> {
         (self.kernel == KernelKind::MultiOrder && self.delta >= LARGE_DELTA).then_some(
-            "delta is 25 or more: where the points have large gaps the function falls to 0 inside, and the surface breaks up",
+            "delta ≥ 25: at large gaps between points the function falls to 0 inside, and the surface breaks up",
         )
     }
 }
@@ -113,7 +113,7 @@ const SPECS: [ParamSpec; 9] = [
     ParamSpec {
         name: "kernel",
         label: "Kernel",
-        help: "The bump that the surface is built from: multi-order smooths in three ways at once, the others are for comparison.",
+        help: "Radial basis function of the implicit function: multi-order combines three orders of smoothness, the others are for comparison.",
         symbol: Some("φ"),
         kind: ParamKind::Choice,
         default: ParamDefault::Choice("multi-order"),
@@ -124,7 +124,7 @@ const SPECS: [ParamSpec; 9] = [
     ParamSpec {
         name: "delta",
         label: "First-order smoothness",
-        help: "More of it pulls the surface tight around the points, like a membrane; from 25 on gaps tear it.",
+        help: "Larger values pull the surface tight around the points, like a membrane; from 25 on it breaks up at large gaps.",
         symbol: Some("δ"),
         default: ParamDefault::Number(5.0),
         min: Some(0.1),
@@ -137,7 +137,7 @@ const SPECS: [ParamSpec; 9] = [
     ParamSpec {
         name: "tau",
         label: "Third-order smoothness",
-        help: "More of it rounds off detail and makes curvature change slowly.",
+        help: "Larger values round off detail and make curvature change slowly.",
         symbol: Some("τ"),
         default: ParamDefault::Number(0.025),
         min: Some(0.001),
@@ -150,7 +150,7 @@ const SPECS: [ParamSpec; 9] = [
     ParamSpec {
         name: "sigma",
         label: "Gaussian width",
-        help: "How far each bump of the Gaussian kernel reaches; the other kernels do not use it.",
+        help: "Width of the Gaussian kernel; other kernels do not use it.",
         symbol: Some("σ"),
         default: ParamDefault::Number(0.07),
         min: Some(0.005),
@@ -163,7 +163,7 @@ const SPECS: [ParamSpec; 9] = [
     ParamSpec {
         name: "lambdaSurface",
         label: "Regularization, surface",
-        help: "0 passes through every point; more lets the surface leave noisy points aside and become smoother.",
+        help: "0 interpolates every point; larger values tolerate noise and give a smoother surface.",
         symbol: Some("λs"),
         default: ParamDefault::Number(0.001),
         min: Some(0.0),
@@ -174,7 +174,7 @@ const SPECS: [ParamSpec; 9] = [
     ParamSpec {
         name: "lambdaExterior",
         label: "Regularization, exterior",
-        help: "How loosely the points outside bind: they only say which side is out, so they should not bind much.",
+        help: "How much exterior constraints may be missed: they only fix the orientation, so a large value is right.",
         symbol: Some("λe"),
         default: ParamDefault::Number(2.0),
         min: Some(0.0),
@@ -184,8 +184,8 @@ const SPECS: [ParamSpec; 9] = [
     },
     ParamSpec {
         name: "tolerance",
-        label: "Residual",
-        help: "The solve ends when the equations hold to this share of their right side.",
+        label: "Tolerance",
+        help: "The solver stops at this relative residual.",
         default: ParamDefault::Number(1e-5),
         min: Some(1e-12),
         max: Some(0.01),
@@ -194,8 +194,8 @@ const SPECS: [ParamSpec; 9] = [
     },
     ParamSpec {
         name: "cell",
-        label: "Cell",
-        help: "Edge of the cells that the surface is drawn with, in the points' units; 0 takes it from their spacing.",
+        label: "Cell size",
+        help: "Edge length of an extraction cell, in the points' units; 0 derives it from their spacing.",
         min: Some(0.0),
         max: Some(1e30),
         scale: None,
@@ -204,8 +204,8 @@ const SPECS: [ParamSpec; 9] = [
     },
     ParamSpec {
         name: "level",
-        label: "Level",
-        help: "Zero is the paper's surface; mean passes through the middle of the points, which lie a little outside of it.",
+        label: "Iso-value",
+        help: "Value of f at the surface: zero is the paper's; mean is the mean of f at the points, which lie slightly outside the zero set.",
         kind: ParamKind::Choice,
         default: ParamDefault::Choice("zero"),
         scale: None,

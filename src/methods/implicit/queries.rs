@@ -32,7 +32,7 @@ impl ImplicitSurface {
     }
 
     fn solved(&self, what: &'static str) -> Result<&Solved, MethodError> {
-        let problem = "the system is not solved yet: step until the phase is 'extract'";
+        let problem = "the system is not solved yet; step until the phase is 'extract'";
         self.solved.as_ref().ok_or_else(|| MethodError::invalid(what, problem))
     }
 
@@ -71,7 +71,7 @@ impl ImplicitSurface {
         if dims.iter().any(|&n| n < 2) {
             return Err(MethodError::invalid(
                 "dims",
-                format!("{dims:?}; at least 2 along each axis are needed"),
+                format!("must be at least 2 along each axis, got {dims:?}"),
             ));
         }
         let (origin, spacing) = self.grid(dims);
@@ -111,10 +111,13 @@ impl ImplicitSurface {
     /// [`MethodError::InvalidArgument`] if there is no surface yet, or no camera has an image.
     pub fn colorize(&mut self, cameras: &[Camera]) -> Result<(), MethodError> {
         if self.mesh.triangles.is_empty() {
-            return Err(MethodError::invalid("colorize", "there is no surface yet: step to the end first"));
+            return Err(MethodError::invalid(
+                "colorize",
+                "there is no surface yet; step until the run is done",
+            ));
         }
         if !cameras.iter().any(Camera::has_image) {
-            return Err(MethodError::invalid("cameras", "none has an image; at least one is needed"));
+            return Err(MethodError::invalid("cameras", "at least one must have an image"));
         }
         if let Some(colors) = color::colors(&self.mesh, cameras) {
             self.mesh.colors = Some(colors);

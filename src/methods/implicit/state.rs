@@ -117,7 +117,7 @@ impl ImplicitSurface {
         let mesh = TriangleMesh { positions, triangles, normals, colors, ..TriangleMesh::default() };
         mesh.validate()?;
         if state.saved_stage.needs_solution() && state.solved.is_none() {
-            return bad("solution", "it is missing");
+            return bad("solution", "missing");
         }
         for edits in std::iter::once(&state.edits).chain(&state.base) {
             edits.validate(&self.original, &self.map)?;
@@ -127,7 +127,7 @@ impl ImplicitSurface {
         if let Some(Function { kernel, centres, solution, mean }) = state.solved {
             if solution.weights.len() != centres.len() || solution.coefficients.len() != kernel.polynomials()
             {
-                return bad("solution", "its parts do not fit each other");
+                return bad("solution", "inconsistent");
             }
             next.solved = Some(Solved::new(kernel, centres, solution, mean));
         }
@@ -198,7 +198,7 @@ impl ImplicitSurface {
         while self.slices < slices {
             self.advance()?;
             if self.stage.reached() != saved_stage {
-                let problem = format!("{slices} given; the stage is over before");
+                let problem = format!("{slices} given; the stage has fewer");
                 return Err(MethodError::BadState { field: "slices", problem });
             }
         }

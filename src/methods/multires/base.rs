@@ -70,7 +70,7 @@ pub(super) fn decomposition(
 fn no_base() -> MethodError {
     MethodError::invalid(
         "detail",
-        "no smoother surface could be made of it that its own normals lead back from: give a `base`, or shorter edges",
+        "no smooth base found with the detail as a graph over it: give a `base`, or use shorter edges",
     )
 }
 
@@ -122,7 +122,7 @@ fn union_of(ellipsoids: &[Ellipsoid], edge: f64) -> Result<TriangleMesh, MethodE
     let nodes = (2.0 * radius / cell).ceil() + 1.0;
     if nodes > MAX_NODES {
         let problem = format!(
-            "they span {} and are {shortest_axis} thin: {MAX_NODES} edges across are accepted; make edgeMax longer or the thinnest thicker",
+            "they span {} with a shortest axis of {shortest_axis}: at most {MAX_NODES} edges across are supported; increase edgeMax or the shortest axis",
             2.0 * radius
         );
         return Err(MethodError::invalid("ellipsoids", problem));

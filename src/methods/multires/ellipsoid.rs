@@ -35,16 +35,16 @@ impl ControlEllipsoid {
         let [x, y, z] = self.axes.map(DVec3::from);
         let lengths = [x, y, z].map(DVec3::length);
         if !DVec3::from(self.center).abs().cmple(DVec3::splat(LONGEST)).all() {
-            return refuse(format!("its center is {:?}; numbers up to {LONGEST} are accepted", self.center));
+            return refuse(format!("center must be finite and at most {LONGEST:e}, got {:?}", self.center));
         }
         if let Some(length) = lengths.into_iter().find(|length| !(SHORTEST..=LONGEST).contains(length)) {
-            return refuse(format!("a semi-axis is {length} long; {SHORTEST} to {LONGEST} are accepted"));
+            return refuse(format!("semi-axes must be {SHORTEST:e} to {LONGEST:e} long, got {length}"));
         }
         let (least, most) =
             (lengths.into_iter().fold(f64::MAX, f64::min), lengths.into_iter().fold(0.0, f64::max));
         if most > MAX_AXIS_RATIO * least {
             return refuse(format!(
-                "one semi-axis is {} times another; up to {MAX_AXIS_RATIO} is accepted",
+                "ratio of semi-axes must be at most {MAX_AXIS_RATIO}, got {}",
                 most / least
             ));
         }
@@ -52,7 +52,7 @@ impl ControlEllipsoid {
             let cosine = a.dot(b).abs() / (a.length() * b.length());
             if cosine > ORTHOGONAL {
                 let angle = libm::acos(cosine).to_degrees();
-                return refuse(format!("axes {k} and {} meet at {angle:.1}°; 90° is accepted", (k + 1) % 3));
+                return refuse(format!("axes {k} and {} must be orthogonal, got {angle:.1}°", (k + 1) % 3));
             }
         }
         Ok(())
@@ -65,7 +65,7 @@ impl ControlEllipsoid {
 /// As [`ControlEllipsoid::validate`], and for an empty list.
 pub(super) fn check_ellipsoids(given: &[ControlEllipsoid]) -> Result<(), MethodError> {
     if given.is_empty() {
-        return Err(MethodError::invalid("ellipsoids", "none given; at least one is needed"));
+        return Err(MethodError::invalid("ellipsoids", "must have at least one, got none"));
     }
     given.iter().enumerate().try_for_each(|(k, e)| e.validate(k))
 }
@@ -252,8 +252,8 @@ pub(super) fn check_tips(ellipsoids: &[Ellipsoid], longest: f64) -> Result<(), M
     };
     let Some((k, radius)) = ellipsoids.iter().enumerate().find_map(slips) else { return Ok(()) };
     let problem = format!(
-        "number {k} has tips of radius {radius:.3}, where a skin with edges up to {longest:.3} would slip off: edgeMax up to \
-         {:.3}, or a rounder ellipsoid, is accepted",
+        "number {k} has tips of radius {radius:.3}, where a membrane with edges up to {longest:.3} would slip off: use edgeMax \
+         ≤ {:.3}, or a rounder ellipsoid",
         MAX_EDGE_PER_RADIUS * radius
     );
     Err(MethodError::invalid("ellipsoids", problem))
@@ -453,10 +453,14 @@ mod tests {
             change(&mut bad);
             bad.validate(4).unwrap_err().to_string()
         };
-        assert!(spoilt(|e| e.axes[1] = [0.0; 3]).contains("number 4: a semi-axis is 0 long"));
-        assert!(spoilt(|e| e.axes[1] = [1.0, 1.0, 0.0]).contains("axes 0 and 1 meet at 45.0°"));
+        assert!(
+            spoilt(|e| e.axes[1] = [0.0; 3]).contains("number 4: semi-axes must be 1e-9 to 1e9 long, got 0")
+        );
+        assert!(
+            spoilt(|e| e.axes[1] = [1.0, 1.0, 0.0]).contains("axes 0 and 1 must be orthogonal, got 45.0°")
+        );
         assert!(spoilt(|e| e.axes[0][0] = f64::NAN).contains("NaN"));
-        assert!(spoilt(|e| e.axes[0][0] = 1e8).contains("times another"));
-        assert!(spoilt(|e| e.center[2] = f64::INFINITY).contains("its center is"));
+        assert!(spoilt(|e| e.axes[0][0] = 1e8).contains("ratio of semi-axes"));
+        assert!(spoilt(|e| e.center[2] = f64::INFINITY).contains("center must be finite"));
     }
 }

@@ -90,10 +90,7 @@ impl MultiresParams {
         if self.edge_max > 2.0 * self.edge_min {
             return Ok(());
         }
-        let problem = format!(
-            "{} given with edgeMin {}: more than twice that is accepted",
-            self.edge_max, self.edge_min
-        );
+        let problem = format!("must be > 2 × edgeMin ({1}), got {0}", self.edge_max, self.edge_min);
         Err(MethodError::invalid("edgeMax", problem))
     }
 
@@ -138,21 +135,21 @@ const SPECS: [ParamSpec; 9] = [
     ParamSpec {
         name: "edgeMin",
         label: "Shortest edge",
-        help: "Shorter edges are drawn together; half as long, and the surface has four times as many triangles.",
+        help: "Shorter edges are collapsed; halving it quadruples the number of triangles.",
         symbol: Some("ε_min"),
         ..EDGE
     },
     ParamSpec {
         name: "edgeMax",
         label: "Longest edge",
-        help: "Longer edges are split; it has to be more than twice the shortest, or halves would be too short.",
+        help: "Longer edges are split; must be more than twice the shortest edge.",
         symbol: Some("ε_max"),
         ..EDGE
     },
     ParamSpec {
         name: "levels",
         label: "Coarse levels",
-        help: "How many coarser meshes the skin is solved on first: far pulls come through in fewer iterations.",
+        help: "Number of coarser meshes on which the membrane is solved first; they speed up large deformations.",
         default: ParamDefault::Number(2.0),
         min: Some(0.0),
         max: Some(6.0),
@@ -160,8 +157,8 @@ const SPECS: [ParamSpec; 9] = [
     },
     ParamSpec {
         name: "refineFactor",
-        label: "Step between levels",
-        help: "By how much edges shrink from one level to the next finer one.",
+        label: "Refinement factor",
+        help: "Ratio of edge lengths between a level and the next coarser one.",
         symbol: Some("q"),
         default: ParamDefault::Number(0.5),
         min: Some(0.3),
@@ -171,8 +168,8 @@ const SPECS: [ParamSpec; 9] = [
     },
     ParamSpec {
         name: "smoothing",
-        label: "Iterations a level",
-        help: "How often each vertex goes to the middle of its neighbours on each level: more, and the skin is tighter.",
+        label: "Iterations per level",
+        help: "Umbrella iterations per level; more make the membrane tighter.",
         default: ParamDefault::Number(10.0),
         min: Some(1.0),
         max: Some(200.0),
@@ -180,8 +177,8 @@ const SPECS: [ParamSpec; 9] = [
     },
     ParamSpec {
         name: "distribute",
-        label: "Distribution",
-        help: "How often the points where detail is looked up are spread out evenly; without it they fold over each other.",
+        label: "Distribution passes",
+        help: "Passes that even out the map to the base; without them it folds.",
         symbol: Some("D"),
         default: ParamDefault::Number(3.0),
         min: Some(0.0),
@@ -191,7 +188,7 @@ const SPECS: [ParamSpec; 9] = [
     ParamSpec {
         name: "supersample",
         label: "Super-sampling",
-        help: "How often edges are halved, at the most, where the detail is finer than the skin or stretches it: the skin stays as it is.",
+        help: "Maximum number of edge halvings where the detail is finer than the base or stretched; the base itself is not changed.",
         default: ParamDefault::Number(0.0),
         min: Some(0.0),
         max: Some(4.0),
@@ -199,8 +196,8 @@ const SPECS: [ParamSpec; 9] = [
     },
     ParamSpec {
         name: "energy",
-        label: "Skin",
-        help: "A membrane makes its area least, like a soap film; a thin plate its bending, like sheet metal.",
+        label: "Surface energy",
+        help: "A membrane minimises area, like a soap film; a thin plate minimises bending, like sheet metal.",
         kind: ParamKind::Choice,
         default: ParamDefault::Choice("membrane"),
         scale: None,
@@ -210,7 +207,7 @@ const SPECS: [ParamSpec; 9] = [
     ParamSpec {
         name: "topology",
         label: "Necks and contacts",
-        help: "Whether a neck that has become a thread is cut, and whether parts that meet again are joined.",
+        help: "Whether thin necks are cut, and whether parts in contact are joined.",
         kind: ParamKind::Choice,
         default: ParamDefault::Choice("split"),
         scale: None,

@@ -76,7 +76,7 @@ fn check_touching(ellipsoids: &[Ellipsoid], base: &SurfaceWalker, target: f64) -
     if base.mesh().positions.iter().any(near) {
         return Ok(());
     }
-    Err(MethodError::invalid("ellipsoids", "none touches the base; at least one has to, or nothing holds it"))
+    Err(MethodError::invalid("ellipsoids", "at least one must touch the base"))
 }
 
 /// Checks that a surface of this area has at most [`MAX_VERTICES`] vertices at the target edge length.

@@ -57,15 +57,15 @@ impl MultiresolutionModel {
             return bad("surfaces", "the state belongs to another detail, base or start");
         }
         if state.params.validate().is_err() || !state.moving.are_valid() {
-            return bad("parameters", "they are out of range");
+            return bad("parameters", "out of range");
         }
         let is_valid = can_be_checked(&state.surface) && state.surface.check().is_ok();
         let has_same_attributes = state.surface.attribute_counts() == self.surface.attribute_counts();
         if !is_valid || !has_same_attributes || state.link.len() != state.surface.slots() {
-            return bad("surface", "its parts do not fit each other");
+            return bad("surface", "inconsistent");
         }
         let Some(correspondence) = self.correspondence_of(&state.link) else {
-            return bad("link", "it leads nowhere");
+            return bad("link", "refers to a missing triangle");
         };
         (self.params, self.ellipsoids, self.correspondence) = (state.params, state.moving, correspondence);
         let replaced = std::mem::replace(&mut self.surface, state.surface);

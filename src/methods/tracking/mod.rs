@@ -137,7 +137,7 @@ impl SurfaceTracker {
         let TrackingOptions { volume, bounds, component, start, params } = options;
         params.validate()?;
         if volume.frames() < 2 {
-            let problem = "it has one frame; a 4D volume of two frames or more is needed";
+            let problem = "must have at least two frames, got one";
             return Err(MethodError::invalid("volume", problem));
         }
         let shortest_side = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
@@ -182,7 +182,7 @@ impl SurfaceTracker {
         let longest = shortest_side * most as f64;
         if params.radius < shortest_side || params.radius > longest {
             let problem = format!(
-                "{} given, {shortest_side} to {longest} (1 to {most} voxels) accepted",
+                "must be from {shortest_side} to {longest} (1 to {most} voxels), got {}",
                 params.radius
             );
             return Err(MethodError::invalid("radius", problem));
@@ -418,11 +418,11 @@ impl SurfaceTracker {
         let frames = self.frames();
         let (found, done) = (self.faces.len(), self.meshes.len());
         let phase = if self.cycle_closure_error.is_some() {
-            "surface, back in the first frame".into()
+            "closing the cycle".into()
         } else if done > 0 {
-            format!("surface, frame {done} of {frames}")
+            format!("tracking surface, frame {done} of {frames}")
         } else {
-            format!("boundary, frame {found} of {frames}")
+            format!("finding boundary, frame {found} of {frames}")
         };
         let closing_steps = usize::from(self.params.cyclic);
         let steps_done = found + done + usize::from(self.cycle_closure_error.is_some());

@@ -82,7 +82,7 @@ impl TrackingParams {
         }
         let (min, max) = (self.edge_min, self.edge_max);
         let problem =
-            format!("{max} given, more than twice edgeMin ({min}) accepted: halves would be too short");
+            format!("must be > 2 × edgeMin ({min}), got {max}: halves of split edges would be too short");
         Err(MethodError::invalid("edgeMax", problem))
     }
 
@@ -136,8 +136,8 @@ const SWITCH: ParamSpec = ParamSpec { kind: ParamKind::Boolean, ..ParamSpec::NUM
 const SPECS: [ParamSpec; 10] = [
     ParamSpec {
         name: "threshold",
-        label: "Step height",
-        help: "The least difference between bright and dark that counts as a boundary; below 2.5 times the noise, noise does.",
+        label: "Edge threshold",
+        help: "Smallest intensity step that counts as a boundary; below 2.5 times the noise, noise is detected too.",
         symbol: Some("τ"),
         unit: Some("intensity"),
         ..FROM_DATA
@@ -145,7 +145,7 @@ const SPECS: [ParamSpec; 10] = [
     ParamSpec {
         name: "window",
         label: "Window",
-        help: "How far to each side voxels are sorted into bright and dark together: wider, and less noise and detail are left.",
+        help: "Half-width of the window that is split into bright and dark voxels; larger windows suppress noise and detail.",
         symbol: Some("k"),
         min: Some(1.0),
         unit: Some("voxels"),
@@ -153,8 +153,8 @@ const SPECS: [ParamSpec; 10] = [
     },
     ParamSpec {
         name: "windowFrames",
-        label: "Window in time",
-        help: "How many frames before and after are sorted along; 0 looks at each frame by itself.",
+        label: "Temporal window",
+        help: "Number of frames before and after that the window includes; 0 processes each frame on its own.",
         min: Some(0.0),
         unit: Some("frames"),
         ..COUNT
@@ -162,15 +162,15 @@ const SPECS: [ParamSpec; 10] = [
     ParamSpec {
         name: "radius",
         label: "Radius",
-        help: "Up to here the points of the boundary make up a plane: a larger radius gives a smoother surface.",
+        help: "Radius of the plane fit to boundary points: a larger one gives a smoother surface.",
         symbol: Some("2h"),
         unit: Some("world"),
         ..FROM_DATA
     },
     ParamSpec {
         name: "timeScale",
-        label: "Length of a frame",
-        help: "The distance that one frame counts as: a small one smooths over time, a large one sees each frame alone.",
+        label: "Time scale",
+        help: "Distance that one frame counts as: small values smooth over time, large ones fit each frame on its own.",
         symbol: Some("c"),
         unit: Some("world"),
         ..FROM_DATA
@@ -178,7 +178,7 @@ const SPECS: [ParamSpec; 10] = [
     ParamSpec {
         name: "damping",
         label: "Damping",
-        help: "Each step of a projection goes by so much less far than the one before, so that it comes to rest.",
+        help: "Each projection step is scaled by this factor relative to the one before, so that the projection converges.",
         symbol: Some("β"),
         default: ParamDefault::Number(0.9),
         min: Some(0.5),
@@ -189,7 +189,7 @@ const SPECS: [ParamSpec; 10] = [
     ParamSpec {
         name: "edgeMin",
         label: "Shortest edge",
-        help: "Shorter edges are drawn together; in the mean edge of the first frame.",
+        help: "Shorter edges are collapsed; relative to the mean edge of the first frame.",
         symbol: Some("c_min"),
         default: ParamDefault::Number(0.25),
         min: Some(0.05),
@@ -200,7 +200,7 @@ const SPECS: [ParamSpec; 10] = [
     ParamSpec {
         name: "edgeMax",
         label: "Longest edge",
-        help: "Longer edges are split; more than twice the shortest, in the mean edge of the first frame.",
+        help: "Longer edges are split; relative to the mean edge of the first frame, more than twice the shortest.",
         symbol: Some("c_max"),
         default: ParamDefault::Number(1.5),
         min: Some(0.5),
@@ -211,14 +211,14 @@ const SPECS: [ParamSpec; 10] = [
     ParamSpec {
         name: "prediction",
         label: "Prediction",
-        help: "A frame begins where the surface is going by how it passes through time; else where it was.",
+        help: "Starts each frame from the predicted surface instead of the previous one.",
         default: ParamDefault::Boolean(true),
         ..SWITCH
     },
     ParamSpec {
         name: "cyclic",
         label: "Cyclic",
-        help: "The last frame is followed by the first, as in a heartbeat; at the end the surface is taken back there.",
+        help: "The first frame follows the last, as in a heartbeat; at the end the surface is tracked back to it, to measure the closure error.",
         default: ParamDefault::Boolean(false),
         ..SWITCH
     },

@@ -68,7 +68,7 @@ impl Region {
         let [x, y, z] = [directions.x_axis, directions.y_axis, directions.z_axis];
         if x.dot(y).abs().max(y.dot(z).abs()).max(z.dot(x).abs()) > ORTHOGONAL {
             let problem =
-                "its voxel axes are not at right angles; resample it, or set an affine whose axes are";
+                "its voxel axes must be orthogonal; resample it, or set an affine with orthogonal axes";
             return Err(MethodError::invalid("volume", problem));
         }
         let [low, high] = voxel_bounds(volume, bounds)?;
@@ -101,7 +101,7 @@ impl Region {
         }
         let [from, to] = intensity_quantiles(&counts);
         if from >= to {
-            let problem = "all voxels in the box have the same intensity; a boundary needs two";
+            let problem = "all voxels in the box have the same intensity";
             return Err(MethodError::invalid("volume", problem));
         }
         let scale = MAX_LEVEL / (to - from);
@@ -213,8 +213,8 @@ fn check_size(dims: [usize; 3], frames: usize) -> Result<(), MethodError> {
         return Ok(());
     }
     let problem = format!(
-        "{dims:?} voxels, with those around, in {frames} frames need {} MB and {} are accepted; a smaller box, or means of \
-         several voxels (binned), need less",
+        "{dims:?} voxels with padding in {frames} frames need {} MB, more than {}; use a smaller box, or bin the volume \
+         (`binned`)",
         bytes / 1_000_000,
         MAX_BYTES / 1_000_000
     );
@@ -250,15 +250,13 @@ fn voxel_bounds(volume: &Volume, bounds: Option<Bounds>) -> Result<[[usize; 3]; 
             ("voxels", [low, high])
         }
         Some(Bounds::Voxels([low, high])) => {
-            let problem = format!(
-                "min {low:?} and max {high:?} given; min up to max, and max up to {last:?}, are needed"
-            );
+            let problem = format!("must satisfy min ≤ max ≤ {last:?}, got min {low:?} and max {high:?}");
             return Err(MethodError::invalid("voxels", problem));
         }
     };
     let counts = [0, 1, 2].map(|k| high[k] - low[k] + 1);
     if counts.iter().filter(|&&count| count >= MIN_VOXELS).count() < 2 {
-        let problem = format!("{counts:?} voxels; {MIN_VOXELS} or more along two axes are needed");
+        let problem = format!("must have at least {MIN_VOXELS} voxels along two axes, got {counts:?}");
         return Err(MethodError::invalid(parameter, problem));
     }
     Ok([low, high])
@@ -269,9 +267,7 @@ fn voxel_bounds(volume: &Volume, bounds: Option<Bounds>) -> Result<[[usize; 3]; 
 fn voxels_around(volume: &Volume, [low, high]: [DVec3; 2]) -> Result<[[usize; 3]; 2], MethodError> {
     let last = volume.dims().map(|n| n - 1);
     if !low.is_finite() || !high.is_finite() || low.cmpge(high).any() {
-        let problem = format!(
-            "min {low} and max {high} given; finite corners, min below max along every axis, are needed"
-        );
+        let problem = format!("must be finite with min < max along every axis, got min {low} and max {high}");
         return Err(MethodError::invalid("box", problem));
     }
     // The corners of the box in voxel coordinates, because its axes are those of the world.

@@ -28,14 +28,13 @@ pub(super) fn validate_start(start: &TriangleMesh, region: &Region) -> Result<Me
     let mesh = checked_mesh("start", start)?;
     let (edge, least) = (measure(start).edge_mean, MIN_EDGE * region.spacing.min_element());
     if edge < least {
-        let problem = format!(
-            "its edges are {edge:.1e} long in the mean; a tenth of a voxel, {least:.1e}, or more is accepted"
-        );
+        let problem =
+            format!("the mean edge length must be ≥ {least:.1e} (a tenth of a voxel), got {edge:.1e}");
         return Err(MethodError::invalid("start", problem));
     }
     if start.positions.iter().all(|&p| region.clamp_into_box(region.to_local(p)).is_some()) {
         let problem =
-            "no vertex of the mesh is in the box; a surface of the first frame, in the world, is needed";
+            "no vertex of the mesh is inside the box; give a surface of the first frame in world coordinates";
         return Err(MethodError::invalid("start", problem));
     }
     Ok(mesh)
@@ -50,7 +49,7 @@ impl SurfaceTracker {
         if self.faces.iter().flatten().all(Vec::is_empty) {
             let largest = self.voting.largest_step(&self.region) * self.region.quantum;
             let problem = format!(
-                "{} given, no boundary found: the largest step in the box is {largest:.4}; less than that is needed",
+                "no boundary found with {}: must be below the largest step in the box, {largest:.4}",
                 self.params.threshold
             );
             return Err(MethodError::invalid("threshold", problem));
@@ -60,8 +59,7 @@ impl SurfaceTracker {
         }
         let surface = extract_bright_surface(&self.region, &self.faces[0], self.falloff())?;
         let Some(part) = self.tracked_component(surface.components()) else {
-            let problem =
-                "no closed surface is in the first frame; choose a larger box, or a lower threshold";
+            let problem = "no closed surface in the first frame; use a larger box or a lower threshold";
             return Err(MethodError::invalid("box", problem));
         };
         let mut mesh = Mesh::from_triangles(&part)?;

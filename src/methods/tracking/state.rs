@@ -59,10 +59,10 @@ impl SurfaceTracker {
             return bad("volume", "the state belongs to another volume, box, component or start");
         }
         let Ok(params) = self.with_defaults(state.params) else {
-            return bad("parameters", "they are out of range");
+            return bad("parameters", "out of range");
         };
         if state.faces.len() > self.frames() || !state.faces.iter().all(|faces| self.are_valid(faces)) {
-            return bad("boundary", "it is not in the box");
+            return bad("boundary", "boundary votes outside the box");
         }
         let meshes: Vec<TriangleMesh> = (state.meshes.into_iter())
             .map(|(positions, triangles)| TriangleMesh { positions, triangles, ..TriangleMesh::default() })
@@ -75,17 +75,17 @@ impl SurfaceTracker {
             state.cycle_closure_error.is_none() || params.cyclic && meshes.len() == self.frames();
         let begins_well = !meshes.is_empty() || state.mesh.to_triangles() == self.start.to_triangles();
         if !edge_fits || !closure_fits || !begins_well {
-            return bad("frames", "they are none of this tracker's");
+            return bad("frames", "inconsistent with this tracker");
         }
         if !frames_fit || !boundary_fits || state.edge.is_some() == meshes.is_empty() {
-            return bad("frames", "their parts do not fit each other");
+            return bad("frames", "inconsistent");
         }
         if !can_be_checked(&state.mesh)
             || state.mesh.attribute_counts() != self.start.attribute_counts()
             || state.mesh.check().is_err()
             || meshes.iter().any(|mesh| mesh.validate().is_err())
         {
-            return bad("surface", "its parts do not fit each other");
+            return bad("surface", "inconsistent");
         }
         self.params = params;
         self.restart();
