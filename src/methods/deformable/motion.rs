@@ -150,7 +150,7 @@ impl Motion {
         let normals = self.forces.normal.clone();
         let (mut x, mut v) = (x0.clone(), v0.clone());
         let mut velocity_change = vec![Vec3::ZERO; x.len()];
-        for (stage, (weight, ahead)) in
+        for (stage, (weight, share)) in
             [(1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)].into_iter().enumerate()
         {
             if stage > 0 {
@@ -161,8 +161,8 @@ impl Motion {
                 let acceleration = (self.forces.force[i] - v[i] * damping) * (1.0 / mass);
                 self.displacements[i] += v[i] * (weight * step / 6.0);
                 velocity_change[i] += acceleration * (weight * step / 6.0);
-                x[i] = x0[i] + v[i] * (ahead * step);
-                v[i] = v0[i] + acceleration * (ahead * step);
+                x[i] = x0[i] + v[i] * (share * step);
+                v[i] = v0[i] + acceleration * (share * step);
             }
         }
         self.forces.normal = normals;

@@ -18,9 +18,9 @@ const COVERED_DISTANCE: f32 = 1.0;
 #[derive(Default)]
 pub(super) struct Renewal {
     /// A vertex of each component to remove from the mesh.
-    pub(super) stale: Vec<VertexId>,
+    pub(super) removed: Vec<VertexId>,
     /// The parts of the finer contour to add instead.
-    pub(super) fresh: Mesh,
+    pub(super) added: Mesh,
 }
 
 impl DeformableModel {
@@ -36,13 +36,13 @@ impl DeformableModel {
         let image = &self.pyramid.levels[level];
         let iso = self.pyramid.normalised(self.params.iso);
         let contour = contour(image, iso, object, self.params.smallest_part)?;
-        let (stale, fresh) =
+        let (removed, added) =
             self.components_to_replace(&contour, COVERED_DISTANCE / image.voxels_per_unit())?;
-        if fresh.triangles.is_empty() {
+        if added.triangles.is_empty() {
             return Ok(Renewal::default());
         }
-        let fresh = simplified(fresh, image, super::delta_at(self.finest_delta, level));
-        Ok(Renewal { stale, fresh: Mesh::from_triangles(&fresh)? })
+        let added = simplified(added, image, super::delta_at(self.finest_delta, level));
+        Ok(Renewal { removed, added: Mesh::from_triangles(&added)? })
     }
 
     /// Returns a vertex of each component of the mesh to remove, and the components of the contour that replace them.
@@ -75,14 +75,14 @@ impl DeformableModel {
             has_contour[group] = true;
             is_renewed[group] |= is_left_out[part as usize];
         }
-        let fresh = contour.parts_where(|v| is_renewed[groups.find(part_of_contour[v as usize] as usize)]);
+        let added = contour.parts_where(|v| is_renewed[groups.find(part_of_contour[v as usize] as usize)]);
         // A component near no contour would be inside of a new component, or around it.
-        let mut is_stale = |v: usize| {
+        let mut is_removed = |v: usize| {
             let group = groups.find(first + v);
             part_of_surface[v] as usize == v && (is_renewed[group] || !has_contour[group])
         };
         let vertices = self.mesh.vertices().enumerate();
-        let stale = vertices.filter(|&(v, _)| is_stale(v)).map(|(_, name)| name).collect();
-        Ok((stale, fresh))
+        let removed = vertices.filter(|&(v, _)| is_removed(v)).map(|(_, name)| name).collect();
+        Ok((removed, added))
     }
 }

@@ -164,7 +164,7 @@ impl DeformableModel {
     fn descend(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         let begin = (self.clock)();
         let renewal = if self.seeds_levels() { self.renewal()? } else { Renewal::default() };
-        let seeds = renewal.fresh.component_count() as u32;
+        let seeds = renewal.added.component_count() as u32;
         let is_renewed = seeds > 0 && self.try_to_renew(&renewal);
         times.add("renewal", (self.clock)() - begin);
         if is_renewed {
@@ -199,10 +199,10 @@ impl DeformableModel {
     /// # Errors
     /// If the new parts do not fit beside the others, or into memory.
     fn descend_renewed(&mut self, renewal: &Renewal) -> Result<(), MethodError> {
-        renewal.stale.iter().for_each(|&v| _ = self.mesh.remove_component(v));
+        renewal.removed.iter().for_each(|&v| _ = self.mesh.remove_component(v));
         self.descend_refined()?;
-        self.check_vertex_limit(&renewal.fresh)?;
-        let added = self.mesh.append(&renewal.fresh)?;
+        self.check_vertex_limit(&renewal.added)?;
+        let added = self.mesh.append(&renewal.added)?;
         self.initialise_attributes(&added);
         self.resolve_contour()?;
         self.mark_checked();

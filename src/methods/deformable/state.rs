@@ -25,7 +25,7 @@ struct State {
     mesh: Mesh,
     waiting: Waiting,
     iteration: u32,
-    rest: Convergence,
+    convergence: Convergence,
     energy: f64,
     fastest: f32,
 }
@@ -43,7 +43,7 @@ impl DeformableModel {
             mesh: self.mesh.clone(),
             waiting: self.resolver.waiting(),
             iteration: self.iteration,
-            rest: self.convergence,
+            convergence: self.convergence,
             energy: self.speed.energy,
             fastest: self.speed.fastest,
         };
@@ -112,7 +112,7 @@ impl DeformableModel {
         next.watch_output();
         next.resolver.set_waiting(state.waiting);
         next.iteration = state.iteration;
-        next.convergence = state.rest;
+        next.convergence = state.convergence;
         next.speed = SpeedSummary { energy: state.energy, fastest: state.fastest };
         next.components = next.mesh.component_count() as u32;
         next.prepare_level()?;

@@ -287,9 +287,9 @@ fn clusters(points: &[Vec3], cell: f32) -> Vec<Vec<u32>> {
 fn neighbours(cell: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
     let [x, y, z] = cell.map(|k| k as i32);
     let steps = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
-    let places =
+    let cells =
         steps.map(move |[dx, dy, dz]| [x.saturating_add(dx), y.saturating_add(dy), z.saturating_add(dz)]);
-    places.map(|place| place.map(|k| k as u32))
+    cells.map(|cell| cell.map(|k| k as u32))
 }
 
 #[cfg(test)]
@@ -306,9 +306,9 @@ pub mod tests {
     /// Returns random points on the unit sphere.
     pub fn on_ball(count: usize) -> Vec<Vec3> {
         let mut random = Random::new(7);
-        let mut place =
+        let mut point =
             || Vec3::new(unit(&mut random), unit(&mut random), unit(&mut random)).normalize_or(Vec3::X);
-        (0..count).map(|_| place()).collect()
+        (0..count).map(|_| point()).collect()
     }
 
     #[test]

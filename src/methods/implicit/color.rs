@@ -219,8 +219,8 @@ impl DepthBuffer {
                 // Triangles that share an edge leave no gap: on it, their factors are exact opposites.
                 if factors.iter().all(|factor| factor.dot(pixel) >= 0.0) {
                     let inverse_depth = sum.dot(pixel).max(limits.start).min(limits.end) as f32;
-                    let there = &mut self.inverse_depth[row * self.width + column];
-                    *there = there.max(inverse_depth);
+                    let stored = &mut self.inverse_depth[row * self.width + column];
+                    *stored = stored.max(inverse_depth);
                 }
             }
         }
@@ -449,7 +449,7 @@ mod tests {
     }
 
     #[test]
-    fn hidden_places_take_no_color_of_what_hides_them() {
+    fn hidden_vertices_take_no_colors_of_occluders() {
         let big = Ball { paint: |_| TEAL, ..UNIT };
         for (gap, size) in [(0.05, 250), (0.05, 1000), (0.3, 100), (1.0, 250)] {
             let small = Ball { centre: DVec3::Z * (1.25 + gap), radius: 0.25, paint: |_| RED };
@@ -506,7 +506,7 @@ mod tests {
     }
 
     #[test]
-    fn unseen_places_take_the_colors_around_them() {
+    fn unseen_vertices_take_the_colors_of_their_neighbours() {
         let halves = Ball { paint: |d| if d.x < 0.0 { RED } else { BLUE }, ..UNIT };
         let aside = Ball { centre: DVec3::Z * 9.0, ..UNIT };
         let surface = joined([halves.mesh(0.1), aside.mesh(0.3)]);

@@ -69,8 +69,8 @@ impl PointEdits {
 
     /// Returns a lookup of the removed points by their positions in the box.
     pub fn removed_positions(&self, original: &[Vec3], map: &BoxMap) -> PositionIndex {
-        let places: Vec<Vec3> = self.removed.iter().map(|&i| map.in_box(original[i as usize])).collect();
-        PositionIndex::new(&places)
+        let positions: Vec<Vec3> = self.removed.iter().map(|&i| map.in_box(original[i as usize])).collect();
+        PositionIndex::new(&positions)
     }
 
     /// Returns `cloud`, which is in the box, without the removed points and with the added ones. As added points have

@@ -15,7 +15,7 @@ const SPHERE: f64 = 1.2;
 /// Number of surface points per exterior point near the surface.
 const SURFACE_POINTS: usize = 10;
 /// Minimum number of exterior points near the surface, for small clouds.
-const LEAST: usize = 30;
+const MIN_POINTS: usize = 30;
 /// Distance of exterior points from the surface, in mean spacings of the points. At 1 they constrain less than noise
 /// does, at 6 they fall into cavities.
 const OFFSET: f32 = 3.0;
@@ -61,7 +61,7 @@ impl Exterior {
 const MAX_OFFSETS: f32 = 1.25;
 
 /// Returns `given` exterior points, in box units, with those on the bounding sphere.
-pub fn given_exterior(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
+pub fn exterior_from_points(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
     Exterior { near: given, offset: 0.0, on_sphere: sphere_around(&cloud.points) }
 }
 
@@ -69,17 +69,17 @@ pub fn given_exterior(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
 ///
 /// They lie towards each camera that sees the surface point; without cameras, along the normals, given or estimated.
 /// Poisson-disc sampling reduces them to one for ten surface points. Those on the bounding sphere are added.
-pub fn made_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: u64) -> Exterior {
-    let wanted = (cloud.len() / SURFACE_POINTS).max(LEAST);
+pub fn generate_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: u64) -> Exterior {
+    let target_count = (cloud.len() / SURFACE_POINTS).max(MIN_POINTS);
     // A few more than wanted, as some will be rejected.
-    let positions = wanted + wanted / 4;
+    let positions = target_count + target_count / 4;
     let directions = outward_directions(cloud, cameras, positions, spacing, seed);
     let offset = [OFFSET * spacing, NOISE * directions.noise, MIN_OFFSET].into_iter().fold(0.0, f32::max);
     let surface = PointGrid::of(&cloud.points, offset);
     let candidates =
         directions.directions.iter().map(|&(i, direction)| cloud.points[i as usize] + direction * offset);
     let outside: Vec<Vec3> = candidates.filter(|&p| !surface.has_within(p, MIN_CLEARANCE * offset)).collect();
-    let kept = subsampled(&outside, wanted, seed).into_iter().map(|i| outside[i as usize]);
+    let kept = subsampled(&outside, target_count, seed).into_iter().map(|i| outside[i as usize]);
     Exterior { near: kept.collect(), offset, on_sphere: sphere_around(&cloud.points) }
 }
 
@@ -157,13 +157,13 @@ fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
     let [min, max] = [bounds.min, bounds.max].map(|corner| corner.as_dvec3());
     let radius = 0.5 * SPHERE * max.distance(min);
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-    let place = |i: usize| {
+    let point = |i: usize| {
         let z = 1.0 - (2 * i + 1) as f64 / SPHERE_POINTS as f64;
         let (across, angle) = ((1.0 - z * z).sqrt(), golden * i as f64);
         let unit = DVec3::new(across * libm::cos(angle), across * libm::sin(angle), z);
         (0.5 * (min + max) + unit * radius).as_vec3()
     };
-    (0..SPHERE_POINTS).map(place).collect()
+    (0..SPHERE_POINTS).map(point).collect()
 }
 
 /// Edge length of an occlusion voxel, in mean spacings: with 1.5 rays pass through the gaps of stereo data, with 6 legs
@@ -276,7 +276,7 @@ mod tests {
             ("both", &known, &cameras),
             ("none", &unknown, &[]),
         ] {
-            let Exterior { near, offset, on_sphere } = made_exterior(cloud, cameras, spacing, 1);
+            let Exterior { near, offset, on_sphere } = generate_exterior(cloud, cameras, spacing, 1);
             println!(
                 "{name}: {} points, nearest {}",
                 near.len(),
@@ -287,7 +287,7 @@ mod tests {
                 assert!(distance(p) > 0.02 && distance(p) < 0.3, "{name}: {p} is {} outside", distance(p));
             }
             assert!(on_sphere.len() == SPHERE_POINTS && on_sphere.iter().all(|p| p.length() > 1.05));
-            let again = made_exterior(cloud, cameras, spacing, 1);
+            let again = generate_exterior(cloud, cameras, spacing, 1);
             assert_eq!((&near, &on_sphere, offset), (&again.near, &again.on_sphere, again.offset));
             // Each is kept with the points it was made from, and dropped if a surface point is added in its position.
             assert_eq!(again.valid_after_edits(&cloud.points, &[]).count(), near.len());
@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn around_everything_evenly() {
+    fn the_bounding_sphere_is_sampled_evenly() {
         let points = [Vec3::new(-1.0, -0.2, 3.0), Vec3::new(1.0, 0.1, 3.4)];
         let sphere = sphere_around(&points);
         let middle = 0.5 * (points[0] + points[1]);

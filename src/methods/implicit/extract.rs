@@ -89,11 +89,11 @@ impl Extraction {
         match &mut self.stage {
             Stage::Extract => {
                 let (field, map, level) = (&mut self.field, &self.map, self.level);
-                let mut places = Vec::new();
+                let mut in_box = Vec::new();
                 let done = self.extractor.advance(SLICE, &mut |points: &[DVec3], values: &mut [f64]| {
-                    places.clear();
-                    places.extend(points.iter().map(|&p| map.in_box_exactly(p)));
-                    field.values(&places, values);
+                    in_box.clear();
+                    in_box.extend(points.iter().map(|&p| map.in_box_exactly(p)));
+                    field.values(&in_box, values);
                     values.iter_mut().for_each(|value| *value -= level);
                 })?;
                 if done {

@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn as_near_as_asked_for() {
+    fn products_have_the_requested_accuracy() {
         // A kernel between two separate segments of a line, a block of rank 1, a zero block, and a block with a single
         // row.
         let far = |i: usize, j: usize| 1.0 / (3.0 + i as f64 * 0.02 + j as f64 * 0.03);

@@ -65,7 +65,7 @@ use crate::mesh::{TriangleMesh, measure as measure_mesh};
 use crate::remesh::Changes;
 use cloud::{BoxMap, MAX_POINTS, MIN_POINTS};
 use color::Coloring;
-use exterior::{Exterior, given_exterior, made_exterior};
+use exterior::{Exterior, exterior_from_points, generate_exterior};
 use extract::{Extraction, default_cell};
 use field::Field;
 use kernel::{Kernel, KernelTable};
@@ -309,13 +309,13 @@ impl ImplicitSurface {
         let Some(samples) = &self.samples else { return Ok(()) };
         let exterior = match &self.options.exterior {
             Some(given) => {
-                given_exterior(&samples.cloud, given.iter().map(|&p| self.map.in_box(p)).collect())
+                exterior_from_points(&samples.cloud, given.iter().map(|&p| self.map.in_box(p)).collect())
             }
             None => {
                 let cameras = self.options.cameras.iter();
                 let cameras: Vec<Camera> =
                     cameras.map(|camera| camera.clone().transformed(&self.map.affine())).collect();
-                made_exterior(&samples.cloud, &cameras, samples.spacing as f32, SEED)
+                generate_exterior(&samples.cloud, &cameras, samples.spacing as f32, SEED)
             }
         };
         let constraints = self.edits.constraints(samples, &exterior, &self.original, &self.map)?;

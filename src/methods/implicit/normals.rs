@@ -145,16 +145,16 @@ fn connected_components(graph: &[Vec<u32>]) -> Vec<Vec<u32>> {
 /// outward normals, it is proportional to the enclosed volume (Gauss's theorem); a negative value shows that all
 /// normals point inwards.
 fn outward_flux(positions: &[Vec3], normals: &[Vec3], part: &[u32]) -> f64 {
-    let place = |i: u32| positions[i as usize].as_dvec3();
-    let middle = part.iter().map(|&i| place(i)).sum::<DVec3>() / part.len() as f64;
-    part.iter().map(|&i| (place(i) - middle).dot(normals[i as usize].as_dvec3())).sum()
+    let position = |i: u32| positions[i as usize].as_dvec3();
+    let middle = part.iter().map(|&i| position(i)).sum::<DVec3>() / part.len() as f64;
+    part.iter().map(|&i| (position(i) - middle).dot(normals[i as usize].as_dvec3())).sum()
 }
 
 /// Orients the normals of the connected component of `start` along a minimum spanning tree over the angle between
 /// normals (Prim's algorithm): each is flipped to agree with the one it is reached from.
 fn propagate(start: u32, graph: &[Vec<u32>], normals: &mut [Vec3], oriented: &mut [bool]) {
-    let mut waiting = BinaryHeap::from([Reverse((0_u32, start, start))]);
-    while let Some(Reverse((_, i, from))) = waiting.pop() {
+    let mut pending = BinaryHeap::from([Reverse((0_u32, start, start))]);
+    while let Some(Reverse((_, i, from))) = pending.pop() {
         if std::mem::replace(&mut oriented[i as usize], true) {
             continue;
         }
@@ -165,7 +165,7 @@ fn propagate(start: u32, graph: &[Vec<u32>], normals: &mut [Vec3], oriented: &mu
         for &j in graph[i as usize].iter().filter(|&&j| !oriented[j as usize]) {
             // Floats of at least 0 have the order of their bits.
             let turn = 1.0 - normal.dot(normals[j as usize]).abs();
-            waiting.push(Reverse(((if turn > 0.0 { turn } else { 0.0 }).to_bits(), j, i)));
+            pending.push(Reverse(((if turn > 0.0 { turn } else { 0.0 }).to_bits(), j, i)));
         }
     }
 }
@@ -246,7 +246,7 @@ mod tests {
 
     /// If the starting normal is wrong, so are all of its component, and the sign of the volume shows it.
     #[test]
-    fn turned_from_any_start() {
+    fn orientation_does_not_depend_on_the_start() {
         let mut random = Random::new(5);
         let positions: Vec<Vec3> = (0..400).map(|_| ball(&mut random).0.as_vec3()).collect();
         let graph = neighbour_graph(&positions, &positions, 0.3);

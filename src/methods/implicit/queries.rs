@@ -80,9 +80,9 @@ impl ImplicitSurface {
         let last = DVec3::from_array(dims.map(|n| (n - 1) as f64));
         let mut fast = FastField::new(solved.field.clone(), corner(DVec3::ZERO), corner(last));
         let level = self.iso_value(solved);
-        let values = sampled(dims, |places, row| {
-            let places: Vec<DVec3> = places.iter().map(|&p| corner(p)).collect();
-            fast.values(&places, row);
+        let values = sampled(dims, |points, row| {
+            let points: Vec<DVec3> = points.iter().map(|&p| corner(p)).collect();
+            fast.values(&points, row);
             row.iter_mut().for_each(|value| *value -= level);
         })?;
         Ok(Volume::new(VolumeInit {
@@ -138,11 +138,11 @@ fn sampled(dims: [usize; 3], mut row: impl FnMut(&[DVec3], &mut [f64])) -> Resul
     let mut values: Vec<f32> = Vec::new();
     let bytes = (count as u64).saturating_mul(4);
     values.try_reserve_exact(count).map_err(|_| VolumeError::TooLarge { bytes })?;
-    let (mut places, mut line) = (vec![DVec3::ZERO; dims[0]], vec![0.0; dims[0]]);
+    let (mut points, mut line) = (vec![DVec3::ZERO; dims[0]], vec![0.0; dims[0]]);
     for at in 0..dims[1] * dims[2] {
         let [y, z] = [at % dims[1], at / dims[1]].map(|k| k as f64);
-        places.iter_mut().enumerate().for_each(|(x, p)| *p = DVec3::new(x as f64, y, z));
-        row(&places, &mut line);
+        points.iter_mut().enumerate().for_each(|(x, p)| *p = DVec3::new(x as f64, y, z));
+        row(&points, &mut line);
         values.extend(line.iter().map(|&value| value as f32));
     }
     Ok(values)

@@ -146,8 +146,8 @@ impl PoissonDisc {
             self.best = std::mem::take(&mut self.kept);
         }
         self.round += 1;
-        let near_enough = count <= self.most && count as f64 >= ACCEPTED_SHARE * self.most as f64;
-        if near_enough || self.round == MAX_RADII {
+        let is_accepted = count <= self.most && count as f64 >= ACCEPTED_SHARE * self.most as f64;
+        if is_accepted || self.round == MAX_RADII {
             let none = self.best.is_empty();
             return Some(if none {
                 self.order[..self.most].to_vec()
@@ -163,8 +163,8 @@ impl PoissonDisc {
     /// Returns the next radius to try. On a surface the number of samples falls with the square of the radius; if the
     /// radius predicted by that is outside the bounds, their midpoint is used, or twice the lower one if there is no upper.
     fn next_radius(&self, count: usize) -> f32 {
-        let wanted = 0.5 * (1.0 + ACCEPTED_SHARE as f32) * self.most as f32;
-        let guess = self.radius * (count as f32 / wanted).sqrt();
+        let target_count = 0.5 * (1.0 + ACCEPTED_SHARE as f32) * self.most as f32;
+        let guess = self.radius * (count as f32 / target_count).sqrt();
         if guess > self.lower && (self.upper == 0.0 || guess < self.upper) {
             guess
         } else if self.upper > 0.0 {
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn nearly_as_many_as_asked_for() {
+    fn subsamples_have_nearly_the_requested_size() {
         let mut uneven = on_ball(3000);
         // Most of them are on a fifth of the sphere.
         uneven.extend(on_ball(30_000).into_iter().filter(|p| p.z > 0.6));

@@ -38,7 +38,7 @@ struct State {
     slices: u32,
     iteration: u32,
     residual: f64,
-    strays: u32,
+    spurious_components: u32,
     solved: Option<Function>,
     surface: Surface,
 }
@@ -76,7 +76,7 @@ impl ImplicitSurface {
                 slices: self.slices,
                 iteration: self.iteration,
                 residual: self.residual,
-                strays: self.spurious_components as u32,
+                spurious_components: self.spurious_components as u32,
                 solved: self.solved.as_ref().map(|solved| Function {
                     kernel: solved.kernel,
                     centres: solved.centres.clone(),
@@ -132,7 +132,7 @@ impl ImplicitSurface {
             next.solved = Some(Solved::new(kernel, centres, solution, mean));
         }
         next.replay(state.saved_stage, state.slices)?;
-        next.spurious_components = state.strays as usize;
+        next.spurious_components = state.spurious_components as usize;
         next.iteration = state.iteration;
         next.residual = state.residual;
         next.version = self.version;

@@ -3,7 +3,7 @@
 
 use super::TOLERANCE;
 use super::correspondence::{BasePoint, normal_at};
-use super::detail::{Band, MAX_BANDS, reach};
+use super::detail::{Band, MAX_BANDS, search_distance};
 use super::ellipsoid::Ellipsoid;
 use super::membrane::{residual, solve};
 use super::params::MultiresParams;
@@ -84,14 +84,14 @@ fn is_embedded(mesh: &Mesh) -> bool {
 /// its back.
 fn missed_share(coarse: &Rc<Band>, bands: &[Rc<Band>]) -> f64 {
     let Some(fine) = bands.last() else { return 0.0 };
-    let reach = reach(coarse, fine);
+    let search_distance = search_distance(coarse, fine);
     let count = coarse.walker.mesh().positions.len();
     let missed = (0..coarse.walker.mesh().triangles.len()).filter(|&t| {
         let third = Vec3::splat(1.0 / 3.0);
         let [a, b, c] = coarse.walker.corners(t as u32);
         let at = BasePoint { triangle: t as u32, weights: third, point: (a + b + c) * third };
         let outward = normal_at(&coarse.walker, &coarse.normals, &at);
-        let hit = fine.walker.tree().line_hit(at.point, outward, reach);
+        let hit = fine.walker.tree().line_hit(at.point, outward, search_distance);
         let faces_back = |found: SurfacePoint| {
             normal_at(&fine.walker, &fine.normals, &found.into()).dot((b - a).cross(c - a)) <= 0.0
         };
@@ -117,8 +117,8 @@ fn union_of(ellipsoids: &[Ellipsoid], edge: f64) -> Result<TriangleMesh, MethodE
     let centre = ellipsoids.iter().map(|e| e.center).sum::<DVec3>() / ellipsoids.len() as f64;
     let shortest_axis = ellipsoids.iter().map(Ellipsoid::shortest_axis).fold(f64::MAX, f64::min);
     let cell = edge.min(CELL * shortest_axis);
-    let reach = |e: &Ellipsoid| e.center.distance(centre) + e.lengths.max_element();
-    let radius = ellipsoids.iter().map(reach).fold(0.0, f64::max) + 2.0 * cell;
+    let extent = |e: &Ellipsoid| e.center.distance(centre) + e.lengths.max_element();
+    let radius = ellipsoids.iter().map(extent).fold(0.0, f64::max) + 2.0 * cell;
     let nodes = (2.0 * radius / cell).ceil() + 1.0;
     if nodes > MAX_NODES {
         let problem = format!(

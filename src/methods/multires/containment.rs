@@ -8,14 +8,14 @@ use crate::mesh::Mesh;
 /// Returns for each ellipsoid whether its centre is inside the closed mesh, by the parity of the hits of a ray from it.
 /// Used to detect a membrane that has slipped off an ellipsoid.
 pub(super) fn contains_centres(mesh: &Mesh, ellipsoids: &[Ellipsoid]) -> Vec<bool> {
-    let centres: Vec<[f32; 2]> = ellipsoids.iter().map(|e| seen_along_ray(e.center.as_vec3())).collect();
-    let projected: Vec<[f32; 2]> = mesh.positions().iter().map(|&p| seen_along_ray(p)).collect();
+    let centres: Vec<[f32; 2]> = ellipsoids.iter().map(|e| project_along_ray(e.center.as_vec3())).collect();
+    let projected: Vec<[f32; 2]> = mesh.positions().iter().map(|&p| project_along_ray(p)).collect();
     let rays: Vec<Line> = ellipsoids.iter().map(|e| Line::new(e.center, RAY)).collect();
     let mut inside = vec![false; ellipsoids.len()];
     for corners in mesh.triangles() {
-        let seen = corners.map(|v| projected[v.index()]);
+        let projected_corners = corners.map(|v| projected[v.index()]);
         for (k, centre) in centres.iter().enumerate() {
-            if may_cover(&seen, centre) {
+            if may_cover(&projected_corners, centre) {
                 inside[k] ^= rays[k].hit(mesh.facet(corners).points).is_some_and(|hit| hit.distance >= 0.0);
             }
         }
@@ -31,7 +31,7 @@ const RAY: DVec3 = DVec3::new(0.5772, 0.6929, 0.4318);
 const ACROSS: [Vec3; 2] = [Vec3::new(-0.6929, 0.5772, 0.0), Vec3::new(-0.2492, -0.2992, 0.8132)];
 
 /// Projects a point along the ray, to two coordinates.
-fn seen_along_ray(p: Vec3) -> [f32; 2] {
+fn project_along_ray(p: Vec3) -> [f32; 2] {
     ACROSS.map(|axis| axis.dot(p))
 }
 
@@ -67,10 +67,10 @@ mod tests {
         };
         let ellipsoids: Vec<Ellipsoid> = centres.iter().map(|at| Ellipsoid::new(&tiny(at))).collect();
         let far = |e: &Ellipsoid| (e.center.distance(DVec3::new(50.0, 0.0, 0.0)) - 1.0).abs() > 0.01;
-        for (e, is_held) in
+        for (e, is_contained) in
             ellipsoids.iter().zip(contains_centres(&mesh, &ellipsoids)).filter(|(e, _)| far(e))
         {
-            assert_eq!(is_held, e.center.distance(DVec3::new(50.0, 0.0, 0.0)) < 1.0, "{}", e.center);
+            assert_eq!(is_contained, e.center.distance(DVec3::new(50.0, 0.0, 0.0)) < 1.0, "{}", e.center);
         }
     }
 

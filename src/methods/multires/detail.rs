@@ -37,7 +37,7 @@ pub(super) struct Bands {
 #[derive(Clone, Debug)]
 struct BandLookup {
     /// The largest distance of a hit; farther ones belong to another part of the surface.
-    reach: f64,
+    search_distance: f64,
     prisms: PrismLookup,
 }
 
@@ -45,8 +45,8 @@ impl Bands {
     /// Prepares the surfaces of a decomposition, from coarse to fine; the first is the base.
     pub fn new(all: Vec<Rc<Band>>) -> Self {
         let lookup = |pair: &[Rc<Band>]| {
-            let reach = reach(&pair[0], &pair[1]);
-            BandLookup { reach, prisms: PrismLookup::new(&pair[0], &pair[1], reach) }
+            let search_distance = search_distance(&pair[0], &pair[1]);
+            BandLookup { search_distance, prisms: PrismLookup::new(&pair[0], &pair[1], search_distance) }
         };
         Self { lookups: all.windows(2).map(lookup).collect(), all }
     }
@@ -63,26 +63,26 @@ impl Bands {
     /// along the normal.
     pub fn detail_at(&self, at: &BasePoint) -> Detail {
         let mut detail = Detail { last: *at, ..NOTHING };
-        for (k, BandLookup { reach, prisms }) in self.lookups.iter().enumerate() {
+        for (k, BandLookup { search_distance, prisms }) in self.lookups.iter().enumerate() {
             let (from, to) = (&self.all[k], &self.all[k + 1]);
             let normal = normal_at(&from.walker, &from.normals, &detail.last);
-            let met = prisms.line_hit(to, &detail.last, normal, *reach);
-            (detail.lambdas[k], detail.last) = met.map_or_else(
+            let hit = prisms.line_hit(to, &detail.last, normal, *search_distance);
+            (detail.lambdas[k], detail.last) = hit.map_or_else(
                 || to.closest_fallback(detail.last.point, normal),
                 |found| (found.distance as f32, found.into()),
             );
-            detail.is_missed |= met.is_none();
+            detail.is_missed |= hit.is_none();
         }
         detail
     }
 }
 
 /// The search distance along a normal, as a multiple of the largest distance between the two surfaces.
-const REACH: f64 = 2.0;
+const SEARCH_FACTOR: f64 = 2.0;
 
 /// Returns the search distance for hits along the normals of `from` on `to`.
-pub(super) fn reach(from: &Band, to: &Band) -> f64 {
-    REACH * hausdorff_bound(from, to)
+pub(super) fn search_distance(from: &Band, to: &Band) -> f64 {
+    SEARCH_FACTOR * hausdorff_bound(from, to)
 }
 
 /// Maximum number of bands above the base.
@@ -142,19 +142,19 @@ pub(super) struct DetailSampling {
 /// Vertices move only as far as no triangles intersect.
 pub(super) fn detailed(
     surface: &Mesh,
-    link: &Correspondence,
+    correspondence: &Correspondence,
     bands: &Bands,
     guard: &mut Embedding,
     sampling: DetailSampling,
 ) -> Detailed {
-    let mut fine = DetailSamples::new(surface, link, bands);
+    let mut fine = DetailSamples::new(surface, correspondence, bands);
     for _ in 0..sampling.rounds {
         fine.refine(bands, sampling.longest);
     }
     let detailed = displace(fine, bands, guard);
     if sampling.rounds > 0 && guard.left_crossing(&detailed.mesh) {
         // A part of the membrane is so small that rounding dominates: edge midpoints then cause intersections.
-        return displace(DetailSamples::new(surface, link, bands), bands, guard);
+        return displace(DetailSamples::new(surface, correspondence, bands), bands, guard);
     }
     detailed
 }
@@ -170,11 +170,11 @@ fn displace(samples: DetailSamples, bands: &Bands, guard: &mut Embedding) -> Det
             displacements[v.index()] = normal * detail[v.index()].lambdas[k];
         }
         guard.follow_with(&mesh, super::typical_edge(&mesh));
-        let wanted = displacements.clone();
+        let intended = displacements.clone();
         let back = guard.carry(&mut mesh, &mut displacements);
         held_vertices += back.len();
         if !back.is_empty() {
-            let mut displacements = spread_hold_back(&mesh, &wanted, &back);
+            let mut displacements = spread_hold_back(&mesh, &intended, &back);
             guard.carry(&mut mesh, &mut displacements);
         }
     }
@@ -198,17 +198,17 @@ fn spread_hold_back(mesh: &Mesh, displacements: &[Vec3], held_back: &[(VertexId,
     let mut missing = vec![0.0_f32; mesh.slots()];
     held_back.iter().for_each(|&(v, share)| missing[v.index()] = 1.0 - share);
     let went = missing.clone();
-    let mut around: Vec<VertexId> = held_back.iter().map(|&(v, _)| v).collect();
+    let mut neighbourhood: Vec<VertexId> = held_back.iter().map(|&(v, _)| v).collect();
     for _ in 0..SOFT_RINGS {
-        around.extend(around.clone().iter().flat_map(|&v| mesh.ring(v).as_slice()));
-        around.sort_unstable();
-        around.dedup();
+        neighbourhood.extend(neighbourhood.clone().iter().flat_map(|&v| mesh.ring(v).as_slice()));
+        neighbourhood.sort_unstable();
+        neighbourhood.dedup();
         let mean = |v: VertexId| {
             let ring = mesh.ring(v).as_slice();
             ring.iter().map(|w| missing[w.index()]).sum::<f32>() / ring.len() as f32
         };
-        let spread: Vec<f32> = around.iter().map(|&v| mean(v).max(missing[v.index()])).collect();
-        around.iter().zip(spread).for_each(|(v, share)| missing[v.index()] = share);
+        let spread: Vec<f32> = neighbourhood.iter().map(|&v| mean(v).max(missing[v.index()])).collect();
+        neighbourhood.iter().zip(spread).for_each(|(v, share)| missing[v.index()] = share);
     }
     let back = |(displacement, (before, after)): (&Vec3, (&f32, &f32))| *displacement * (before - after);
     displacements.iter().zip(went.iter().zip(&missing)).map(back).collect()
@@ -227,14 +227,19 @@ struct DetailSamples {
 const MAX_DEVIATION: f32 = 0.04;
 
 impl DetailSamples {
-    fn new(surface: &Mesh, link: &Correspondence, bands: &Bands) -> Self {
+    fn new(surface: &Mesh, correspondence: &Correspondence, bands: &Bands) -> Self {
         let ids = (0..surface.slots()).map(VertexId::from_index);
         let normals = ids.clone().map(|v| surface.area_normal(v).normalize_or_zero()).collect();
         let detail = ids.map(|v| match surface.is_live(v) {
-            true => bands.detail_at(&link[v.index()]),
+            true => bands.detail_at(&correspondence[v.index()]),
             false => NOTHING,
         });
-        Self { details: detail.collect(), mesh: surface.clone(), correspondence: link.clone(), normals }
+        Self {
+            details: detail.collect(),
+            mesh: surface.clone(),
+            correspondence: correspondence.clone(),
+            normals,
+        }
     }
 
     /// Returns the approximate position of a vertex with its detail: all bands along the normal of the deformed base.
@@ -248,18 +253,18 @@ impl DetailSamples {
 
     /// Halves edges that are too long with their detail, or off it at their midpoint, longest first.
     fn refine(&mut self, bands: &Bands, longest: f32) {
-        let mut wanted: Vec<(f32, VertexId, VertexId, Sample)> = Vec::new();
+        let mut splits: Vec<(f32, VertexId, VertexId, Sample)> = Vec::new();
         for (u, v) in self.mesh.edges() {
             let (p, q) = (self.detailed_position(u), self.detailed_position(v));
             let middle = self.middle(bands, u, v);
             let deviation =
                 self.position_with(middle.position, middle.normal, &middle.detail).distance((p + q) * 0.5);
             if p.distance(q) > longest || deviation > MAX_DEVIATION * longest {
-                wanted.push((p.distance_squared(q), u, v, middle));
+                splits.push((p.distance_squared(q), u, v, middle));
             }
         }
-        wanted.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-        for (_, u, v, middle) in wanted {
+        splits.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        for (_, u, v, middle) in splits {
             let Ok(w) = self.mesh.split(u, v, middle.position) else { continue };
             self.correspondence.resize(self.mesh.slots(), UNSET);
             self.normals.resize(self.mesh.slots(), Vec3::ZERO);
@@ -274,12 +279,12 @@ impl DetailSamples {
     fn middle(&self, bands: &Bands, u: VertexId, v: VertexId) -> Sample {
         let (from, to) = (&self.correspondence[u.index()], &self.correspondence[v.index()]);
         let on_base = bands.base().walker.march(from.triangle, (from.point + to.point) * 0.5);
-        let link: BasePoint = on_base.into();
+        let base_point: BasePoint = on_base.into();
         Sample {
             position: (self.mesh.position(u) + self.mesh.position(v)) * 0.5,
             normal: (self.normals[u.index()] + self.normals[v.index()]).normalize_or_zero(),
-            detail: bands.detail_at(&link),
-            base_point: link,
+            detail: bands.detail_at(&base_point),
+            base_point,
         }
     }
 }

@@ -443,7 +443,7 @@ mod tests {
     }
 
     #[test]
-    fn what_spans_no_ellipsoid_is_named() {
+    fn invalid_ellipsoids_are_refused() {
         let good =
             ControlEllipsoid { center: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]] };
         assert_eq!(good.validate(0), Ok(()));

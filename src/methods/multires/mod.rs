@@ -238,7 +238,8 @@ impl MultiresolutionModel {
         check_ellipsoids(given)?;
         check_tips(&given.iter().map(Ellipsoid::new).collect::<Vec<_>>(), self.params.edge_max)?;
         let surface = &self.surface;
-        self.ellipsoids.set_targets(given, |goal| contains_centres(surface, std::slice::from_ref(goal))[0]);
+        self.ellipsoids
+            .set_targets(given, |target| contains_centres(surface, std::slice::from_ref(target))[0]);
         self.residual = f64::NAN;
         Ok(())
     }

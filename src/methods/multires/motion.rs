@@ -36,11 +36,11 @@ pub(super) struct MovingEllipsoids(Vec<MovingEllipsoid>);
 impl MovingEllipsoids {
     /// Creates ellipsoids that are at their targets.
     pub fn new(given: &[ControlEllipsoid]) -> Self {
-        let still = |given| {
+        let at_target = |given| {
             let now = Ellipsoid::new(given);
             MovingEllipsoid { now, target: Some(now) }
         };
-        Self(given.iter().map(still).collect())
+        Self(given.iter().map(at_target).collect())
     }
 
     /// Sets new targets, matched by index. A new ellipsoid starts at a twentieth of its size if the membrane `holds`
@@ -135,19 +135,19 @@ impl MovingEllipsoids {
 fn steps_between(from: &Ellipsoid, to: &Ellipsoid) -> f64 {
     let max_shift = MAX_SHIFT * from.shortest_axis().max(to.shortest_axis());
     let shift = from.center.distance(to.center) / max_shift;
-    let turn = 2.0 * libm::acos(quaternion(from).dot(quaternion(to)).abs().min(1.0)) / MAX_TURN;
+    let turns = 2.0 * libm::acos(quaternion(from).dot(quaternion(to)).abs().min(1.0)) / MAX_TURN;
     let ratios = to.lengths / from.lengths;
     let growth = ratios.max(ratios.recip()).max_element();
-    shift.max(turn).max(libm::log(growth) / libm::log(MAX_GROWTH))
+    shift.max(turns).max(libm::log(growth) / libm::log(MAX_GROWTH))
 }
 
 /// Interpolates between two ellipsoids: centres linearly, orientations about one axis, lengths geometrically.
 fn between(from: &Ellipsoid, to: &Ellipsoid, share: f64) -> Ellipsoid {
-    let turn = slerp(quaternion(from), quaternion(to), share);
+    let rotation = slerp(quaternion(from), quaternion(to), share);
     let lengths = [0, 1, 2].map(|k| from.lengths[k] * libm::pow(to.lengths[k] / from.lengths[k], share));
     Ellipsoid::from(Shape {
         center: from.center.lerp(to.center, share),
-        rotation: DMat3::from_quat(turn),
+        rotation: DMat3::from_quat(rotation),
         lengths: DVec3::from_array(lengths),
     })
 }

@@ -29,12 +29,12 @@ const ROUNDING: f64 = 1e-5;
 const MIN_COSINE: f32 = 0.1;
 
 impl PrismLookup {
-    /// Builds the lists for the triangles of `from` among those of `to`, with prisms no deeper than `reach`.
-    pub fn new(from: &Band, to: &Band, reach: f64) -> Self {
+    /// Builds the lists for the triangles of `from` among those of `to`, with prisms no deeper than `search_distance`.
+    pub fn new(from: &Band, to: &Band, search_distance: f64) -> Self {
         let count = from.walker.mesh().triangles.len();
         let mut prisms = Self { first: vec![0], candidates: Vec::new(), depths: Vec::with_capacity(count) };
         for t in 0..count as u32 {
-            let depth = depth(from, to, reach, t).min(reach);
+            let depth = depth(from, to, search_distance, t).min(search_distance);
             prisms.depths.push(depth as f32);
             if depth > 0.0 {
                 let prism = Prism::new(from, t, depth);
@@ -50,8 +50,14 @@ impl PrismLookup {
     }
 
     /// Returns the intersection with the other surface nearest to a point along its normal, no farther away than
-    /// `reach`. The same result as the tree's, which is queried if the lists have none.
-    pub fn line_hit(&self, to: &Band, at: &BasePoint, normal: Vec3, reach: f64) -> Option<SurfacePoint> {
+    /// `search_distance`. The same result as the tree's, which is queried if the lists have none.
+    pub fn line_hit(
+        &self,
+        to: &Band,
+        at: &BasePoint,
+        normal: Vec3,
+        search_distance: f64,
+    ) -> Option<SurfacePoint> {
         let t = at.triangle as usize;
         let line = Line::new(at.point.as_dvec3(), normal.as_dvec3().try_normalize()?);
         let mut nearest = FirstHit::within(f64::from(self.depths[t]));
@@ -59,17 +65,17 @@ impl PrismLookup {
             nearest.look_at(other, line.hit(to.walker.corners(other)));
         }
         let found = nearest.found(|other| to.walker.corners(other));
-        found.or_else(|| to.walker.tree().line_hit(at.point, normal, reach))
+        found.or_else(|| to.walker.tree().line_hit(at.point, normal, search_distance))
     }
 }
 
 /// Returns the depth of the prism of a triangle; 0 if it gets none.
-fn depth(from: &Band, to: &Band, reach: f64, t: u32) -> f64 {
+fn depth(from: &Band, to: &Band, search_distance: f64, t: u32) -> f64 {
     let third = Vec3::splat(1.0 / 3.0);
     let farthest = [Vec3::X, Vec3::Y, Vec3::Z, third].into_iter().filter_map(|weights| {
         let at = BasePoint::at(&from.walker, t, weights);
         let normal = normal_at(&from.walker, &from.normals, &at);
-        to.walker.tree().line_hit(at.point, normal, reach).map(|hit| hit.distance.abs())
+        to.walker.tree().line_hit(at.point, normal, search_distance).map(|hit| hit.distance.abs())
     });
     let normals = corner_normals(from, t);
     let bends = (0..3).any(|k| normals[k].dot(normals[(k + 1) % 3]) < MIN_COSINE);
@@ -150,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_meet_what_they_meet_in_the_tree() {
+    fn lookups_hit_the_same_triangles_as_the_tree() {
         let (from, to) = pair();
         let prisms = PrismLookup::new(&from, &to, 0.5);
         let count = from.walker.mesh().triangles.len();

@@ -20,7 +20,7 @@ struct State {
     moving: MovingEllipsoids,
     surface: Mesh,
     /// Triangle and barycentric coordinates of the map T, by slot.
-    link: Vec<(u32, Vec3)>,
+    correspondence: Vec<(u32, Vec3)>,
     iteration: u32,
     passing: u32,
     components: u32,
@@ -37,7 +37,7 @@ impl MultiresolutionModel {
                 params: self.params.clone(),
                 moving: self.ellipsoids.clone(),
                 surface: self.surface.clone(),
-                link: self.correspondence.iter().map(|at| (at.triangle, at.weights)).collect(),
+                correspondence: self.correspondence.iter().map(|at| (at.triangle, at.weights)).collect(),
                 iteration: self.iteration,
                 passing: self.refreshed_frames,
                 components: self.components,
@@ -61,10 +61,10 @@ impl MultiresolutionModel {
         }
         let is_valid = can_be_checked(&state.surface) && state.surface.check().is_ok();
         let has_same_attributes = state.surface.attribute_counts() == self.surface.attribute_counts();
-        if !is_valid || !has_same_attributes || state.link.len() != state.surface.slots() {
+        if !is_valid || !has_same_attributes || state.correspondence.len() != state.surface.slots() {
             return bad("surface", "inconsistent");
         }
-        let Some(correspondence) = self.correspondence_of(&state.link) else {
+        let Some(correspondence) = self.correspondence_of(&state.correspondence) else {
             return bad("link", "refers to a missing triangle");
         };
         (self.params, self.ellipsoids, self.correspondence) = (state.params, state.moving, correspondence);

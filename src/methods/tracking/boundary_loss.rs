@@ -107,8 +107,8 @@ impl FrameTracker {
             let mut outer: Vec<VertexId> = ring.filter(|w| depth[w.index()] < depth[v.index()]).collect();
             sort_by_rank(&mut outer, |&w| rank(mesh.position(w).distance_squared(from)).into());
             let drawn = outer.into_iter().any(|w| {
-                let place = mesh.position(w);
-                self.guard.attempt(mesh, |mesh| mesh.collapse(w, v, place)).is_ok()
+                let position = mesh.position(w);
+                self.guard.attempt(mesh, |mesh| mesh.collapse(w, v, position)).is_ok()
             });
             collapsed += u32::from(drawn);
         }

@@ -20,7 +20,7 @@ const MAX_CURVATURE_CORRECTION: f64 = 0.3;
 const UNFOLDINGS: usize = 3;
 
 /// Number of times that the mesh is projected in the first frame: it comes from a grid, not from a tracked frame.
-const FIRST_SETTLINGS: usize = 3;
+const FIRST_FRAME_PASSES: usize = 3;
 
 /// A vertex is on a boundary if intensity falls along its normal by at least this share of τ.
 const MIN_STEP: f64 = 0.3;
@@ -127,8 +127,8 @@ impl FrameTracker {
             Some(from) if context.params.prediction => prediction(mesh, context.region, from),
             _ => vec![Vec3::ZERO; mesh.slots()],
         };
-        for _ in 0..if from.is_some() { 1 } else { FIRST_SETTLINGS } {
-            changes += self.settle(mesh, predicted, context, &mut statistics);
+        for _ in 0..if from.is_some() { 1 } else { FIRST_FRAME_PASSES } {
+            changes += self.project_and_restructure(mesh, predicted, context, &mut statistics);
             predicted = vec![Vec3::ZERO; mesh.slots()];
         }
         self.correct_curvature_bias(mesh, context, &mut statistics);
@@ -140,7 +140,7 @@ impl FrameTracker {
     }
 
     /// Projects the mesh, displaced by `offsets`, onto the surface of a frame, and restores its edge bounds.
-    fn settle(
+    fn project_and_restructure(
         &mut self,
         mesh: &mut Mesh,
         offsets: Vec<Vec3>,

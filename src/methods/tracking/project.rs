@@ -167,18 +167,18 @@ mod tests {
                 let (mut weight, mut first, mut second) = (0.0, [0.0; 4], [0.0; 10]);
                 for (t, faces) in (-5..=5).zip(&frames) {
                     for (direction, face) in (0..4).flat_map(|d| faces[d].iter().map(move |face| (d, face))) {
-                        let (place, later) = region.face(direction, face.voxel);
-                        let way = place - at;
+                        let (position, later) = region.face(direction, face.voxel);
+                        let offset = position - at;
                         let time = (f64::from(t) + f64::from(later)) * C;
                         // Along x the cut-off is at the radius, whatever the other coordinates are.
-                        let across = way.y * way.y + way.z * way.z;
+                        let across = offset.y * offset.y + offset.z * offset.z;
                         let square = radius * radius;
-                        if across >= square || way.x.abs() > radius || time.abs() >= radius {
+                        if across >= square || offset.x.abs() > radius || time.abs() >= radius {
                             continue;
                         }
-                        let r = across + way.x * way.x + time * time;
+                        let r = across + offset.x * offset.x + time * time;
                         let w = f64::from(face.weight) * libm::exp(-4.0 * r / square);
-                        let x = [way.x, way.y, way.z, time];
+                        let x = [offset.x, offset.y, offset.z, time];
                         weight += w;
                         (0..4).for_each(|i| first[i] += w * x[i]);
                         let pairs = (0..4).flat_map(|i| (i..4).map(move |j| (i, j)));
@@ -208,14 +208,14 @@ mod tests {
                     assert!((x - start).cross(normal).length() < 0.05, "{}", x - start);
                 }
                 let (x, _) = samples.project(start, Onto::SpaceTime).unwrap();
-                let way = samples.prediction(x).unwrap();
-                assert!((way - normal * speed).length() < 0.04, "{speed} {way}");
+                let predicted = samples.prediction(x).unwrap();
+                assert!((predicted - normal * speed).length() < 0.04, "{speed} {predicted}");
             }
         }
     }
 
     #[test]
-    fn where_there_are_no_points_or_they_are_too_far_nothing_is_found() {
+    fn projection_fails_without_points_within_reach() {
         let samples = moving_plane(DVec3::X, 10.0, 0.0);
         assert!(samples.project(DVec3::new(1.0, 10.0, 10.0), Onto::SpaceTime).is_none());
         assert!(samples.project(DVec3::new(-500.0, 1e6, 3.0), Onto::Frame).is_none());

@@ -496,10 +496,10 @@ mod tests {
     type Checked = (Vec<(usize, usize)>, Option<f64>);
 
     #[test]
-    fn votes_are_those_of_all_windows_that_hold_both_voxels() {
-        for (frames, reach_in_time, cyclic) in [(1, 0, false), (4, 1, false), (5, 2, true), (2, 2, true)] {
+    fn all_windows_that_contain_both_voxels_vote() {
+        for (frames, frames_each_way, cyclic) in [(1, 0, false), (4, 1, false), (5, 2, true), (2, 2, true)] {
             let region = region([7, 6, 5], frames);
-            let window = Window { half_width: 1, frames: reach_in_time, threshold: 50.0, cyclic };
+            let window = Window { half_width: 1, frames: frames_each_way, threshold: 50.0, cyclic };
             let mut voting = BoundaryVoting::new(window, frames);
             let [nx, ny, nz] = region.dims;
             let count = nx * ny * nz;
@@ -525,8 +525,8 @@ mod tests {
                             continue;
                         }
                         let later = if direction == TIME { t + 1 } else { t };
-                        if later == frames && (!cyclic || reach_in_time == 0)
-                            || direction == TIME && reach_in_time == 0
+                        if later == frames && (!cyclic || frames_each_way == 0)
+                            || direction == TIME && frames_each_way == 0
                         {
                             continue;
                         }

@@ -333,7 +333,7 @@ mod tests {
     }
 
     /// Returns points on the surface, near it, inside, at the rim of the box, and beyond it.
-    fn places(count: usize) -> Vec<DVec3> {
+    fn random_points(count: usize) -> Vec<DVec3> {
         let mut random = Random::new(2);
         (0..count)
             .map(|k| direction(&mut random) * [1.0, 1.001, 1.1, 0.3, 1.9, 6.0, 60.0][k % 7])
@@ -355,7 +355,7 @@ mod tests {
             // Kernels that grow with the distance cancel far away.
             let rounding = if kernel.is_conditional() { 1e-6 } else { 1e-12 };
             let mut fast = FastField::new(exact.clone(), DVec3::splat(-1.5), DVec3::splat(1.5));
-            let at = places(700);
+            let at = random_points(700);
             let mut values = vec![0.0; at.len()];
             fast.values(&at, &mut values);
             let expected: Vec<(f64, DVec3)> = at.iter().map(|&p| exact.value_and_gradient(p)).collect();
@@ -379,7 +379,7 @@ mod tests {
     fn the_same_bits_in_any_order_of_asking() {
         let exact = field(Kernel::MultiOrder { delta: 5.0, tau: 0.025 });
         let new = || FastField::new(exact.clone(), DVec3::splat(-1.5), DVec3::splat(1.5));
-        let at = places(300);
+        let at = random_points(300);
         let (mut values, mut backwards) = (vec![0.0; at.len()], vec![0.0; at.len()]);
         new().values(&at, &mut values);
         let mut other = new();
@@ -391,14 +391,14 @@ mod tests {
     }
 
     #[test]
-    fn few_terms_and_terms_in_one_place() {
+    fn few_terms_and_coincident_terms() {
         let kernel = Kernel::MultiOrder { delta: 5.0, tau: 0.025 };
         for centres in [vec![Vec3::ZERO], (0..200).map(|k| Vec3::X + Vec3::Y * (k as f32 * 1e-6)).collect()] {
             let weights = vec![1.0; centres.len()];
             let solution = Solution { weights, coefficients: vec![0.0] };
             let exact = Field::new(KernelTable::new(kernel), &centres, &solution);
             let mut fast = FastField::new(exact.clone(), DVec3::splat(-1.0), DVec3::splat(1.0));
-            let at = places(70);
+            let at = random_points(70);
             let mut values = vec![0.0; at.len()];
             fast.values(&at, &mut values);
             for (p, value) in at.iter().zip(&values) {

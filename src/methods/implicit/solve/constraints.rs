@@ -82,8 +82,8 @@ impl PositionIndex {
 
     /// Returns the index of the first of the points that equals `p`.
     pub fn find(&self, p: Vec3) -> Option<usize> {
-        let at = self.0.partition_point(|(place, _)| *place < bits(p));
-        self.0.get(at).filter(|(place, _)| *place == bits(p)).map(|&(_, i)| i as usize)
+        let at = self.0.partition_point(|(position, _)| *position < bits(p));
+        self.0.get(at).filter(|(position, _)| *position == bits(p)).map(|&(_, i)| i as usize)
     }
 }
 

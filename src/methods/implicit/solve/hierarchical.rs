@@ -117,8 +117,8 @@ impl<T: MatrixScalar> HierarchicalMatrix<T> {
 
     /// Returns the share of blocks computed.
     pub fn progress(&self) -> f64 {
-        let made = self.blocks.len();
-        made as f64 / (made + self.pending.len()) as f64
+        let done = self.blocks.len();
+        done as f64 / (done + self.pending.len()) as f64
     }
 
     /// Returns the size of all blocks, in bytes.

@@ -168,8 +168,8 @@ impl Solver {
         match &self.stage {
             Stage::Build => 0.7 * self.system.progress(),
             Stage::Iterate(..) => {
-                let wanted = libm::log(ITERATE_TO * self.tolerance);
-                0.7 + 0.25 * (libm::log(self.residual) / wanted).clamp(0.0, 1.0)
+                let target = libm::log(ITERATE_TO * self.tolerance);
+                0.7 + 0.25 * (libm::log(self.residual) / target).clamp(0.0, 1.0)
             }
             Stage::Check(..) | Stage::RecomputeResidual(..) => 0.95,
             Stage::Done(_) => 1.0,
@@ -303,13 +303,13 @@ mod tests {
     /// Returns constraints at points of a bumpy ball, some outside, and 16 around it.
     fn system(count: usize, [surface, outside]: [f64; 2], confidence: bool) -> Constraints {
         let mut random = Random::new(5);
-        let mut place = |size: f64| {
+        let mut point = |size: f64| {
             let d = direction(&mut random);
             (d * size * (0.8 + 0.1 * (8.0 * d.x * d.y * d.z))).as_vec3()
         };
-        let points: Vec<Vec3> = (0..count).map(|_| place(1.0)).collect();
+        let points: Vec<Vec3> = (0..count).map(|_| point(1.0)).collect();
         let sizes = (0..count / 10 + 16).map(|i| if i < count / 10 { 1.1 } else { 2.0 });
-        let far: Vec<Vec3> = sizes.map(&mut place).collect();
+        let far: Vec<Vec3> = sizes.map(&mut point).collect();
         let confidence = confidence.then(|| (0..count).map(|i| 0.02 + (i % 50) as f32 / 51.0).collect());
         let mut constraints = Constraints::new(&Cloud { points, confidence, ..Cloud::default() }, &far);
         constraints.regularize(surface, outside);
@@ -442,11 +442,14 @@ mod tests {
             for lambda in [[0.0, 0.0], [0.001, 2.0]] {
                 let constraints = system(400, lambda, false);
                 for kernel in kernels(constraints.radius()) {
-                    let (solution, told) = solved(&constraints, kernel, tolerance);
+                    let (solution, reported) = solved(&constraints, kernel, tolerance);
                     let found = true_residual(&constraints, kernel, &solution);
-                    println!("{tolerance:e} λ {} {kernel:?}: told {told:e}, true {found:e}", lambda[0]);
+                    println!(
+                        "{tolerance:e} λ {} {kernel:?}: reported {reported:e}, true {found:e}",
+                        lambda[0]
+                    );
                     // The solver uses the kernel's table, which without regularization is off by a few 1e-7 of it.
-                    assert!(told <= tolerance && found <= 1.1 * tolerance + 1e-6);
+                    assert!(reported <= tolerance && found <= 1.1 * tolerance + 1e-6);
                 }
             }
         }
@@ -459,10 +462,13 @@ mod tests {
         let constraints = system(7300, [0.001, 2.0], false);
         for tolerance in [1e-3, 1e-6, 1e-9] {
             let kernel = Kernel::MultiOrder { delta: 5.0, tau: 0.025 };
-            let (solution, told) = solved(&constraints, kernel, tolerance);
+            let (solution, reported) = solved(&constraints, kernel, tolerance);
             let found = true_residual(&constraints, kernel, &solution);
-            println!("{tolerance:e}: told {told:e}, true {found:e}");
-            assert!(told <= tolerance && found <= 1.2 * tolerance, "{tolerance:e}: {told:e}, {found:e}");
+            println!("{tolerance:e}: reported {reported:e}, true {found:e}");
+            assert!(
+                reported <= tolerance && found <= 1.2 * tolerance,
+                "{tolerance:e}: {reported:e}, {found:e}"
+            );
         }
     }
 
@@ -516,7 +522,7 @@ mod tests {
     }
 
     /// Returns the weights of `solution` at those centres that are also in `to`, and 0 at others.
-    fn carried(from: &Constraints, solution: &Solution, to: &Constraints) -> Vec<f64> {
+    fn weights_carried_over(from: &Constraints, solution: &Solution, to: &Constraints) -> Vec<f64> {
         let known = PositionIndex::new(&from.centres);
         to.centres.iter().map(|&c| known.find(c).map_or(0.0, |i| solution.weights[i])).collect()
     }
@@ -539,7 +545,7 @@ mod tests {
                 let mut solver = Solver::new(&base, kernel, 1e-7, 1);
                 let whole = run(&mut solver);
                 let iterations = solver.iterations;
-                let weights = carried(&base, &solver.solution().unwrap(), &changed);
+                let weights = weights_carried_over(&base, &solver.solution().unwrap(), &changed);
                 assert!(solver.revise(&changed, weights));
                 let again = run(&mut solver);
                 let (expected, _) = solved(&changed, kernel, 1e-7);
@@ -576,7 +582,7 @@ mod tests {
         let changed = changed(&base);
         let mut kept = Solver::new(&base, kernel, 1e-6, 1);
         run(&mut kept);
-        let weights = carried(&base, &kept.solution().unwrap(), &changed);
+        let weights = weights_carried_over(&base, &kept.solution().unwrap(), &changed);
         // There and back, and there again; and on a solver that has computed nothing yet.
         for constraints in [&changed, &base, &changed] {
             let start = if constraints.centres == changed.centres {
@@ -587,11 +593,11 @@ mod tests {
             assert!(kept.revise(constraints, start));
             run(&mut kept);
         }
-        let mut fresh = Solver::new(&base, kernel, 1e-6, 1);
-        assert!(fresh.revise(&changed, weights));
-        run(&mut fresh);
-        assert!(kept.solution().unwrap().weights == fresh.solution().unwrap().weights);
-        assert_eq!(kept.position(), fresh.position());
+        let mut rebuilt = Solver::new(&base, kernel, 1e-6, 1);
+        assert!(rebuilt.revise(&changed, weights));
+        run(&mut rebuilt);
+        assert!(kept.solution().unwrap().weights == rebuilt.solution().unwrap().weights);
+        assert_eq!(kept.position(), rebuilt.position());
         // To the same position again, slice by slice.
         let (mut one, mut other) = (Solver::new(&base, kernel, 1e-6, 1), Solver::new(&base, kernel, 1e-6, 1));
         while !one.advance().unwrap() {

@@ -74,9 +74,9 @@ impl SparseInverse {
         0.5 * (self.rows.centres.len() + self.computed) as f64 / self.ordering.centres.len() as f64
     }
 
-    /// Returns the inverse for edited centres, from one that is complete: without those flagged in `gone`, and with
+    /// Returns the inverse for edited centres, from one that is complete: without those flagged in `removed`, and with
     /// those appended to `centres`, each predicted from the nearest of all before it that remain.
-    pub fn revised(&self, gone: &[bool], centres: &[DVec3], lambda: &[f64], table: &KernelTable) -> Self {
+    pub fn revised(&self, removed: &[bool], centres: &[DVec3], lambda: &[f64], table: &KernelTable) -> Self {
         let mut revised = Self {
             rows: Rows::default(),
             ordering: MaximinOrdering::default(),
@@ -84,23 +84,23 @@ impl SparseInverse {
             weights: Vec::new(),
         };
         let mut rest = &self.weights[..];
-        let is_gone = |i: &u32| gone[*i as usize];
+        let is_removed = |i: &u32| removed[*i as usize];
         for (centre, near) in self.rows.iter() {
             let (weights, after) = rest.split_at(near.len() + 1);
             rest = after;
-            if is_gone(&centre) {
+            if is_removed(&centre) {
                 continue;
             }
-            if near.iter().any(is_gone) {
-                let near: Vec<u32> = near.iter().copied().filter(|i| !is_gone(i)).collect();
+            if near.iter().any(is_removed) {
+                let near: Vec<u32> = near.iter().copied().filter(|i| !is_removed(i)).collect();
                 revised.add(centre, &near, centres, lambda, table);
             } else {
                 revised.rows.push(centre, near.iter().copied());
                 revised.weights.extend_from_slice(weights);
             }
         }
-        for added in gone.len()..centres.len() {
-            let near = nearest(&centres[..added], centres[added], |i| i >= gone.len() || !gone[i]);
+        for added in removed.len()..centres.len() {
+            let near = nearest(&centres[..added], centres[added], |i| i >= removed.len() || !removed[i]);
             revised.add(added as u32, &near, centres, lambda, table);
         }
         revised.computed = revised.rows.centres.len();
