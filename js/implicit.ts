@@ -81,7 +81,7 @@ export interface PointEdits {
   /** Points to leave out, by their index in the original points. */
   removed?: Uint32Array;
   /** Additional points known to be outside, packed. */
-  outside?: Float32Array;
+  exterior?: Float32Array;
 }
 
 /** Distances of the points from a surface, in the points' units, and its curvature. */
@@ -247,7 +247,7 @@ export class ImplicitSurface implements Stepper {
     return this.#handle.use((raw) => ({
       added: raw.added(),
       removed: raw.removed(),
-      outside: raw.outside(),
+      exterior: raw.exterior(),
     }));
   }
 
@@ -261,12 +261,12 @@ export class ImplicitSurface implements Stepper {
    *   size, no such index, too few points left, on the surface and outside at once; nothing has changed then.
    */
   setEdits(edits: PointEdits): void {
-    const known = knownOnly('edits', edits, ['added', 'removed', 'outside']) as PointEdits;
-    const { added = new Float32Array(), removed = new Uint32Array(), outside = new Float32Array() } = known;
+    const known = knownOnly('edits', edits, ['added', 'removed', 'exterior']) as PointEdits;
+    const { added = new Float32Array(), removed = new Uint32Array(), exterior = new Float32Array() } = known;
     finite('added', added, 3);
-    finite('outside', outside, 3);
+    finite('exterior', exterior, 3);
     typed('removed', removed, Uint32Array);
-    this.#handle.use((raw) => raw.setEdits(added, removed, outside));
+    this.#handle.use((raw) => raw.setEdits(added, removed, exterior));
   }
 
   /**

@@ -222,9 +222,9 @@ fn implicit_change(
         }
         _ => {
             let mut places = |most| (0..bytes.below(most)).map(|_| bytes.place(2.0).as_vec3()).collect();
-            let (added, outside) = (places(6), places(3));
+            let (added, exterior) = (places(6), places(3));
             let removed = (0..bytes.below(4)).map(|_| bytes.below(count + 1) as u32).collect();
-            surface.set_edits(PointEdits { added, removed, outside })
+            surface.set_edits(PointEdits { added, removed, exterior })
         }
     }
 }

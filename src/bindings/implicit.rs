@@ -154,16 +154,16 @@ impl RawImplicit {
         Ok(())
     }
 
-    /// Sets the manual edits of the points in place of earlier ones: points added and points outside as packed xyz, and
+    /// Sets the manual edits of the points in place of earlier ones: points added and exterior points as packed xyz, and
     /// the indices of points removed.
     #[wasm_bindgen(js_name = setEdits)]
     pub fn set_edits(
         &self,
         added: &Float32Array,
         removed: Vec<u32>,
-        outside: &Float32Array,
+        exterior: &Float32Array,
     ) -> Result<(), JsValue> {
-        let edits = PointEdits { added: points(added)?, removed, outside: points(outside)? };
+        let edits = PointEdits { added: points(added)?, removed, exterior: points(exterior)? };
         self.0.borrow_mut().set_edits(edits).map_err(Failure::from)?;
         Ok(())
     }
@@ -179,8 +179,8 @@ impl RawImplicit {
     }
 
     /// Returns the exterior points that were set manually, as packed xyz.
-    pub fn outside(&self) -> Vec<f32> {
-        packed(&self.0.borrow().edits().outside)
+    pub fn exterior(&self) -> Vec<f32> {
+        packed(&self.0.borrow().edits().exterior)
     }
 
     /// Returns the values of f at packed points.

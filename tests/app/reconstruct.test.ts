@@ -280,7 +280,7 @@ describe('points by hand', () => {
     // In the middle a point was added before.
     await view.press('Enter');
     // Between two of the clicks a run may have come to its end.
-    await expect.poll(() => text('[data-error]')).toMatch(/outside.*also a surface point/);
+    await expect.poll(() => text('[data-error]')).toMatch(/exterior.*also a surface point/);
     await expect.poll(() => text('.edit-tools [role=status]')).toBe('4 points added.');
     await expect.poll(measured).toMatchObject({ surfaceConstraints: 1604, closed: true });
     expect(await address()).not.toContain('outside');
@@ -503,7 +503,7 @@ describe('a link', () => {
     ['maxPoints=2', 'maxPoints'],
     ['keepComponents=1.5', 'keepComponents'],
     ['add=1e30,0,0', 'added'],
-    ['outside=0,0,1e30', 'outside'],
+    ['outside=0,0,1e30', 'exterior'],
   ])('with %s opens its example without the settings, and says why', async (settings, why) => {
     await openAt(`#reconstruct?example=two-balls&${settings}`, 'done');
     expect(await text('.banner')).toMatch(new RegExp(`settings are left out.*${why}`));
@@ -513,7 +513,7 @@ describe('a link', () => {
 
   test('warns where δ is too large for gaps, beside the view', async () => {
     await openAt('#reconstruct?example=torus&p.delta=30', 'done');
-    expect(await app.page.locator('.stage [data-warning]').textContent()).toContain('25 or more');
+    expect(await app.page.locator('.stage [data-warning]').textContent()).toContain('≥ 25');
   });
 
   test('followed in the open page to no example leaves what is open, and its address', async () => {

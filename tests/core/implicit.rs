@@ -366,7 +366,7 @@ fn edited() -> (Vec<Vec3>, PointEdits) {
     let edits = PointEdits {
         added: bump.to_vec(),
         removed: (first..first + 3).collect(),
-        outside: vec![Vec3::new(0.0, 1.03, 0.0)],
+        exterior: vec![Vec3::new(0.0, 1.03, 0.0)],
     };
     (points, edits)
 }
@@ -450,23 +450,23 @@ fn far_from_the_origin_points_by_hand_have_room() {
 #[test]
 fn impossible_edits_are_named_and_change_nothing() {
     let (points, edits) = edited();
-    let on_a_point = PointEdits { outside: vec![Vec3::X, points[7]], ..PointEdits::default() };
+    let on_a_point = PointEdits { exterior: vec![Vec3::X, points[7]], ..PointEdits::default() };
     let mut surface = begun(points.clone(), ImplicitParams::default());
     // Also before anything was chosen.
-    assert_eq!(refused(surface.set_edits(on_a_point)), "outside");
+    assert_eq!(refused(surface.set_edits(on_a_point)), "exterior");
     finish(&mut surface);
     surface.set_edits(edits.clone()).unwrap();
     finish(&mut surface);
     let before = surface.surface().clone();
     let added = |p: Vec3| PointEdits { added: vec![Vec3::X, p], ..PointEdits::default() };
-    let outside = |p: Vec3| PointEdits { outside: vec![p], ..PointEdits::default() };
+    let outside = |p: Vec3| PointEdits { exterior: vec![p], ..PointEdits::default() };
     let removed = |removed: Vec<u32>| PointEdits { removed, ..PointEdits::default() };
     for (name, bad) in [
         ("added", added(Vec3::new(0.0, f32::NAN, 0.0))),
         ("added", added(Vec3::X * 7.0)),
-        ("outside", outside(Vec3::splat(f32::INFINITY))),
-        ("outside", outside(Vec3::Z * -7.0)),
-        ("outside", outside(points[5])),
+        ("exterior", outside(Vec3::splat(f32::INFINITY))),
+        ("exterior", outside(Vec3::Z * -7.0)),
+        ("exterior", outside(points[5])),
         ("removed", removed(vec![3, 803])),
         ("points", removed((0..800).collect())),
     ] {
@@ -713,8 +713,8 @@ fn bad_points_and_options_are_named() {
     let flat: Vec<Vec3> = points.iter().map(|p| Vec3::new(p.x, p.y, 0.5 * p.x - 0.3 * p.y)).collect();
     let line: Vec<Vec3> = points.iter().map(|p| Vec3::ONE * p.x).collect();
     let crowd = vec![Vec3::X; 100_001];
-    let outside = PointEdits { outside: crowd.clone(), ..PointEdits::default() };
-    assert_eq!(refused(new(of_points(points.clone()), options()).unwrap().set_edits(outside)), "outside");
+    let outside = PointEdits { exterior: crowd.clone(), ..PointEdits::default() };
+    assert_eq!(refused(new(of_points(points.clone()), options()).unwrap().set_edits(outside)), "exterior");
     let exterior = ImplicitOptions { exterior: Some(crowd), ..options() };
     assert_eq!(refused(new(of_points(points.clone()), exterior)), "exterior");
     // With a point added where one is outside.

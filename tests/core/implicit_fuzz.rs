@@ -222,9 +222,9 @@ fn edits(surface: &ImplicitSurface, count: usize, random: &mut Random) -> PointE
     if places(5).is_empty() {
         return PointEdits::default();
     }
-    let (added, outside) = (places(300), places(4));
+    let (added, exterior) = (places(300), places(4));
     let removed = (0..random.below(40)).map(|_| random.below(count + 1) as u32).collect();
-    PointEdits { added, removed, outside }
+    PointEdits { added, removed, exterior }
 }
 
 fn change(surface: &mut ImplicitSurface, count: usize, random: &mut Random) -> Result<(), MethodError> {

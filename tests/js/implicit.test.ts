@@ -105,7 +105,7 @@ test('points by hand are live, and come back with a saved state', () => {
   const edits = {
     added: Float32Array.of(0, 0, 1.15, 0, 0.1, 1.14),
     removed: Uint32Array.of(0, 1, 2),
-    outside: Float32Array.of(0, 0, -1.1),
+    exterior: Float32Array.of(0, 0, -1.1),
   };
   const before = found.constraints().surface.length / 3;
   found.setEdits(edits);
@@ -128,7 +128,7 @@ test('points by hand are live, and come back with a saved state', () => {
     ['added', { added: Float32Array.of(0, 0, 9) }],
     ['added', { added: Float32Array.of(0, Number.NaN, 0) }],
     ['added', { added: Float32Array.of(0, 1) }],
-    ['outside', { outside: wrong([0, 0, 1]) }],
+    ['exterior', { exterior: wrong([0, 0, 1]) }],
     ['removed', { removed: Uint32Array.of(1_000_000) }],
     ['removed', { removed: wrong([1]) }],
     ['remove', { remove: Uint32Array.of(1) } as object],

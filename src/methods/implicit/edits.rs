@@ -17,7 +17,7 @@ pub struct PointEdits {
     /// points is used, removed samples are not replaced by others.
     pub removed: Vec<u32>,
     /// Additional points known to be outside, in world units.
-    pub outside: Vec<Vec3>,
+    pub exterior: Vec<Vec3>,
 }
 
 /// Maximum distance, along each axis, of added points from the centre of the input points' bounding box, in half its
@@ -30,7 +30,7 @@ impl PointEdits {
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the list, the entry and what is accepted.
     pub fn validate(&self, original: &[Vec3], map: &BoxMap) -> Result<(), MethodError> {
-        for (name, points) in [("added", &self.added), ("outside", &self.outside)] {
+        for (name, points) in [("added", &self.added), ("exterior", &self.exterior)] {
             check_max_count(name, points.len())?;
             check_finite(name, points)?;
             if let Some(i) =
@@ -56,12 +56,12 @@ impl PointEdits {
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the first point that does.
-    pub fn check_outside(&self, surface: &Cloud, map: &BoxMap) -> Result<(), MethodError> {
+    pub fn check_exterior(&self, surface: &Cloud, map: &BoxMap) -> Result<(), MethodError> {
         let known = PositionIndex::new(&surface.points);
-        match self.outside.iter().position(|&p| known.find(map.in_box(p)).is_some()) {
+        match self.exterior.iter().position(|&p| known.find(map.in_box(p)).is_some()) {
             Some(i) => {
-                let problem = format!("point {i} is {}, which is also a surface point", self.outside[i]);
-                Err(MethodError::invalid("outside", problem))
+                let problem = format!("point {i} is {}, which is also a surface point", self.exterior[i]);
+                Err(MethodError::invalid("exterior", problem))
             }
             None => Ok(()),
         }
@@ -113,7 +113,7 @@ impl PointEdits {
         let all_in_box = |all: &[Vec3]| all.iter().map(|&p| map.in_box(p)).collect::<Vec<Vec3>>();
         let mut outside: Vec<Vec3> =
             exterior.valid_after_edits(&surface.points, &all_in_box(&self.added)).collect();
-        outside.extend(all_in_box(&self.outside));
+        outside.extend(all_in_box(&self.exterior));
         outside.extend(&exterior.on_sphere);
         let outside = Cloud { points: outside, ..Cloud::default() }.distinct().points;
         let constraints = Constraints::new(&surface, &outside);

@@ -507,7 +507,7 @@ impl ImplicitSurface {
         let remaining = edits.apply_to(&self.cloud, &self.original, &self.map);
         remaining.check_count()?;
         remaining.check_span()?;
-        edits.check_outside(&remaining, &self.map)?;
+        edits.check_exterior(&remaining, &self.map)?;
         if edits == self.edits {
             return Ok(());
         }

@@ -36,7 +36,7 @@ export function packed({ added, removed, outside }: Edits): Required<PointEdits>
   return {
     added: Float32Array.from(added.flat()),
     removed: Uint32Array.from(removed),
-    outside: Float32Array.from(outside.flat()),
+    exterior: Float32Array.from(outside.flat()),
   };
 }
 
