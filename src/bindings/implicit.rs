@@ -154,8 +154,8 @@ impl RawImplicit {
         Ok(())
     }
 
-    /// Sets the manual edits of the points in place of earlier ones: points added and exterior points as packed xyz, and
-    /// the indices of points removed.
+    /// Sets the manual edits of the points in place of earlier ones: points added and exterior points as packed xyz,
+    /// and the indices of points removed.
     #[wasm_bindgen(js_name = setEdits)]
     pub fn set_edits(
         &self,

@@ -86,7 +86,17 @@ describe('a heartbeat', () => {
 
   test('is a table with a line a frame', () => {
     const facts: FrameStatistics = {
-      ...{ volume: 2, area: 3, triangles: 4, folded: 5, rejected: 6, heldMoves: 7, withoutBoundary: 8, steps: 9, meanFinalCorrection: 10 },
+      ...{
+        volume: 2,
+        area: 3,
+        triangles: 4,
+        folded: 5,
+        rejected: 6,
+        heldMoves: 7,
+        withoutBoundary: 8,
+        steps: 9,
+        meanFinalCorrection: 10,
+      },
     };
     const frame = { facts, surface: {}, measures: {}, error: { mean: 0.5, most: 1 } };
     const lines = framesCsv([frame] as unknown as Parameters<typeof framesCsv>[0], [2.5]).split('\n');

@@ -162,7 +162,8 @@ test('every frame tells what happened in it, and the volume how noisy it is', ()
   for (const [frame, facts] of one.statistics.entries()) {
     const { area, triangles } = one.meshAt(frame).info();
     expect(facts).toMatchObject({ area, triangles, folded: 0, volume: one.volumes()[frame] });
-    for (const count of [facts.rejected, facts.heldMoves, facts.withoutBoundary]) expect(Number.isInteger(count)).toBe(true);
+    for (const count of [facts.rejected, facts.heldMoves, facts.withoutBoundary])
+      expect(Number.isInteger(count)).toBe(true);
     expect(facts.steps).toBeGreaterThan(0);
     expect(facts.meanFinalCorrection).toBeLessThan(1);
   }

@@ -127,7 +127,13 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
         await surface.constraints(),
         await surface.fitness(),
       ],
-      await Promise.all([surface.cell, surface.spacing, surface.duplicates, surface.spuriousComponents, surface.warning]),
+      await Promise.all([
+        surface.cell,
+        surface.spacing,
+        surface.duplicates,
+        surface.spuriousComponents,
+        surface.warning,
+      ]),
       await Promise.all([surface.evaluate(points), surface.gradient(points), surface.params]),
       [await (await surface.preview()).vertexCount, await next.mesh.arrays()],
     ];
@@ -137,7 +143,14 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
     const tracker = new SurfaceTracker({ volume: await Volume.fromFrames(frames), params: { window: 1 } });
     const { phase } = await tracker.run();
     return [
-      await Promise.all([phase, tracker.frame, tracker.frames, tracker.noise, tracker.cycleClosureError, tracker.statistics]),
+      await Promise.all([
+        phase,
+        tracker.frame,
+        tracker.frames,
+        tracker.noise,
+        tracker.cycleClosureError,
+        tracker.statistics,
+      ]),
       await Promise.all([tracker.boundary(1), tracker.volumes(), tracker.toGlb(), tracker.params]),
       await (await tracker.meshAt(1)).arrays(),
     ];
@@ -158,7 +171,14 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
     return [
       await Promise.all([model.mesh, model.baseMesh, model.linkMesh].map((mesh) => mesh.arrays())),
       await Promise.all((await model.levelMeshes()).map((level) => level.vertexCount)),
-      await Promise.all([model.ellipsoids, model.targets, model.bandCount, model.folded, model.unmatchedVertices, model.heldVertices]),
+      await Promise.all([
+        model.ellipsoids,
+        model.targets,
+        model.bandCount,
+        model.folded,
+        model.unmatchedVertices,
+        model.heldVertices,
+      ]),
       await model.distortion(),
     ];
   },

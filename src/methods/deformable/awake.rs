@@ -26,8 +26,8 @@ pub(super) struct Awake {
 }
 
 impl Awake {
-    /// Collects the vertices with fewer than [`ITERATIONS_TO_SLEEP`] still iterations, or all vertices if `all` is set or few
-    /// sleep.
+    /// Collects the vertices with fewer than [`ITERATIONS_TO_SLEEP`] still iterations, or all vertices if `all` is set
+    /// or few sleep.
     pub(super) fn find(&mut self, mesh: &Mesh, still: ScalarKey, all: bool) {
         let still = mesh.scalar(still);
         self.moving.clear();

@@ -55,8 +55,8 @@ impl<'a> ImageGuide<'a> {
         })
     }
 
-    /// Returns the largest difference of intensity over [`MAX_OFFSET`] along the normals of some vertices. It vanishes inside
-    /// object or background; on the contour it is the tolerance for settled vertices off the contour.
+    /// Returns the largest difference of intensity over [`MAX_OFFSET`] along the normals of some vertices. It vanishes
+    /// inside object or background; on the contour it is the tolerance for settled vertices off the contour.
     fn tolerance(&self, mesh: &Mesh, vertices: &[VertexId]) -> f32 {
         vertices.iter().fold(0.0, |most, &v| {
             let (p, half) = (mesh.position(v), mesh.area_normal(v).normalize_or_zero() * 0.5);

@@ -75,8 +75,8 @@ impl Motion {
 
     /// Moves the vertices by one time step as far as `displace` allows; needs [`Self::prepare`] for the current mesh.
     ///
-    /// `displace` moves vertices by displacements, given by slot, and replaces these by the ones applied. It returns the
-    /// vertices held back, each with the share of its displacement that it moved by.
+    /// `displace` moves vertices by displacements, given by slot, and replaces these by the ones applied. It returns
+    /// the vertices held back, each with the share of its displacement that it moved by.
     pub(super) fn advance(
         &mut self,
         mesh: &mut Mesh,

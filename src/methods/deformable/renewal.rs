@@ -47,8 +47,9 @@ impl DeformableModel {
 
     /// Returns a vertex of each component of the mesh to remove, and the components of the contour that replace them.
     ///
-    /// Components of mesh and contour within `covered_distance` of each other form groups. Groups with a point of the contour
-    /// further than `covered_distance` from the mesh are replaced; components of the mesh near no contour are removed, too.
+    /// Components of mesh and contour within `covered_distance` of each other form groups. Groups with a point of the
+    /// contour further than `covered_distance` from the mesh are replaced; components of the mesh near no contour are
+    /// removed, too.
     fn components_to_replace(
         &self,
         contour: &TriangleMesh,

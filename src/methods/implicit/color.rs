@@ -252,8 +252,8 @@ impl DepthBuffer {
     }
 
     /// Returns the colour of a surface point in the camera's image, and its weight: the cosine between normal and
-    /// direction to the camera, times alpha, at a silhouette times [`SILHOUETTE_WEIGHT`]. `None` if the camera does not see the
-    /// point.
+    /// direction to the camera, times alpha, at a silhouette times [`SILHOUETTE_WEIGHT`]. `None` if the camera does not
+    /// see the point.
     ///
     /// Only those of the four surrounding pixels that show the surface near the point are blended. If one shows
     /// something nearer, the point counts as hidden.
@@ -282,8 +282,8 @@ impl DepthBuffer {
         Some((color, cosine as f32 * alpha * worth))
     }
 
-    /// Returns whether a surface point is at a silhouette: something farther away, or nothing, is [`SILHOUETTE_WIDTH`] pixels
-    /// beside it in the image.
+    /// Returns whether a surface point is at a silhouette: something farther away, or nothing, is [`SILHOUETTE_WIDTH`]
+    /// pixels beside it in the image.
     fn at_silhouette(&self, camera: &Camera, at: Projected, tolerance: f64) -> bool {
         let [width, height] = camera.size().map(|side| side as usize);
         let beyond = at.depth + (SILHOUETTE_WIDTH + 1.0) * tolerance;

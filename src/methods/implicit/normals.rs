@@ -97,7 +97,8 @@ fn flattest_radius(grid: &PointGrid, positions: &[Vec3], spacing: f32) -> (f32, 
     (best.1, best.2)
 }
 
-/// Returns the undirected neighbour graph of `positions`: neighbours along the surface, not across a gap or a thin wall.
+/// Returns the undirected neighbour graph of `positions`: neighbours along the surface, not across a gap or a thin
+/// wall.
 fn neighbour_graph(positions: &[Vec3], normals: &[Vec3], radius: f32) -> Vec<Vec<u32>> {
     let grid = PointGrid::of(positions, radius);
     let near = |&p: &Vec3| grid.nearest(p, NEIGHBOURS + 1, radius).into_iter().map(|(_, i)| i as usize);

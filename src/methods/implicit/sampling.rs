@@ -161,7 +161,8 @@ impl PoissonDisc {
     }
 
     /// Returns the next radius to try. On a surface the number of samples falls with the square of the radius; if the
-    /// radius predicted by that is outside the bounds, their midpoint is used, or twice the lower one if there is no upper.
+    /// radius predicted by that is outside the bounds, their midpoint is used, or twice the lower one if there is no
+    /// upper.
     fn next_radius(&self, count: usize) -> f32 {
         let target_count = 0.5 * (1.0 + ACCEPTED_SHARE as f32) * self.most as f32;
         let guess = self.radius * (count as f32 / target_count).sqrt();

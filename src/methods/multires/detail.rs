@@ -192,8 +192,8 @@ fn displace(samples: DetailSamples, bands: &Bands, guard: &mut Embedding) -> Det
 const SOFT_RINGS: usize = 4;
 
 /// Returns corrections, by slot, that move the neighbours of held-back vertices back as well, less with every ring.
-/// `displacements` are the intended displacements of all vertices, and `held_back` the share of it that each held-back vertex moved
-/// by.
+/// `displacements` are the intended displacements of all vertices, and `held_back` the share of it that each held-back
+/// vertex moved by.
 fn spread_hold_back(mesh: &Mesh, displacements: &[Vec3], held_back: &[(VertexId, f32)]) -> Vec<Vec3> {
     let mut missing = vec![0.0_f32; mesh.slots()];
     held_back.iter().for_each(|&(v, share)| missing[v.index()] = 1.0 - share);

@@ -140,7 +140,7 @@ impl Ellipsoid {
     }
 
     /// Converts the ellipsoid back to the caller's form.
-    pub fn to_control(&self) -> ControlEllipsoid {
+    pub fn control(&self) -> ControlEllipsoid {
         let axis = |k: usize| (self.rotation.col(k) * self.lengths[k]).to_array();
         ControlEllipsoid { center: self.center.to_array(), axes: [axis(0), axis(1), axis(2)] }
     }
@@ -308,7 +308,8 @@ fn push_straight(ellipsoids: &[Ellipsoid], p: DVec3) -> DVec3 {
     p + direction * distance
 }
 
-/// Returns the distance at which a ray leaves the ellipsoid, if it is inside at the distance `distance`; `None` otherwise.
+/// Returns the distance at which a ray leaves the ellipsoid, if it is inside at the distance `distance`; `None`
+/// otherwise.
 fn exit_beyond(e: &Ellipsoid, p: DVec3, direction: DVec3, distance: f64) -> Option<f64> {
     if e.unit(p + direction * distance).length_squared() >= OUTSIDE * OUTSIDE {
         return None;
@@ -447,7 +448,7 @@ mod tests {
         let good =
             ControlEllipsoid { center: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]] };
         assert_eq!(good.validate(0), Ok(()));
-        assert_eq!(Ellipsoid::new(&good).to_control(), good);
+        assert_eq!(Ellipsoid::new(&good).control(), good);
         let spoilt = |change: fn(&mut ControlEllipsoid)| {
             let mut bad = good;
             change(&mut bad);

@@ -3,8 +3,9 @@
 //! Kobbelt, Bareuther & Seidel, *Multiresolution shape deformations for meshes with dynamic vertex connectivity*. A
 //! detailed surface M₁ is split into a smooth base M₀ and the signed distance λ to M₁ along the normals of M₀ (`base`,
 //! `detail`; section 2). The deformed base S is a membrane over control ellipsoids (`ellipsoid`, `motion`), solved from
-//! coarse to fine and remeshed on the way (`membrane`; sections 4 and 5). A map T leads from S back to M₀ (`correspondence`;
-//! section 3), where λ is sampled to reconstruct the detail on S (section 6). Without detail the model is a lava lamp.
+//! coarse to fine and remeshed on the way (`membrane`; sections 4 and 5). A map T leads from S back to M₀
+//! (`correspondence`; section 3), where λ is sampled to reconstruct the detail on S (section 6). Without detail the
+//! model is a lava lamp.
 //!
 //! # Guarantees
 //! After every step the deformed base and the detailed surface are closed, oriented 2-manifolds without
@@ -246,12 +247,12 @@ impl MultiresolutionModel {
 
     /// Returns the ellipsoids at their current positions, including those that are being removed.
     pub fn ellipsoids(&self) -> Vec<ControlEllipsoid> {
-        self.ellipsoids.now().iter().map(Ellipsoid::to_control).collect()
+        self.ellipsoids.now().iter().map(Ellipsoid::control).collect()
     }
 
     /// Returns the target ellipsoids.
     pub fn targets(&self) -> Vec<ControlEllipsoid> {
-        self.ellipsoids.targets().iter().map(Ellipsoid::to_control).collect()
+        self.ellipsoids.targets().iter().map(Ellipsoid::control).collect()
     }
 
     /// Counts the triangles of the deformed base whose image on the base M₀ under T is flipped or has no area.

@@ -80,7 +80,7 @@ impl MovingEllipsoids {
     /// Whether all are valid ellipsoids; those of a saved state may not be.
     pub fn are_valid(&self) -> bool {
         let all = self.0.iter().flat_map(|ellipsoid| std::iter::once(ellipsoid.now).chain(ellipsoid.target));
-        !self.0.is_empty() && all.into_iter().all(|e| e.to_control().validate(0).is_ok())
+        !self.0.is_empty() && all.into_iter().all(|e| e.control().validate(0).is_ok())
     }
 
     /// Returns all ellipsoids in their current state.

@@ -122,8 +122,8 @@ fn without_boundary(mesh: &Mesh, context: &FrameContext) -> Vec<(VertexId, Suppo
     mesh.vertices().map(support).filter(|(_, support)| *support != Support::Boundary).collect()
 }
 
-/// Returns the vertices among `without_boundary` that are on a sheet: another one close by faces the opposite way. In ascending
-/// order.
+/// Returns the vertices among `without_boundary` that are on a sheet: another one close by faces the opposite way. In
+/// ascending order.
 fn on_sheets(mesh: &Mesh, without_boundary: &[(VertexId, Support)], context: &FrameContext) -> Vec<VertexId> {
     let thickness = (THICKNESS * context.region.spacing.min_element()) as f32;
     let positions: Vec<Vec3> = without_boundary.iter().map(|&(v, _)| mesh.position(v)).collect();

@@ -79,8 +79,8 @@ pub(super) fn label_bright(
     Some(reconstructed.iter().zip(levels).map(|(value, level)| *value > level).collect())
 }
 
-/// As [`label_bright`], by comparing each intensity with the middle of the step at the nearest wall. Needs no solve, but is
-/// only right where the signal is as strong as at that wall.
+/// As [`label_bright`], by comparing each intensity with the middle of the step at the nearest wall. Needs no solve,
+/// but is only right where the signal is as strong as at that wall.
 pub(super) fn label_bright_by_level(
     region: &Region,
     frame: usize,

@@ -71,7 +71,17 @@ export function moreOf({ frames, count, frame, closing, noise }: Tracked): Recor
 }
 
 const COLUMNS = [
-  ...['volume', 'area', 'triangles', 'folded', 'rejected', 'heldMoves', 'withoutBoundary', 'steps', 'meanFinalCorrection'],
+  ...[
+    'volume',
+    'area',
+    'triangles',
+    'folded',
+    'rejected',
+    'heldMoves',
+    'withoutBoundary',
+    'steps',
+    'meanFinalCorrection',
+  ],
 ] as const;
 
 /** Returns the data of all tracked frames as CSV, one line per frame, in world units. */

@@ -122,7 +122,8 @@ export class TrackComparePanel {
 
 /** Returns the figures of the table, also for other programs. */
 function summary({ name, facts, closing, error, took }: ComparedRun) {
-  const mean = (of: (one: FrameStatistics) => number) => facts.reduce((sum, one) => sum + of(one), 0) / (facts.length || 1);
+  const mean = (of: (one: FrameStatistics) => number) =>
+    facts.reduce((sum, one) => sum + of(one), 0) / (facts.length || 1);
   const later = facts.slice(1);
   const rest = later.reduce((sum, { meanFinalCorrection }) => sum + meanFinalCorrection, 0) / (later.length || 1);
   const steps = later.reduce((sum, one) => sum + one.steps, 0) / (later.length || 1);

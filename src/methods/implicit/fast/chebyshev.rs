@@ -80,7 +80,7 @@ impl Chebyshev {
 
     /// Interpolates values at the nodes of a cube at the nodes of one of its octants (the local-to-local translation);
     /// `half` is the side of the octant, 0 or 1, along each axis.
-    pub fn to_octant(&self, whole: &Nodal, half: [usize; 3]) -> Nodal {
+    pub fn local_to_local(&self, whole: &Nodal, half: [usize; 3]) -> Nodal {
         let mut values = whole.map(f64::from);
         for (axis, side) in half.into_iter().enumerate() {
             values = apply_along(&values, axis, |to, from| self.halves[side][to][from]);
@@ -89,8 +89,8 @@ impl Chebyshev {
     }
 
     /// Moves sources at the nodes of an octant to the nodes of the whole cube (the multipole-to-multipole translation),
-    /// by the transpose of [`Self::to_octant`].
-    pub fn from_octant(&self, part: &Nodal, half: [usize; 3]) -> Nodal {
+    /// by the transpose of [`Self::local_to_local`].
+    pub fn multipole_to_multipole(&self, part: &Nodal, half: [usize; 3]) -> Nodal {
         let mut values = part.map(f64::from);
         for (axis, side) in half.into_iter().enumerate() {
             values = apply_along(&values, axis, |to, from| self.halves[side][from][to]);

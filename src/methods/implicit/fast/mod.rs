@@ -226,7 +226,8 @@ impl FastField {
         for (at, &number) in below.source_ids.iter().enumerate().filter(|(_, number)| **number != NONE) {
             let side = below.side as usize;
             let cube = [at % side, at / side % side, at / (side * side)];
-            let moved = self.chebyshev.from_octant(&below.sources[number as usize], cube.map(|k| k % 2));
+            let moved =
+                self.chebyshev.multipole_to_multipole(&below.sources[number as usize], cube.map(|k| k % 2));
             let Some(slot) = here.index(cube.map(|k| (k / 2) as i32)) else { continue };
             if here.source_ids[slot] == NONE {
                 here.source_ids[slot] = here.sources.len() as u32;
@@ -273,7 +274,7 @@ impl FastField {
             let parent = self.target(level - 1, cube.map(|k| k / 2));
             nodal = self
                 .chebyshev
-                .to_octant(&self.levels[level - 1].targets[parent], cube.map(|k| (k % 2) as usize));
+                .local_to_local(&self.levels[level - 1].targets[parent], cube.map(|k| (k % 2) as usize));
         }
         let here = &self.levels[level];
         for offset in far_offsets(cube) {

@@ -34,9 +34,9 @@ impl Constraints {
         }
     }
 
-    /// Sets λ: `outside` for exterior constraints, `surface` divided by the confidence for surface constraints. From 3,000
-    /// surface constraints on, their λ grows in proportion to their number, so that more points give a better surface and
-    /// not a rougher one.
+    /// Sets λ: `outside` for exterior constraints, `surface` divided by the confidence for surface constraints. From
+    /// 3,000 surface constraints on, their λ grows in proportion to their number, so that more points give a better
+    /// surface and not a rougher one.
     pub fn regularize(&mut self, surface: f64, outside: f64) {
         let crowd = self.surface as f64 / USUAL_POINTS;
         let surface = if crowd > 1.0 { surface * crowd } else { surface };
