@@ -142,7 +142,7 @@ struct Keys {
     velocity: VectorKey,
     /// The position at the last check of edge bounds and contacts.
     checked_position: VectorKey,
-    /// The number of still iterations in a row; from [`awake::PATIENCE`] on the vertex sleeps.
+    /// The number of still iterations in a row; from [`awake::ITERATIONS_TO_SLEEP`] on the vertex sleeps.
     still_iterations: ScalarKey,
     /// The number of iterations since an edit made or displaced the vertex.
     since_edit: ScalarKey,

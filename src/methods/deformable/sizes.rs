@@ -4,7 +4,7 @@
 //! sagitta. It is measured in the image, also where the ends have not settled: their own offsets are subtracted. It
 //! bounds the length of an edge that stays near the contour. Where a wall or a gap is thin, edges are no longer than
 //! with uniform δ, since sheets whose edges are longer than their distance are cut. They need not be shorter, since
-//! [`super::contact`] keeps the sheets apart. The paper has uniform δ and names this as future work.
+//! [`super::image_guide`] keeps the sheets apart. The paper has uniform δ and names this as future work.
 
 use super::DeformableModel;
 use super::contour::ObjectIs;

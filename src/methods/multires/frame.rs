@@ -3,9 +3,9 @@
 use super::containment::contains_centres;
 use super::correspondence::{BasePoint, Current, distribute, project, unfold};
 use super::ellipsoid::{Ellipsoid, move_with};
-use super::guarded::{cut_threads, displacements_to, move_guarded};
 use super::membrane::{pushed_positions, refresh, residual, solve};
 use super::setup::check_size;
+use super::topology::{cut_threads, displacements_to, move_guarded};
 use super::{MAX_VERTICES, MultiresParams, MultiresolutionModel, TOLERANCE, area, mean_edge, typical_edge};
 use crate::mesh::{Mesh, VertexId, measure};
 use crate::methods::{MethodError, Times};

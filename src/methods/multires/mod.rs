@@ -22,7 +22,6 @@ mod detail;
 mod distortion;
 mod ellipsoid;
 mod frame;
-mod guarded;
 mod membrane;
 mod motion;
 mod params;
@@ -30,6 +29,7 @@ mod prisms;
 mod setup;
 mod state;
 mod texture;
+mod topology;
 
 pub use distortion::Distortion;
 pub use ellipsoid::ControlEllipsoid;
@@ -43,10 +43,10 @@ use containment::contains_centres;
 use correspondence::{Correspondence, Current, folded, project};
 use detail::{Bands, DetailSampling, Detailed, detailed};
 use ellipsoid::{Ellipsoid, check_ellipsoids, check_tips};
-use guarded::displacements_to;
 use membrane::{pushed_positions, solve_with};
 use motion::MovingEllipsoids;
 use setup::{check_size, identity, set_up};
+use topology::displacements_to;
 
 /// Options to create a [`MultiresolutionModel`].
 #[derive(Clone, Debug, Default)]
