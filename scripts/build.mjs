@@ -1,4 +1,5 @@
-// Fills pkg/ with the npm package: the wasm module, its glue, the TypeScript face and the papers around it.
+// Fills pkg/ with the npm package: the wasm module, its glue code, the TypeScript layer, and the documents that go with
+// it.
 
 import { createHash } from 'node:crypto';
 import { existsSync } from 'node:fs';
@@ -9,18 +10,18 @@ import { writeNotices } from './licences.mjs';
 import { setup } from './setup.mjs';
 import { at, must, say, script, startedAs, tool } from './shell.mjs';
 
-// The module is compiled with vectors and, for engines without them, plain. Glue and optimised module are kept between builds:
-// both depend on the compiled module alone.
+// The module is compiled twice: with SIMD and, for engines without it, plain. Glue code and optimised module are kept
+// between builds; both depend on the compiled module alone.
 const WITH_VECTORS = { target: 'target', glue: 'target/glue', module: 'vesicle_bg.wasm', env: {} };
 const PLAIN = {
   ...{ target: 'target/plain', glue: 'target/plain-glue', module: 'vesicle_plain_bg.wasm' },
-  // After what .cargo/config.toml says of the target: the last word counts.
+  // Follows the flags of .cargo/config.toml, and the last flag wins.
   env: { CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS: '-Ctarget-feature=-simd128' },
 };
 
 const compiled = ({ target }) => at(target, 'wasm32-unknown-unknown/release/vesicle.wasm');
 
-// What the README links to comes along.
+// Documents that the README links to.
 const PAPERS = [
   'LICENSE-MIT',
   'LICENSE-APACHE',
@@ -38,7 +39,7 @@ const PAPERS = [
   'docs/fuzzing.md',
 ];
 
-// Between the package and other people's: `vesicle/three` and so on.
+// Adapters between the package and other libraries: `vesicle/three` and so on.
 const ADAPTERS = ['three', 'niivue', 'vtk'];
 
 async function compile({ target, env }) {
@@ -69,16 +70,16 @@ async function makeGlue(kind) {
   await rm(at(kind.glue), { recursive: true, force: true });
   await must('cargo', [
     ...['run', '--locked', '--quiet', '--package', 'xtask', '--', 'bindgen', compiled(kind)],
-    // A trap loses the instance; the reset function lets a page start a new one without reloading.
+    // A trap makes the instance unusable; the reset function lets a page start a new one without reloading.
     ...['--target', 'web', '--out-dir', at(kind.glue), '--experimental-reset-state-function'],
-    // The face says where the module is, so that a bundler meets only one address of it.
+    // The TypeScript layer names the address of the module, so that a bundler meets only one.
     ...['--omit-default-module-path', '--remove-producers-section'],
   ]);
   await optimise(at(kind.glue, 'vesicle_bg.wasm'));
   await writeFile(stampFile, wanted);
 }
 
-/** Both modules are called by the same glue. */
+/** Fails unless both modules have the same glue code. */
 async function compareGlue() {
   const [one, other] = await Promise.all(
     [WITH_VECTORS, PLAIN].map(({ glue }) => readFile(at(glue, 'vesicle.js'), 'utf8')),
@@ -134,10 +135,10 @@ async function manifest() {
   };
 }
 
-/** The whole package; fast where nothing changed. */
+/** Builds the whole package; fast if nothing changed. */
 export async function build() {
   const started = performance.now();
-  // Side by side: each is linked by one thread.
+  // In parallel: each is linked by one thread.
   await Promise.all([WITH_VECTORS, PLAIN].map(compile));
   for (const kind of [WITH_VECTORS, PLAIN]) await makeGlue(kind);
   await compareGlue();

@@ -52,7 +52,7 @@ def write_nifti(voxels, affine, name):
     image.set_qform(affine, 1)
     image.header.set_xyzt_units("mm", "sec")
     image.header["descrip"] = b"Visible Human male, CT; NLM, public domain"
-    # A fixed time in the gzip header: the same input gives the same bytes.
+    # A fixed time in the gzip header, so that the same input gives the same bytes.
     (OUT / name).write_bytes(gzip.compress(image.to_bytes(), 9, mtime=0))
 
 

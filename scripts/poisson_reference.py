@@ -1,4 +1,4 @@
-"""Prints how far screened Poisson surface reconstruction, given the true normals, is from shapes that are known.
+"""Prints the errors of screened Poisson surface reconstruction, given the true normals, on known shapes.
 
     pip install pymeshlab==2025.7.post1 numpy==2.4.6
     cargo test --release --test core implicit_accuracy -- --ignored
@@ -25,7 +25,7 @@ import pymeshlab
 DEPTHS = [5, 6, 7, 8, 9]
 
 
-# The shapes of tests/common/points.rs: near the surface their functions are distances, but for the blend.
+# The shapes of tests/common/points.rs: signed distances near the surface, except for the blend.
 def sphere(p):
     return np.linalg.norm(p, axis=1) - 1
 
