@@ -1,27 +1,26 @@
-"""Times other people's software on the data of our own bench, and prints what came of it as JSON.
+"""Times other software on the data of our own benches, and prints the results as JSON.
 
     python3 bench/peers.py <job.json>
 
-`npm run bench -- peers` writes the job, runs this and puts our own figures of the same run beside it. Nothing is installed
-here: a package that is not there is skipped with a word. All of them together:
+`npm run bench -- peers` writes the job, runs this script and prints our own figures of the same run beside its results. It installs
+nothing: packages that are missing are skipped with a message. To install all of them:
 
     pip install vtk scikit-image SimpleITK scipy pymeshlab cgal numpy
 
-How far things can be compared:
+Limits of the comparison:
 
-- All of these are native code. Ours is WebAssembly, where it is not said to be native.
-- Ours has one thread. So have these here: VTK, ITK, OpenMP and BLAS are told so before they start.
+- All of these packages are native code. Ours is WebAssembly, unless it is said to be native.
+- Ours has one thread. So have these: VTK, ITK, OpenMP and BLAS are limited to one thread before they start.
 - Reading files and converting arrays is not timed, on either side.
-- Flying edges and marching cubes take the same voxels and the same value. Those of scikit-image make normals, too.
+- Flying edges and marching cubes use the same voxels and the same iso value. Those of scikit-image compute normals as well.
 - A level set is not a mesh, and may stop farther from the object: it is done when the root mean square of its changes falls
-  below ITK's own default. It is given a start 5 mm around the object, ours finds its way from outside the head. No surface
-  is made of its result in the time that counts, and one run of it has to do.
-- SciPy solves exactly, and with a matrix of all pairs; ours iterates to a residual. With neighbors= it solves nothing as a
-  whole, but a small system for each place asked about, and what comes out has steps: here it is asked about the vertices
-  of our surface only.
-- The two remeshers do three rounds, as in CGAL's example (MeshLab's usual ten take three times as long), then stop, whether
-  the edges are in bounds or not; ours goes on until they are. Neither looks whether the surface crosses itself. Reprojection and
-  flips are on in all of them; MeshLab keeps what it takes for sharp edges.
+  below ITK's own default. It starts 5 mm around the object; our model starts outside the head. Extracting a surface from its result
+  is not timed, and it runs only once.
+- SciPy solves exactly, with a dense matrix; ours iterates to a residual. With neighbors= it does not solve one system but a small
+  one for each evaluation point, and the result is discontinuous: here it is evaluated only at the vertices of our surface.
+- The two remeshers do three rounds, as in CGAL's example (MeshLab's default of ten takes three times as long), then stop, whether
+  the edges are in bounds or not; ours continues until they are. Neither checks for self-intersections. Reprojection and flips are
+  on in all of them; MeshLab keeps edges that it considers sharp.
 """
 
 import gzip

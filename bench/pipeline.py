@@ -1,12 +1,12 @@
-"""Times how one would get a mesh with even triangles without us: VTK's flying edges, then MeshLab's isotropic remeshing.
+"""Times the alternative to this library for a mesh with even triangles: VTK's flying edges, then MeshLab's isotropic remeshing.
 
     python3 bench/pipeline.py <job.json>
 
-`npm run real -- FOLDER --pipeline` writes the job, runs this and prints the figures below our own. pip install vtk pymeshlab numpy
+`npm run real -- FOLDER --pipeline` writes the job, runs this and prints the figures below our own. It needs `pip install vtk pymeshlab numpy`.
 
 - Native code with one thread each; ours is WebAssembly.
 - The same voxels, the same iso value, and the mean edge of our surface as target.
-- MeshLab makes ten rounds, its default. Three, as in CGAL's example, are timed, too, and not measured otherwise.
+- MeshLab makes ten rounds, its default. Three, as in CGAL's example, are timed as well, but their result is not measured.
 - Reading files and converting arrays is not timed.
 - Flying edges leaves the surface open where the object crosses the border of the volume, and remeshing may open it elsewhere: edges with
   one triangle, and with more than two, are counted.

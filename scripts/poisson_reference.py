@@ -4,13 +4,13 @@
     cargo test --release --test core implicit_accuracy -- --ignored
     python scripts/poisson_reference.py target/tmp/accuracy
 
-The second line writes the points, with the outward normals of the shapes where they were before noise moved them, as
-<shape>-<noise>-<seed>.xyz. tests/core/implicit_accuracy.rs has the table that comes out, and holds the implicit surface of the
-same points, without the normals, against it.
+The second command writes the points as <shape>-<noise>-<seed>.xyz, with the outward normals at their positions before noise
+was added. tests/core/implicit_accuracy.rs contains the resulting table, and compares the implicit surface of the same points,
+without the normals, with it.
 
-Each row is the mean over the seeds of the mean distance to the shape: that of the centre of each triangle, weighted by area.
-Depth is that of the octree; all else is the library's default, but for one thread, so that every run gives the same.
-Best is the depth of the least error; the parts of its surfaces and their genus in all are named for every outcome.
+Each row is the mean over the seeds of the mean distance to the shape: that of each triangle's centre, weighted by area.
+Depth is that of the octree; other settings are the library's defaults, except for one thread, so that every run gives the same.
+Best is the depth with the smallest error; components and total genus of its surfaces are listed for every outcome.
 It takes some minutes.
 """
 

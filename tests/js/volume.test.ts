@@ -36,7 +36,7 @@ test('position in the world: spacing and origin, or an affine', () => {
   expect(turned.sample([5 - 3 * 2, 6 + 2, 7 + 4 * 3])).toBe(1 + 2 * 2 + 6 * 3);
 });
 
-test('properties', () => {
+test('dimensions, spacing, range and other properties', () => {
   const volume = grid({ space: 'LPS' });
   expect(volume.dims).toEqual([2, 3, 4]);
   expect(volume.frames).toBe(1);
