@@ -114,7 +114,7 @@ describe.each(LABS)('the %s lab', (lab) => {
   test.each([
     [640, 400],
     [320, 256],
-  ])('loses nothing at %i by %i, as when it is zoomed', async (width, height) => {
+  ])('shows all its texts at %i by %i, as when zoomed in', async (width, height) => {
     await app.page.setViewportSize({ width: 1280, height: 800 });
     const wide = await words();
     expect(wide).toContain('How it works');

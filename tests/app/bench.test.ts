@@ -64,7 +64,7 @@ test('missed bounds are marked', async () => {
 test.each([
   [360, 800],
   [1100, 900],
-])('nothing is wider than a page of %i by %i, tables unfolded', async (width, height) => {
+])('fits a page of %i by %i, tables expanded', async (width, height) => {
   await page.locator('details').evaluateAll((all) => {
     for (const one of all) (one as HTMLDetailsElement).open = true;
   });

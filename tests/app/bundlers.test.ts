@@ -148,7 +148,7 @@ test('one file, from a blob address, as in notebooks', async () => {
 });
 
 test.each(['bundler', 'node16', 'nodenext'])(
-  'types, as TypeScript with moduleResolution %s finds them',
+  'types resolve in TypeScript with moduleResolution %s',
   async (resolution) => {
     const entries = ['vesicle', 'vesicle/inline'];
     const lines = entries.map((entry, k) => `import init${k}, { Mesh as Mesh${k} } from '${entry}';`);

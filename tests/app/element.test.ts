@@ -139,7 +139,7 @@ test.each([
   ['<vesicle-lab src="ring.mha" params=\'{ "isoo": 3 }\'></vesicle-lab>', /isoo/],
   ['<vesicle-lab src="bust.ply"></vesicle-lab>', /NIfTI/],
   ['<vesicle-lab src="bust.ply" method="multires"></vesicle-lab>', /ellipsoids/],
-])('%s says what is wrong', async (body, message) => {
+])('%s gives an error message', async (body, message) => {
   await open(body);
   await state('error');
   expect(await words()).toMatch(message);

@@ -14,7 +14,7 @@ test.each([
   [1024, 768],
   [1440, 900],
   [390, 844],
-])('nothing is wider than a page of %i by %i', async (width, height) => {
+])('the page fits %i by %i', async (width, height) => {
   expect(await overflow(app.page, width, height)).toBeLessThanOrEqual(0);
 });
 

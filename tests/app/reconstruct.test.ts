@@ -504,7 +504,7 @@ describe('a link', () => {
     ['keepComponents=1.5', 'keepComponents'],
     ['add=1e30,0,0', 'added'],
     ['outside=0,0,1e30', 'outside'],
-  ])('with %s opens its example without the settings, and says why', async (settings, why) => {
+  ])('with %s opens its example without the settings, and gives the reason', async (settings, why) => {
     await openAt(`#reconstruct?example=two-balls&${settings}`, 'done');
     expect(await text('.banner')).toMatch(new RegExp(`settings are left out.*${why}`));
     expect(await measured()).toMatchObject({ components: 2, closed: true });
@@ -566,7 +566,7 @@ describe('the page', () => {
     [390, 844],
     [1024, 768],
     [1440, 900],
-  ])('nothing is wider than a page of %i by %i', async (width, height) => {
+  ])('fits a page of %i by %i', async (width, height) => {
     expect(await overflow(app.page, width, height)).toBeLessThanOrEqual(0);
   });
 

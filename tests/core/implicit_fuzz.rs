@@ -84,7 +84,7 @@ fn cloud(random: &mut Random) -> Cloud {
     }
 }
 
-/// Returns one of a ring of cameras that face the origin and lie along y.
+/// Returns a camera at a random position in the plane y = −5 that looks along y.
 fn camera(random: &mut Random) -> Camera {
     let (x, z) = (random.within(-2.0, 2.0), random.within(-2.0, 2.0));
     let rows = [100.0, 32.0, 0.0, 100.0 * x + 160.0, 0.0, 32.0, 100.0, 100.0 * z + 160.0, 0.0, 1.0, 0.0, 5.0];

@@ -137,7 +137,7 @@ fn a_vessel_tree_is_one_component() {
     assert!(less.abs() < 0.02 && off <= 0.1);
 }
 
-/// Returns a ball in noise, for which marching cubes give hundreds of components and handles.
+/// Returns a ball in noise, for which marching cubes give thousands of small components and handles.
 fn noisy_ball() -> Volume {
     let mut random = Random(7);
     let noise: Vec<f32> = (0..48 * 48 * 48).map(|_| random.unit() - 0.5).collect();

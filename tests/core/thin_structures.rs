@@ -188,7 +188,7 @@ fn coverage_in_slices_is_the_same() {
     assert_eq!(survey.finish(), model.coverage().unwrap());
 }
 
-/// Parts of noise are left out, parts above the threshold of 64 voxels are not.
+/// Components that enclose fewer voxels than `smallest_part` are left out, larger ones are not.
 #[test]
 fn parts_that_are_too_small_are_left_out() {
     let balls = [

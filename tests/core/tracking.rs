@@ -344,7 +344,7 @@ fn invalid_input_is_refused_by_name() {
     for voxels in [[[0; 3], [36; 3]], [[9; 3], [8; 3]], [[0; 3], [3, 3, 30]]] {
         assert_eq!(refused(TrackingOptions { bounds: Some(Bounds::Voxels(voxels)), ..good() }).0, "voxels");
     }
-    // A start is refused if there is no boundary near it.
+    // A given start does not help if no step reaches the threshold.
     let mut without = good();
     (without.start, without.params.threshold) = (Some(cine.truth(0.0, 2.0)), 240.0);
     assert_eq!(refused(without).0, "threshold");

@@ -100,7 +100,7 @@ const loaded = (bytes: Uint8Array) => new NRRDLoader().parse(wrong(bytes.slice()
 const SPACES = ['right-anterior-superior', 'left-posterior-superior', 'left-anterior-superior', 'RAS', 'LPS', 'LAS'];
 
 test.each(SPACES.flatMap((space) => GRIDS.map(([name, grid]) => [space, name, grid] as const)))(
-  'three: %s, %s, is where the file says',
+  'three: %s, %s, is placed as the file says',
   (space, _, grid) => {
     const bytes = scan(space, grid);
     const three = loaded(bytes);
