@@ -636,7 +636,7 @@ fn oscillations_on_a_coarse_level_converge() {
     assert!(report.iteration > 600, "nothing swings any more: {} iterations", report.iteration);
 }
 
-/// Regression: with a strong image force, vertices oscillated across the voxel steps of noisy images; this took 1,399
+/// Regression: with a strong image force, vertices oscillated across intensity steps of noisy images; this took 1,399
 /// iterations.
 #[cfg(not(target_arch = "wasm32"))]
 #[test]
