@@ -1,17 +1,17 @@
-// Takes docs/*, the pictures of README and docs, from the running app: examples of the labs when they are done.
+// Takes the pictures of the README and the docs from the running app, of labs whose examples are done.
 import { mkdir } from 'node:fs/promises';
 import { launchChromium } from './chromium.mjs';
 import { serve } from './serve.mjs';
 import { at, say, script } from './shell.mjs';
 
 const SIZE = { width: 1440, height: 900 };
-/** Many small dots: as JPEG a third as large. */
+/** Pictures with many small dots are JPEG, a third as large. */
 const PICTURES = [
   { file: 'docs/extract.png', hash: '#extract' },
   { file: 'docs/reconstruct.jpg', hash: '#reconstruct', type: 'jpeg', quality: 85 },
   { file: 'docs/track.jpg', hash: '#track', type: 'jpeg', quality: 85 },
   { file: 'docs/sculpt.jpg', hash: '#sculpt', type: 'jpeg', quality: 85 },
-  // The 3D view alone, with what is left out marked: the model of the paper, and the defaults.
+  // The 3D view alone, with uncovered parts marked: for the paper's model, and for the defaults.
   {
     file: 'docs/coverage-paper.jpg',
     hash: '#extract?start=enclosing&p.adaptivity=0&p.integrator=euler&v=2',
@@ -22,7 +22,7 @@ const PICTURES = [
   { file: 'docs/coverage-default.jpg', hash: '#extract', coverage: true, type: 'jpeg', quality: 85 },
 ];
 
-/** Waits for the example to be done, then for the frame that shows it. */
+/** Waits for the example to be done, then for the frame that shows it, and takes the picture. */
 async function shoot(page, address, { hash, file, coverage = false, ...format }) {
   await page.goto(address + hash);
   await page.waitForSelector('[data-state=done]', { timeout: 120_000 });

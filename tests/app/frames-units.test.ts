@@ -1,4 +1,4 @@
-/** What surfaces on their way to the screen are made of, without a browser. */
+/** Buffers and simplified surfaces for rendering, without a browser. */
 import { beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
 import { coarseCorners, type Fine } from '../../www/src/view/coarse';
@@ -13,15 +13,15 @@ function fineOf(mesh: Mesh): Fine {
   return { positions, normals, indices, vertices, corners: 3 * triangles };
 }
 
-describe('room', () => {
-  test('is enough, not much more, and seldom another', () => {
+describe('buffer capacity', () => {
+  test('is sufficient, not much larger, and seldom changes', () => {
     const rooms = Array.from({ length: 20_000 }, (_, count) => roomFor(count));
     expect(rooms.filter((room, count) => room < count)).toEqual([]);
     expect(rooms.filter((room, count) => room > Math.max(1, 1.25 * count) + 1)).toEqual([]);
     expect(new Set(rooms).size).toBeLessThan(50);
   });
 
-  test('a mesh goes into the arrays it is given where they fit, else into new ones', () => {
+  test('a mesh is copied into given arrays if they are large enough, and into new ones otherwise', () => {
     const mesh = ball(0.5);
     const first = surfaceIn(noArrays(), mesh);
     expect(first.vertices).toBe(mesh.vertexCount);
@@ -38,7 +38,7 @@ describe('room', () => {
 });
 
 describe('a coarse surface', () => {
-  test('has about as many triangles as are asked for, on vertices of the fine one', () => {
+  test('has about the requested number of triangles, on vertices of the fine one', () => {
     const mesh = ball(0.08);
     const fine = fineOf(mesh);
     for (const wanted of [500, 2000]) {
@@ -50,7 +50,7 @@ describe('a coarse surface', () => {
     mesh.free();
   });
 
-  test('faces outwards and encloses nearly the same', () => {
+  test('faces outwards and encloses nearly the same volume', () => {
     const mesh = ball(0.08);
     const fine = fineOf(mesh);
     const whole = enclosed(fine.positions, fine.indices.subarray(0, fine.corners));
@@ -84,7 +84,7 @@ function gridCorners(side: number, first: number): number[] {
   return cells.flatMap((a) => [a, a + 1, a + side, a + 1, a + side + 1, a + side]).map((corner) => corner + first);
 }
 
-/** Six times the volume that triangles enclose. */
+/** Returns six times the volume that triangles enclose. */
 function enclosed(positions: Float32Array, indices: Uint32Array): number {
   let sum = 0;
   for (let i = 0; i < indices.length; i += 3) {

@@ -33,14 +33,14 @@ function expectClose(one: ControlEllipsoid, other: ControlEllipsoid): void {
 }
 
 describe('ellipsoids', () => {
-  test('turned all the way round are as they were, and axes keep their lengths', () => {
+  test('a full turn changes nothing, and axes keep their lengths', () => {
     const about: [number, number, number] = [0.6, 0, 0.8];
     expect(lengthsOf(turned(LONG, about, 1)).map((x) => Number(x.toFixed(9)))).toEqual([3, 2, 1]);
     expectClose(turned(LONG, about, 2 * Math.PI), LONG);
     expectClose(turnedAbout(turnedAbout(LONG, [5, 0, 1], about, 0.7), [5, 0, 1], about, -0.7), LONG);
   });
 
-  test('between two is half the way, half the turn and the geometric mean of lengths', () => {
+  test('interpolation halves the translation and the rotation, and takes the geometric mean of lengths', () => {
     const end = scaled(turned(moved(LONG, [2, 0, 0]), [0, 0, 1], 1.2), [4, 1, 1]);
     expectClose(between(LONG, end, 0.5), scaled(turned(moved(LONG, [1, 0, 0]), [0, 0, 1], 0.6), [2, 1, 1]));
     for (const half of [Math.PI, -Math.PI])
@@ -48,21 +48,21 @@ describe('ellipsoids', () => {
     expect(lengthsOf(between(LONG, turned(LONG, [0, 1, 0], Math.PI), 0.5))[0]).toBeCloseTo(3, 9);
   });
 
-  test('their box touches them', () => {
+  test('their bounding box is tight', () => {
     expect(boxOf([LONG, ball(-5, 0, 0, 1)])).toEqual({ min: [-6, -1, -1], max: [4, 4, 4] });
   });
 
-  test('rounded as a link rounds them are still the same to the eye, moved by a hundredth are not', () => {
+  test('rounding in a link keeps poses equal, moving by a hundredth does not', () => {
     expect(samePose([LONG], [moved(LONG, [1e-6, 0, 0])])).toBe(true);
     expect(samePose([LONG], [moved(LONG, [0.01, 0, 0])])).toBe(false);
     expect(samePose([LONG], [LONG, LONG])).toBe(false);
   });
 });
 
-describe('films', () => {
+describe('animations', () => {
   const film: Film = { keys: [[LONG], [moved(LONG, [1, 0, 0])], [ball(0, 0, 0, 1)]], between: 10, loop: false };
 
-  test('pass through their keyframes, and a loop comes back to the first', () => {
+  test('pass through their keyframes, and a loop returns to the first', () => {
     expect(lastFrame(film)).toBe(20);
     for (const [k, key] of film.keys.entries()) expect(poseAt(film, 10 * k)).toEqual(key);
     const loop = { ...film, loop: true };
@@ -70,7 +70,7 @@ describe('films', () => {
     expect(poseAt(loop, 30)).toEqual(film.keys[0]);
   });
 
-  test('of lava end where they began, and never jump', () => {
+  test('of lava end where they began, and have no jumps', () => {
     const lava: Film = { motion: 'lava', loop: false };
     const last = lastFrame(lava);
     expect(samePose(poseAt(lava, 0), poseAt(lava, last))).toBe(true);
@@ -82,8 +82,8 @@ describe('films', () => {
   });
 });
 
-describe('ellipsoids that fit', () => {
-  test('a rod lie in a row along it, inside, and a model of it can be made', () => {
+describe('fitted ellipsoids', () => {
+  test('of a rod lie in a row inside it, and a model can be made of them', () => {
     const round = Mesh.icosphere([0, 0, 0], 1, 0.2);
     const { positions, indices } = round.arrays();
     const rod = Mesh.fromArrays(
@@ -103,7 +103,7 @@ describe('ellipsoids that fit', () => {
     for (const one of [model, rod, round]) one.free();
   });
 
-  test('principal axes are at right angles, the longest first', () => {
+  test('principal axes are orthogonal, the longest first', () => {
     const [a, b, c] = principalAxes([2, 1, 0, 1, 3, 0.5, 0, 0.5, 9]);
     expect(Math.abs(a?.[2] ?? 0)).toBeGreaterThan(0.9);
     const dot = (x = [0], y = [0]) => x.reduce((sum, value, k) => sum + value * (y[k] ?? 0), 0);
@@ -121,11 +121,11 @@ describe('links', () => {
   const settings = { file: '', usual: { smoothing: 10 }, params: { smoothing: 10 }, color: 'plain', layout: 'result' };
   const [bust] = SCENES;
 
-  test('of the first scene as it opens say nothing', () => {
+  test('of the first scene in its initial state have no parameters', () => {
     expect(toHash(linkOf({ ...settings, example: bust, pose: undefined, film: bust.film }))).toBe('#sculpt');
   });
 
-  test('bring pose, film and parameters back', () => {
+  test('restore pose, animation and parameters', () => {
     const film: Film = { keys: [[LONG], [ball(0, 1, 0, 2)]], between: 12, loop: true };
     const pose = [turned(LONG, [0, 1, 0], 0.3), ball(0, 0, 0, 1)];
     const hash = toHash(linkOf({ ...settings, params: { smoothing: 4 }, example: bust, pose, film }));
@@ -136,14 +136,14 @@ describe('links', () => {
     expect(linked && filmOf(linked, bust.film)).toEqual(film);
   });
 
-  test('that make no sense are read as far as they do', () => {
+  test('with invalid parts are read as far as possible', () => {
     expect(fromHash('#sculpt?pose=1,2;3&key=x&between=-4&layout=row')).toEqual({ params: {}, layout: 'row' });
     expect(fromHash('#extract?example=bust')).toBeUndefined();
   });
 });
 
-describe('answers to the hand', () => {
-  test('count from the oldest pose that a frame follows', () => {
+describe('drag latency', () => {
+  test('is measured from the oldest pose that a frame follows', () => {
     const answers = new Answers();
     answers.sent(1, 100);
     answers.sent(2, 110);
@@ -154,17 +154,17 @@ describe('answers to the hand', () => {
   });
 });
 
-describe('a surface ahead of its model', () => {
+describe('extrapolated display of a surface', () => {
   const points = Float32Array.of(2.5, 0, 0, 0, 1.5, 0.5, -1, -1, 4, 40, 3, 2);
   const pair = [LONG, ball(-6, 0, 0, 1)];
 
-  test('goes rigidly with ellipsoids that move alike', () => {
+  test('moves rigidly with ellipsoids that move alike', () => {
     const after = pair.map((one) => moved(turnedAbout(one, [0, 0, 0], [0, 0, 1], Math.PI / 2), [1, 2, 3]));
     const expected = [1, 4.5, 3, -0.5, 2, 3.5, 2, 1, 7, -2, 42, 5];
     for (const [i, x] of carried(points, pair, after).entries()) expect(x).toBeCloseTo(expected[i] ?? 0, 4);
   });
 
-  test('goes with the near one, and stays by the one that stays', () => {
+  test('moves with the nearest ellipsoid, and stays with one that does not move', () => {
     const on = Float32Array.of(4, 2, 3, -6, 1, 0);
     const out = carried(on, pair, [moved(LONG, [0, 0, 1]), ball(-6, 0, 0, 1)]);
     expect(out[2]).toBeGreaterThan(3.95);
@@ -173,7 +173,7 @@ describe('a surface ahead of its model', () => {
     expect(carried(on, [LONG], [scaled(LONG, [2, 2, 2])]).slice(0, 3)).toEqual(Float32Array.of(7, 2, 3));
   });
 
-  test('is as a first step of the model has it', () => {
+  test('equals a first step of the model', () => {
     const [start, end] = [ball(0, 0, 0, 1), moved(ball(0, 0, 0, 1), [0.2, 0, 0])];
     const model = new MultiresolutionModel({ ellipsoids: [start], params: { edgeMin: 0.1, edgeMax: 0.25 } });
     while (!model.step(1).done);
@@ -187,21 +187,21 @@ describe('a surface ahead of its model', () => {
     model.free();
   });
 
-  /** Keeps what it is told to draw. */
+  /** Records the positions that are drawn. */
   function ahead() {
     const drawn: (number | undefined)[] = [];
     const view = { move: (_: string, positions: Float32Array) => drawn.push(positions[0]) };
     return { drawn, ahead: new Ahead(view as unknown as ConstructorParameters<typeof Ahead>[0]) };
   }
 
-  /** One point on a ball, at x, which goes to `goal`. */
+  /** Returns a frame with one point on a ball at x that moves to `goal`. */
   function frame(x: number, goal: number, turn: number) {
     const one = { positions: Float32Array.of(x + 1, 0, 0) };
     const event = { result: one, ellipsoids: [ball(x, 0, 0, 1)], pose: [ball(goal, 0, 0, 1)], turn };
     return event as unknown as Parameters<Ahead['shown']>[0];
   }
 
-  test('stays with the hand while the model comes after it, and is the model again once it has come', () => {
+  test('follows the pointer while the model lags behind, and equals the model once it has caught up', () => {
     const { drawn, ahead: one } = ahead();
     expect(one.follow([ball(1, 0, 0, 1)], 1)).toBe(false);
     one.shown(frame(0, 0, 0));
@@ -214,7 +214,7 @@ describe('a surface ahead of its model', () => {
     expect(drawn).toHaveLength(4);
   });
 
-  test('is left where others lead, where ellipsoids come or go, and at rest', () => {
+  test('ends when other input moves the ellipsoids, when ellipsoids are added or removed, and at rest', () => {
     const { drawn, ahead: one } = ahead();
     one.shown(frame(0, 0, 0));
     one.follow([ball(2, 0, 0, 1)], 1);
@@ -230,7 +230,7 @@ describe('a surface ahead of its model', () => {
 });
 
 describe('the preview', () => {
-  test('is coarse only while a hand drags and frames are slow, and puts everything back', () => {
+  test('is coarse only during a drag with slow frames, and restores all parameters', () => {
     const set = { edgeMin: 0.1, edgeMax: 0.25, supersample: 2 };
     const model = new MultiresolutionModel({ ellipsoids: [ball(0, 0, 0, 1)], params: set });
     const preview = new Preview();

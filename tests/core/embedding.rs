@@ -1,4 +1,4 @@
-//! A mesh that is moved and edited at random never crosses itself.
+//! Meshes that are moved and edited at random never intersect themselves.
 
 use crate::common::{Random, torus_around};
 use vesicle::math::Vec3;
@@ -14,7 +14,7 @@ fn embedded(mesh: &Mesh) -> bool {
     count_crossings(&mesh.to_triangles()) == 0
 }
 
-/// Two spheres and two tori, side by side with little between them.
+/// Returns two spheres and two tori, side by side with little space between them.
 fn crowd() -> Mesh {
     let mut mesh = Mesh::icosphere(Vec3::ZERO, 4.0, 1.8).unwrap();
     mesh.append(&Mesh::icosphere(Vec3::X * 8.5, 4.0, 2.4).unwrap()).unwrap();
@@ -25,7 +25,7 @@ fn crowd() -> Mesh {
     mesh
 }
 
-/// A way for every vertex: a common drift of each region, and something of its own.
+/// Returns a random displacement for every vertex: a smooth part, common to each region, and an individual part.
 fn random_ways(mesh: &Mesh, random: &mut Random, size: f32) -> Vec<Vec3> {
     let mut any = || Vec3::new(random.unit(), random.unit(), random.unit()) * 2.0 - 1.0;
     let (drift, place) = (any(), any());
@@ -33,10 +33,10 @@ fn random_ways(mesh: &Mesh, random: &mut Random, size: f32) -> Vec<Vec3> {
     mesh.positions().iter().map(|&p| (regional(p) + any() * 0.3) * size).collect()
 }
 
-/// Which vertices are looked at must not matter: one that has followed from the beginning and one that knows nothing
-/// carry the same mesh to the same place.
+/// The result must not depend on which vertices are checked: an embedding that has followed the mesh from the start and
+/// a new one apply the same displacements.
 #[test]
-fn a_mesh_carried_at_random_never_crosses_itself() {
+fn a_mesh_moved_at_random_never_intersects_itself() {
     for seed in 0..12 {
         let mut random = Random(seed);
         let mut mesh = crowd();
@@ -67,7 +67,7 @@ fn a_mesh_carried_at_random_never_crosses_itself() {
     }
 }
 
-/// Two spheres pushed into each other come to rest on each other; the rest of them goes on.
+/// Two spheres pushed against each other flatten where they touch; the rest of them moves on.
 #[test]
 fn spheres_pushed_together_flatten() {
     let mut mesh = Mesh::icosphere(-Vec3::X * 4.5, 4.0, 1.5).unwrap();
@@ -85,9 +85,9 @@ fn spheres_pushed_together_flatten() {
     assert!((gone - 2.0).abs() < 1e-3, "the far side went {gone}");
 }
 
-/// A large triangle mesh beside small ones, all vertices moved far: found across all sizes.
+/// Large triangles beside small ones, all vertices with large displacements: contacts are found at all sizes.
 #[test]
-fn large_and_small_triangles_do_not_cross() {
+fn large_and_small_triangles_do_not_intersect() {
     let mut mesh = Mesh::icosahedron(Vec3::ZERO, 40.0);
     for k in 0..6 {
         let turn = std::f32::consts::TAU * k as f32 / 6.0;
@@ -97,7 +97,7 @@ fn large_and_small_triangles_do_not_cross() {
     assert!(embedded(&mesh));
     let mut embedding = Embedding::default();
     for _ in 0..30 {
-        // The small spheres fly outwards, the large one shrinks.
+        // The small spheres move outwards; the large one shrinks.
         let mut ways: Vec<Vec3> = mesh.positions().iter().map(|p| *p * 0.02).collect();
         ways[..12].iter_mut().for_each(|way| *way *= -0.5);
         embedding.follow_with(&mesh, EDGE);
@@ -107,9 +107,8 @@ fn large_and_small_triangles_do_not_cross() {
 }
 
 #[test]
-fn an_edit_that_would_cross_is_taken_back() {
-    // A plate with a sphere just above it: drawing an edge of the plate together at a place above the sphere's bottom
-    // would pierce it.
+fn an_edit_that_would_intersect_is_rolled_back() {
+    // Two spheres near each other: collapsing an edge of one to a position inside the other would pierce it.
     let mut mesh = Mesh::icosphere(Vec3::ZERO, 4.0, 1.5).unwrap();
     mesh.append(&Mesh::icosphere(Vec3::X * 8.2, 4.0, 1.5).unwrap()).unwrap();
     let nearest = |mesh: &Mesh| {
@@ -130,9 +129,9 @@ fn an_edit_that_would_cross_is_taken_back() {
     assert!(embedded(&mesh) && mesh.check() == Ok(()));
 }
 
-/// Moves and passes in turn, with parts that meet and part; what is left of the mesh is sound after each.
+/// Moves alternate with remeshing, while components join and split; the mesh is valid after each.
 #[test]
-fn a_mesh_resolved_after_every_move_never_crosses_itself() {
+fn a_mesh_resolved_after_every_move_never_intersects_itself() {
     let sampling = Sampling::new(1.0);
     for seed in 0..10 {
         let mut random = Random(seed);
@@ -157,7 +156,8 @@ fn a_mesh_resolved_after_every_move_never_crosses_itself() {
     }
 }
 
-/// The largest factor up to `most` by which `inner` can be scaled about the origin and still not touch `outer`.
+/// Returns both meshes as one, with `inner` scaled about the origin, by at most `most`, until it nearly touches
+/// `outer`.
 fn nearly_touching(outer: &Mesh, inner: &Mesh, most: f32) -> Mesh {
     let within = |factor: f32| {
         let mut both = inner.clone();
@@ -174,7 +174,7 @@ fn nearly_touching(outer: &Mesh, inner: &Mesh, most: f32) -> Mesh {
 }
 
 #[test]
-fn refinement_of_facing_sheets_does_not_cross() {
+fn refinement_of_facing_sheets_does_not_intersect() {
     let mut crossed = 0;
     for seed in 0..6 {
         let mut random = Random(seed);
