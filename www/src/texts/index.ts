@@ -1,0 +1,91 @@
+import bench from './en/bench.json';
+import counts from './en/counts.json';
+import extract from './en/extract.json';
+import files from './en/files.json';
+import labs from './en/labs.json';
+import panels from './en/panels.json';
+import presets from './en/presets.json';
+import reconstruct from './en/reconstruct.json';
+import sculpt from './en/sculpt.json';
+import shapes from './en/shapes.json';
+import shell from './en/shell.json';
+import track from './en/track.json';
+import view from './en/view.json';
+
+/** All texts of the interface, by the part of the app that shows them. To translate the app, translate these values and set `LANGUAGE`. */
+const catalogue = {
+  bench,
+  counts,
+  extract,
+  files,
+  labs,
+  panels,
+  presets,
+  reconstruct,
+  sculpt,
+  shapes,
+  shell,
+  track,
+  view,
+};
+const LANGUAGE = 'en';
+
+type Catalogue = typeof catalogue;
+type KeyIn<S extends keyof Catalogue> = `${S}.${keyof Catalogue[S] & string}`;
+/** Key of a text, as in `extract.openVolume`. */
+export type TextKey = { [S in keyof Catalogue]: KeyIn<S> }[keyof Catalogue];
+/** Key of a text with plural forms, without the suffix of the form. */
+export type PluralKey = TextKey extends infer K ? (K extends `${infer Base}_other` ? Base : never) : never;
+/** What replaces the placeholders of a text, by their names. */
+export type TextValues = Record<string, string | number>;
+
+const sections: Record<string, Record<string, string>> = catalogue;
+const FORMS = new Intl.PluralRules(LANGUAGE);
+const NUMBER = new Intl.NumberFormat(LANGUAGE, { maximumFractionDigits: 0 });
+
+/**
+ * Returns a text of the interface with its placeholders `{name}` replaced.
+ *
+ * Throws an Error if the value of a placeholder is missing.
+ */
+export function text(key: TextKey, values: TextValues = {}): string {
+  return template(key).replace(/\{(\w+)\}/g, (_, name: string) => {
+    const value = values[name];
+    if (value === undefined) throw new Error(`the text ${key} needs a value for {${name}}`);
+    return String(value);
+  });
+}
+
+/**
+ * Returns the form of a text that the language uses for this number, as "1 frame" or "2 frames"; the placeholder
+ * `{count}` is the number. The forms have the suffixes `_one`, `_other` and so on.
+ */
+export function plural(key: PluralKey, count: number, values: TextValues = {}): string {
+  const form = `${key}_${FORMS.select(count)}`;
+  const known = (isKnown(form) ? form : `${key}_other`) as TextKey;
+  return text(known, { count: NUMBER.format(count), ...values });
+}
+
+/** Returns a text whose placeholders may be elements, as children for an element. */
+export function textNodes(key: TextKey, values: Record<string, Node | string>): (Node | string)[] {
+  return template(key)
+    .split(/(\{\w+\})/)
+    .filter((part) => part !== '')
+    .map((part) => {
+      const name = /^\{(\w+)\}$/.exec(part)?.[1];
+      if (name === undefined) return part;
+      const value = values[name];
+      if (value === undefined) throw new Error(`the text ${key} needs a value for {${name}}`);
+      return value;
+    });
+}
+
+function template(key: string): string {
+  const [section = '', name = ''] = key.split('.');
+  return sections[section]?.[name] ?? key;
+}
+
+function isKnown(key: string): boolean {
+  const [section = '', name = ''] = key.split('.');
+  return sections[section]?.[name] !== undefined;
+}
