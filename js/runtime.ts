@@ -1,6 +1,6 @@
 // The WebAssembly instance: loading, translation of errors, and handles of objects inside it.
 import { type ErrorCode, VesicleCrash, VesicleError } from './error.js';
-import { ownModule } from './module.js';
+import { defaultModule } from './module.js';
 import load, { initSync as loadSync, __wbg_reset_state as reset } from './vesicle.js';
 
 /** Sources of the WebAssembly module: its address, a response, its bytes, or the compiled module. */
@@ -40,7 +40,7 @@ export function initSync(options: { module: BufferSource | WebAssembly.Module })
 }
 
 async function begin(source: InitInput | Promise<InitInput> | undefined): Promise<unknown> {
-  const module = await compile((await source) ?? (await ownModule()));
+  const module = await compile((await source) ?? (await defaultModule()));
   instance ??= await load({ module_or_path: module });
   return instance;
 }

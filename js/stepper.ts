@@ -1,4 +1,4 @@
-import { invalid, knownOnly, positive, whole } from './check.js';
+import { checkProperties, integer, invalid, positive } from './check.js';
 import type { Mesh } from './mesh.js';
 
 /** State of a method after one step, or several together, and the events during them. */
@@ -73,12 +73,12 @@ export interface Stepper {
 }
 
 /** Default duration of a slice of work before yielding to the event loop, milliseconds. */
-const SLICE = 12;
+const DEFAULT_BUDGET_MS = 12;
 
 const OPTIONS = ['signal', 'maxIterations', 'budgetMs', 'onStep'];
 
 /** Yields to the event loop by posting a message to itself, which is faster than timers, which browsers throttle. */
-class Pause {
+class EventLoopYield {
   readonly #channel = new MessageChannel();
 
   wait(): Promise<void> {
@@ -95,12 +95,12 @@ class Pause {
 }
 
 /** Calls `work` until it returns a value, yielding to the event loop between slices. Rejects with `signal.reason`. */
-export async function inSlices<T extends object>(
+export async function runInSlices<T extends object>(
   work: () => T | undefined,
   signal: AbortSignal | undefined,
-  budgetMs = SLICE,
+  budgetMs = DEFAULT_BUDGET_MS,
 ): Promise<T> {
-  const pause = new Pause();
+  const pause = new EventLoopYield();
   try {
     let sliceEnd = performance.now() + budgetMs;
     for (;;) {
@@ -140,7 +140,7 @@ export class Runner {
       return report.done || left === 0 ? report : undefined;
     };
     try {
-      return await inSlices(next, signal, budgetMs);
+      return await runInSlices(next, signal, budgetMs);
     } finally {
       this.#running = false;
     }
@@ -149,9 +149,9 @@ export class Runner {
 
 /** Validates the options of a run; throws `invalid-argument`. */
 export function checkedRun(given: RunOptions | undefined): RunOptions {
-  const run = knownOnly<RunOptions>('options', given, OPTIONS);
+  const run = checkProperties<RunOptions>('options', given, OPTIONS);
   if (run.maxIterations !== undefined)
-    whole('maxIterations', run.maxIterations, { min: 1, max: Number.MAX_SAFE_INTEGER });
+    integer('maxIterations', run.maxIterations, { min: 1, max: Number.MAX_SAFE_INTEGER });
   if (run.budgetMs !== undefined) positive('budgetMs', run.budgetMs);
   checkSignal(run.signal);
   checkListener('onStep', run.onStep);

@@ -8,7 +8,7 @@
 import { choice, invalid } from '../check.js';
 import type { MeshArrays } from '../mesh.js';
 import type { Space, VolumeInit } from '../volume.js';
-import { affineOf, bounds, type Frame, type MeshSource, Reader, voxels } from './source.js';
+import { affineOf, bounds, MeshReader, type MeshSource, type SurfaceArrays, voxels } from './source.js';
 
 export type { MeshSource } from './source.js';
 
@@ -136,7 +136,7 @@ const ATTRIBUTES = [
 ] as const;
 
 /** Capacity of buffers relative to their contents, so that they are seldom reallocated. */
-const ROOM = 1.5;
+const CAPACITY_FACTOR = 1.5;
 
 /**
  * A surface in a three.js scene that follows a mesh, through all changes of connectivity.
@@ -153,7 +153,7 @@ const ROOM = 1.5;
 export class ThreeSurface {
   readonly #three: ThreeClasses;
   readonly #object: ThreeObject;
-  readonly #reader: Reader;
+  readonly #reader: MeshReader;
   #buffers: Buffers | undefined;
 
   /**
@@ -170,7 +170,7 @@ export class ThreeSurface {
     if (!Object(object).geometry) throw invalid('object', 'an object with a geometry is needed, as a THREE.Mesh');
     this.#three = three;
     this.#object = object;
-    this.#reader = new Reader(options.space, options.worldSpace);
+    this.#reader = new MeshReader(options.space, options.worldSpace);
   }
 
   /**
@@ -187,7 +187,7 @@ export class ThreeSurface {
     return true;
   }
 
-  #grow(frame: Frame): void {
+  #grow(frame: SurfaceArrays): void {
     this.#buffers?.geometry.dispose();
     this.#buffers = new Buffers(this.#three, frame);
     this.#object.geometry = this.#buffers.geometry;
@@ -217,12 +217,12 @@ class Buffers {
     for (const [name, called, size] of ATTRIBUTES) {
       const values = frame[name];
       if (!values) continue;
-      const array = new Float32Array(size * room(values.length / size));
+      const array = new Float32Array(size * capacityFor(values.length / size));
       const attribute = new BufferAttribute(array, size);
       this.geometry.setAttribute(called, attribute);
       this.#parts.set(name, { array, attribute });
     }
-    const array = new Uint32Array(3 * room(frame.indices.length / 3));
+    const array = new Uint32Array(3 * capacityFor(frame.indices.length / 3));
     const attribute = new BufferAttribute(array, 1);
     this.geometry.setIndex(attribute);
     this.#parts.set('indices', { array, attribute });
@@ -236,7 +236,7 @@ class Buffers {
     });
   }
 
-  write(frame: Frame): void {
+  write(frame: SurfaceArrays): void {
     for (const [name] of ATTRIBUTES) this.#fill(name, frame[name]);
     if (frame.topology || !this.#filled) this.#fill('indices', frame.indices);
     this.#filled = true;
@@ -259,4 +259,4 @@ class Buffers {
   }
 }
 
-const room = (count: number): number => Math.ceil(ROOM * count);
+const capacityFor = (count: number): number => Math.ceil(CAPACITY_FACTOR * count);

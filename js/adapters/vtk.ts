@@ -7,7 +7,7 @@
  */
 import { choice, invalid } from '../check.js';
 import type { Space, VolumeInit } from '../volume.js';
-import { affineOf, type Frame, type MeshSource, Reader, voxels } from './source.js';
+import { affineOf, MeshReader, type MeshSource, type SurfaceArrays, voxels } from './source.js';
 
 export type { MeshSource } from './source.js';
 
@@ -116,7 +116,7 @@ export class VtkSurface<P extends VtkPolyData> {
   /** Input of a `vtkMapper`; the same object from start to end. */
   readonly polyData: P;
   readonly #normals: DataArray;
-  readonly #reader: Reader;
+  readonly #reader: MeshReader;
 
   /**
    * @param vtk - The classes of vtk.js.
@@ -128,7 +128,7 @@ export class VtkSurface<P extends VtkPolyData> {
     for (const name of ['vtkPolyData', 'vtkDataArray'] as const) {
       if (typeof Object(vtk)[name]?.newInstance !== 'function') throw invalid('vtk', `has no ${name} of vtk.js`);
     }
-    this.#reader = new Reader(options.space, options.worldSpace);
+    this.#reader = new MeshReader(options.space, options.worldSpace);
     this.polyData = vtk.vtkPolyData.newInstance();
     this.#normals = vtk.vtkDataArray.newInstance({
       name: 'Normals',
@@ -163,7 +163,7 @@ export class VtkSurface<P extends VtkPolyData> {
 }
 
 /** Returns the triangles as vtk cells: each preceded by its number of corners. */
-function polygons({ indices }: Frame): Uint32Array {
+function polygons({ indices }: SurfaceArrays): Uint32Array {
   const cells = new Uint32Array((indices.length / 3) * 4);
   for (let from = 0, to = 0; from < indices.length; from += 3, to += 4) {
     cells[to] = 3;
