@@ -1,4 +1,5 @@
 import uPlot from 'uplot';
+import { text } from '../texts';
 import 'uplot/dist/uPlot.min.css';
 import { type Beat, beatOf } from '../track/curve';
 import { h, onSchemeChange, token } from './dom';
@@ -70,18 +71,18 @@ export class BeatCurve {
       Array.from({ length: all }, (_, i) => (values?.[i] === undefined ? null : scale * (values[i] ?? 0)));
     const x = Array.from({ length: all }, (_, i) => i + 1);
     this.#plot.setData([x, column(volumes), column(truth), column(other?.volumes)] as uPlot.AlignedData);
-    this.#title.textContent = `Volume by frame, ${unit === 'mm' ? 'ml' : `${unit || 'unit'}³`}`;
+    this.#title.textContent = text('trackPanels.volumeByFrame', { unit: unit === 'mm' ? 'ml' : `${unit || 'unit'}³` });
     const key = (name: string, text: string) =>
       h('span', {}, h('span', { class: `mark ${name}`, 'aria-hidden': 'true' }), text);
     this.#legend.replaceChildren(
-      key('tracked', 'tracked'),
-      ...(truth ? [key('truth', 'true')] : []),
+      key('tracked', text('trackPanels.curveTracked')),
+      ...(truth ? [key('truth', text('trackPanels.curveTruth'))] : []),
       ...(other ? [key('annular', other.name)] : []),
     );
     const beat = beatOf(volumes);
     this.#caption.dataset.beat = JSON.stringify(beat ?? {});
     this.#caption.textContent =
-      beat && volumes.length === frames ? told(beat, this.#curves) : 'Not all frames are done.';
+      beat && volumes.length === frames ? told(beat, this.#curves) : text('trackPanels.curveUnfinished');
   }
 
   /** Draws vertical lines at the current frame, and at the largest and smallest volume. */
@@ -89,7 +90,12 @@ export class BeatCurve {
     const { ctx, bbox } = plot;
     const { volumes, frames, frame } = this.#curves;
     const beat = volumes.length === frames ? beatOf(volumes) : undefined;
-    const marks = beat ? [['ED', beat.diastole] as const, ['ES', beat.systole] as const] : [];
+    const marks = beat
+      ? [
+          [text('trackPanels.endDiastoleMark'), beat.diastole] as const,
+          [text('trackPanels.endSystoleMark'), beat.systole] as const,
+        ]
+      : [];
     ctx.save();
     ctx.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
     ctx.textAlign = 'center';
@@ -115,15 +121,37 @@ export class BeatCurve {
 
 /** Describes the curve in words, for screen readers. */
 function told(beat: Beat, { truth, other, unit }: BeatCurves): string {
-  const size = (volume: number) => (unit === 'mm' ? `${(volume / 1000).toFixed(1)} ml` : figure(volume));
-  const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
+  const size = (volume: number) =>
+    unit === 'mm' ? text('controls.millilitres', { value: (volume / 1000).toFixed(1) }) : figure(volume);
+  const percent = (share: number) => text('controls.percent', { value: (100 * share).toFixed(1) });
   const known = truth && beatOf(truth);
   const second = other && beatOf(other.volumes);
   return [
-    `End-diastole (ED) in frame ${beat.diastole + 1}: ${size(beat.largest)}; end-systole (ES) in frame ${beat.systole + 1}: ${size(beat.smallest)}; ejection fraction ${percent(beat.ejection)}.`,
-    ...(known ? [`In truth ${size(known.largest)}, ${size(known.smallest)} and ${percent(known.ejection)}.`] : []),
+    text('trackPanels.beatTold', {
+      diastoleFrame: beat.diastole + 1,
+      largest: size(beat.largest),
+      systoleFrame: beat.systole + 1,
+      smallest: size(beat.smallest),
+      ejection: percent(beat.ejection),
+    }),
+    ...(known
+      ? [
+          text('trackPanels.beatTruth', {
+            largest: size(known.largest),
+            smallest: size(known.smallest),
+            ejection: percent(known.ejection),
+          }),
+        ]
+      : []),
     ...(other && second
-      ? [`${other.name}: ${size(second.largest)}, ${size(second.smallest)} and ${percent(second.ejection)}.`]
+      ? [
+          text('trackPanels.beatOther', {
+            name: other.name,
+            largest: size(second.largest),
+            smallest: size(second.smallest),
+            ejection: percent(second.ejection),
+          }),
+        ]
       : []),
   ].join(' ');
 }

@@ -1,3 +1,4 @@
+import { text } from '../texts';
 import { h, uniqueId } from './dom';
 
 const MOST = 20_000;
@@ -22,15 +23,21 @@ export class CloudSetup {
   #inForce: CloudChoice = { maxPoints: undefined, keepComponents: undefined };
 
   constructor(onChange: (choice: CloudChoice, what: string) => void) {
-    this.#most = numberField('Points at most', 'maxPoints', { min: 4, max: 100_000, placeholder: String(MOST) }, [
-      'Above this an even subsample is taken. Empty: 20,000.',
-    ]);
-    this.#keep = numberField('Clusters kept', 'keepComponents', { min: 1, max: 10_000, placeholder: 'all' }, [
-      'Points that lie together; with 1 only the largest cluster stays and strays go. Empty: all.',
-    ]);
+    this.#most = numberField(
+      text('pointPanels.maxPoints'),
+      'maxPoints',
+      { min: 4, max: 100_000, placeholder: String(MOST) },
+      [text('pointPanels.maxPointsHelp')],
+    );
+    this.#keep = numberField(
+      text('pointPanels.clustersToKeep'),
+      'keepComponents',
+      { min: 1, max: 10_000, placeholder: text('pointPanels.all') },
+      [text('pointPanels.clustersToKeepHelp')],
+    );
     const fields: [Field, string][] = [
-      [this.#most, 'number of points'],
-      [this.#keep, 'clusters kept'],
+      [this.#most, text('pointPanels.maxPointsChange')],
+      [this.#keep, text('pointPanels.clustersToKeepChange')],
     ];
     for (const [field, what] of fields)
       field.input.addEventListener('change', () => this.#changed(field, what, onChange));
@@ -52,7 +59,10 @@ export class CloudSetup {
     error.textContent = '';
     if (!input.checkValidity()) {
       this.show(this.#inForce);
-      error.textContent = `A whole number from ${input.min} to ${Number(input.max).toLocaleString('en')} is needed, or nothing.`;
+      error.textContent = text('controls.integerOrEmptyError', {
+        min: input.min,
+        max: Number(input.max).toLocaleString('en'),
+      });
       return;
     }
     const number = (one: HTMLInputElement) => (one.value === '' ? undefined : one.valueAsNumber);

@@ -1,3 +1,4 @@
+import { text } from '../texts';
 import { h } from './dom';
 
 /** One of several images of a figure. */
@@ -41,10 +42,10 @@ export class FigurePanel<Variant extends Picture, Preset extends Figure<Variant>
   #layOut(preset: Preset): void {
     this.#buttons = preset.variants.map((one) => ({ variant: one, button: this.#button(preset, one) }));
     const several = preset.variants.length > 1;
-    const group = h('div', { class: 'buttons', role: 'group', 'aria-label': 'Pictures of the figure' });
+    const group = h('div', { class: 'buttons', role: 'group', 'aria-label': text('controls.figureImages') });
     group.append(...this.#buttons.map(({ button }) => button));
     this.element.replaceChildren(
-      h('p', {}, h('strong', {}, 'Paper: '), preset.saw),
+      h('p', {}, h('strong', {}, text('controls.figurePaper')), preset.saw),
       this.#came,
       ...(several ? [group] : []),
       ...(preset.hint ? [h('p', { class: 'help' }, preset.hint)] : []),
@@ -52,7 +53,7 @@ export class FigurePanel<Variant extends Picture, Preset extends Figure<Variant>
   }
 
   #choose(variant: Variant | undefined): void {
-    this.#came.textContent = variant?.came ?? 'Here the settings are others than those of the figure.';
+    this.#came.textContent = variant?.came ?? text('controls.figureChanged');
     for (const { variant: one, button } of this.#buttons) button.setAttribute('aria-pressed', String(one === variant));
   }
 

@@ -1,3 +1,5 @@
+import { text } from '../texts';
+
 const COUNT = new Intl.NumberFormat('en', { maximumFractionDigits: 0 });
 
 export function count(value: number): string {
@@ -13,7 +15,9 @@ export function figure(value: number): string {
 }
 
 export function milliseconds(value: number): string {
-  return value < 1000 ? `${figure(Math.round(value))} ms` : `${(value / 1000).toFixed(2)} s`;
+  return value < 1000
+    ? text('controls.milliseconds', { value: figure(Math.round(value)) })
+    : text('controls.seconds', { value: (value / 1000).toFixed(2) });
 }
 
 export function plural(value: number, one: string, many = `${one}s`): string {

@@ -1,3 +1,4 @@
+import { text } from '../texts';
 import { h, icon, uniqueId } from './dom';
 import { count } from './format';
 
@@ -37,14 +38,14 @@ export class FrameBar {
       this.#icon,
       this.#text,
     );
-    const previous = labelled('previous', BACK, 'Previous frame', () => this.go(-1));
-    const next = labelled('next', ON, 'Next frame', () => this.go(1));
+    const previous = labelled('previous', BACK, text('trackPanels.previousFrame'), () => this.go(-1));
+    const next = labelled('next', ON, text('trackPanels.nextFrame'), () => this.go(1));
     this.#buttons = [previous, next];
     this.element = h(
       'div',
-      { class: 'frames', role: 'group', 'aria-label': 'Frames' },
+      { class: 'frames', role: 'group', 'aria-label': text('trackPanels.frames') },
       h('div', { class: 'buttons' }, previous, this.#beat, next),
-      h('label', { for: id }, 'Frame'),
+      h('label', { for: id }, text('controls.frame')),
       this.#slider,
       this.#at,
     );
@@ -68,8 +69,8 @@ export class FrameBar {
     this.#slider.max = String(Math.max(1, frames - 1));
     this.#slider.valueAsNumber = this.#frame;
     this.#slider.disabled = frames < 2;
-    this.#slider.setAttribute('aria-valuetext', `frame ${this.#frame + 1} of ${frames}`);
-    this.#at.value = `${count(this.#frame + 1)} of ${count(frames)}`;
+    this.#slider.setAttribute('aria-valuetext', text('trackPanels.frameOfSpoken', { frame: this.#frame + 1, frames }));
+    this.#at.value = text('controls.frameOf', { frame: count(this.#frame + 1), last: count(frames) });
     this.#beat.disabled = done < 2;
     for (const button of this.#buttons) button.disabled = frames < 2;
     this.#label();
@@ -112,8 +113,8 @@ export class FrameBar {
 
   #label(): void {
     this.#icon.replaceChildren(icon(this.beating ? PAUSE : PLAY));
-    this.#text.textContent = this.beating ? 'Hold' : 'Beat';
-    const title = this.beating ? 'Hold this frame' : 'Beat: show the frames that are done in a loop';
+    this.#text.textContent = this.beating ? text('trackPanels.stopLoop') : text('trackPanels.loop');
+    const title = this.beating ? text('trackPanels.stopLoopLabel') : text('trackPanels.loopLabel');
     this.#beat.title = title;
     this.#beat.setAttribute('aria-label', title);
   }

@@ -1,3 +1,4 @@
+import { text } from '../texts';
 import { h, pen } from './dom';
 import { figure } from './format';
 
@@ -21,7 +22,7 @@ export class Legend {
   readonly #color: (t: number) => [number, number, number];
   readonly element = h(
     'div',
-    { class: 'color-legend', role: 'group', 'aria-label': 'Meaning of the colours', hidden: true },
+    { class: 'color-legend', role: 'group', 'aria-label': text('controls.colorScale'), hidden: true },
     this.#title,
     this.#bar,
     h('span', { class: 'ends' }, ...this.#ends),

@@ -1,5 +1,6 @@
 import type { Unit } from '../examples';
 import type { Measures, StepReport } from '../protocol';
+import { text } from '../texts';
 import { h } from './dom';
 import { count, figure } from './format';
 
@@ -19,27 +20,27 @@ export interface MeasureValues {
 type Name = keyof MeasureValues;
 
 const ROWS: { name: Name; label: string; help: string }[] = [
-  { name: 'vertices', label: 'Vertices', help: 'Points of the mesh' },
-  { name: 'triangles', label: 'Triangles', help: 'Faces of the mesh' },
-  { name: 'components', label: 'Components', help: 'Separate closed surfaces' },
-  { name: 'genus', label: 'Genus', help: 'Handles, all components together' },
-  { name: 'chi', label: 'Euler characteristic χ', help: 'Vertices − edges + triangles = 2 × components − 2 × genus' },
-  { name: 'volume', label: 'Volume', help: 'Enclosed volume' },
-  { name: 'area', label: 'Area', help: 'Area of the surface' },
+  { name: 'vertices', label: text('measures.vertices'), help: text('measures.verticesHelp') },
+  { name: 'triangles', label: text('measures.triangles'), help: text('measures.trianglesHelp') },
+  { name: 'components', label: text('measures.components'), help: text('measures.componentsHelp') },
+  { name: 'genus', label: text('measures.genus'), help: text('measures.genusHelp') },
+  { name: 'chi', label: text('measures.euler'), help: text('measures.eulerHelp') },
+  { name: 'volume', label: text('measures.volume'), help: text('measures.volumeHelp') },
+  { name: 'area', label: text('measures.area'), help: text('measures.areaHelp') },
   {
     name: 'closed',
-    label: 'Closed',
-    help: 'No edge without its second triangle; checked when the surface stands still',
+    label: text('measures.closed'),
+    help: text('measures.closedHelp'),
   },
   {
     name: 'oriented',
-    label: 'Oriented',
-    help: 'All triangles face outwards alike; checked when the surface stands still',
+    label: text('measures.oriented'),
+    help: text('measures.orientedHelp'),
   },
   {
     name: 'crossings',
-    label: 'Crossings',
-    help: 'Pairs of triangles that cross; counted when the surface stands still',
+    label: text('measures.selfIntersections'),
+    help: text('measures.selfIntersectionsHelp'),
   },
 ];
 
@@ -144,7 +145,7 @@ export class MeasurePanel {
 }
 
 function textOf(name: Name, value: number | boolean, unit: Unit): string {
-  if (typeof value === 'boolean') return value ? 'yes' : 'no';
+  if (typeof value === 'boolean') return value ? text('controls.yes') : text('controls.no');
   if (name === 'volume') return sized(value, 3, unit);
   if (name === 'area') return sized(value, 2, unit);
   return count(value);

@@ -1,4 +1,5 @@
 import type { ParamSpec, ParamValues } from '../protocol';
+import { text } from '../texts';
 import { h, symbol, uniqueId } from './dom';
 import { figure } from './format';
 
@@ -135,7 +136,7 @@ function withNumber({ main, show }: Input, spec: ParamSpec, onChange: (value: un
   const name = [label, unit].filter(Boolean).join(', ');
   const field = h('input', { type: 'number', min, max, step: 'any', inputmode: 'decimal', 'aria-label': name });
   const row = h('span', { class: 'value own', hidden: true }, field, ...unitOf(spec));
-  main.append(h('option', { value: NUMBER }, 'a number'));
+  main.append(h('option', { value: NUMBER }, text('controls.customValue')));
   main.addEventListener('change', () => {
     row.hidden = main.value !== NUMBER;
     if (!row.hidden) field.focus();
@@ -190,7 +191,11 @@ class Slider {
     this.#max = max;
     const step = spec.step ?? (spec.type === 'integer' ? 1 : (max - min) / LOG_STEPS);
     const range = this.#scale === 'linear' ? { min, max, step } : { min: 0, max: LOG_STEPS, step: 1 };
-    this.element = h('input', { type: 'range', 'aria-label': `${spec.label}, slider`, ...range });
+    this.element = h('input', {
+      type: 'range',
+      'aria-label': text('controls.sliderOf', { label: spec.label }),
+      ...range,
+    });
   }
 
   get value(): number {

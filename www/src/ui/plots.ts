@@ -1,4 +1,5 @@
 import uPlot from 'uplot';
+import { type TextKey, text } from '../texts';
 import 'uplot/dist/uPlot.min.css';
 import type { StepReport } from '../protocol';
 import { h, onSchemeChange, token } from './dom';
@@ -31,25 +32,26 @@ export interface PlotKind {
 /** Plots of the deformable model. */
 export const ENERGY_PLOTS: PlotKind[] = [
   {
-    title: 'Kinetic energy',
+    title: text('measures.kineticEnergy'),
     log: true,
     curves: [
-      { label: 'energy', color: '--curve', of: (report) => report.residual },
-      { label: 'tolerance ε', color: '--muted', dash: [4, 4], of: (report) => report.tolerance },
+      { label: text('measures.curveEnergy'), color: '--curve', of: (report) => report.residual },
+      { label: text('measures.curveTolerance'), color: '--muted', dash: [4, 4], of: (report) => report.tolerance },
     ],
     tell: tellEnergy,
   },
   {
-    title: 'Vertices',
+    title: text('measures.vertices'),
     log: false,
-    curves: [{ label: 'vertices', color: '--curve', of: (report) => report.vertices }],
-    tell: (history) => `${tellChange(history, 'vertices', (report) => report.vertices)} ${tellByLevel(history)}`.trim(),
+    curves: [{ label: text('measures.curveVertices'), color: '--curve', of: (report) => report.vertices }],
+    tell: (history) =>
+      `${tellChange(history, 'measures.verticesChange', (report) => report.vertices)} ${tellByLevel(history)}`.trim(),
   },
   {
-    title: 'Euler characteristic χ',
+    title: text('measures.euler'),
     log: false,
     curves: [{ label: 'χ', color: '--curve', of: (report) => report.euler }],
-    tell: (history) => tellChange(history, 'Euler characteristic', (report) => report.euler),
+    tell: (history) => tellChange(history, 'measures.eulerChange', (report) => report.euler),
   },
 ];
 
@@ -80,11 +82,11 @@ export class Plots {
     return h(
       'p',
       { class: 'legend' },
-      key('level', 'level change'),
-      key('axial', 'axial: parts join'),
-      key('annular', 'annular: a neck is cut'),
-      key('vanished', 'a part vanishes'),
-      key('seeds', 'a part is seeded'),
+      key('level', text('measures.levelChange')),
+      key('axial', text('measures.axialEvent')),
+      key('annular', text('measures.annularEvent')),
+      key('vanished', text('measures.vanishedEvent')),
+      key('seeds', text('measures.seededEvent')),
     );
   }
 
@@ -134,7 +136,7 @@ class Plot {
     const { reports } = history;
     this.#extend(reports);
     this.#plot.setData(this.#columns as uPlot.AlignedData);
-    this.#caption.textContent = reports.length > 0 ? this.#kind.tell(history) : 'No step yet.';
+    this.#caption.textContent = reports.length > 0 ? this.#kind.tell(history) : text('measures.noSteps');
   }
 
   /** Appends only new reports: runs have thousands of steps. */
@@ -274,14 +276,20 @@ function upright(ctx: CanvasRenderingContext2D, x: number, top: number, bottom: 
 function tellEnergy({ reports }: History): string {
   const last = reports.at(-1);
   if (!last) return '';
-  const relation = last.residual < last.tolerance ? 'below' : 'above';
-  return `After ${count(last.iteration)} iterations the energy is ${figure(last.residual)}, ${relation} the tolerance of ${figure(last.tolerance)}.`;
+  const key = last.residual < last.tolerance ? 'measures.energyBelow' : 'measures.energyAbove';
+  return text(key, {
+    iterations: count(last.iteration),
+    energy: figure(last.residual),
+    tolerance: figure(last.tolerance),
+  });
 }
 
 /** Describes where each level began, and all topology changes. */
 function tellEvents({ phases, changes, reports }: History): string {
   if (reports.length === 0) return '';
-  const levels = phases.map(({ phase, iteration }) => `${phase} from iteration ${count(iteration)}`).join(', ');
+  const levels = phases
+    .map(({ phase, iteration }) => text('measures.phaseFrom', { phase, iteration: count(iteration) }))
+    .join(', ');
   return `${levels[0]?.toUpperCase()}${levels.slice(1)}. ${totals(changes)}`;
 }
 
@@ -289,7 +297,7 @@ function tellEvents({ phases, changes, reports }: History): string {
 function tellByLevel({ phases, reports }: History): string {
   const left = phases.slice(1).map(({ iteration }, i) => {
     const last = lastBefore(reports, iteration);
-    return last && `${count(last.vertices)} at the end of ${phases[i]?.phase}`;
+    return last && text('measures.verticesAtEnd', { vertices: count(last.vertices), phase: phases[i]?.phase ?? '' });
   });
   const known = left.filter(Boolean);
   return known.length > 0 ? `${known.join(', ')}.` : '';
@@ -300,7 +308,7 @@ function lastBefore(reports: readonly StepReport[], iteration: number): StepRepo
   return undefined;
 }
 
-function tellChange({ reports }: History, name: string, of: (report: StepReport) => number): string {
+function tellChange({ reports }: History, key: TextKey, of: (report: StepReport) => number): string {
   const last = reports.at(-1);
   if (!last) return '';
   let [low, high] = [of(last), of(last)];
@@ -308,5 +316,5 @@ function tellChange({ reports }: History, name: string, of: (report: StepReport)
     low = Math.min(low, of(report));
     high = Math.max(high, of(report));
   }
-  return `${name[0]?.toUpperCase()}${name.slice(1)}: now ${count(of(last))}; between ${count(low)} and ${count(high)} so far.`;
+  return text(key, { now: count(of(last)), low: count(low), high: count(high) });
 }

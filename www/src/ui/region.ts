@@ -1,4 +1,5 @@
 import type { Vec3 } from '../protocol';
+import { text } from '../texts';
 import type { VoxelBox } from '../track/box';
 import { h } from './dom';
 
@@ -25,17 +26,17 @@ export class RegionControls {
   constructor({ onRegion, onComponent }: RegionEvents) {
     this.#onRegion = onRegion;
     const rows = [0, 1, 2].map((axis) => this.#row(axis));
-    this.#whole = button('box', 'whole', 'Whole image', () => onRegion(undefined));
-    this.#largest = button('component', 'largest', 'Largest', () => onComponent('largest'));
-    this.#here = button('component', 'here', 'Nearest to the crosshair', () => onComponent('here'));
+    this.#whole = button('box', 'whole', text('trackPanels.wholeImage'), () => onRegion(undefined));
+    this.#largest = button('component', 'largest', text('trackPanels.largestComponent'), () => onComponent('largest'));
+    this.#here = button('component', 'here', text('trackPanels.nearestComponent'), () => onComponent('here'));
     this.element = h(
       'div',
       { class: 'region' },
-      h('p', { class: 'help' }, 'Drag the sides of the dashed box on the slices, or type its first and last slice.'),
+      h('p', { class: 'help' }, text('trackPanels.regionHelp')),
       ...rows,
       this.#error,
       h('div', { class: 'buttons' }, this.#whole),
-      h('p', {}, 'Surface that is followed'),
+      h('p', {}, text('trackPanels.trackedSurface')),
       h('div', { class: 'buttons' }, this.#largest, this.#here),
       this.#followed,
     );
@@ -58,8 +59,8 @@ export class RegionControls {
     this.#largest.setAttribute('aria-pressed', String(nearest === undefined));
     this.#here.setAttribute('aria-pressed', String(nearest !== undefined));
     this.#followed.textContent = nearest
-      ? `The one nearest to (${nearest.map((x) => x.toFixed(1)).join(', ')}).`
-      : 'The largest of the first frame.';
+      ? text('trackPanels.trackedNearest', { point: nearest.map((x) => x.toFixed(1)).join(', ') })
+      : text('trackPanels.trackedLargest');
     this.#error.textContent = '';
   }
 
@@ -101,7 +102,7 @@ export class RegionControls {
         !Number.isInteger(from) || !Number.isInteger(to) || from < 0 || to >= (this.#dims[axis] ?? 1) || from >= to
       );
     });
-    if (wrong) this.#error.textContent = 'Whole numbers within the image are needed, the first below the last.';
+    if (wrong) this.#error.textContent = text('trackPanels.regionError');
     else if (low.some((x, k) => x !== this.#region.low[k]) || high.some((x, k) => x !== this.#region.high[k]))
       this.#onRegion({ low, high });
   }

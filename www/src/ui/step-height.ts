@@ -1,4 +1,5 @@
 import type { ParamSpec } from '../protocol';
+import { text } from '../texts';
 import { h, symbol, uniqueId } from './dom';
 import { figure } from './format';
 
@@ -31,7 +32,13 @@ export class StepHeight {
       inputmode: 'decimal',
       'aria-describedby': `${id}-help`,
     });
-    this.#slider = h('input', { type: 'range', min: 0, max: 1, step: 'any', 'aria-label': `${label}, slider` });
+    this.#slider = h('input', {
+      type: 'range',
+      min: 0,
+      max: 1,
+      step: 'any',
+      'aria-label': text('controls.sliderOf', { label }),
+    });
     this.#number.addEventListener('change', () => onChange(this.#number.valueAsNumber));
     // A change restarts the tracker, so it is applied only when the slider is released.
     this.#slider.addEventListener('input', () => {
@@ -69,12 +76,15 @@ export class StepHeight {
     this.#slider.valueAsNumber = threshold;
     this.#slider.setAttribute('aria-valuetext', figure(threshold));
     this.#number.value = String(Number(threshold.toPrecision(6)));
-    this.#noise.textContent = `Noise measured in the box: σ = ${figure(rounded(noise))}. Suggested: ${figure(rounded(suggested))}.`;
-    this.#suggest.textContent = `Take ${figure(rounded(suggested))}`;
+    this.#noise.textContent = text('trackPanels.noiseEstimate', {
+      noise: figure(rounded(noise)),
+      suggested: figure(rounded(suggested)),
+    });
+    this.#suggest.textContent = text('trackPanels.useSuggested', { suggested: figure(rounded(suggested)) });
     this.#suggest.disabled = Object.is(threshold, suggested);
     const low = threshold < SAFE * noise;
-    const text = low ? `Below 2.5 σ = ${figure(rounded(SAFE * noise))}: noise alone will make boundaries.` : '';
-    if (this.#warning.textContent !== text) this.#warning.textContent = text;
+    const warning = low ? text('trackPanels.noiseWarning', { limit: figure(rounded(SAFE * noise)) }) : '';
+    if (this.#warning.textContent !== warning) this.#warning.textContent = warning;
     this.#error.textContent = '';
   }
 

@@ -1,9 +1,10 @@
 import type { Vec3 } from '../protocol';
+import { text } from '../texts';
 import type { CannySettings } from '../track/canny';
-import type { Between, Votes } from '../track/protocol';
-import type { Below } from '../view/beating';
+import type { Between, BoundaryVotes } from '../track/protocol';
+import type { ContentBelow } from '../view/beating';
 import {
-  Picture,
+  FigureImage,
   paintBetween,
   paintBoundary,
   paintCanny,
@@ -18,8 +19,8 @@ import { h, uniqueId } from './dom';
 const CANNY: CannySettings = { deviation: 1, low: 6, high: 14 };
 const CANNY_FIELDS = [
   { name: 'deviation', label: 'σ', min: 0.1 },
-  { name: 'low', label: 'low', min: 0 },
-  { name: 'high', label: 'high', min: 0 },
+  { name: 'low', label: text('trackPanels.cannyLow'), min: 0 },
+  { name: 'high', label: text('trackPanels.cannyHigh'), min: 0 },
 ] as const;
 
 /** Data for the figures, as far as it is available. */
@@ -28,7 +29,7 @@ export interface StillsOf {
   /** Window size k, and edge threshold τ. */
   window: number;
   threshold: number;
-  votes: Votes | undefined;
+  votes: BoundaryVotes | undefined;
   between: Between | undefined;
   /** The slice that `between` replaces, and the number of slices. */
   pair: [number, number];
@@ -39,20 +40,20 @@ export interface StillsOf {
 /** One of the paper's rows of figures, shown in place of the slices. */
 export class Stills {
   readonly element: HTMLElement;
-  readonly #rows: Record<Exclude<Below, 'slices'>, HTMLElement>;
-  readonly #sorted = new Picture('The slice with the window at the crosshair sorted into bright and dark');
-  readonly #boundary = new Picture('The boundary in the slice: the brighter the more windows voted for it');
-  readonly #canny = new Picture('Canny’s edges in the slice');
-  readonly #time = new Picture('One line of the slice in all frames, time to the right, with the surface on it');
+  readonly #rows: Record<Exclude<ContentBelow, 'slices'>, HTMLElement>;
+  readonly #sorted = new FigureImage(text('trackPanels.clusteredLabel'));
+  readonly #boundary = new FigureImage(text('trackPanels.votesLabel'));
+  readonly #canny = new FigureImage(text('trackPanels.cannyLabel'));
+  readonly #time = new FigureImage(text('trackPanels.timeLineLabel'));
   readonly #between = [
-    'The slice before',
-    'Made of the two by optical flow',
-    'The slice between them as it was measured',
-    'Made of the two by linear interpolation',
-    'The slice after',
-  ].map((label) => new Picture(label));
+    text('trackPanels.sliceBefore'),
+    text('trackPanels.sliceByFlow'),
+    text('trackPanels.sliceMeasured'),
+    text('trackPanels.sliceLinear'),
+    text('trackPanels.sliceAfter'),
+  ].map((label) => new FigureImage(label));
   readonly #settings = { ...CANNY };
-  #below: Below = 'slices';
+  #below: ContentBelow = 'slices';
   #of: StillsOf | undefined;
 
   /** `onVoxel` and `onFrame` are called with the voxel or frame that was clicked. */
@@ -72,15 +73,15 @@ export class Stills {
     this.element = h('div', { hidden: true, 'data-stills': '' }, ...Object.values(this.#rows));
     this.#sorted.canvas.addEventListener('click', (event) => {
       const { volume, voxel } = this.#of?.subject ?? {};
-      if (volume && voxel) onVoxel(voxelIn(volume, voxel, ...this.#sorted.partsAt(event)));
+      if (volume && voxel) onVoxel(voxelIn(volume, voxel, ...this.#sorted.fractionsAt(event)));
     });
     this.#time.canvas.addEventListener('click', (event) => {
       const frames = this.#of?.subject.volume.frames ?? 1;
-      onFrame(Math.min(frames - 1, Math.floor(this.#time.partsAt(event)[0] * frames)));
+      onFrame(Math.min(frames - 1, Math.floor(this.#time.fractionsAt(event)[0] * frames)));
     });
   }
 
-  set below(below: Below) {
+  set below(below: ContentBelow) {
     this.#below = below;
     this.element.hidden = below === 'slices';
     for (const [name, row] of Object.entries(this.#rows)) row.hidden = name !== below;
@@ -101,13 +102,11 @@ export class Stills {
 
   #drawBoundary({ subject, window, threshold, votes }: StillsOf): void {
     const split = paintWindow(this.#sorted, subject, window, threshold);
-    this.#sorted.caption = split
-      ? 'The window at the crosshair, sorted by 2-means: it votes for what lies between green and red.'
-      : 'The window at the crosshair, sorted by 2-means: the two are too near each other, it does not vote.';
+    this.#sorted.caption = split ? text('trackPanels.clusteredVotes') : text('trackPanels.clusteredNoVote');
     if (votes) paintBoundary(this.#boundary, subject, votes);
     this.#boundary.caption = votes
-      ? `Votes of all windows, which reach into the slices and frames beside; τ = ${Number(threshold.toPrecision(3))}.`
-      : 'The boundary of this frame is not found yet.';
+      ? text('trackPanels.votesCaption', { threshold: Number(threshold.toPrecision(3)) })
+      : text('trackPanels.votesMissing');
     this.element.dataset.votes = String(votes?.weights.length ?? 0);
     this.#drawCanny();
   }
@@ -115,24 +114,25 @@ export class Stills {
   #drawCanny(): void {
     if (!this.#of) return;
     paintCanny(this.#canny, this.#of.subject, this.#settings);
-    this.#canny.caption = 'Canny’s edges: three numbers to find by trying (the paper’s: 1.5, 10, 20).';
+    this.#canny.caption = text('trackPanels.cannyCaption');
   }
 
   #drawTime({ subject, outlines }: StillsOf): void {
     const points = paintTime(this.#time, subject, outlines());
     this.element.dataset.crossings = String(points);
-    this.#time.caption = `The line through the crosshair, from left to right of the slice downwards, in all ${subject.volume.frames} frames to the right; dots: where the surface crosses it. A click shows the frame.`;
+    this.#time.caption = text('trackPanels.timeLineCaption', { frames: subject.volume.frames });
   }
 
   #drawBetween({ subject, between, pair: [slice, slices] }: StillsOf): void {
     if (between) paintBetween(this.#between, subject.volume, between);
-    const off = (method: 'linear' | 'flow') => (between ? `: off by ${between.off[method].toFixed(1)}` : '');
+    const off = (method: 'linear' | 'flow') =>
+      between ? text('trackPanels.sliceError', { error: between.off[method].toFixed(1) }) : '';
     const captions = [
-      `Slice ${slice} of ${slices}`,
-      `Of these two, by flow${off('flow')}`,
-      `Slice ${slice + 1}, as measured`,
-      `Of these two, linear${off('linear')}`,
-      `Slice ${slice + 2}`,
+      text('trackPanels.sliceNumberOf', { number: slice, slices }),
+      text('trackPanels.byFlowCaption', { error: off('flow') }),
+      text('trackPanels.measuredCaption', { number: slice + 1 }),
+      text('trackPanels.linearCaption', { error: off('linear') }),
+      text('trackPanels.sliceNumber', { number: slice + 2 }),
     ];
     for (const [i, picture] of this.#between.entries()) picture.caption = captions[i] ?? '';
     this.element.dataset.between = between ? String(slice) : '';
@@ -151,8 +151,8 @@ export class Stills {
     });
     return h(
       'div',
-      { class: 'canny', role: 'group', 'aria-label': 'Canny’s numbers' },
-      h('span', {}, 'Canny’s'),
+      { class: 'canny', role: 'group', 'aria-label': text('trackPanels.cannyParameters') },
+      h('span', {}, text('trackPanels.cannyName')),
       ...fields,
     );
   }
