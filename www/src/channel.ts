@@ -1,4 +1,5 @@
 import type { Failure } from './protocol';
+import { text } from './texts';
 
 /**
  * A request that a worker could not fulfil. `code` is that of the library's VesicleError, or 'internal' if the engine
@@ -109,9 +110,9 @@ export class Channel<Requests extends Asked<Requests>, Event extends { event: st
     worker.onerror = (event) => {
       // The page shows the error; the console need not repeat it.
       event.preventDefault();
-      this.#broken(event.message || 'the worker could not be started');
+      this.#broken(event.message || text('shell.workerFailed'));
     };
-    worker.onmessageerror = () => this.#broken('a message could not be read');
+    worker.onmessageerror = () => this.#broken(text('shell.messageUnreadable'));
     return worker;
   }
 

@@ -1,4 +1,5 @@
 /** Worker of the Extract lab: holds one volume and one model, and serves the page's requests. */
+
 import init, { type DeformableModel, type Mesh, paramSpecs, type StepReport, type Volume, version } from 'vesicle';
 import type {
   Attractor,
@@ -21,6 +22,7 @@ import type {
   VolumeSource,
   WorkerEvent,
 } from './protocol';
+import { text } from './texts';
 import { compare } from './worker/compare';
 import { buildModel, valuesFor } from './worker/models';
 import { Refusal, toFailure } from './worker/refusal';
@@ -139,12 +141,12 @@ class Session {
   }
 
   #current(): DeformableModel {
-    if (!this.#model) throw new Refusal('invalid-argument', 'no volume is loaded: open one first');
+    if (!this.#model) throw new Refusal('invalid-argument', text('extract.noVolume'));
     return this.#model;
   }
 
   #image(): Volume {
-    if (!this.#volume) throw new Refusal('invalid-argument', 'no volume is loaded: open one first');
+    if (!this.#volume) throw new Refusal('invalid-argument', text('extract.noVolume'));
     return this.#volume;
   }
 

@@ -2,6 +2,7 @@ import type { Client } from '../client';
 import { EXAMPLES, type Example, exampleUrl } from '../examples';
 import { exampleById, startOf } from '../presets';
 import type { Loaded, ParamSpec, ParamValues, Setup, VolumeSource } from '../protocol';
+import { text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import { count } from '../ui/format';
 import type { StartChoice } from '../ui/start';
@@ -97,7 +98,7 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
     this.#ui.adopt(volume, source);
     if (source.linked?.color) this.#ui.options.color = source.linked.color;
     this.#settings.adopt(volume, choice, params, setup.attractors);
-    this.#settings.remember('Play');
+    this.#settings.remember(text('labs.play'));
     await this.#client.request('play', undefined);
   }
 
@@ -111,8 +112,9 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
       await this.#client.request('restore', newest.saved);
       this.#settings.adoptMoment(newest);
     } else this.#settings.begin(choice, params);
-    const where = newest ? `from iteration ${count(newest.saved.iteration)}` : 'from the beginning';
-    this.#ui.status.say(`Started again ${where}.`);
+    this.#ui.status.say(
+      newest ? text('extract.restartedFrom', { iteration: count(newest.saved.iteration) }) : text('extract.restarted'),
+    );
   }
 
   protected override keep(): void {

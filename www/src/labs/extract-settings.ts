@@ -1,7 +1,7 @@
 import { type Client, toFailure } from '../client';
 import type { Preset, Variant } from '../presets';
 import type { Attractor, ParamValues, SavedRun, Setup, StartShape, Vec3, VolumeView } from '../protocol';
-import { plural } from '../ui/format';
+import { plural, text } from '../texts';
 import type { HistoryMark } from '../ui/history';
 import type { StartChoice } from '../ui/start';
 import type { ExtractParts } from './extract-parts';
@@ -15,7 +15,7 @@ const SPHERE_PART = 0.1;
 const ATTRACTOR_PART = 0.15;
 
 /** Why nothing can be changed after a failure of the engine. */
-const BROKEN = 'The engine has stopped; Reset starts it again.';
+const BROKEN = text('labs.engineStopped');
 
 /** State of the page besides the model, which undo restores. */
 interface PageState {
@@ -90,7 +90,7 @@ export class ExtractSettings {
 
   /** Adopts a new model of the present volume, before its first step. */
   begin(choice: StartChoice, params: ParamValues): void {
-    this.#states.stand('Ready to start.');
+    this.#states.stand(text('labs.readyToStart'));
     this.#adoptModel(choice, params);
   }
 
@@ -115,7 +115,7 @@ export class ExtractSettings {
    */
   changeTo({ params: usual, startsOver }: Preset, { id, params: differing }: Variant): Promise<void> {
     const params = { ...usual, ...differing };
-    return this.#change(`figure ${id}`, 'That did not work.', async () => {
+    return this.#change(text('extract.figureChange', { id }), text('labs.requestFailed'), async () => {
       if (startsOver) await this.#rebuild(this.#ui.start.inForce, params);
       else this.#take(await this.#client.request('setParams', params));
       await this.#client.request('play', undefined);
@@ -125,27 +125,27 @@ export class ExtractSettings {
   /** Adds missing parts to the surface, and continues the run if there were any. */
   seed(): Promise<void> {
     const { coverage } = this.#ui;
-    return this.#change('seeding', 'Missing parts could not be seeded.', async () => {
+    return this.#change(text('extract.seeding'), text('extract.seedFailed'), async () => {
       const seeds = await this.#client.request('seed', undefined);
-      coverage.say(seeds === 0 ? 'Nothing to seed on this level.' : `${plural(seeds, 'part')} seeded.`);
+      coverage.say(seeds === 0 ? text('extract.nothingToSeed') : plural('extract.seeded', seeds));
       if (seeds > 0) await this.#client.request('play', undefined);
     });
   }
 
   /** Rebuilds the model from its start, with the parameters unchanged. */
   startOver(): Promise<void> {
-    return this.#change('Reset', 'The model could not be built.', async () => {
+    return this.#change(text('labs.reset'), text('labs.buildFailed'), async () => {
       await this.#rebuild(this.#ui.start.inForce, this.#params);
     });
   }
 
   /** Rebuilds the model from the chosen start, and runs it. If the start is rejected, the previous model continues. */
   async restart(): Promise<void> {
-    if (!this.#states.canChange) return this.#ui.start.refuse(this.#why('Not while a volume is opened.'));
+    if (!this.#states.canChange) return this.#ui.start.refuse(this.#why(text('extract.notWhileOpening')));
     await this.#states.inTurn(async () => {
       if (!this.#states.canChange) return;
       const running = this.#states.value === 'running';
-      const forget = this.remember('another start');
+      const forget = this.remember(text('extract.startChange'));
       try {
         await this.#rebuild(this.#ui.start.value, this.#params);
         await this.#client.request('play', undefined);
@@ -153,7 +153,7 @@ export class ExtractSettings {
         forget();
         const { code, message } = toFailure(error);
         this.#ui.start.refuse(message);
-        if (code === 'internal') return this.#states.fail('The model could not be built.', error);
+        if (code === 'internal') return this.#states.fail(text('labs.buildFailed'), error);
         this.#states.back((state) => this.#results.describe(state));
         if (running) this.#play();
       }
@@ -165,14 +165,14 @@ export class ExtractSettings {
     return this.#states.inTurn(async () => {
       if (this.#states.engineBroken) return this.#refuseParam(name, BROKEN);
       if (!this.#states.canChange) return this.#onChange();
-      const forget = this.remember(`change of ${this.#ui.labelOf(name)}`, name);
+      const forget = this.remember(text('labs.changeOf', { name: this.#ui.labelOf(name) }), name);
       try {
         this.#take(await this.#client.request('setParams', { [name]: value }));
         this.#goOn();
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);
-        if (code === 'internal') this.#states.fail('That did not work.', error);
+        if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
         this.#refuseParam(name, this.#why(message));
       }
     });
@@ -195,7 +195,7 @@ export class ExtractSettings {
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);
-        if (code === 'internal') this.#states.fail('That did not work.', error);
+        if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
         this.#ui.showAttractors(this.#attractors);
         this.#ui.attractors.complain(this.#why(message));
       }
@@ -205,13 +205,13 @@ export class ExtractSettings {
   travel(way: 'undo' | 'redo'): Promise<void> {
     return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return;
-      this.#states.load(way === 'undo' ? 'Going back.' : 'Going forth again.');
+      this.#states.load(way === 'undo' ? text('labs.undoing') : text('labs.redoing'));
       try {
         const moment = await this.#rewinder.travel(way);
         if (moment) this.adoptMoment(moment);
         else this.#states.back((state) => this.#results.describe(state));
       } catch (error) {
-        this.#states.fail('That did not work.', error);
+        this.#states.fail(text('labs.requestFailed'), error);
       }
     });
   }
@@ -243,7 +243,7 @@ export class ExtractSettings {
   }
 
   async #rebuild(choice: StartChoice, params: ParamValues): Promise<void> {
-    this.#states.load('Starting over.');
+    this.#states.load(text('labs.resetting'));
     const ready = await this.#client.request('rebuild', this.setup(choice, params));
     this.begin(choice, ready.params);
   }
@@ -267,7 +267,7 @@ export class ExtractSettings {
   }
 
   #play(): void {
-    this.#client.request('play', undefined).catch((error) => this.#states.fail('That did not work.', error));
+    this.#client.request('play', undefined).catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 
   #showPyramid({ levels }: StartChoice): void {

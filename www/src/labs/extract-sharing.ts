@@ -1,5 +1,7 @@
 /** Shares the state of the Extract lab as an address, and passes its surface to the Sculpt lab. */
+
 import type { Client } from '../client';
+import { text } from '../texts';
 import { copyAddress, FILE_LACKS, showAddress } from './address';
 import type { ExtractOpening } from './extract-opening';
 import type { ExtractParts } from './extract-parts';
@@ -51,8 +53,9 @@ export class ExtractSharing {
   /** Passes the surface on as a mesh to deform. */
   toSculpt(passOn: PassOn): void {
     this.#client.request('export', { format: 'ply' }).then(
-      (bytes) => passOn({ lab: 'sculpt', name: `${this.#ui.saving.name} (surface)`, bytes, params: {} }),
-      (error) => this.#states.fail('The surface could not be passed on.', error),
+      (bytes) =>
+        passOn({ lab: 'sculpt', name: text('labs.surfaceName', { name: this.#ui.saving.name }), bytes, params: {} }),
+      (error) => this.#states.fail(text('labs.toSculptFailed'), error),
     );
   }
 }

@@ -2,7 +2,7 @@ import { Client, RequestError, toFailure } from '../client';
 import { GUIDES } from '../guides';
 import type { Shade, WorkerEvent } from '../protocol';
 import type { LabState } from '../state';
-import { plural } from '../ui/format';
+import { plural, text } from '../texts';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { ViewOptions } from '../ui/view-options';
@@ -111,15 +111,21 @@ export class ExtractLab implements Lab {
     const redo = () => void this.#settings.travel('redo');
     const attract = () => this.#ui.attractors.add(this.#ui.stage.crosshair);
     return [
-      { key: ' ', shown: 'Space', text: 'play or pause', act: () => this.#toggle() },
-      { key: 's', shown: 's', text: 'one step', act: () => this.#step(1) },
-      { key: 'd', shown: 'd', text: 'ten steps', act: () => this.#step(10) },
-      { key: 'r', shown: 'r', text: 'reset', act: () => void this.#reset() },
-      { key: 'a', shown: 'a', text: 'attractor at the crosshair', act: attract },
-      { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#settings.travel('undo') },
-      { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: redo },
-      { key: 'y', ctrl: true, shown: 'Ctrl Y', text: 'redo', act: redo },
-      { key: 'Escape', shown: 'Esc', text: 'away with the message', act: () => this.#dismiss() },
+      { key: ' ', shown: text('labs.keySpace'), text: text('labs.playOrPause'), act: () => this.#toggle() },
+      { key: 's', shown: 's', text: text('labs.oneStep'), act: () => this.#step(1) },
+      { key: 'd', shown: 'd', text: text('labs.tenSteps'), act: () => this.#step(10) },
+      { key: 'r', shown: 'r', text: text('labs.resetKey'), act: () => void this.#reset() },
+      { key: 'a', shown: 'a', text: text('extract.attractorKey'), act: attract },
+      {
+        key: 'z',
+        ctrl: true,
+        shown: text('labs.keyUndo'),
+        text: text('labs.undo'),
+        act: () => void this.#settings.travel('undo'),
+      },
+      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: redo },
+      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: redo },
+      { key: 'Escape', shown: text('labs.keyEscape'), text: text('labs.dismissKey'), act: () => this.#dismiss() },
     ];
   }
 
@@ -139,14 +145,14 @@ export class ExtractLab implements Lab {
     const running = this.#states.value === 'running';
     if (!running && !this.#states.canRun) return;
     this.#ui.banner.hide();
-    if (!running) this.#settings.remember('Play');
+    if (!running) this.#settings.remember(text('labs.play'));
     this.#ask(this.#client.request(running ? 'pause' : 'play', undefined));
   }
 
   #step(steps: number): void {
     if (!this.#states.canRun) return;
     this.#ui.banner.hide();
-    this.#settings.remember(plural(steps, 'step'));
+    this.#settings.remember(plural('counts.step', steps));
     this.#ask(this.#client.request('step', { count: steps }));
   }
 
@@ -160,13 +166,13 @@ export class ExtractLab implements Lab {
   async #compare(): Promise<void> {
     if (!this.#states.canChange) return;
     const { compare, start } = this.#ui;
-    if (start.value.levels === 0) return compare.refuse('Choose one pyramid level or more under Start first.');
+    if (start.value.levels === 0) return compare.refuse(text('extract.compareNeedsLevel'));
     compare.begin();
     try {
       const setup = this.#settings.setup(start.value, this.#settings.params, []);
       compare.finish(await this.#client.request('compare', setup));
     } catch (error) {
-      compare.refuse(`The comparison stopped: ${toFailure(error).message}`);
+      compare.refuse(text('extract.compareFailed', { message: toFailure(error).message }));
     }
   }
 
@@ -176,17 +182,17 @@ export class ExtractLab implements Lab {
     try {
       coverage.finish(await this.#client.request('coverage', undefined));
     } catch (error) {
-      coverage.say(`Coverage could not be measured: ${toFailure(error).message}`);
+      coverage.say(text('extract.coverageFailed', { message: toFailure(error).message }));
     }
   }
 
   /** Reports a request's failure, without waiting for its reply. */
   #ask(request: Promise<unknown>): void {
-    request.catch((error) => this.#states.fail('That did not work.', error));
+    request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 
   #onEvent(event: WorkerEvent): void {
-    if (event.event === 'failure') this.#states.fail('The run has stopped.', new RequestError(event.failure));
+    if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
     else if (event.event === 'comparing') this.#ui.compare.tell(event);
     else if (event.event === 'covering') this.#ui.coverage.tell(event);
     else if (event.event !== 'state') this.#results.take(event);

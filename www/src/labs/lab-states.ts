@@ -1,5 +1,6 @@
 import { toFailure } from '../channel';
 import { type LabState, Observable } from '../state';
+import { text } from '../texts';
 import type { ErrorBanner, StatusLine } from '../ui/status';
 
 /** The state of a lab; an error covers it until the user dismisses it. */
@@ -118,11 +119,9 @@ export class LabStates {
     if (failure.code === 'internal') this.engineBroken = true;
     // The failure concerns the model being replaced, or else `Opening` reports it.
     if (this.#opening) return;
-    const hint =
-      this.engineBroken && this.ready
-        ? 'What you see is the last result; Reset starts the engine again. It said: '
-        : '';
-    this.#banner.show(title, hint + failure.message);
+    const message =
+      this.engineBroken && this.ready ? text('labs.engineHint', { message: failure.message }) : failure.message;
+    this.#banner.show(title, message);
     if (this.value === 'running' && !this.engineBroken) return;
     this.#status.say('');
     if (this.#model === 'running' && this.engineBroken) this.#model = 'paused';

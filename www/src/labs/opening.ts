@@ -1,6 +1,7 @@
 import { toFailure } from '../channel';
 import type { Unit } from '../examples';
 import type { Failure, ParamSpec } from '../protocol';
+import { text } from '../texts';
 import type { ErrorBanner, StatusLine } from '../ui/status';
 import type { LabStates } from './lab-states';
 
@@ -113,7 +114,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     try {
       await this.#greet();
     } catch (error) {
-      this.states.fail('Vesicle could not start.', error);
+      this.states.fail(text('labs.startFailed'), error);
       return;
     }
     if (signal.aborted) return;
@@ -172,7 +173,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     const opening = this.#source ? this.again() : this.example(this.first);
     const own = this.#turn;
     await opening;
-    if (own === this.#turn && !this.#ui.banner.shown) this.#ui.status.say('Cancelled.');
+    if (own === this.#turn && !this.#ui.banner.shown) this.#ui.status.say(text('labs.cancelled'));
   }
 
   /** Opens what the address asks for. If that is not possible, opens `otherwise` and says why. */
@@ -184,8 +185,8 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     if (!linked) return;
     this.#awaiting = linked.file ? linked : undefined;
     if (linked.file)
-      this.#ui.banner.show('This link needs a file.', `Open ${linked.file} from your disk: its settings will follow.`);
-    else this.#ui.banner.show('This link cannot be followed.', `There is no example “${linked.example ?? ''}”.`);
+      this.#ui.banner.show(text('labs.linkNeedsFile'), text('labs.linkNeedsFileHint', { file: linked.file }));
+    else this.#ui.banner.show(text('labs.linkInvalid'), text('labs.linkNoExample', { example: linked.example ?? '' }));
   }
 
   #exampleOf({ example, file }: Linked): Example | undefined {
@@ -197,7 +198,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   protected async open(source: Source<Example, Linked, Data>, again = false): Promise<void> {
     const turn = ++this.#turn;
     if (this.states.canChange) this.keep();
-    const calm = this.states.open(again ? 'Starting the engine again.' : `Opening ${source.name}.`);
+    const calm = this.states.open(again ? text('labs.restartingEngine') : text('labs.opening', { name: source.name }));
     try {
       await this.#needEngine();
       await calm;
@@ -236,20 +237,20 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       return this.#openWithoutLink(source, message);
     this.#ui.data.choose(this.#source?.example);
     if (this.#astray) this.states.engineBroken = true;
-    this.states.fail(`${source.name} could not be opened.`, error);
+    this.states.fail(text('labs.openFailed', { name: source.name }), error);
   }
 
   /** Opens a link's example with its own settings, after one of the link's settings was rejected. */
   async #openWithoutLink({ linked: _, ...source }: Source<Example, Linked, Data>, why: string): Promise<void> {
     await this.open(source);
     if (this.states.value === 'error' || this.#source !== source) return;
-    this.#ui.banner.show('The link’s settings are left out.', `One of them cannot be: ${why}.`);
+    this.#ui.banner.show(text('labs.linkSettingsIgnored'), text('labs.linkSettingRejected', { reason: why }));
   }
 
   /** Restarts the engine if it is broken. */
   async #needEngine(): Promise<void> {
     if (!this.states.engineBroken) return;
-    this.#engine.restart({ code: 'internal', message: 'the engine was started again' });
+    this.#engine.restart({ code: 'internal', message: text('labs.engineRestarted') });
     this.#astray = true;
     await this.#greet();
     await this.restarted();

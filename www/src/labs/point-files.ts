@@ -1,6 +1,8 @@
 /** Opens points, cameras and photographs of the Reconstruct lab, from an example or from the user's files. */
+
 import { type CloudExample, dataUrl } from '../reconstruct/examples';
 import type { CloudSource } from '../reconstruct/protocol';
+import { text } from '../texts';
 import { readFiles } from '../ui/files';
 import { fetched } from './downloads';
 import { type Photograph, readPhotographs } from './photographs';
@@ -41,11 +43,8 @@ export async function fromFiles(files: File[]): Promise<Opened> {
   const lists = files.filter(({ name }) => /\.json$/i.test(name));
   const pictures = files.filter(({ name, type }) => type.startsWith('image/') || /\.(png|jpe?g|webp)$/i.test(name));
   const [points, ...more] = files.filter((file) => !lists.includes(file) && !pictures.includes(file));
-  if (more.length > 0) throw new Error('One file with points at a time, please.');
-  if (!lists[0] && pictures.length > 0)
-    throw new Error(
-      'Photographs need a cameras.json with the projection of each, chosen or dropped together with them.',
-    );
+  if (more.length > 0) throw new Error(text('reconstruct.onePointFile'));
+  if (!lists[0] && pictures.length > 0) throw new Error(text('reconstruct.photosNeedCameras'));
   const byName = new Map(pictures.map((file) => [file.name, file]));
   // A list may name photographs with their folder.
   const find = async (name: string) => byName.get(name.replace(/^.*[/\\]/, ''));

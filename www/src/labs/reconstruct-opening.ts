@@ -2,6 +2,7 @@ import type { ReconstructClient } from '../reconstruct/client';
 import { CLOUDS, type CloudExample } from '../reconstruct/examples';
 import { type CloudVariant, cloudById, isCloudPreset } from '../reconstruct/presets';
 import type { Cloud, CloudSource, ParamSpec, ParamValues, Setup } from '../reconstruct/protocol';
+import { text } from '../texts';
 import type { CloudChoice } from '../ui/cloud-setup';
 import type { LabStates } from './lab-states';
 import { Opening, type Source } from './opening';
@@ -87,9 +88,9 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
 
   /** Returns the present points, for cameras that are opened after them. */
   async #presentPoints(): Promise<CloudSource> {
-    if (!this.source) throw new Error('Open points first, or together with their cameras.');
+    if (!this.source) throw new Error(text('reconstruct.camerasNeedPoints'));
     const { source } = await this.source.opened();
-    if (!source) throw new Error('Open points together with their cameras.');
+    if (!source) throw new Error(text('reconstruct.camerasWithPoints'));
     return source;
   }
 

@@ -1,7 +1,8 @@
 import type { ReconstructClient } from '../reconstruct/client';
 import type { ConstraintsEvent, MeasuredEvent, ProgressEvent, SurfaceEvent, TimedEvent } from '../reconstruct/protocol';
 import type { LabState } from '../state';
-import { count, figure, plural } from '../ui/format';
+import { plural, text } from '../texts';
+import { count, figure } from '../ui/format';
 import { type History, underWay } from '../ui/history';
 import { overallProgress } from '../ui/phases';
 import type { LabStates } from './lab-states';
@@ -65,11 +66,15 @@ export class Results {
   /** Describes a state for the status line. */
   describe(state: LabState): string {
     const last = this.#history.reports.at(-1);
-    if (state === 'running') return 'Running.';
-    if (!last) return 'Ready to start.';
-    if (state !== 'done') return `Paused at iteration ${count(last.iteration)}, in the phase ${last.phase}.`;
-    if (last.vertices === 0) return 'Done, but there is no surface: f is nowhere 0.';
-    return `Done: ${count(last.vertices)} vertices in ${plural(last.components, 'component')}, residual ${figure(last.residual)}.`;
+    if (state === 'running') return text('labs.running');
+    if (!last) return text('labs.readyToStart');
+    if (state !== 'done') return text('reconstruct.pausedAt', { iteration: count(last.iteration), phase: last.phase });
+    if (last.vertices === 0) return text('reconstruct.noSurfaceDone');
+    return text('reconstruct.done', {
+      vertices: plural('counts.vertex', last.vertices),
+      components: plural('counts.component', last.components),
+      residual: figure(last.residual),
+    });
   }
 
   /** Clears the history for a new run; the surface stays until the new one is complete. */
@@ -124,9 +129,6 @@ export class Results {
   #showNothing(): void {
     this.#whole = false;
     this.#ui.clearSurface();
-    this.#ui.banner.show(
-      'There is no surface.',
-      'f is nowhere above the level. Few points need a smaller δ, or more points; else try a smaller λs, the level “mean”, or a smaller cell.',
-    );
+    this.#ui.banner.show(text('reconstruct.noSurface'), text('reconstruct.noSurfaceHint'));
   }
 }

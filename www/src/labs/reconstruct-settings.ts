@@ -1,6 +1,7 @@
 import { toFailure } from '../channel';
 import type { ReconstructClient } from '../reconstruct/client';
 import type { Cloud, Edits, ParamValues, Setup } from '../reconstruct/protocol';
+import { text } from '../texts';
 import type { CloudChoice } from '../ui/cloud-setup';
 import type { Hit } from '../view/reconstruction';
 import type { LabStates } from './lab-states';
@@ -101,13 +102,13 @@ export class ModelSettings {
     return this.#states.inTurn(async () => {
       if (!this.#cloud || !this.#states.canChange) return;
       const edits = editedBy(tool, hit, length, this.#edits, this.#cloud.points);
-      if (edits) await this.#change({ edits }, 'points by hand');
-      else if (tool === 'remove') this.#ui.status.say('No point is so near to that place.');
+      if (edits) await this.#change({ edits }, text('reconstruct.editChange'));
+      else if (tool === 'remove') this.#ui.status.say(text('reconstruct.noPointsNear'));
     });
   }
 
   takeBackEdits(): Promise<void> {
-    return this.change({ edits: NO_EDITS }, 'taking all back');
+    return this.change({ edits: NO_EDITS }, text('reconstruct.discardChange'));
   }
 
   travel(way: 'undo' | 'redo'): Promise<void> {
@@ -130,7 +131,7 @@ export class ModelSettings {
     const before = this.#now;
     try {
       const params = await this.#client.request('setParams', { [name]: value });
-      this.#remember(before, `change of ${name}`, name);
+      this.#remember(before, text('labs.changeOf', { name }), name);
       this.showParams(params);
       if (this.#states.beneath === 'done') {
         this.#results.startOver();
@@ -139,7 +140,7 @@ export class ModelSettings {
     } catch (error) {
       const { code, message } = toFailure(error);
       this.#ui.refuseParam(name, message, this.#params);
-      if (code === 'internal') this.#states.fail('That did not work.', error);
+      if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
     }
   }
 
@@ -170,7 +171,7 @@ export class ModelSettings {
       return true;
     } catch (error) {
       this.#ui.setup.show(this.choice);
-      this.#states.fail('That cannot be.', error);
+      this.#states.fail(text('labs.settingsRejected'), error);
       return false;
     }
   }

@@ -1,4 +1,5 @@
 import type { ReconstructClient } from '../reconstruct/client';
+import { text } from '../texts';
 import { copyAddress, FILE_LACKS, showAddress } from './address';
 import type { LabStates } from './lab-states';
 import type { PassOn } from './labs';
@@ -58,7 +59,7 @@ export class Sharing {
     const fit = fits(this.#settings.edits);
     await copyAddress(this.#ui.status, [
       !this.#opening.source?.example && FILE_LACKS,
-      !fit && 'So many points by hand are not in it.',
+      !fit && text('reconstruct.linkLacksEdits'),
     ]);
   }
 
@@ -71,10 +72,15 @@ export class Sharing {
 
   /** Passes f on to the Extract lab as a volume; inside is above the level. */
   toExtract(passOn: PassOn): void {
-    this.#ui.status.say('Making a volume.');
+    this.#ui.status.say(text('reconstruct.samplingVolume'));
     this.#tryTo(async () => {
       const { bytes, level } = await this.#client.request('volume', { size: VOLUME_SIZE });
-      passOn({ lab: 'extract', name: `${this.#ui.saving.name} (volume)`, bytes, params: { iso: level, isoForce: -1 } });
+      passOn({
+        lab: 'extract',
+        name: text('reconstruct.volumeName', { name: this.#ui.saving.name }),
+        bytes,
+        params: { iso: level, isoForce: -1 },
+      });
     });
   }
 
@@ -82,11 +88,11 @@ export class Sharing {
   toSculpt(passOn: PassOn): void {
     this.#tryTo(async () => {
       const bytes = await this.#client.request('export', { format: 'ply' });
-      passOn({ lab: 'sculpt', name: `${this.#ui.saving.name} (surface)`, bytes, params: {} });
-    }, 'The surface could not be passed on.');
+      passOn({ lab: 'sculpt', name: text('labs.surfaceName', { name: this.#ui.saving.name }), bytes, params: {} });
+    }, text('labs.toSculptFailed'));
   }
 
-  #tryTo(work: () => Promise<void>, title = 'The volume could not be made.'): void {
+  #tryTo(work: () => Promise<void>, title = text('reconstruct.volumeFailed')): void {
     work().catch((error) => this.#states.fail(title, error));
   }
 }

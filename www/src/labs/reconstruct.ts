@@ -4,6 +4,7 @@ import { ReconstructClient } from '../reconstruct/client';
 import { type CloudPreset, type CloudVariant, isCloudPreset, variantInForce } from '../reconstruct/presets';
 import type { ParamValues, PointShade, WorkerEvent } from '../reconstruct/protocol';
 import type { LabState } from '../state';
+import { text } from '../texts';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { CloudViewOptions } from '../view/reconstruction';
@@ -79,7 +80,7 @@ export class ReconstructLab implements Lab {
       onExample: (example) => void this.#opening.example(example),
       onExampleId: (id) => this.#opening.byId(id),
       onVariant: (preset, variant) => this.#openVariant(preset, variant),
-      onChoice: (choice, what) => void this.#settings.change({ choice }, `change of ${what}`),
+      onChoice: (choice, what) => void this.#settings.change({ choice }, text('labs.changeOf', { name: what })),
       onParam: (name, value) => void this.#settings.setParam(name, value),
       onPick: (hit) => void this.#settings.pick(hit),
       onTakeBack: () => void this.#settings.takeBackEdits(),
@@ -102,17 +103,23 @@ export class ReconstructLab implements Lab {
   #shortcuts(): Shortcut[] {
     const redo = () => void this.#settings.travel('redo');
     return [
-      { key: ' ', shown: 'Space', text: 'play or pause', act: () => this.#running.toggle() },
-      { key: 's', shown: 's', text: 'one step', act: () => this.#running.step(1) },
-      { key: 'd', shown: 'd', text: 'ten steps', act: () => this.#running.step(10) },
-      { key: 'r', shown: 'r', text: 'reset', act: () => void this.#reset() },
-      { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#settings.travel('undo') },
-      { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: redo },
-      { key: 'y', ctrl: true, shown: 'Ctrl Y', text: 'redo', act: redo },
+      { key: ' ', shown: text('labs.keySpace'), text: text('labs.playOrPause'), act: () => this.#running.toggle() },
+      { key: 's', shown: 's', text: text('labs.oneStep'), act: () => this.#running.step(1) },
+      { key: 'd', shown: 'd', text: text('labs.tenSteps'), act: () => this.#running.step(10) },
+      { key: 'r', shown: 'r', text: text('labs.resetKey'), act: () => void this.#reset() },
+      {
+        key: 'z',
+        ctrl: true,
+        shown: text('labs.keyUndo'),
+        text: text('labs.undo'),
+        act: () => void this.#settings.travel('undo'),
+      },
+      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: redo },
+      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: redo },
       {
         key: 'Escape',
-        shown: 'Esc',
-        text: 'away with the message, the tool or the photograph',
+        shown: text('labs.keyEscape'),
+        text: text('reconstruct.dismissKey'),
         act: () => this.#putAway(),
       },
     ];
@@ -138,7 +145,7 @@ export class ReconstructLab implements Lab {
   #openVariant(preset: CloudPreset, { name, params, maxPoints }: CloudVariant): void {
     const choice = { ...this.#settings.choice, maxPoints: maxPoints ?? preset.maxPoints };
     const changed = { choice, params: { ...this.#opening.defaults, ...preset.params, ...params } };
-    void this.#settings.change(changed, `figure ${name}`);
+    void this.#settings.change(changed, text('labs.figureChange', { name }));
   }
 
   #showParams(params: ParamValues): void {
@@ -162,18 +169,18 @@ export class ReconstructLab implements Lab {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
     if (engineBroken) return this.#opening.again();
-    this.#states.load('Starting over.');
+    this.#states.load(text('labs.resetting'));
     try {
       await this.#settings.rebuild();
       this.#results.clear();
-      this.#states.stand('Ready to start.');
+      this.#states.stand(text('labs.readyToStart'));
     } catch (error) {
-      this.#states.fail('The model could not be built.', error);
+      this.#states.fail(text('labs.buildFailed'), error);
     }
   }
 
   #onEvent(event: WorkerEvent): void {
-    if (event.event === 'failure') this.#states.fail('The run has stopped.', new RequestError(event.failure));
+    if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
     else if (event.event !== 'state') this.#results.take(event);
     else if (this.#states.enter(event.state)) this.#results.showState(event.state);
   }

@@ -2,6 +2,7 @@ import type { SculptClient } from '../sculpt/client';
 import { SCENES, type SculptExample } from '../sculpt/examples';
 import { isSculptPreset, sceneById } from '../sculpt/presets';
 import type { Opened, SceneSource } from '../sculpt/protocol';
+import { text } from '../texts';
 import type { LabStates } from './lab-states';
 import { fromExample, fromFiles } from './mesh-files';
 import { Opening, type Source } from './opening';
@@ -52,7 +53,7 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
   }
 
   protected load({ name, example, linked }: SculptSource, meshes: SceneSource): Promise<Opened> {
-    if (meshes.detail && !meshes.base) this.states.load(`Making the base of ${name}: its smooth form, without detail.`);
+    if (meshes.detail && !meshes.base) this.states.load(text('sculpt.computingBase', { name }));
     const params = { ...(example?.params ?? OWN_PARAMS), ...linked?.params };
     const [variant] = isSculptPreset(example) ? example.variants : [];
     const usual = linked?.keys ? undefined : (variant?.pose ?? example?.pose);

@@ -4,6 +4,7 @@ import { SCENES, type SculptExample } from '../sculpt/examples';
 import { posesOf, SCULPT_PRESETS, type SculptPreset, type SculptVariant } from '../sculpt/presets';
 import type { MeshTexture, Opened, ParamSpec, ParamValues } from '../sculpt/protocol';
 import type { LabState } from '../state';
+import { text } from '../texts';
 import { h } from '../ui/dom';
 import { EllipsoidControls, type EllipsoidEvents } from '../ui/ellipsoids';
 import { exercises, SCULPT_EXERCISES } from '../ui/exercises';
@@ -50,15 +51,14 @@ export class SculptParts {
   readonly #canvas = h('canvas', {
     tabindex: 0,
     role: 'application',
-    'aria-label':
-      '3D view of the surface and its ellipsoids. Number keys choose an ellipsoid; arrow keys and Page Up and Down then move, turn or size it, by the keys m, t and e; Escape lets it go. Without one, arrow keys turn the view, plus and minus zoom.',
+    'aria-label': text('sculpt.viewLabel'),
   });
   readonly view = new SculptureView(this.#canvas, INITIAL_VIEW);
   readonly ahead = new Ahead(this.view);
   readonly answer = new Answers();
   readonly status = new StatusLine();
   readonly measures = new MeasurePanel(SCULPT_ROWS);
-  readonly coarse = h('p', { class: 'coarse', hidden: true }, 'Coarse preview: it gets fine when the hand rests');
+  readonly coarse = h('p', { class: 'coarse', hidden: true }, text('sculpt.coarsePreview'));
   readonly banner: ErrorBanner;
   readonly data: ScenePanel;
   readonly options: SculptOptionControls;
@@ -95,7 +95,7 @@ export class SculptParts {
       (text) => this.status.say(text),
     );
     this.#exports = new ExportButtons((format, type) => {
-      this.saving.mesh(format, type).catch((error) => events.onError('The surface could not be saved.', error));
+      this.saving.mesh(format, type).catch((error) => events.onError(text('labs.saveFailed'), error));
     });
     this.options = new SculptOptionControls(INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
@@ -105,18 +105,18 @@ export class SculptParts {
     this.#cancel = h(
       'button',
       { type: 'button', hidden: true, 'data-action': 'cancel', onclick: events.onCancel },
-      'Cancel',
+      text('labs.cancel'),
     );
     this.csv = h(
       'button',
       { type: 'button', onclick: () => this.saving.plots(history, 'unrest'), disabled: true },
-      'Plot data (CSV)',
+      text('labs.plotData'),
     );
     this.#layOut(signal);
   }
 
   #layOut(signal: AbortSignal): void {
-    const drop = h('div', { class: 'drop', hidden: true }, 'Drop a mesh to open it');
+    const drop = h('div', { class: 'drop', hidden: true }, text('sculpt.drop'));
     acceptDrops(drop, this.#events.onFiles, signal);
     layOut(this.#root, {
       data: this.data.element,
@@ -136,7 +136,7 @@ export class SculptParts {
       drop,
       measures: this.measures.element,
       exports: this.#exports.element,
-      link: button('Copy link to these settings', this.#events.onCopyLink, 'link'),
+      link: button(text('labs.copyLink'), this.#events.onCopyLink, 'link'),
       plots: this.plots.element,
       csv: this.csv,
       exercises: exercises(SCULPT_EXERCISES, this.#events.onExampleId),
@@ -177,7 +177,7 @@ export class SculptParts {
         this.#texture = picture;
         this.view.texture = picture;
       },
-      (error) => this.#events.onError('The texture could not be shown.', error),
+      (error) => this.#events.onError(text('sculpt.textureFailed'), error),
     );
   }
 

@@ -1,5 +1,6 @@
 import { moved, scaled, turned } from '../sculpt/ellipsoids';
 import type { ControlEllipsoid, Pose, Vec3 } from '../sculpt/protocol';
+import { text } from '../texts';
 import { figure } from '../ui/format';
 import type { HandleMode } from '../view/handles';
 import type { SculptParts } from './sculpt-parts';
@@ -19,7 +20,14 @@ const NEW = 0.12;
 const REST = 350;
 
 const MODE_KEYS: Record<string, HandleMode> = { m: 'move', t: 'turn', e: 'size' };
-const DONE: Record<HandleMode, string> = { move: 'moved', turn: 'turned', size: 'sized' };
+const DONE: Record<HandleMode, string> = {
+  move: text('sculpt.moved'),
+  turn: text('sculpt.rotated'),
+  size: text('sculpt.scaled'),
+};
+
+/** Messages on what handles and arrow keys do. */
+const MODE_TEXTS = { move: 'sculpt.handlesMove', turn: 'sculpt.handlesRotate', size: 'sculpt.handlesScale' } as const;
 
 /** Selects ellipsoids and moves, rotates and scales them, by handles, keys and numbers. */
 export class Posing {
@@ -33,7 +41,7 @@ export class Posing {
     this.#ui = ui;
     this.#settings = settings;
     ui.view.onPick = (index) => settings.choose(index);
-    ui.view.handles.onGrab = () => this.#remember(DONE[this.#mode], false);
+    ui.view.handles.onDragStart = () => this.#remember(DONE[this.#mode], false);
     ui.view.handles.onDrag = (ellipsoid, dragging) => this.#drag(ellipsoid, dragging);
     ui.view.takesKey = (event, directions) => this.#key(event, directions);
   }
@@ -42,7 +50,7 @@ export class Posing {
     this.#mode = mode;
     this.#ui.ellipsoids.mode = mode;
     this.#ui.view.mode = mode;
-    this.#ui.status.say(`Handles and arrow keys ${mode === 'size' ? 'change the size' : mode}.`);
+    this.#ui.status.say(text(MODE_TEXTS[mode]));
   }
 
   /** Replaces the selected ellipsoid by one entered as numbers. */
@@ -63,7 +71,7 @@ export class Posing {
       [0, size, 0],
       [0, 0, size],
     ];
-    this.#settings.remember('new ellipsoid');
+    this.#settings.remember(text('sculpt.newEllipsoidChange'));
     this.#settings.send([...pose, { center, axes: [x, y, z] }], false, [...names, '']);
     this.#settings.choose(pose.length);
   }
@@ -74,10 +82,10 @@ export class Posing {
     if (chosen === undefined || pose.length < 2) return;
     const name = this.#settings.nameOf(chosen);
     const others = <T>(list: T[]) => list.filter((_, index) => index !== chosen);
-    this.#settings.remember('removed ellipsoid');
+    this.#settings.remember(text('sculpt.removedEllipsoidChange'));
     this.#settings.send(others(pose), false, others(names));
     this.#settings.choose(undefined);
-    this.#ui.status.say(`${name} is removed.`);
+    this.#ui.status.say(text('sculpt.ellipsoidRemoved', { name }));
     this.#ui.ellipsoids.focus();
   }
 
@@ -100,7 +108,7 @@ export class Posing {
   #remember(what: string, together: boolean): void {
     const { chosen } = this.#settings;
     if (chosen === undefined) return;
-    const label = `${this.#settings.nameOf(chosen)} ${what}`;
+    const label = text('sculpt.ellipsoidChange', { name: this.#settings.nameOf(chosen), what });
     this.#settings.remember(label, together ? label : '');
   }
 
@@ -110,7 +118,7 @@ export class Posing {
     const ellipsoid = chosen === undefined ? undefined : pose[chosen];
     if (chosen === undefined || !ellipsoid) return;
     const place = ellipsoid.center.map((x) => figure(Number(x.toPrecision(3)))).join(', ');
-    this.#ui.status.say(`${this.#settings.nameOf(chosen)}: ${what}; its centre is ${place}.`);
+    this.#ui.status.say(text('sculpt.ellipsoidMoved', { name: this.#settings.nameOf(chosen), what, centre: place }));
   }
 
   /** Handles a key in the view; returns whether it was for an ellipsoid. */

@@ -1,7 +1,8 @@
 import type { SculptClient } from '../sculpt/client';
 import type { FrameEvent, MeasuredEvent, StageKind } from '../sculpt/protocol';
 import type { LabState } from '../state';
-import { count, plural } from '../ui/format';
+import { plural, text } from '../texts';
+import { count } from '../ui/format';
 import { type History, underWay } from '../ui/history';
 import type { LabStates } from './lab-states';
 import type { SculptParts } from './sculpt-parts';
@@ -101,11 +102,16 @@ export class Results {
   /** Describes a state for the status line. */
   describe(state: LabState): string {
     const last = this.#history.reports.at(-1);
-    if (state === 'running') return 'Running.';
-    if (!last) return 'Ready.';
+    if (state === 'running') return text('labs.running');
+    if (!last) return text('labs.ready');
     const { vertices, components } = last;
-    const what = `${count(vertices)} vertices in ${plural(components, 'component')}`;
-    return state === 'done' ? `At rest: ${what}.` : `Paused at iteration ${count(last.iteration)}: ${what}.`;
+    const what = text('labs.surfaceSize', {
+      vertices: plural('counts.vertex', vertices),
+      components: plural('counts.component', components),
+    });
+    return state === 'done'
+      ? text('sculpt.converged', { surface: what })
+      : text('sculpt.pausedAt', { iteration: count(last.iteration), surface: what });
   }
 
   /** Requests and displays the undeformed meshes, if the layout includes them. */
@@ -119,7 +125,7 @@ export class Results {
         this.#ui.view.show('S0', base);
         this.#ui.view.show('S1', detail ?? base);
       },
-      (error) => this.#states.fail('The undeformed meshes could not be shown.', error),
+      (error) => this.#states.fail(text('sculpt.originalsFailed'), error),
     );
   }
 
@@ -130,7 +136,7 @@ export class Results {
       (stages) => {
         if (scene === this.#scene) this.#ui.view.showStages(stages);
       },
-      (error) => this.#states.fail('The meshes could not be made.', error),
+      (error) => this.#states.fail(text('sculpt.stagesFailed'), error),
     );
   }
 

@@ -3,6 +3,7 @@ import type { SculptClient } from '../sculpt/client';
 import { samePose } from '../sculpt/ellipsoids';
 import type { Film } from '../sculpt/film';
 import type { FrameEvent, ParamValues, Pose, SavedPose } from '../sculpt/protocol';
+import { text } from '../texts';
 import type { History, HistoryMark } from '../ui/history';
 import type { LabStates } from './lab-states';
 import { Rewinder } from './rewinder';
@@ -86,7 +87,9 @@ export class ModelSettings {
   /** Returns the number and name of an ellipsoid, for messages. */
   nameOf(index: number): string {
     const name = this.#names[index];
-    return name ? `Ellipsoid ${index + 1}, ${name}` : `Ellipsoid ${index + 1}`;
+    return name
+      ? text('sculpt.ellipsoidNamed', { number: index + 1, name })
+      : text('sculpt.ellipsoid', { number: index + 1 });
   }
 
   /** Adopts another scene, and clears the undo history. */
@@ -106,7 +109,9 @@ export class ModelSettings {
   choose(index: number | undefined): void {
     const chosen = index !== undefined && index < this.#pose.length ? index : undefined;
     if (chosen !== this.#chosen)
-      this.#ui.status.say(chosen === undefined ? 'No ellipsoid is chosen.' : `${this.nameOf(chosen)} is chosen.`);
+      this.#ui.status.say(
+        chosen === undefined ? text('sculpt.noneSelected') : text('sculpt.selected', { name: this.nameOf(chosen) }),
+      );
     this.#chosen = chosen;
     this.#showPose();
   }
@@ -180,14 +185,14 @@ export class ModelSettings {
   setParams(values: ParamValues, what: string): Promise<void> {
     return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return this.show();
-      const forget = this.remember(`change of ${what}`, what);
+      const forget = this.remember(text('labs.changeOf', { name: what }), what);
       try {
         this.#params = await this.#client.request('setParams', values);
         if (this.#states.beneath === 'done') await this.#client.request('settle', undefined);
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);
-        if (code === 'internal') this.#states.fail('That did not work.', error);
+        if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
         this.show();
         this.#ui.refuseParam(Object.keys(values)[0] ?? '', message, this.#params);
         return;
@@ -203,7 +208,7 @@ export class ModelSettings {
         const moment = await this.#rewinder.travel(way);
         if (moment) await this.#goTo(moment.saved, moment.page);
       } catch (error) {
-        this.#states.fail(way === 'undo' ? 'That could not be undone.' : 'That could not be done again.', error);
+        this.#states.fail(way === 'undo' ? text('labs.undoFailed') : text('labs.redoFailed'), error);
       }
     });
   }

@@ -5,6 +5,7 @@ import { lastFrame } from '../sculpt/film';
 import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
 import type { FrameEvent, Opened, ParamValues, SculptShade, Shown, WorkerEvent } from '../sculpt/protocol';
 import type { LabState } from '../state';
+import { plural, text } from '../texts';
 import { wantsStillness } from '../ui/dom';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
@@ -113,18 +114,24 @@ export class SculptLab implements Lab {
   #shortcuts(): Shortcut[] {
     const redo = () => void this.#settings.travel('redo');
     return [
-      { key: ' ', shown: 'Space', text: 'play or pause', act: () => this.#toggle() },
-      { key: 's', shown: 's', text: 'one step', act: () => this.#step(1) },
-      { key: 'd', shown: 'd', text: 'ten steps', act: () => this.#step(10) },
-      { key: 'r', shown: 'r', text: 'reset', act: () => void this.#reset() },
-      { key: 'k', shown: 'k', text: 'add a keyframe', act: () => this.#filming.addKey() },
-      { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#settings.travel('undo') },
-      { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: redo },
-      { key: 'y', ctrl: true, shown: 'Ctrl Y', text: 'redo', act: redo },
+      { key: ' ', shown: text('labs.keySpace'), text: text('labs.playOrPause'), act: () => this.#toggle() },
+      { key: 's', shown: 's', text: text('labs.oneStep'), act: () => this.#step(1) },
+      { key: 'd', shown: 'd', text: text('labs.tenSteps'), act: () => this.#step(10) },
+      { key: 'r', shown: 'r', text: text('labs.resetKey'), act: () => void this.#reset() },
+      { key: 'k', shown: 'k', text: text('sculpt.addKeyframeKey'), act: () => this.#filming.addKey() },
+      {
+        key: 'z',
+        ctrl: true,
+        shown: text('labs.keyUndo'),
+        text: text('labs.undo'),
+        act: () => void this.#settings.travel('undo'),
+      },
+      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: redo },
+      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: redo },
       {
         key: 'Escape',
-        shown: 'Esc',
-        text: 'away with the message, or let the ellipsoid go',
+        shown: text('labs.keyEscape'),
+        text: text('sculpt.dismissKey'),
         act: () => this.#putAway(),
       },
     ];
@@ -163,8 +170,8 @@ export class SculptLab implements Lab {
   #openVariant(preset: SculptPreset, { name, params, pose }: SculptVariant): void {
     const values = { ...this.#usual, ...params };
     const differs = Object.entries(values).some(([key, value]) => !Object.is(this.#settings.params[key], value));
-    if (differs) void this.#settings.setParams(values, `figure ${name}`);
-    this.#settings.remember(`figure ${name}`);
+    if (differs) void this.#settings.setParams(values, text('labs.figureChange', { name }));
+    this.#settings.remember(text('labs.figureChange', { name }));
     this.#settings.send(pose ?? preset.start ?? this.#settings.pose, false);
   }
 
@@ -204,7 +211,7 @@ export class SculptLab implements Lab {
     this.#ui.banner.hide();
     if (value === 'running') this.#ask(this.#client.request('pause', undefined));
     else if (this.#canPlay || this.#states.beneath === 'paused') {
-      this.#settings.remember('Play');
+      this.#settings.remember(text('labs.play'));
       this.#ask(this.#client.request('play', undefined));
     }
   }
@@ -212,7 +219,7 @@ export class SculptLab implements Lab {
   #step(steps: number): void {
     if (!this.#states.canChange || this.#states.value === 'running') return;
     this.#ui.banner.hide();
-    this.#settings.remember(steps === 1 ? '1 step' : `${steps} steps`);
+    this.#settings.remember(plural('counts.step', steps));
     this.#ask(this.#client.request('step', { count: steps }));
   }
 
@@ -221,20 +228,20 @@ export class SculptLab implements Lab {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
     if (engineBroken) return this.#opening.again();
-    this.#states.load('Starting over.');
+    this.#states.load(text('labs.resetting'));
     try {
       await this.#settings.rebuild(undefined);
       this.#results.startOver();
       await this.#client.request('show', this.#shown);
-      this.#states.stand('Ready to start.');
+      this.#states.stand(text('labs.readyToStart'));
     } catch (error) {
-      this.#states.fail('The model could not be built.', error);
+      this.#states.fail(text('labs.buildFailed'), error);
     }
   }
 
   /** Reports a request's failure, without waiting for its reply. */
   #ask(request: Promise<unknown>): void {
-    request.catch((error) => this.#states.fail('That did not work.', error));
+    request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 
   /** Updates the page's address with what is open and the settings. */
@@ -264,7 +271,7 @@ export class SculptLab implements Lab {
 
   #onEvent(event: WorkerEvent): void {
     if (event.event === 'recorded') this.#ui.film.showRecording(event.part);
-    else if (event.event === 'failure') this.#states.fail('The run has stopped.', new RequestError(event.failure));
+    else if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
     else if (event.event === 'frame') this.#results.take(event);
     else if (event.event === 'measured') this.#results.measured(event);
     else if (event.event === 'refused') this.#settings.refuse(event.pose, event.failure.message);

@@ -1,3 +1,4 @@
+import { text } from '../texts';
 import type { TrackClient } from '../track/client';
 import type { Enrichment, Setup, SurfaceError } from '../track/protocol';
 import { type ComparedRun, comparedRun, type Other } from '../ui/track-compare';
@@ -6,9 +7,9 @@ import type { TrackSettings } from './track-settings';
 
 /** Names of the enrichments in the comparison. */
 const NAMES: Record<Enrichment, string> = {
-  none: 'as measured',
-  linear: 'linear',
-  flow: 'by flow',
+  none: text('track.withoutEnrichment'),
+  linear: text('track.linear'),
+  flow: text('track.opticalFlow'),
 };
 
 /** Repeats the present run with one setting changed; returns both for the comparison, or undefined if cancelled. */
@@ -21,7 +22,10 @@ export async function compareWith(
   const predicted = params.prediction === true;
   const [here, there] =
     other === 'prediction'
-      ? [predicted ? 'predicted' : 'not predicted', predicted ? 'not predicted' : 'predicted']
+      ? [
+          predicted ? text('track.withPrediction') : text('track.withoutPrediction'),
+          predicted ? text('track.withoutPrediction') : text('track.withPrediction'),
+        ]
       : [NAMES[setup.preparation.enrichment], NAMES[other]];
   const changed = otherwise(setup, other, predicted);
   const facts = results.frames.map((frame) => frame.facts);

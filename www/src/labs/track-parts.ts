@@ -1,5 +1,6 @@
 import type { MeshFormat } from '../protocol';
 import type { LabState } from '../state';
+import { text } from '../texts';
 import type { VoxelBox } from '../track/box';
 import type { TrackClient } from '../track/client';
 import { FILMS, type TrackExample } from '../track/examples';
@@ -23,7 +24,7 @@ import { Stills } from '../ui/stills';
 import { type Other, TrackComparePanel } from '../ui/track-compare';
 import { TrackOptionControls } from '../ui/track-options';
 import { Transport, type TransportEvents } from '../ui/transport';
-import { BeatingView, type TrackViewOptions } from '../view/beating';
+import { TrackView, type TrackViewOptions } from '../view/beating';
 import { Saving } from './saving';
 import { TRACK_ROWS } from './track-measures';
 import { FilmPanel, layOut } from './track-page';
@@ -65,10 +66,10 @@ export class TrackParts {
   readonly #canvas = h('canvas', {
     tabindex: 0,
     role: 'application',
-    'aria-label': '3D view of the surface in the frame that is shown. Arrow keys turn it, plus and minus zoom.',
+    'aria-label': text('track.viewLabel'),
   });
   readonly #slices = h('div', { class: 'slices' });
-  readonly view = new BeatingView(this.#canvas, this.#slices, INITIAL_VIEW);
+  readonly view = new TrackView(this.#canvas, this.#slices, INITIAL_VIEW);
   readonly status = new StatusLine();
   readonly measures = new MeasurePanel(TRACK_ROWS);
   readonly table = new BeatTable();
@@ -125,11 +126,11 @@ export class TrackParts {
     );
     this.#exports = new ExportButtons((format, type) => this.#saveMesh(format, type));
     this.#saves = [
-      button('All frames (ZIP of PLY)', () => events.onSave('frames'), 'save-frames'),
-      button('Animation (GLB)', () => events.onSave('animation'), 'save-animation'),
-      button('Table of frames (CSV)', () => events.onSave('table'), 'save-table'),
+      button(text('track.saveFrames'), () => events.onSave('frames'), 'save-frames'),
+      button(text('track.saveAnimation'), () => events.onSave('animation'), 'save-animation'),
+      button(text('track.saveTable'), () => events.onSave('table'), 'save-table'),
     ];
-    this.#sculpt = button('Open in Sculpt', events.onSculpt, 'sculpt');
+    this.#sculpt = button(text('labs.openInSculpt'), events.onSculpt, 'sculpt');
     this.options = new TrackOptionControls(INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
       this.#slices.hidden = options.below !== 'slices';
@@ -139,7 +140,7 @@ export class TrackParts {
     this.#cancel = h(
       'button',
       { type: 'button', hidden: true, 'data-action': 'cancel', onclick: events.onCancel },
-      'Cancel',
+      text('labs.cancel'),
     );
     this.view.onRegion = (region: VoxelBox) => events.onRegion(region);
     this.view.onMoved = events.onMoved;
@@ -147,7 +148,7 @@ export class TrackParts {
   }
 
   #layOut(signal: AbortSignal): void {
-    const drop = h('div', { class: 'drop', hidden: true }, 'Drop a 4D image to open it');
+    const drop = h('div', { class: 'drop', hidden: true }, text('track.drop'));
     acceptDrops(drop, this.#events.onFiles, signal);
     layOut(this.#root, {
       data: this.data.element,
@@ -173,7 +174,7 @@ export class TrackParts {
       compare: this.compare.element,
       exports: this.#exports.element,
       saves: h('div', {}, ...this.#saves, this.#sculpt),
-      link: button('Copy link to these settings', this.#events.onCopyLink, 'link'),
+      link: button(text('labs.copyLink'), this.#events.onCopyLink, 'link'),
       exercises: exercises(TRACK_EXERCISES, this.#events.onExampleId),
     });
   }
@@ -238,7 +239,7 @@ export class TrackParts {
   #saveMesh(format: MeshFormat, type: string): void {
     this.saving
       .mesh(format, type, `-${this.frames.frame + 1}`)
-      .catch((error) => this.#events.onError('The surface could not be saved.', error));
+      .catch((error) => this.#events.onError(text('labs.saveFailed'), error));
   }
 }
 

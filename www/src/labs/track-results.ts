@@ -1,7 +1,8 @@
 import type { LabState } from '../state';
+import { text } from '../texts';
 import type { TrackClient } from '../track/client';
 import { beatOf } from '../track/curve';
-import type { Between, StepEvent, TrackedFrame, VolumeView, Votes } from '../track/protocol';
+import type { Between, BoundaryVotes, StepEvent, TrackedFrame, VolumeView } from '../track/protocol';
 import type { History, HistoryMark } from '../ui/history';
 import type { LabStates } from './lab-states';
 import { moreOf } from './track-measures';
@@ -34,7 +35,7 @@ export class TrackResults {
   #frame = 0;
   /** Whether the user has chosen the displayed frame, so that new frames do not replace it. */
   #held = false;
-  #votes: Votes | undefined;
+  #votes: BoundaryVotes | undefined;
   #between: { key: string; between: Between } | undefined;
   /** Kinds of requests that are pending. */
   #asked = new Set<string>();
@@ -208,12 +209,12 @@ export class TrackResults {
   describe(state: LabState): string {
     const count = this.#film?.volume.frames ?? 0;
     const steps = this.#history.reports.length;
-    if (state === 'running') return this.#frames.length > 0 ? 'Following the surface.' : 'Finding the boundary.';
-    if (steps === 0) return 'Ready.';
-    if (state !== 'done') return `Paused: ${this.#frames.length} of ${count} frames have their surface.`;
+    if (state === 'running') return this.#frames.length > 0 ? text('track.tracking') : text('track.findingBoundary');
+    if (steps === 0) return text('labs.ready');
+    if (state !== 'done') return text('track.paused', { tracked: this.#frames.length, frames: count });
     const beat = beatOf(this.#frames.map(({ facts }) => facts.volume));
-    const ejection = beat ? ` Ejection fraction ${(100 * beat.ejection).toFixed(1)} %.` : '';
-    return `Done: all ${count} frames have their surface.${ejection}`;
+    if (!beat) return text('track.done', { frames: count });
+    return text('track.doneCycle', { frames: count, ejection: (100 * beat.ejection).toFixed(1) });
   }
 
   get #root(): HTMLElement {
@@ -271,7 +272,7 @@ export class TrackResults {
       (error) => {
         if (run !== this.#run) return;
         this.#asked.delete(kind);
-        this.#states.fail('That could not be shown.', error);
+        this.#states.fail(text('track.displayFailed'), error);
       },
     );
   }

@@ -1,5 +1,6 @@
 import { toFailure } from '../channel';
 import type { ParamValues } from '../protocol';
+import { text } from '../texts';
 import type { TrackClient } from '../track/client';
 import type { Ready, SavedTrack, Setup, VolumeView } from '../track/protocol';
 import type { LabStates } from './lab-states';
@@ -89,21 +90,21 @@ export class TrackSettings {
     return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return;
       await this.#client.request('pause', undefined);
-      const forget = this.remember(`change of ${what}`);
+      const forget = this.remember(text('labs.changeOf', { name: what }));
       const setup = { ...this.#setup, ...changed };
-      this.#states.load('Preparing the image.');
+      this.#states.load(text('track.preparing'));
       try {
         const ready = await this.#client.request('rebuild', setup);
         this.#take(setup, ready);
         this.#results.startOver();
-        this.#states.stand('Ready.');
+        this.#states.stand(text('labs.ready'));
         await this.#client.request('play', undefined);
       } catch (error) {
         forget();
         // Cancelled: the engine is being restarted.
         if (this.#states.engineBroken) return;
         this.#onChange();
-        this.#states.fail(`That ${what} cannot be.`, error);
+        this.#states.fail(text('track.settingsRejected', { what }), error);
       }
     });
   }
@@ -112,7 +113,7 @@ export class TrackSettings {
   setParams(values: ParamValues, what: string): Promise<void> {
     return this.#states.inTurn(async () => {
       if (!this.#states.canChange) return;
-      const forget = this.remember(`change of ${what}`, what);
+      const forget = this.remember(text('labs.changeOf', { name: what }), what);
       try {
         const { params, iteration } = await this.#client.request('setParams', values);
         this.#setup = { ...this.#setup, params: { ...this.#setup.params, ...values } };
@@ -120,13 +121,13 @@ export class TrackSettings {
         this.#inForce();
         this.#ui.banner.hide();
         this.#results.rewind(iteration);
-        this.#states.stand('Beginning again.');
+        this.#states.stand(text('track.trackingAgain'));
         this.#onChange();
         await this.#client.request('play', undefined);
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);
-        if (code === 'internal') this.#states.fail('That did not work.', error);
+        if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
         this.#onChange();
         this.#ui.refuseParam(Object.keys(values)[0] ?? '', message);
       }
@@ -150,7 +151,7 @@ export class TrackSettings {
         const moment = await this.#rewinder.travel(way);
         if (moment) await this.#goTo(moment.saved, moment.page);
       } catch (error) {
-        this.#states.fail(way === 'undo' ? 'That could not be undone.' : 'That could not be done again.', error);
+        this.#states.fail(way === 'undo' ? text('labs.undoFailed') : text('labs.redoFailed'), error);
       }
     });
   }

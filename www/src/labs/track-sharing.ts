@@ -1,7 +1,9 @@
 /**
  * Shares the state of the Track lab as an address, saves its results as files, and passes a surface to the Sculpt lab.
  */
+
 import { zipSync } from 'three/addons/libs/fflate.module.js';
+import { text } from '../texts';
 import type { TrackClient } from '../track/client';
 import { copyAddress, FILE_LACKS, showAddress } from './address';
 import type { LabStates } from './lab-states';
@@ -53,15 +55,21 @@ export class TrackSharing {
 
   save(what: 'frames' | 'animation' | 'table'): void {
     const work = { frames: () => this.#frames(), animation: () => this.#animation(), table: async () => this.#table() };
-    work[what]().catch((error) => this.#states.fail('That could not be saved.', error));
+    work[what]().catch((error) => this.#states.fail(text('track.fileFailed'), error));
   }
 
   /** Passes the displayed frame's surface on as a mesh to deform. */
   toSculpt(passOn: PassOn): void {
     const { frame } = this.#results;
     this.#client.request('export', { frame, format: 'ply' }).then(
-      (bytes) => passOn({ lab: 'sculpt', name: `${this.#ui.saving.name} (frame ${frame + 1})`, bytes, params: {} }),
-      (error) => this.#states.fail('The surface could not be passed on.', error),
+      (bytes) =>
+        passOn({
+          lab: 'sculpt',
+          name: text('track.frameName', { name: this.#ui.saving.name, frame: frame + 1 }),
+          bytes,
+          params: {},
+        }),
+      (error) => this.#states.fail(text('labs.toSculptFailed'), error),
     );
   }
 

@@ -1,6 +1,7 @@
 import { RequestError, toFailure } from '../channel';
 import { GUIDES } from '../guides';
 import type { LabState } from '../state';
+import { plural, text } from '../texts';
 import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
 import { TrackClient } from '../track/client';
 import { isTrackPreset, type TrackPreset, type TrackVariant, variantInForce, viewOf } from '../track/presets';
@@ -9,7 +10,7 @@ import { wantsStillness } from '../ui/dom';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { Other } from '../ui/track-compare';
-import { invert, sliceFrames } from '../view/anatomy';
+import { invert, sliceOrientations } from '../view/anatomy';
 import { LabStates } from './lab-states';
 import type { Lab, PassedOn, PassOn } from './labs';
 import { compareWith } from './track-comparing';
@@ -112,17 +113,23 @@ export class TrackLab implements Lab {
     const redo = () => void this.#settings.travel('redo');
     const { frames } = this.#ui;
     return [
-      { key: ' ', shown: 'Space', text: 'play or pause the tracking', act: () => this.#toggle() },
-      { key: 's', shown: 's', text: 'one step', act: () => this.#step(1) },
-      { key: 'd', shown: 'd', text: 'ten steps', act: () => this.#step(10) },
-      { key: 'r', shown: 'r', text: 'reset', act: () => void this.#reset() },
-      { key: 'b', shown: 'b', text: 'beat, or hold', act: () => frames.toggle() },
-      { key: ',', shown: ',', text: 'previous frame', act: () => frames.go(-1) },
-      { key: '.', shown: '.', text: 'next frame', act: () => frames.go(1) },
-      { key: 'z', ctrl: true, shown: 'Ctrl Z', text: 'undo', act: () => void this.#settings.travel('undo') },
-      { key: 'shift+z', ctrl: true, shown: 'Ctrl ⇧ Z', text: 'redo', act: redo },
-      { key: 'y', ctrl: true, shown: 'Ctrl Y', text: 'redo', act: redo },
-      { key: 'Escape', shown: 'Esc', text: 'away with the message', act: () => this.#dismiss() },
+      { key: ' ', shown: text('labs.keySpace'), text: text('track.playOrPause'), act: () => this.#toggle() },
+      { key: 's', shown: 's', text: text('labs.oneStep'), act: () => this.#step(1) },
+      { key: 'd', shown: 'd', text: text('labs.tenSteps'), act: () => this.#step(10) },
+      { key: 'r', shown: 'r', text: text('labs.resetKey'), act: () => void this.#reset() },
+      { key: 'b', shown: 'b', text: text('track.framesKey'), act: () => frames.toggle() },
+      { key: ',', shown: ',', text: text('track.previousFrameKey'), act: () => frames.go(-1) },
+      { key: '.', shown: '.', text: text('track.nextFrameKey'), act: () => frames.go(1) },
+      {
+        key: 'z',
+        ctrl: true,
+        shown: text('labs.keyUndo'),
+        text: text('labs.undo'),
+        act: () => void this.#settings.travel('undo'),
+      },
+      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: redo },
+      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: redo },
+      { key: 'Escape', shown: text('labs.keyEscape'), text: text('labs.dismissKey'), act: () => this.#dismiss() },
     ];
   }
 
@@ -138,7 +145,7 @@ export class TrackLab implements Lab {
     this.#settings.adopt(setup, { ...opened, volume: undefined });
     this.#results.startOver();
     this.#ui.options.set({ ...viewOf(example), ...linked?.view });
-    if (setup.box && this.#region) this.#ui.view.look(this.#region);
+    if (setup.box && this.#region) this.#ui.view.fitRegion(this.#region);
     const crosshair = (setup.at === example?.at && example?.crosshair) || setup.at;
     if (crosshair) this.#ui.view.goTo(crosshair);
     await this.#client.request('play', undefined);
@@ -163,18 +170,18 @@ export class TrackLab implements Lab {
     const present = this.#region;
     if (!volume || JSON.stringify(region) === JSON.stringify(present)) return;
     const box = region && boxOf(region, volume.affine);
-    void this.#settings.change({ box }, 'box');
+    void this.#settings.change({ box }, text('track.regionChange'));
   }
 
   #setComponent(which: 'here' | 'largest'): void {
     const at = which === 'here' ? this.#ui.view.crosshair.point : undefined;
-    void this.#settings.change({ at }, 'surface');
+    void this.#settings.change({ at }, text('track.surfaceChange'));
   }
 
   #openVariant(preset: TrackPreset, { name, params, view }: TrackVariant): void {
     this.#ui.options.set({ ...viewOf(preset), ...view });
     const differs = Object.entries(params).some(([key, value]) => !Object.is(this.#settings.params[key], value));
-    if (differs) void this.#settings.setParams(params, `figure: ${name}`);
+    if (differs) void this.#settings.setParams(params, text('labs.figureChange', { name }));
   }
 
   #showSettings(): void {
@@ -185,7 +192,7 @@ export class TrackLab implements Lab {
     this.#ui.compare.show(params.prediction === true, setup.preparation);
     const region = this.#region;
     if (region && this.#volume) {
-      const names = sliceFrames(this.#volume).map((frame) => frame.name);
+      const names = sliceOrientations(this.#volume).map((frame) => frame.name);
       this.#ui.region.show(region, this.#volume.dims, names, setup.at, setup.box === undefined);
       this.#ui.view.showRegion(region);
     }
@@ -218,10 +225,8 @@ export class TrackLab implements Lab {
     if (!this.#states.canRun || this.#states.value === 'running') return;
     this.#ui.banner.hide();
     this.#results.follow();
-    this.#settings.remember(steps === 1 ? '1 step' : `${steps} steps`);
-    this.#client
-      .request('step', { count: steps })
-      .catch((error) => this.#states.fail('The step could not be done.', error));
+    this.#settings.remember(plural('counts.step', steps));
+    this.#client.request('step', { count: steps }).catch((error) => this.#states.fail(text('track.stepFailed'), error));
   }
 
   /** Rebuilds the tracker, with the same settings. */
@@ -229,12 +234,12 @@ export class TrackLab implements Lab {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
     if (engineBroken) return this.#opening.again();
-    this.#states.load('Starting over.');
+    this.#states.load(text('labs.resetting'));
     try {
       await this.#settings.rebuild();
-      this.#states.stand('Ready to start.');
+      this.#states.stand(text('labs.readyToStart'));
     } catch (error) {
-      this.#states.fail('The tracker could not be built.', error);
+      this.#states.fail(text('track.buildFailed'), error);
     }
   }
 
@@ -244,26 +249,26 @@ export class TrackLab implements Lab {
     try {
       const present = { results: this.#results, took: this.#took };
       const runs = await compareWith(this.#client, this.#settings, present, other);
-      if (!runs) return compare.refuse('Cancelled.');
+      if (!runs) return compare.refuse(text('labs.cancelled'));
       compare.finish(runs);
       const [, there] = runs;
       this.#results.other = { volumes: there.facts.map(({ volume }) => volume), name: there.name };
     } catch (error) {
       const { code, message } = toFailure(error);
       compare.refuse(message);
-      if (code === 'internal') this.#states.fail('The comparison stopped.', error);
+      if (code === 'internal') this.#states.fail(text('track.compareFailed'), error);
     }
   }
 
   /** Reports a request's failure, without waiting for its reply. */
   #ask(request: Promise<unknown>): void {
-    request.catch((error) => this.#states.fail('That did not work.', error));
+    request.catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 
   #onEvent(event: WorkerEvent): void {
     if (event.event === 'preparing') this.#ui.status.say(event.what);
     else if (event.event === 'comparing') this.#ui.compare.tell(event.part, event.phase);
-    else if (event.event === 'failure') this.#states.fail('The run has stopped.', new RequestError(event.failure));
+    else if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
     else if (event.event === 'step') {
       this.#results.take(event);
       this.#report(event);
@@ -275,7 +280,10 @@ export class TrackLab implements Lab {
     if (index === undefined || this.#states.value !== 'running') return;
     const { frames } = this.#results;
     if (index === 0) this.#ui.status.say(this.#results.describe('running'));
-    else this.#ui.status.report(() => `${frames.length} of ${this.#volume?.frames} frames have their surface.`);
+    else
+      this.#ui.status.report(() =>
+        text('track.tracked', { tracked: frames.length, frames: this.#volume?.frames ?? 0 }),
+      );
   }
 
   #settled(state: 'running' | 'paused' | 'done'): void {

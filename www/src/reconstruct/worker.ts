@@ -1,6 +1,8 @@
 /** Worker of the Reconstruct lab: holds points, cameras and one model of them, and serves the page's requests. */
+
 import init, { type ImplicitSurface, paramSpecs, type StepReport, version } from 'vesicle';
 import type { Surface } from '../protocol';
+import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
 import { noArrays, surfaceIn, transferOf } from '../worker/room';
 import { answer, buffersOf, stop, type Work } from '../worker/serving';
@@ -109,7 +111,7 @@ class Session {
   }
 
   #points(): Cloud {
-    if (!this.#cloud) throw new Refusal('invalid-argument', 'no points are loaded: open some first');
+    if (!this.#cloud) throw new Refusal('invalid-argument', text('reconstruct.noPoints'));
     return this.#cloud;
   }
 
@@ -119,7 +121,7 @@ class Session {
   }
 
   #current(): ImplicitSurface {
-    if (!this.#model) throw new Refusal('invalid-argument', 'no points are loaded: open some first');
+    if (!this.#model) throw new Refusal('invalid-argument', text('reconstruct.noPoints'));
     return this.#model;
   }
 

@@ -1,5 +1,7 @@
 /** Rows of meshes to compare: levels of the solver, and stages of restructuring. Used by the worker only. */
+
 import { Mesh, type MultiresolutionModel } from 'vesicle';
+import { text } from '../texts';
 import { surfaceOf } from './model';
 import type { Stage, StageKind, Surface } from './protocol';
 
@@ -18,7 +20,7 @@ export function levelsOf(model: MultiresolutionModel): Stage[] {
 
 function sizeOf(mesh: Mesh): string {
   const { edge, triangles } = mesh.info();
-  return `${triangles} triangles, mean edge ${edge.mean.toPrecision(2)}`;
+  return text('sculpt.stageSize', { triangles, edge: edge.mean.toPrecision(2) });
 }
 
 /**
@@ -29,7 +31,10 @@ function staged(mesh: Mesh, what: string): Stage {
   const surface = surfaceOf(mesh);
   const shapes = shapesOf(surface).sort();
   const worst = shapes[Math.floor(WORST * shapes.length)] ?? 0;
-  return { caption: `${what}: ${mesh.triangleCount} triangles, the worst below ${worst.toFixed(2)}`, surface };
+  return {
+    caption: text('sculpt.stageQuality', { name: what, triangles: mesh.triangleCount, quality: worst.toFixed(2) }),
+    surface,
+  };
 }
 
 /** Share of the triangles that are counted as the worst. */
@@ -86,7 +91,11 @@ function restructured(mesh: Mesh): Stage[] {
   try {
     refined.refine();
     for (let round = 0; round < ROUNDS; round++) good.restructure(BOUNDS);
-    return [staged(mesh, 'Moved'), staged(refined, 'Refined everywhere'), staged(good, 'Restructured')];
+    return [
+      staged(mesh, text('sculpt.stageDeformed')),
+      staged(refined, text('sculpt.stageRefined')),
+      staged(good, text('sculpt.stageRestructured')),
+    ];
   } finally {
     refined.free();
     good.free();
@@ -102,17 +111,17 @@ const BOUNDS = { min: 0.6 * EDGE, max: 1.35 * EDGE };
 function passes(mesh: Mesh): Stage[] {
   const at = mesh.clone();
   try {
-    const stages = [staged(at, '1 Moved')];
+    const stages = [staged(at, text('sculpt.passDeformed'))];
     for (const [pass, name] of [
-      ['collapse', '2 Collapsed'],
-      ['split', '3 Split'],
-      ['flip', '4 Flipped'],
+      ['collapse', text('sculpt.passCollapsed')],
+      ['split', text('sculpt.passSplit')],
+      ['flip', text('sculpt.passFlipped')],
     ] as const) {
       at.restructure(BOUNDS, [pass]);
       stages.push(staged(at, name));
     }
     for (let round = 1; round < ROUNDS; round++) at.restructure(BOUNDS);
-    return [...stages, staged(at, `${ROUNDS} rounds`)];
+    return [...stages, staged(at, text('sculpt.passRounds', { rounds: ROUNDS }))];
   } finally {
     at.free();
   }

@@ -1,5 +1,7 @@
 /** Worker of the Sculpt lab: holds the meshes and one model of them, and serves the page's requests. */
+
 import init, { paramSpecs, type StepReport, version } from 'vesicle';
+import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
 import { transferOf } from '../worker/room';
 import { answer, stop, type Work } from '../worker/serving';
@@ -156,7 +158,7 @@ class Session {
   }
 
   #current(): Model {
-    if (!this.#model) throw new Refusal('invalid-argument', 'nothing is open: open a mesh first');
+    if (!this.#model) throw new Refusal('invalid-argument', text('sculpt.noMesh'));
     return this.#model;
   }
 
@@ -312,7 +314,7 @@ class Session {
     await stop(this.#recording);
     const model = this.#current();
     const { film } = this.#course;
-    if (!film) throw new Refusal('invalid-argument', 'there is no film: add two keyframes first');
+    if (!film) throw new Refusal('invalid-argument', text('sculpt.noFilm'));
     const before = model.save();
     const abort = new AbortController();
     const result = recorded(model, film, frameSeconds, abort.signal, (part) => send({ event: 'recorded', part }));

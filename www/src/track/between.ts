@@ -2,8 +2,10 @@
  * Interpolates a measured slice from its two neighbours, linearly and along the optical flow, for comparison (figure
  * 5).
  */
+
 import { Volume } from 'vesicle';
 import { quantize } from '../quantize';
+import { text } from '../texts';
 import { Refusal } from '../worker/refusal';
 import type { Between } from './protocol';
 
@@ -14,7 +16,7 @@ import type { Between } from './protocol';
 export function betweenSlices(volume: Volume, frame: number, slice: number, window: [number, number]): Between {
   const [width, height, slices] = volume.dims;
   if (slice < 1 || slice + 1 >= slices)
-    throw new Refusal('invalid-argument', `slice ${slice} has no two neighbours: there are ${slices} slices`);
+    throw new Refusal('invalid-argument', text('track.noNeighbours', { slice, slices }));
   const [before, measured, after] = [-1, 0, 1].map((off) => volume.slice(2, slice + off, frame)) as Three;
   const middle = (method: 'flow' | 'linear') => between(before, after, width, height, method);
   const [linear, flow] = [middle('linear'), middle('flow')];

@@ -111,7 +111,7 @@ export interface SavedTrack {
  * Boundary votes of a frame: the points, packed xyz, between two voxels, and the share of windows that separate the
  * two.
  */
-export interface Votes {
+export interface BoundaryVotes {
   frame: number;
   points: Float32Array;
   weights: Float32Array;
@@ -155,7 +155,7 @@ export interface Requests {
   step: { body: { count: number }; reply: undefined };
   /** Changes parameters; replies with all parameters and with the iteration that the run was set back to. */
   setParams: { body: ParamValues; reply: { params: ParamValues; iteration: number } };
-  votes: { body: { frame: number }; reply: Votes };
+  votes: { body: { frame: number }; reply: BoundaryVotes };
   between: { body: { frame: number; slice: number; window: [number, number] }; reply: Between };
   save: { body: undefined; reply: SavedTrack };
   /** Restores a saved run of the same image; the state is sent only in reply to `tell`. */

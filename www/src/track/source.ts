@@ -1,6 +1,8 @@
 /** Opens and prepares 4D images, and builds trackers of them. Used by the worker only. */
+
 import { SurfaceTracker, Volume } from 'vesicle';
 import { readForeign } from '../foreign';
+import { text } from '../texts';
 import { invert } from '../view/anatomy';
 import { Refusal } from '../worker/refusal';
 import { parseFiles } from '../worker/volumes';
@@ -40,7 +42,7 @@ export function framesOf(files: NamedBytes[]): NamedBytes[][] {
 
 function fromParts(parts: NamedBytes[][]): Volume {
   const [first] = parts;
-  if (!first) throw new Refusal('bad-file', 'there is no image among the files, only data without a header');
+  if (!first) throw new Refusal('bad-file', text('track.noHeader'));
   if (parts.length === 1) return parseFiles(first);
   const frames: Volume[] = [];
   try {
@@ -64,12 +66,12 @@ export function prepared(film: Volume, preparation: Preparation, tell: (what: st
   };
   try {
     if (binning > 1) {
-      tell('Binning pixels.');
+      tell(text('track.binning'));
       take(present.binned(factorsOf(present, binning)));
     }
     if (enrichment !== 'none' && factor !== 1) {
-      const how = enrichment === 'flow' ? 'by optical flow' : 'by linear interpolation';
-      tell(`Making in-between slices of ${present.frames} frames ${how}.`);
+      const key = enrichment === 'flow' ? 'track.enrichingFlow' : 'track.enrichingLinear';
+      tell(text(key, { frames: present.frames }));
       take(present.enrichSlices({ method: enrichment, ...(factor > 0 && { factor }) }));
     }
     return present;

@@ -1,5 +1,7 @@
 /** Worker of the Track lab: holds one 4D image and one tracker, and serves the page's requests. */
+
 import init, { paramSpecs, type StepReport, type SurfaceTracker, type Volume, version } from 'vesicle';
+import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
 import { transferOf } from '../worker/room';
 import { answer, givingAway, stop, type Work } from '../worker/serving';
@@ -9,6 +11,7 @@ import { type CineSpec, trueVolume } from './cine';
 import { compared } from './comparing';
 import { trackedFrame } from './frames';
 import type {
+  BoundaryVotes,
   ComparedTrack,
   Opened,
   ParamValues,
@@ -20,7 +23,6 @@ import type {
   Setup,
   ToWorker,
   VolumeView,
-  Votes,
   WorkerEvent,
 } from './protocol';
 import { buildTracker, filmFrom, prepared } from './source';
@@ -159,12 +161,12 @@ class Session {
   }
 
   #image(): Film {
-    if (!this.#film) throw new Refusal('invalid-argument', 'no image is open: open one first');
+    if (!this.#film) throw new Refusal('invalid-argument', text('track.noImage'));
     return this.#film;
   }
 
   #current(): SurfaceTracker {
-    if (!this.#tracker) throw new Refusal('invalid-argument', 'no image is open: open one first');
+    if (!this.#tracker) throw new Refusal('invalid-argument', text('track.noImage'));
     return this.#tracker;
   }
 
@@ -256,7 +258,7 @@ class Session {
     this.#standAt(this.#bounded.iteration, false);
   }
 
-  #votes(frame: number): Votes {
+  #votes(frame: number): BoundaryVotes {
     const all = this.#current().boundary(frame);
     const count = all.length / 5;
     const [points, weights] = [new Float32Array(3 * count), new Float32Array(count)];
