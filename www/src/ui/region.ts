@@ -1,6 +1,7 @@
 import type { Vec3 } from '../protocol';
 import { text } from '../texts';
 import type { VoxelBox } from '../track/box';
+import { SLICE_NAMES, type SliceOrientation } from '../view/anatomy';
 import { h } from './dom';
 
 export interface RegionEvents {
@@ -43,16 +44,26 @@ export class RegionControls {
   }
 
   /** `names` are the names of the slices across each axis. */
-  show(region: VoxelBox, dims: Vec3, names: string[], nearest: Vec3 | undefined, whole: boolean): void {
+  show(
+    region: VoxelBox,
+    dims: Vec3,
+    names: SliceOrientation['name'][],
+    nearest: Vec3 | undefined,
+    whole: boolean,
+  ): void {
     this.#dims = dims;
     this.#region = region;
     for (const axis of [0, 1, 2]) {
-      const name = names[axis] ?? '';
+      const orientation = names[axis];
+      const name = orientation ? SLICE_NAMES[orientation] : '';
       this.#names[axis]?.replaceChildren(name);
       for (const [side, input] of this.#inputs.slice(2 * axis, 2 * axis + 2).entries()) {
         input.max = String((dims[axis] ?? 1) - 1);
         input.value = String((side === 0 ? region.low : region.high)[axis] ?? 0);
-        input.setAttribute('aria-label', `${name}, ${side === 0 ? 'first' : 'last'} slice of the box`);
+        input.setAttribute(
+          'aria-label',
+          text(side === 0 ? 'trackPanels.firstSlice' : 'trackPanels.lastSlice', { name }),
+        );
       }
     }
     this.#whole.disabled = whole;
@@ -64,7 +75,7 @@ export class RegionControls {
     this.#error.textContent = '';
   }
 
-  complain(message: string): void {
+  showError(message: string): void {
     this.#error.textContent = message;
   }
 
@@ -77,7 +88,7 @@ export class RegionControls {
         inputmode: 'numeric',
         'data-box': `${axis}-${side}`,
       });
-      input.addEventListener('change', () => this.#typed());
+      input.addEventListener('change', () => this.#onInput());
       this.#inputs.push(input);
       return input;
     });
@@ -92,7 +103,7 @@ export class RegionControls {
     );
   }
 
-  #typed(): void {
+  #onInput(): void {
     const values = this.#inputs.map((input) => input.valueAsNumber);
     const ends = (side: number) => [0, 1, 2].map((axis) => values[2 * axis + side] ?? Number.NaN) as Vec3;
     const [low, high] = [ends(0), ends(1)];

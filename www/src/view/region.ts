@@ -4,7 +4,7 @@
 import type { Vec3 } from '../protocol';
 import type { VoxelBox } from '../track/box';
 import { token } from '../ui/dom';
-import { type Axis, type SliceFrame, toWorld } from './anatomy';
+import { type Axis, type SliceOrientation, toWorld } from './anatomy';
 import type { Grip } from './panel';
 
 /** Smallest size of the region along an axis, voxels; a smaller one contains no window with a boundary. */
@@ -54,14 +54,20 @@ export class RegionGrips {
   }
 
   /** Draws the intersection of the box with a slice, in pixels of the slice times the scales. */
-  draw(context: CanvasRenderingContext2D, frame: SliceFrame, dims: Vec3, scaleX: number, scaleY: number): void {
+  draw(
+    context: CanvasRenderingContext2D,
+    orientation: SliceOrientation,
+    dims: Vec3,
+    scaleX: number,
+    scaleY: number,
+  ): void {
     const { region } = this;
     if (!region) return;
-    const span = ({ axis, flip }: SliceFrame['horizontal']) => {
+    const span = ({ axis, flip }: SliceOrientation['horizontal']) => {
       const [from, to] = [region.low[axis], region.high[axis] + 1];
       return flip ? [dims[axis] - to, dims[axis] - from] : [from, to];
     };
-    const [[x0 = 0, x1 = 0], [y0 = 0, y1 = 0]] = [span(frame.horizontal), span(frame.vertical)];
+    const [[x0 = 0, x1 = 0], [y0 = 0, y1 = 0]] = [span(orientation.horizontal), span(orientation.vertical)];
     context.save();
     context.setLineDash([5, 4]);
     context.lineWidth = 1.5;

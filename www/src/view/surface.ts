@@ -15,7 +15,7 @@ import {
 } from 'three';
 import type { Surface } from '../protocol';
 import type { ColorMode } from '../ui/view-options';
-import { coarseCorners } from './coarse';
+import { simplifiedIndices } from './coarse';
 import { componentColors } from './components';
 import { isShade, linearColors, robustRange, SHADES, shadeColors, type ValueShade } from './shading';
 
@@ -188,7 +188,7 @@ export class SurfaceObject {
     if (!positions || !normals || !index) return;
     const indices = index.array as Uint32Array;
     const [vertices, corners] = [this.#vertices, this.#corners];
-    const list = coarseCorners({ positions, normals, indices, vertices, corners }, SMOOTH);
+    const list = simplifiedIndices({ positions, normals, indices, vertices, corners }, SMOOTH);
     this.#coarse = new BufferGeometry();
     for (const [name, attribute] of Object.entries(attributes)) this.#coarse.setAttribute(name, attribute);
     this.#coarse.setIndex(new BufferAttribute(list, 1));

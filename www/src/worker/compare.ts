@@ -8,18 +8,18 @@ const MOST_ITERATIONS = 4000;
 /** Milliseconds between two reports to the page. */
 const TELL_EVERY = 150;
 
-type Tell = (run: ComparingEvent['run'], report: StepReport) => void;
+type OnReport = (run: ComparingEvent['run'], report: StepReport) => void;
 
 /** Compares the two runs; resolves with undefined when the signal aborts. */
 export async function compare(
   volume: Volume,
   setup: Setup,
   signal: AbortSignal,
-  tell: Tell,
+  onReport: OnReport,
 ): Promise<Requests['compare']['reply']> {
   try {
-    const direct = await once(volume, { ...setup, levels: 0 }, signal, (report) => tell('direct', report));
-    const coarseToFine = await once(volume, setup, signal, (report) => tell('coarseToFine', report));
+    const direct = await once(volume, { ...setup, levels: 0 }, signal, (report) => onReport('direct', report));
+    const coarseToFine = await once(volume, setup, signal, (report) => onReport('coarseToFine', report));
     return { direct, coarseToFine };
   } catch (error) {
     if (signal.aborted) return undefined;
@@ -31,7 +31,7 @@ async function once(
   volume: Volume,
   setup: Setup,
   signal: AbortSignal,
-  tell: (report: StepReport) => void,
+  onReport: (report: StepReport) => void,
 ): Promise<ComparedRun> {
   const model = buildModel(volume, setup);
   try {
@@ -52,7 +52,7 @@ async function once(
       }
       if (performance.now() - toldAt < TELL_EVERY && !report.done) return;
       toldAt = performance.now();
-      tell(report);
+      onReport(report);
     };
     const report = await model.run({ signal, onStep, maxIterations: MOST_ITERATIONS });
     return { levels: setup.levels, byLevel, report, info: model.mesh.info() };
