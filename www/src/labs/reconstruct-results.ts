@@ -4,7 +4,7 @@ import type { LabState } from '../state';
 import { plural, text } from '../texts';
 import { count, figure } from '../ui/format';
 import { type History, underWay } from '../ui/history';
-import { overallProgress } from '../ui/phases';
+import { overallProgress, phaseName } from '../ui/phases';
 import type { LabStates } from './lab-states';
 import { fitValues } from './reconstruct-measures';
 import type { ReconstructParts } from './reconstruct-parts';
@@ -12,13 +12,13 @@ import type { ReconstructParts } from './reconstruct-parts';
 export type ResultEvent = ProgressEvent | SurfaceEvent | ConstraintsEvent | MeasuredEvent | TimedEvent;
 
 /** Displays the worker's results: progress, constraints, surface and measures. */
-export class Results {
+export class ReconstructResults {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;
   readonly #history: History;
   /** Whether the displayed surface is complete; previews must not replace it. */
-  #whole = false;
+  #complete = false;
   /** The newest surface, until it is displayed at the next animation frame. */
   #surface: SurfaceEvent | undefined;
   #framePending = 0;
@@ -31,8 +31,8 @@ export class Results {
   }
 
   /** Whether there is a complete surface to save or pass on. */
-  get whole(): boolean {
-    return this.#whole;
+  get complete(): boolean {
+    return this.#complete;
   }
 
   take(event: ResultEvent): void {
@@ -52,7 +52,7 @@ export class Results {
         this.#showMeasures(event);
         break;
       case 'timed':
-        this.#ui.timing.tell(event.timing);
+        this.#ui.timing.add(event.timing);
     }
   }
 
@@ -68,7 +68,8 @@ export class Results {
     const last = this.#history.reports.at(-1);
     if (state === 'running') return text('labs.running');
     if (!last) return text('labs.readyToStart');
-    if (state !== 'done') return text('reconstruct.pausedAt', { iteration: count(last.iteration), phase: last.phase });
+    if (state !== 'done')
+      return text('reconstruct.pausedAt', { iteration: count(last.iteration), phase: phaseName(last.phase) });
     if (last.vertices === 0) return text('reconstruct.noSurfaceDone');
     return text('reconstruct.done', {
       vertices: plural('counts.vertex', last.vertices),
@@ -84,7 +85,7 @@ export class Results {
 
   /** Clears the history and the surface; only the points stay. */
   clear(): void {
-    this.#whole = false;
+    this.#complete = false;
     this.#surface = undefined;
     this.#history.clear();
     this.#ui.clearSurface();
@@ -97,23 +98,23 @@ export class Results {
 
   /** Displays a surface at the next animation frame; only then may the worker send another. */
   #takeSurface(event: SurfaceEvent): void {
-    if (event.preview && this.#whole) {
-      this.#client.shown();
+    if (event.preview && this.#complete) {
+      this.#client.acknowledge();
       return;
     }
     this.#surface = event;
-    this.#whole = !event.preview;
+    this.#complete = !event.preview;
     this.#framePending ||= requestAnimationFrame(() => {
       this.#framePending = 0;
       if (this.#surface) this.#ui.view.showSurface(this.#surface.surface);
       this.#surface = undefined;
-      this.#client.shown();
+      this.#client.acknowledge();
     });
   }
 
   #showMeasures({ measures, fit }: MeasuredEvent): void {
     if (measures) this.#ui.measures.showMeasures(measures);
-    this.#ui.measures.showMore(fitValues(fit));
+    this.#ui.measures.showExtra(fitValues(fit));
     this.#ui.warning.textContent = fit.warning ?? '';
   }
 
@@ -127,7 +128,7 @@ export class Results {
 
   /** Clears a surface that belongs to other settings, and explains why there is none. */
   #showNothing(): void {
-    this.#whole = false;
+    this.#complete = false;
     this.#ui.clearSurface();
     this.#ui.banner.show(text('reconstruct.noSurface'), text('reconstruct.noSurfaceHint'));
   }

@@ -13,6 +13,11 @@ const PHASES = [
   { name: 'colour', text: text('pointPanels.phaseColour') },
 ] as const;
 
+/** Returns the name of a stage for messages. */
+export function phaseName(phase: string): string {
+  return PHASES.find(({ name }) => name === phase)?.text ?? phase;
+}
+
 /** List of the stages, each with its progress and duration. */
 export class PhaseList {
   readonly element = h('ol', { class: 'phases' });
