@@ -172,7 +172,7 @@ describe('the mean edge', () => {
     await app.page.click('text=Reset');
     await reach(app.page, 'paused');
     expect(await edge().inputValue()).toBe('1');
-    await app.page.click('text=Play');
+    await app.page.click('text="Play"');
     await reach(app.page, 'done');
     expect((await measures(app.page)).vertices).toBe(shorter.vertices);
   });
@@ -262,7 +262,7 @@ describe('what cannot be opened', () => {
     await app.page.click('button:has-text("Reset")');
     await expect.poll(state).toMatch(/paused|done/);
     await app.page.keyboard.press('Escape');
-    if ((await state()) === 'paused') await app.page.click('text=Play');
+    if ((await state()) === 'paused') await app.page.click('text="Play"');
     await reach(app.page, 'done');
     await expect.poll(() => measures(app.page)).toEqual(before);
   });

@@ -162,7 +162,7 @@ describe.each(LABS)('the %s lab', (lab) => {
       Object.assign(window, { Worker: Breaking });
     });
     await page.waitForSelector('[data-state=error]');
-    expect(await banner().textContent()).toMatch(/Reset starts the engine again.*out of memory/);
+    expect(await banner().textContent()).toMatch(/Reset restarts the engine.*out of memory/);
     await expect.poll(async () => countColors(page, await view())).toBeGreaterThan(100);
     await page.getByRole('button', { name: 'Reset', exact: true }).click();
     await expect.poll(() => banner().isVisible()).toBe(false);

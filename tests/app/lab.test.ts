@@ -35,7 +35,7 @@ describe('a figure of the paper', () => {
     await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('head phantom'));
     await reach(app.page, 'done');
     expect(await measures(app.page)).toMatchObject({ components: 1, genus: 5, closed: true });
-    expect(await text('.figure')).toMatch(/Paper: On the CT of a head.*Here both end/);
+    expect(await text('.figure')).toMatch(/Paper: On a head CT.*Here both runs end/);
     expect(await app.page.evaluate(() => location.hash)).toBe('#extract?example=figure-15-16&v=2');
   });
 

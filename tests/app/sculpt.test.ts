@@ -109,7 +109,7 @@ describe('the built-in example', () => {
 
   test('tells in words what the plots show', async () => {
     const captions = await app.page.locator('.plots figcaption').allTextContents();
-    expect(captions[0]).toMatch(/^After \d+ frames one more iteration would move the skin by /);
+    expect(captions[0]).toMatch(/^After \d+ frames, one more iteration would move the membrane by /);
     expect(captions[2]).toMatch(/^Half of the frames took less than /);
   });
 
@@ -172,12 +172,12 @@ describe('the hand', () => {
     const before = await app.page.inputValue('[aria-label="Centre, x"]');
     const news = await recordNews(app.page);
     await view().press('ArrowRight');
-    const moved = /^Ellipsoid 2, small: moved; its centre is /;
+    const moved = /^Ellipsoid 2, small: moved, centre /;
     await expect.poll(news).toContainEqual(expect.stringMatching(moved));
     expect(await app.page.inputValue('[aria-label="Centre, x"]')).not.toBe(before);
     await view().press('t');
     await view().press('ArrowLeft');
-    await expect.poll(news).toContainEqual(expect.stringMatching(/small: turned/));
+    await expect.poll(news).toContainEqual(expect.stringMatching(/small: rotated/));
     await view().press('Escape');
     expect(await app.page.locator('.numbers').isVisible()).toBe(false);
     await atRest();
@@ -275,7 +275,7 @@ describe('a file', () => {
     const bytes = new Uint8Array(await readFile(at('www/public/data/nefertiti.ply')));
     await openAt(SMALL, 'done');
     await drop(app.page, [{ name: 'bust.ply', bytes }]);
-    await expect.poll(() => text('.status')).toMatch(/^Making the base of bust\.ply/);
+    await expect.poll(() => text('.status')).toMatch(/^Computing the base of bust\.ply/);
     await app.page.click('[data-action=cancel]');
     await reach(app.page, 'done');
     expect(await text('.facts dd')).toMatch(/^Globe/);
