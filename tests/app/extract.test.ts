@@ -157,7 +157,7 @@ describe('files', () => {
 });
 
 describe('the mean edge', () => {
-  const edge = () => app.page.getByLabel('Mean edge');
+  const edge = () => app.page.getByLabel('Mean edge length');
   const complaint = () => app.page.locator('.start .field-error:not(:empty)');
 
   test('shorter edges make more vertices, also after a reset', async () => {

@@ -133,7 +133,7 @@ describe.each(LABS)('the %s lab', (lab) => {
         });
     });
     await reach(page, 'done');
-    expect(await page.textContent('.view-note')).toContain('no WebGL 2');
+    expect(await page.textContent('.view-note')).toContain('needs WebGL 2');
     expect(await measures(page)).toMatchObject({ closed: true });
     await page.locator('canvas[tabindex]').first().press('ArrowLeft');
   });

@@ -122,13 +122,13 @@ describe('TIFF', () => {
     await app.page.setInputFiles('input[type=file]', files);
     await expect
       .poll(() => app.page.textContent('.banner'))
-      .toMatch(/TIFF: page 2 is of another size than the first, 24 by 20/);
+      .toMatch(/TIFF: page 2 differs in size from the first page, 24 × 20/);
   });
 
   test('a single slice', async () => {
     const file = { name: 'slice.tif', mimeType: 'image/tiff', buffer: tiffStack([new Uint8Array(4)], [2, 2], '') };
     await app.page.setInputFiles('input[type=file]', [file]);
-    await expect.poll(() => app.page.textContent('.banner')).toMatch(/TIFF: a single slice; choose or drop all files/);
+    await expect.poll(() => app.page.textContent('.banner')).toMatch(/TIFF: this is a single slice; open all files/);
   });
 
   test('more files than a header and its data', async () => {

@@ -95,7 +95,7 @@ describe('the built-in example', () => {
     for (const time of times) expect(time).toMatch(/^[\d.,]+ m?s$/);
     const captions = await app.page.locator('.plots figcaption, [data-plot=kernel]').allTextContents();
     expect(captions[0]).toMatch(/^After \d+ iterations of the solver the residual is .* below the tolerance of/);
-    expect(captions[1]).toMatch(/^Falls to half at r = 0\.\d+; at 0\.5, [\d.]+ % are left/);
+    expect(captions[1]).toMatch(/^Decays to half at r = 0\.\d+; at 0\.5, [\d.]+ % remain/);
   });
 
   test.each(['ply', 'stl', 'glb', 'obj'])('exports %s that reads back closed', async (format) => {
@@ -250,7 +250,7 @@ describe('points by hand', () => {
     await app.page.keyboard.press('Control+z');
     await expect.poll(told).toBe('1 point added.');
     await app.page.keyboard.press('Control+z');
-    await expect.poll(told).toBe('Nothing was changed by hand.');
+    await expect.poll(told).toBe('No edits.');
     await app.page.keyboard.press('Control+Shift+Z');
     await expect.poll(told).toBe('1 point added.');
     // Each of these began a run: what is measured tells that the last one has ended.
@@ -470,7 +470,9 @@ describe('a link', () => {
 
   test('to a figure says what the paper saw; another of its pictures solves again', async () => {
     await openAt('#reconstruct?example=figure-7', 'done');
-    expect(await text('.figure')).toMatch(/Paper: A surface from 477 of 3,173 points.*Here the mean distance of all 6,930 points/);
+    expect(await text('.figure')).toMatch(
+      /Paper: A surface from 477 of 3,173 points.*Here the mean distance of all 6,930 points/,
+    );
     await afterRun(() => app.page.click('.figure button:has-text("a subset")'));
     expect(await text('[data-figure=came]')).toContain('812');
     expect(await measured()).toMatchObject({ surfaceConstraints: 812, components: 1, genus: 0 });
@@ -487,7 +489,7 @@ describe('a link', () => {
     expect(await app.page.evaluate(() => document.activeElement?.textContent)).toBe('2,168 points');
     await afterRun(() => setParam('tau', '0.02'));
     expect(await app.page.locator('.figure button[aria-pressed=true]').count()).toBe(0);
-    expect(await text('[data-figure=came]')).toBe('Here the settings are others than those of the figure.');
+    expect(await text('[data-figure=came]')).toBe('The settings differ from those of the figure.');
   });
 
   test('that cannot be followed says so, and the first example opens', async () => {

@@ -187,7 +187,7 @@ describe('the hand', () => {
     await app.page.click('[data-ellipsoid="1"]');
     await app.page.fill('[aria-label="Semi-axis 1"]', '-1');
     await app.page.keyboard.press('Enter');
-    expect(await text('.ellipsoids .field-error')).toBe('A length above 0 is needed.');
+    expect(await text('.ellipsoids .field-error')).toBe('The length must be > 0.');
     await app.page.fill('[aria-label="Semi-axis 1"]', '0.95');
     await app.page.keyboard.press('Enter');
     await atRest();

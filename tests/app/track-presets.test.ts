@@ -10,7 +10,7 @@ import { canny } from '../../www/src/track/canny';
 import { beatOf } from '../../www/src/track/curve';
 import { filmById, isTrackPreset, TRACK_PRESETS, variantInForce } from '../../www/src/track/presets';
 import { buildTracker, filmFrom, prepared } from '../../www/src/track/source';
-import { invert, sliceFrames } from '../../www/src/view/anatomy';
+import { invert, sliceOrientations } from '../../www/src/view/anatomy';
 import { votesIn } from '../../www/src/view/votes';
 
 let film: Volume;
@@ -103,7 +103,7 @@ async function stepsIn(prediction: boolean): Promise<number> {
 test('figure 4: the boundary of a slice goes around the ventricle, where Cannyâ€™s has gaps', () => {
   const inverse = invert(volume.affine);
   const view = { dims: volume.dims, spacing: volume.spacing, affine: volume.affine, space: volume.space };
-  const [, , side] = sliceFrames(view);
+  const [, , side] = sliceOrientations(view);
   if (!side) throw new Error('a volume has three axes');
   const all = tracker.boundary(0);
   const count = all.length / 5;
@@ -113,7 +113,7 @@ test('figure 4: the boundary of a slice goes around the ventricle, where Cannyâ€
     weights: Float32Array.from({ length: count }, (_, i) => all[5 * i + 4] ?? 0),
   };
   const slice = 21;
-  const on = { volume: view as Parameters<typeof votesIn>[1]['volume'], inverse, frame: side, slice };
+  const on = { volume: view as Parameters<typeof votesIn>[1]['volume'], inverse, orientation: side, slice };
   const strong = votesIn(votes, on).filter(({ weight }) => weight > 0.3);
   expect(strong.length).toBeGreaterThan(100);
   const [width, height] = volume.dims;

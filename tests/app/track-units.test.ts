@@ -10,7 +10,7 @@ import { betweenSlices } from '../../www/src/track/between';
 import { boxOf, voxelsOf } from '../../www/src/track/box';
 import { canny } from '../../www/src/track/canny';
 import { cineVoxels, contraction, trueVolume, wallDistances } from '../../www/src/track/cine';
-import { boundaryPicture, isSplit, sliceVotes, twoMeans, windowAt } from '../../www/src/track/clusters';
+import { boundaryImage, hasBoundary, sliceVotes, twoMeans, windowAt } from '../../www/src/track/clusters';
 import { beatOf, warningsOf } from '../../www/src/track/curve';
 import { crossings, cutBy } from '../../www/src/track/cut';
 import { FILMS } from '../../www/src/track/examples';
@@ -140,9 +140,9 @@ describe('windows', () => {
     expect(found.means[0]).toBeCloseTo(11);
     expect(found.means[1]).toBeCloseTo(102);
     expect([...found.bright]).toEqual([0, 0, 0, 1, 1]);
-    expect(isSplit(found, 50)).toBe(true);
-    expect(isSplit(found, 95)).toBe(false);
-    expect(isSplit(twoMeans([...new Array(24).fill(10), 100]), 50)).toBe(false);
+    expect(hasBoundary(found, 50)).toBe(true);
+    expect(hasBoundary(found, 95)).toBe(false);
+    expect(hasBoundary(twoMeans([...new Array(24).fill(10), 100]), 50)).toBe(false);
     expect(twoMeans([7, 7, 7]).means).toEqual([7, 7]);
   });
 
@@ -167,7 +167,7 @@ describe('windows', () => {
       { x: 0.25, y: 0.75, weight: 1 },
       { x: 9, y: 9, weight: 1 },
     ];
-    expect([...boundaryPicture({ width: 2, height: 1 }, faces)]).toEqual([1.5, 0]);
+    expect([...boundaryImage({ width: 2, height: 1 }, faces)]).toEqual([1.5, 0]);
   });
 });
 

@@ -92,7 +92,7 @@ describe('the computed ventricle', () => {
 
   test('tells in words what the curve shows, beside the truth', async () => {
     // It is written when the curve is drawn, in the next frame of the screen.
-    const words = /^End-diastole \(ED\) in frame \d+: [\d.]+ ml; end-systole .* In truth /;
+    const words = /^End-diastole \(ED\) in frame \d+: [\d.]+ ml; end-systole .* Ground truth: /;
     await expect.poll(() => text('[data-beat]')).toMatch(words);
     expect(await text('.status')).toMatch(/^Done: all 12 frames tracked\. Ejection fraction [\d.]+ %\.$/);
     expect(await app.page.locator('.results table').first().locator('tbody tr').count()).toBe(12);
@@ -113,7 +113,7 @@ describe('the computed ventricle', () => {
     await app.page.click('[data-frame=beat]');
     await expect.poll(shown).not.toBe(5);
     await app.page.click('[data-frame=beat]');
-    await expect.poll(() => text('[data-frame=beat]')).toBe('Beat');
+    await expect.poll(() => text('[data-frame=beat]')).toBe('Loop');
   });
 
   test('has votes on its surface and pictures below', async () => {

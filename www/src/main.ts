@@ -1,6 +1,6 @@
 import { text } from './texts';
 import './style.css';
-import { spawnAhead } from './channel';
+import { preloadWorker } from './channel';
 import { spawnExtract } from './client';
 import { GUIDES } from './guides';
 import { labOf } from './labs/address';
@@ -86,7 +86,7 @@ class Labs {
     this.#root.dataset.state = 'loading';
     try {
       // The engine loads in parallel with the lab's own code.
-      spawnAhead(kind.spawn);
+      preloadWorker(kind.spawn);
       const Kind = await kind.load();
       if (turn !== this.#turn) return;
       this.#lab = new Kind(this.#root, this.#help, (passedOn) => this.#passOn(passedOn));

@@ -223,8 +223,8 @@ export class ExtractParts {
   }
 
   refuseParam(name: string, message: string): void {
-    if (name === 'iso') this.histogram.complain(message);
-    else this.#params?.complain(name, message);
+    if (name === 'iso') this.histogram.showError(message);
+    else this.#params?.showError(name, message);
   }
 
   /** Shows the attractors in force, in the list and in the views. */

@@ -100,7 +100,7 @@ export class ExtractResults {
   /** Displays a snapshot at the next animation frame; only then may the worker send another. */
   #takeSnapshot(event: SnapshotEvent): void {
     this.#takeReports(event.reports);
-    if (this.#snapshot) this.#client.giveBack(this.#snapshot.surface);
+    if (this.#snapshot) this.#client.returnBuffers(this.#snapshot.surface);
     this.#snapshot = event;
     this.#level = event.level;
     this.#ui.pyramid.setInUse(event.level);
@@ -116,7 +116,7 @@ export class ExtractResults {
     this.#ui.stage.showSurface(snapshot.surface);
     this.#ui.stage.showSections(snapshot.sections);
     // The previous surface is no longer drawn.
-    if (this.#shown) this.#client.giveBack(this.#shown);
+    if (this.#shown) this.#client.returnBuffers(this.#shown);
     this.#shown = snapshot.surface;
     this.#ui.showHistory();
   }

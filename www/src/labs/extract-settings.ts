@@ -197,7 +197,7 @@ export class ExtractSettings {
         const { code, message } = toFailure(error);
         if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
         this.#ui.showAttractors(this.#attractors);
-        this.#ui.attractors.complain(this.#why(message));
+        this.#ui.attractors.showError(this.#why(message));
       }
     });
   }

@@ -193,8 +193,8 @@ export class ExtractLab implements Lab {
 
   #onEvent(event: WorkerEvent): void {
     if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
-    else if (event.event === 'comparing') this.#ui.compare.tell(event);
-    else if (event.event === 'covering') this.#ui.coverage.tell(event);
+    else if (event.event === 'comparing') this.#ui.compare.showProgress(event);
+    else if (event.event === 'covering') this.#ui.coverage.showProgress(event);
     else if (event.event !== 'state') this.#results.take(event);
     else if (this.#states.enter(event.state)) this.#results.showState(event.state);
   }

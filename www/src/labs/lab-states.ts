@@ -27,9 +27,9 @@ export class LabStates {
     this.#signal = signal;
   }
 
-  /** Calls `follower` now and at every change. */
+  /** Calls `subscriber` now and at every change. */
   follow(follower: (state: LabState) => void): void {
-    this.#state.follow((state) => {
+    this.#state.subscribe((state) => {
       if (state !== 'loading' && state !== 'error') this.#model = state;
       follower(state);
     });

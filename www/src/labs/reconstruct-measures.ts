@@ -2,11 +2,11 @@ import type { Fit } from '../reconstruct/protocol';
 import { text } from '../texts';
 import { count, figure } from '../ui/format';
 import type { History } from '../ui/history';
-import type { MoreMeasure } from '../ui/measures';
+import type { ExtraMeasure } from '../ui/measures';
 import type { PlotKind } from '../ui/plots';
 
 /** Measures of the points and the fit, shown besides those of the surface. */
-export const FIT_ROWS: MoreMeasure[] = [
+export const FIT_ROWS: ExtraMeasure[] = [
   {
     name: 'fitMean',
     label: text('reconstruct.fitMean'),
@@ -66,10 +66,10 @@ export const RESIDUAL_PLOT: PlotKind = {
     { label: text('reconstruct.residualCurve'), color: '--curve', of: ({ residual }) => residual },
     { label: text('labs.toleranceCurve'), color: '--muted', dash: [4, 4], of: ({ tolerance }) => tolerance },
   ],
-  tell: tellResidual,
+  describe: describeResidual,
 };
 
-function tellResidual({ reports }: History): string {
+function describeResidual({ reports }: History): string {
   const last = reports.at(-1);
   const solving = reports.filter(({ phase, residual }) => phase === 'solve' && Number.isFinite(residual));
   if (!last || solving.length === 0) return text('reconstruct.solveNotStarted');

@@ -11,7 +11,7 @@ import { NO_EDITS } from './picking';
 import { type Opened as Data, fromExample, fromFiles } from './point-files';
 import { fromHash, type LinkedCloud, withLink } from './reconstruct-link';
 import type { ReconstructParts } from './reconstruct-parts';
-import type { ModelSettings } from './reconstruct-settings';
+import type { ReconstructSettings } from './reconstruct-settings';
 
 export type CloudOrigin = Source<CloudExample, LinkedCloud, Data>;
 
@@ -29,7 +29,7 @@ export interface OpenedCloud {
 export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data, OpenedCloud> {
   protected readonly first = CLOUDS[0];
   readonly #client: ReconstructClient;
-  readonly #settings: ModelSettings;
+  readonly #settings: ReconstructSettings;
   readonly #onOpened: (opened: OpenedCloud, origin: CloudOrigin) => Promise<void>;
   /** Default parameters of the method. */
   defaults: ParamValues = {};
@@ -38,7 +38,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     client: ReconstructClient,
     ui: ReconstructParts,
     states: LabStates,
-    settings: ModelSettings,
+    settings: ReconstructSettings,
     onOpened: (opened: OpenedCloud, origin: CloudOrigin) => Promise<void>,
   ) {
     super(client, ui, states);

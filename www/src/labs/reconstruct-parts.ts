@@ -202,7 +202,7 @@ export class ReconstructParts {
 
   refuseParam(name: string, message: string, inForce: ParamValues): void {
     this.#params?.show(inForce);
-    this.#params?.complain(name, message);
+    this.#params?.showError(name, message);
   }
 
   showState(state: LabState, ready: boolean, surface: boolean): void {

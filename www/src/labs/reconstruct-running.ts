@@ -4,7 +4,7 @@ import type { LabStates } from './lab-states';
 import type { ReconstructParts } from './reconstruct-parts';
 
 /** Runs, pauses and steps the model of the Reconstruct lab. */
-export class Running {
+export class RunControl {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;

@@ -7,8 +7,8 @@ import type { Hit } from '../view/reconstruction';
 import type { LabStates } from './lab-states';
 import { editedBy, NO_EDITS, without } from './picking';
 import type { ReconstructParts } from './reconstruct-parts';
-import type { Results } from './reconstruct-results';
-import type { Running } from './reconstruct-running';
+import type { ReconstructResults } from './reconstruct-results';
+import type { RunControl } from './reconstruct-running';
 import { UndoStack } from './undo';
 
 /** Limits of the undo history. */
@@ -24,12 +24,12 @@ interface Settings {
 }
 
 /** The points and the settings of their model: changes them, sends them to the worker, and undoes changes. */
-export class ModelSettings {
+export class ReconstructSettings {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;
-  readonly #results: Results;
-  readonly #running: Running;
+  readonly #results: ReconstructResults;
+  readonly #running: RunControl;
   readonly #onParams: (params: ParamValues) => void;
   readonly #undo = new UndoStack<Settings>(UNDO_LIMITS);
   #lastChange = { together: '', at: 0 };
@@ -42,8 +42,8 @@ export class ModelSettings {
     client: ReconstructClient,
     ui: ReconstructParts,
     states: LabStates,
-    results: Results,
-    running: Running,
+    results: ReconstructResults,
+    running: RunControl,
     onParams: (params: ParamValues) => void,
   ) {
     this.#client = client;
@@ -72,7 +72,7 @@ export class ModelSettings {
     const removed = setup.edits.removed.filter((index) => index < cloud.points.length / 3);
     this.#edits = { ...setup.edits, removed };
     this.#undo.clear();
-    this.#tellUndo();
+    this.#showUndo();
     this.#ui.setup.show(setup);
     this.#showEdits();
   }
@@ -149,7 +149,7 @@ export class ModelSettings {
     const state = this.#now;
     const back = this.#undo[way]({ bytes: sizeOf(state), state });
     this.#lastChange.together = '';
-    this.#tellUndo();
+    this.#showUndo();
     if (back) await this.#apply(back);
   }
 
@@ -196,10 +196,10 @@ export class ModelSettings {
     const isOne = together !== '' && together === this.#lastChange.together && now - this.#lastChange.at < TOGETHER;
     this.#lastChange = { together, at: now };
     if (!isOne) this.#undo.push({ label, bytes: sizeOf(state), state });
-    this.#tellUndo();
+    this.#showUndo();
   }
 
-  #tellUndo(): void {
+  #showUndo(): void {
     this.#ui.transport.showUndo(this.#undo.undoable, this.#undo.redoable);
   }
 

@@ -6,7 +6,7 @@ import type { PassOn } from './labs';
 import { fits, linkOf, toHash } from './reconstruct-link';
 import type { ReconstructOpening } from './reconstruct-opening';
 import type { ReconstructParts } from './reconstruct-parts';
-import type { ModelSettings } from './reconstruct-settings';
+import type { ReconstructSettings } from './reconstruct-settings';
 
 /** Voxels along the longest side of a volume that is saved or passed on. */
 const VOLUME_SIZE = 96;
@@ -15,18 +15,18 @@ const VOLUME_SIZE = 96;
  * Shares the state of the Reconstruct lab as an address, saves f as a volume, and passes volume or surface to other
  * labs.
  */
-export class Sharing {
+export class ReconstructSharing {
   readonly #client: ReconstructClient;
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;
-  readonly #settings: ModelSettings;
+  readonly #settings: ReconstructSettings;
   readonly #opening: ReconstructOpening;
 
   constructor(
     client: ReconstructClient,
     ui: ReconstructParts,
     states: LabStates,
-    settings: ModelSettings,
+    settings: ReconstructSettings,
     opening: ReconstructOpening,
   ) {
     this.#client = client;

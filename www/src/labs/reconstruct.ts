@@ -13,10 +13,10 @@ import type { Lab, PassOn } from './labs';
 import { photoFor } from './reconstruct-link';
 import { type CloudOrigin, type OpenedCloud, ReconstructOpening } from './reconstruct-opening';
 import { type PartEvents, ReconstructParts } from './reconstruct-parts';
-import { Results } from './reconstruct-results';
-import { Running } from './reconstruct-running';
-import { ModelSettings } from './reconstruct-settings';
-import { Sharing } from './reconstruct-sharing';
+import { ReconstructResults } from './reconstruct-results';
+import { RunControl } from './reconstruct-running';
+import { ReconstructSettings } from './reconstruct-settings';
+import { ReconstructSharing } from './reconstruct-sharing';
 
 /**
  * The Reconstruct lab: an implicit surface is fitted to points. This class connects the lab's parts; opening, settings,
@@ -29,11 +29,11 @@ export class ReconstructLab implements Lab {
   readonly #client = new ReconstructClient((event) => this.#onEvent(event));
   readonly #ui: ReconstructParts;
   readonly #states: LabStates;
-  readonly #running: Running;
-  readonly #results: Results;
-  readonly #settings: ModelSettings;
+  readonly #running: RunControl;
+  readonly #results: ReconstructResults;
+  readonly #settings: ReconstructSettings;
   readonly #opening: ReconstructOpening;
-  readonly #sharing: Sharing;
+  readonly #sharing: ReconstructSharing;
   #shade: PointShade | undefined;
 
   constructor(root: HTMLElement, help: HTMLElement, passOn: PassOn) {
@@ -46,15 +46,15 @@ export class ReconstructLab implements Lab {
     const states = new LabStates(ui.banner, ui.status, signal);
     this.#ui = ui;
     this.#states = states;
-    this.#running = new Running(client, ui, states);
-    this.#results = new Results(client, ui, states, history);
-    this.#settings = new ModelSettings(client, ui, states, this.#results, this.#running, (params) =>
+    this.#running = new RunControl(client, ui, states);
+    this.#results = new ReconstructResults(client, ui, states, history);
+    this.#settings = new ReconstructSettings(client, ui, states, this.#results, this.#running, (params) =>
       this.#showParams(params),
     );
     this.#opening = new ReconstructOpening(client, ui, states, this.#settings, (opened, origin) =>
       this.#adopt(opened, origin),
     );
-    this.#sharing = new Sharing(client, ui, states, this.#settings, this.#opening);
+    this.#sharing = new ReconstructSharing(client, ui, states, this.#settings, this.#opening);
     states.follow((state) => this.#showState(state));
     offerShortcuts(this.#shortcuts(), help, GUIDES.reconstruct, signal);
   }
@@ -120,7 +120,7 @@ export class ReconstructLab implements Lab {
         key: 'Escape',
         shown: text('labs.keyEscape'),
         text: text('reconstruct.dismissKey'),
-        act: () => this.#putAway(),
+        act: () => this.#escape(),
       },
     ];
   }
@@ -188,14 +188,14 @@ export class ReconstructLab implements Lab {
   #showState(state: LabState): void {
     const { beneath, ready } = this.#states;
     this.#root.dataset.state = state;
-    this.#ui.showState(beneath, ready, state !== 'loading' && this.#results.whole);
+    this.#ui.showState(beneath, ready, state !== 'loading' && this.#results.complete);
   }
 
   /** Handles Escape: dismisses the message, else deselects the tool, else leaves the photograph. */
-  #putAway(): void {
+  #escape(): void {
     const { banner, tools, photos } = this.#ui;
     if (banner.shown) this.#dismiss();
-    else if (tools.tool !== 'none') tools.putAway();
+    else if (tools.tool !== 'none') tools.deselect();
     else photos.choose(undefined);
   }
 

@@ -4,7 +4,7 @@ import { poseAt } from '../sculpt/film';
 import { text } from '../texts';
 import type { LabStates } from './lab-states';
 import type { SculptParts } from './sculpt-parts';
-import type { ModelSettings } from './sculpt-settings';
+import type { SculptSettings } from './sculpt-settings';
 
 /** Duration of a recorded frame, in seconds. */
 const FRAME_SECONDS = 1 / 25;
@@ -14,9 +14,9 @@ export class Filming {
   readonly #client: SculptClient;
   readonly #ui: SculptParts;
   readonly #states: LabStates;
-  readonly #settings: ModelSettings;
+  readonly #settings: SculptSettings;
 
-  constructor(client: SculptClient, ui: SculptParts, states: LabStates, settings: ModelSettings) {
+  constructor(client: SculptClient, ui: SculptParts, states: LabStates, settings: SculptSettings) {
     this.#client = client;
     this.#ui = ui;
     this.#states = states;

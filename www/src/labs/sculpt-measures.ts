@@ -2,11 +2,11 @@ import type { StepReport } from '../sculpt/protocol';
 import { text } from '../texts';
 import { count, figure, milliseconds } from '../ui/format';
 import type { History } from '../ui/history';
-import type { MoreMeasure } from '../ui/measures';
+import type { ExtraMeasure } from '../ui/measures';
 import type { PlotKind } from '../ui/plots';
 
 /** Measures of frames, detail and correspondence, shown besides those of the surface. */
-export const SCULPT_ROWS: MoreMeasure[] = [
+export const SCULPT_ROWS: ExtraMeasure[] = [
   { name: 'frameMs', label: text('sculpt.frameTime'), help: text('sculpt.frameTimeHelp'), text: milliseconds },
   {
     name: 'alongMs',
@@ -59,19 +59,19 @@ export const SCULPT_PLOTS: PlotKind[] = [
       { label: text('sculpt.residualCurve'), color: '--curve', of: ({ residual }) => residual },
       { label: text('labs.toleranceCurve'), color: '--muted', dash: [4, 4], of: ({ tolerance }) => tolerance },
     ],
-    tell: tellResidual,
+    describe: describeResidual,
   },
   {
     title: text('sculpt.verticesPlot'),
     log: false,
     curves: [{ label: text('sculpt.verticesCurve'), color: '--curve', of: ({ vertices }) => vertices }],
-    tell: tellVertices,
+    describe: describeVertices,
   },
   {
     title: text('sculpt.frameTimePlot'),
     log: false,
     curves: [{ label: text('sculpt.timeCurve'), color: '--curve', of: timeOf }],
-    tell: tellTime,
+    describe: describeTime,
   },
 ];
 
@@ -80,7 +80,7 @@ function timeOf({ times }: StepReport): number {
   return Object.values(times).reduce((sum, time) => sum + time, 0);
 }
 
-function tellResidual({ reports }: History): string {
+function describeResidual({ reports }: History): string {
   const last = reports.at(-1);
   if (!last) return '';
   const key = last.residual <= last.tolerance ? 'sculpt.residualBelow' : 'sculpt.residualAbove';
@@ -91,12 +91,12 @@ function tellResidual({ reports }: History): string {
   });
 }
 
-function tellVertices({ reports }: History): string {
+function describeVertices({ reports }: History): string {
   const [first, last] = [reports[0], reports.at(-1)];
   return first && last ? text('sculpt.verticesTold', { first: count(first.vertices), last: count(last.vertices) }) : '';
 }
 
-function tellTime({ reports }: History): string {
+function describeTime({ reports }: History): string {
   const sorted = reports.map(timeOf).sort((a, b) => a - b);
   const median = sorted[sorted.length >> 1] ?? 0;
   return text('sculpt.frameTimesTold', { median: milliseconds(median), longest: milliseconds(sorted.at(-1) ?? 0) });

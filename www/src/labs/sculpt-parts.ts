@@ -192,7 +192,7 @@ export class SculptParts {
 
   refuseParam(name: string, message: string, inForce: ParamValues): void {
     this.#params?.show(inForce);
-    this.#params?.complain(name, message);
+    this.#params?.showError(name, message);
   }
 
   /** With `canPlay`, a model at rest can be played, since there is a film. */

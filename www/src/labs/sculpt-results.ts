@@ -11,7 +11,7 @@ import type { SculptParts } from './sculpt-parts';
 const SHOW_EVERY = 250;
 
 /** Displays the worker's results: frames, measures and plots. */
-export class Results {
+export class SculptResults {
   readonly #client: SculptClient;
   readonly #ui: SculptParts;
   readonly #states: LabStates;
@@ -74,7 +74,7 @@ export class Results {
       if (this.#frame) this.#show(this.#frame);
       this.#frame = undefined;
       this.#showMeasured();
-      this.#client.shown();
+      this.#client.acknowledge();
     });
   }
 
@@ -90,7 +90,7 @@ export class Results {
     this.#measured = undefined;
     Object.assign(this.#more, facts);
     this.#ui.measures.showMeasures(measures);
-    this.#ui.measures.showMore(this.#more);
+    this.#ui.measures.showExtra(this.#more);
   }
 
   showState(state: LabState): void {
@@ -149,15 +149,15 @@ export class Results {
     if (frame.levels) view.showStages(frame.levels);
     coarse.hidden = !frame.coarse;
     this.#follow(frame);
-    this.#tellAnswer(frame.turn);
+    this.#showLatency(frame.turn);
     this.#more.frameMs = frame.took;
     const last = frame.reports.at(-1);
     if (last) measures.showReport({ ...last, vertices: frame.result.vertices, triangles: frame.result.triangles });
-    measures.showMore(this.#more);
+    measures.showExtra(this.#more);
     if (performance.now() - this.#shownAt > SHOW_EVERY) this.#showHistory();
   }
 
-  #tellAnswer(turn: number): void {
+  #showLatency(turn: number): void {
     const { answer } = this.#ui;
     if (!answer.drawn(turn, performance.now()) || !answer.last) return;
     if (answer.alongMs !== undefined) this.#more.alongMs = Math.round(answer.alongMs);

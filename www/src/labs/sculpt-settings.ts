@@ -28,7 +28,7 @@ export interface Adopted {
 }
 
 /** Ellipsoids, film and parameters: changes them, sends them to the worker, and undoes changes. */
-export class ModelSettings {
+export class SculptSettings {
   readonly #client: SculptClient;
   readonly #ui: SculptParts;
   readonly #states: LabStates;
@@ -178,7 +178,7 @@ export class ModelSettings {
     this.#pose = pose;
     this.#names = named(this.#names, pose.length);
     this.#showPose();
-    this.#ui.ellipsoids.complain(why);
+    this.#ui.ellipsoids.showError(why);
   }
 
   /** Sets parameters of the live model; a run continues, and a model at rest is resumed. */

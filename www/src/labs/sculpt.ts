@@ -6,7 +6,7 @@ import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce }
 import type { FrameEvent, Opened, ParamValues, SculptShade, Shown, WorkerEvent } from '../sculpt/protocol';
 import type { LabState } from '../state';
 import { plural, text } from '../texts';
-import { wantsStillness } from '../ui/dom';
+import { prefersReducedMotion } from '../ui/dom';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { SculptViewOptions } from '../view/sculpture';
@@ -18,8 +18,8 @@ import { filmOf, linkOf, toHash } from './sculpt-link';
 import { SculptOpening, type SculptSource } from './sculpt-opening';
 import { type PartEvents, SculptParts } from './sculpt-parts';
 import { Posing } from './sculpt-posing';
-import { Results } from './sculpt-results';
-import { ModelSettings } from './sculpt-settings';
+import { SculptResults } from './sculpt-results';
+import { SculptSettings } from './sculpt-settings';
 
 /** The colourings that the worker has to compute. */
 const SHADES: readonly string[] = ['area distortion', 'angle distortion', 'mean curvature'] satisfies SculptShade[];
@@ -34,8 +34,8 @@ export class SculptLab implements Lab {
   readonly #client = new SculptClient((event) => this.#onEvent(event));
   readonly #ui: SculptParts;
   readonly #states: LabStates;
-  readonly #results: Results;
-  readonly #settings: ModelSettings;
+  readonly #results: SculptResults;
+  readonly #settings: SculptSettings;
   readonly #posing: Posing;
   readonly #filming: Filming;
   readonly #opening: SculptOpening;
@@ -52,8 +52,8 @@ export class SculptLab implements Lab {
     const states = new LabStates(ui.banner, ui.status, signal);
     this.#ui = ui;
     this.#states = states;
-    this.#results = new Results(client, ui, states, history, (frame) => this.#follow(frame));
-    this.#settings = new ModelSettings(client, ui, states, history, () => this.#showSettings());
+    this.#results = new SculptResults(client, ui, states, history, (frame) => this.#follow(frame));
+    this.#settings = new SculptSettings(client, ui, states, history, () => this.#showSettings());
     this.#posing = new Posing(ui, this.#settings);
     this.#filming = new Filming(client, ui, states, this.#settings);
     this.#opening = new SculptOpening(client, ui, states, (opened, source) => this.#adopt(opened, source));
@@ -132,7 +132,7 @@ export class SculptLab implements Lab {
         key: 'Escape',
         shown: text('labs.keyEscape'),
         text: text('sculpt.dismissKey'),
-        act: () => this.#putAway(),
+        act: () => this.#escape(),
       },
     ];
   }
@@ -163,7 +163,7 @@ export class SculptLab implements Lab {
     if (preset?.stages) this.#results.showStages(preset.stages);
     await this.#settings.setFilm(film, 0);
     await this.#client.request('show', this.#shown);
-    const endless = film?.loop === true && wantsStillness();
+    const endless = film?.loop === true && prefersReducedMotion();
     await this.#client.request(film && !linked?.pose && !endless ? 'play' : 'settle', undefined);
   }
 
@@ -285,7 +285,7 @@ export class SculptLab implements Lab {
     if (state === 'done' || state === 'paused') this.#updateAddress();
   }
 
-  #putAway(): void {
+  #escape(): void {
     if (this.#ui.banner.shown) this.#dismiss();
     else this.#settings.choose(undefined);
   }

@@ -1,7 +1,7 @@
 import { text } from '../texts';
 import type { TrackClient } from '../track/client';
 import type { Enrichment, Setup, SurfaceError } from '../track/protocol';
-import { type ComparedRun, comparedRun, type Other } from '../ui/track-compare';
+import { type Alternative, comparedRun, type TrackingRun } from '../ui/track-compare';
 import type { TrackResults } from './track-results';
 import type { TrackSettings } from './track-settings';
 
@@ -16,9 +16,9 @@ const NAMES: Record<Enrichment, string> = {
 export async function compareWith(
   client: TrackClient,
   { setup, params }: TrackSettings,
-  { results, took }: { results: TrackResults; took: number | undefined },
-  other: Other,
-): Promise<[ComparedRun, ComparedRun] | undefined> {
+  { results, duration }: { results: TrackResults; duration: number | undefined },
+  other: Alternative,
+): Promise<[TrackingRun, TrackingRun] | undefined> {
   const predicted = params.prediction === true;
   const [here, there] =
     other === 'prediction'
@@ -30,12 +30,12 @@ export async function compareWith(
   const changed = otherwise(setup, other, predicted);
   const facts = results.frames.map((frame) => frame.facts);
   const errors = results.frames.flatMap(({ error }) => error ?? []);
-  const present: ComparedRun = { name: here, facts, closing: results.closing, error: meanOf(errors), took };
+  const present: TrackingRun = { name: here, facts, closing: results.closing, error: meanOf(errors), duration };
   const run = await client.request('compare', { setup: changed });
   return run && [present, comparedRun(there, run)];
 }
 
-function otherwise(setup: Setup, other: Other, predicted: boolean): Setup {
+function otherwise(setup: Setup, other: Alternative, predicted: boolean): Setup {
   if (other === 'prediction') return { ...setup, params: { ...setup.params, prediction: !predicted } };
   return { ...setup, preparation: { ...setup.preparation, enrichment: other } };
 }

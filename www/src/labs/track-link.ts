@@ -21,7 +21,7 @@ export interface LinkedTrack {
 }
 
 /** Present settings of the lab, from which a link is made. */
-export interface TrackSettings {
+export interface LinkableTrack {
   example: TrackExample | undefined;
   file: string;
   setup: Setup;
@@ -43,7 +43,7 @@ export function setupOf(example: TrackExample | undefined, linked?: LinkedTrack)
 }
 
 /** Returns the settings that differ from those of the example, or else from the defaults. */
-export function linkOf({ example, file, setup, view }: TrackSettings): LinkedTrack {
+export function linkOf({ example, file, setup, view }: LinkableTrack): LinkedTrack {
   const usual = setupOf(example);
   const same = (one: unknown, other: unknown) => JSON.stringify(one) === JSON.stringify(other);
   return {

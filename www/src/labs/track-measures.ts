@@ -2,13 +2,13 @@ import { text } from '../texts';
 import { beatOf } from '../track/curve';
 import type { TrackedFrame } from '../track/protocol';
 import { count, figure } from '../ui/format';
-import type { MoreMeasure } from '../ui/measures';
+import type { ExtraMeasure } from '../ui/measures';
 
 const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
 const round = (value: number) => figure(Number(value.toPrecision(3)));
 
 /** Measures of the tracking, shown besides those of the frame's surface. */
-export const TRACK_ROWS: MoreMeasure[] = [
+export const TRACK_ROWS: ExtraMeasure[] = [
   {
     name: 'ejection',
     label: text('track.ejection'),

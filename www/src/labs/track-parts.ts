@@ -6,8 +6,8 @@ import type { TrackClient } from '../track/client';
 import { FILMS, type TrackExample } from '../track/examples';
 import { TRACK_PRESETS, type TrackPreset, type TrackVariant } from '../track/presets';
 import type { Opened, ParamSpec, ParamValues, Preparation, Vec3 } from '../track/protocol';
-import { BeatCurve } from '../ui/beat-curve';
-import { BeatTable } from '../ui/beat-table';
+import { VolumeCurve } from '../ui/beat-curve';
+import { FrameTable } from '../ui/beat-table';
 import { h } from '../ui/dom';
 import { exercises, TRACK_EXERCISES } from '../ui/exercises';
 import { ExportButtons } from '../ui/exports';
@@ -19,9 +19,9 @@ import { ParamControls } from '../ui/params';
 import { PreparationControls } from '../ui/preparation';
 import { RegionControls, type RegionEvents } from '../ui/region';
 import { ErrorBanner, StatusLine } from '../ui/status';
-import { StepHeight } from '../ui/step-height';
-import { Stills } from '../ui/stills';
-import { type Other, TrackComparePanel } from '../ui/track-compare';
+import { EdgeThreshold } from '../ui/step-height';
+import { FigureRow } from '../ui/stills';
+import { type Alternative, TrackComparePanel } from '../ui/track-compare';
 import { TrackOptionControls } from '../ui/track-options';
 import { Transport, type TransportEvents } from '../ui/transport';
 import { TrackView, type TrackViewOptions } from '../view/beating';
@@ -48,7 +48,7 @@ export interface PartEvents extends TransportEvents, RegionEvents {
   onOptions: (options: TrackViewOptions) => void;
   onFrame: (frame: number) => void;
   onMoved: () => void;
-  onCompare: (other: Other) => void;
+  onCompare: (other: Alternative) => void;
   onCancelCompare: () => void;
   onSave: (what: 'frames' | 'animation' | 'table') => void;
   onSculpt: () => void;
@@ -72,7 +72,7 @@ export class TrackParts {
   readonly view = new TrackView(this.#canvas, this.#slices, INITIAL_VIEW);
   readonly status = new StatusLine();
   readonly measures = new MeasurePanel(TRACK_ROWS);
-  readonly table = new BeatTable();
+  readonly table = new FrameTable();
   readonly banner: ErrorBanner;
   readonly data: FilmPanel;
   readonly options: TrackOptionControls;
@@ -80,8 +80,8 @@ export class TrackParts {
   readonly region: RegionControls;
   readonly transport: Transport;
   readonly frames: FrameBar;
-  readonly curve: BeatCurve;
-  readonly stills: Stills;
+  readonly curve: VolumeCurve;
+  readonly stills: FigureRow;
   readonly compare: TrackComparePanel;
   readonly saving: Saving;
   readonly #root: HTMLElement;
@@ -94,7 +94,7 @@ export class TrackParts {
   readonly #paramsHolder = h('div');
   readonly #thresholdHolder = h('div');
   #params: ParamControls | undefined;
-  #threshold: StepHeight | undefined;
+  #threshold: EdgeThreshold | undefined;
   /** Half width k of the window, in voxels. */
   #window = 2;
 
@@ -108,11 +108,11 @@ export class TrackParts {
     this.region = new RegionControls(events);
     this.transport = new Transport(events);
     this.frames = new FrameBar(events.onFrame);
-    this.curve = new BeatCurve((frame) => {
+    this.curve = new VolumeCurve((frame) => {
       this.frames.stop();
       events.onFrame(frame);
     });
-    this.stills = new Stills(
+    this.stills = new FigureRow(
       (voxel: Vec3) => this.view.goToVoxel(voxel),
       (frame) => {
         this.frames.stop();
@@ -186,7 +186,7 @@ export class TrackParts {
     this.#paramsHolder.replaceWith(this.#params.element);
     const threshold = specs.find(({ name }) => name === 'threshold');
     if (!threshold) return;
-    this.#threshold = new StepHeight(
+    this.#threshold = new EdgeThreshold(
       threshold,
       (value) => onParam('threshold', value),
       (value) => this.view.preview(value, this.#window),
@@ -216,8 +216,8 @@ export class TrackParts {
   }
 
   refuseParam(name: string, message: string): void {
-    if (name === 'threshold') this.#threshold?.complain(message);
-    else this.#params?.complain(name, message);
+    if (name === 'threshold') this.#threshold?.showError(message);
+    else this.#params?.showError(name, message);
   }
 
   /** `tracked` is the number of frames with a surface; `here`, whether the displayed frame has one. */

@@ -152,7 +152,7 @@ export class TrackResults {
     if (tracked) measures.showMeasures(tracked.measures);
     else measures.clear();
     const { noise } = this;
-    measures.showMore(moreOf({ frames: this.#frames, count, frame: this.#frame, closing: this.#closing, noise }));
+    measures.showExtra(moreOf({ frames: this.#frames, count, frame: this.#frame, closing: this.#closing, noise }));
     this.showCurve();
     this.showStills();
     this.#ui.transport.showReport(this.#history.reports.at(-1));

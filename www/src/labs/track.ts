@@ -6,10 +6,10 @@ import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
 import { TrackClient } from '../track/client';
 import { isTrackPreset, type TrackPreset, type TrackVariant, variantInForce, viewOf } from '../track/presets';
 import type { StepEvent, VolumeView, WorkerEvent } from '../track/protocol';
-import { wantsStillness } from '../ui/dom';
+import { prefersReducedMotion } from '../ui/dom';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
-import type { Other } from '../ui/track-compare';
+import type { Alternative } from '../ui/track-compare';
 import { invert, sliceOrientations } from '../view/anatomy';
 import { LabStates } from './lab-states';
 import type { Lab, PassedOn, PassOn } from './labs';
@@ -41,7 +41,7 @@ export class TrackLab implements Lab {
   #truth: number[] | undefined;
   /** Start and duration of the run in milliseconds, for comparisons; undefined if it was interrupted. */
   #began: number | undefined;
-  #took: number | undefined;
+  #duration: number | undefined;
 
   constructor(root: HTMLElement, help: HTMLElement, passOn: PassOn) {
     this.#root = root;
@@ -243,19 +243,19 @@ export class TrackLab implements Lab {
     }
   }
 
-  async #compare(other: Other): Promise<void> {
+  async #compare(other: Alternative): Promise<void> {
     const { compare } = this.#ui;
     compare.begin();
     try {
-      const present = { results: this.#results, took: this.#took };
+      const present = { results: this.#results, duration: this.#duration };
       const runs = await compareWith(this.#client, this.#settings, present, other);
-      if (!runs) return compare.refuse(text('labs.cancelled'));
+      if (!runs) return compare.reject(text('labs.cancelled'));
       compare.finish(runs);
       const [, there] = runs;
       this.#results.other = { volumes: there.facts.map(({ volume }) => volume), name: there.name };
     } catch (error) {
       const { code, message } = toFailure(error);
-      compare.refuse(message);
+      compare.reject(message);
       if (code === 'internal') this.#states.fail(text('track.compareFailed'), error);
     }
   }
@@ -267,7 +267,7 @@ export class TrackLab implements Lab {
 
   #onEvent(event: WorkerEvent): void {
     if (event.event === 'preparing') this.#ui.status.say(event.what);
-    else if (event.event === 'comparing') this.#ui.compare.tell(event.part, event.phase);
+    else if (event.event === 'comparing') this.#ui.compare.showProgress(event.part, event.phase);
     else if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
     else if (event.event === 'step') {
       this.#results.take(event);
@@ -289,16 +289,16 @@ export class TrackLab implements Lab {
   #settled(state: 'running' | 'paused' | 'done'): void {
     this.#time(state);
     this.#ui.status.say(this.#results.describe(state));
-    if (state === 'done' && !wantsStillness()) this.#ui.frames.start();
+    if (state === 'done' && !prefersReducedMotion()) this.#ui.frames.start();
     else this.#ui.frames.stop();
   }
 
   /** Measures the duration of a run; only one without a pause can be compared. */
   #time(state: 'running' | 'paused' | 'done'): void {
     if (state === 'running') this.#began = this.#results.isNew ? performance.now() : undefined;
-    else if (state === 'done' && this.#began !== undefined) this.#took = performance.now() - this.#began;
+    else if (state === 'done' && this.#began !== undefined) this.#duration = performance.now() - this.#began;
     if (state !== 'running') this.#began = undefined;
-    if (state === 'paused') this.#took = undefined;
+    if (state === 'paused') this.#duration = undefined;
   }
 
   #showState(state: LabState): void {

@@ -4,8 +4,8 @@ import init, { type ImplicitSurface, paramSpecs, type StepReport, version } from
 import type { Surface } from '../protocol';
 import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
-import { noArrays, surfaceIn, transferOf } from '../worker/room';
-import { answer, buffersOf, stop, type Work } from '../worker/serving';
+import { copySurface, emptyArrays, transferOf } from '../worker/room';
+import { buffersOf, reply, stop, type Task } from '../worker/serving';
 import { buildModel, cloudFrom, cubicDims, edited, fitOf, levelOf, packed, valuesFor } from './model';
 import type {
   CameraView,
@@ -25,7 +25,7 @@ import { timeSolves } from './timing';
 
 /** Least milliseconds between two previews of a surface being extracted, and between two progress events. */
 const PREVIEW_EVERY = 100;
-const TELL_EVERY = 50;
+const REPORT_EVERY = 50;
 
 type Handlers = {
   [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
@@ -43,7 +43,7 @@ class Session {
   #shade: PointShade | undefined;
   /** Reports of steps that were not sent to the page yet. */
   #reports: StepReport[] = [];
-  #toldAt = 0;
+  #reportedAt = 0;
   #previewedAt = 0;
   /** Whether the page has drawn the last surface it was sent. */
   #shown = true;
@@ -51,8 +51,8 @@ class Session {
   #sent = '';
   #constraintsSent = false;
   #last: StepReport | undefined;
-  #run: Work | undefined;
-  #timing: Work | undefined;
+  #run: Task | undefined;
+  #timing: Task | undefined;
 
   readonly handlers: Handlers = {
     hello: async () => {
@@ -142,22 +142,22 @@ class Session {
       if (!signal.aborted) queueMicrotask(() => send({ event: 'failure', failure: toFailure(error) }));
     }
     this.#run = undefined;
-    this.#standStill();
+    this.#reportStopped();
   }
 
   #stepped(report: StepReport): void {
     this.#last = report;
     this.#reports.push(report);
     const now = performance.now();
-    if (now - this.#toldAt > TELL_EVERY) this.#tell();
+    if (now - this.#reportedAt > REPORT_EVERY) this.#flushReports();
     this.#showConstraints();
     if (report.phase === 'extract' && now - this.#previewedAt > PREVIEW_EVERY) this.#preview();
   }
 
-  #tell(): void {
+  #flushReports(): void {
     if (this.#reports.length > 0) send({ event: 'progress', reports: this.#reports });
     this.#reports = [];
-    this.#toldAt = performance.now();
+    this.#reportedAt = performance.now();
   }
 
   #showConstraints(): void {
@@ -180,11 +180,11 @@ class Session {
     for (let i = 0; i < count && !this.#last?.done; i++) this.#stepped(model.step(1));
     this.#previewedAt = 0;
     if (this.#last?.phase === 'extract') this.#preview();
-    this.#standStill();
+    this.#reportStopped();
   }
 
-  #standStill(): void {
-    this.#tell();
+  #reportStopped(): void {
+    this.#flushReports();
     this.#showSurface();
     this.#measure();
     send({ event: 'state', state: this.#last?.done ? 'done' : 'paused' });
@@ -216,7 +216,7 @@ class Session {
     if (!this.#shown) return;
     const mesh = this.#current().preview();
     try {
-      if (mesh.vertexCount > 0) this.#sendSurface(surfaceIn(noArrays(), mesh), true);
+      if (mesh.vertexCount > 0) this.#sendSurface(copySurface(emptyArrays(), mesh), true);
     } finally {
       mesh.free();
       this.#previewedAt = performance.now();
@@ -232,7 +232,7 @@ class Session {
     if (version === this.#sent) return;
     this.#sent = version;
     const values = this.#shade && valuesFor(model, this.#pointsInForce(), this.#shade);
-    this.#sendSurface({ ...surfaceIn(noArrays(), mesh), ...(values && { values }) }, false);
+    this.#sendSurface({ ...copySurface(emptyArrays(), mesh), ...(values && { values }) }, false);
   }
 
   #sendSurface(surface: Surface, preview: boolean): void {
@@ -283,5 +283,5 @@ const session = new Session();
 
 self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
   if (data.kind === 'shown') session.shown();
-  else void answer(session.handlers, data);
+  else void reply(session.handlers, data);
 };

@@ -2,7 +2,7 @@
 
 import { Mesh, MultiresolutionModel, type MultiresParams } from 'vesicle';
 import type { Surface } from '../protocol';
-import { noArrays, surfaceIn, texturedSurface } from '../worker/room';
+import { copySurface, emptyArrays, texturedSurface } from '../worker/room';
 import { scaled } from './ellipsoids';
 import { fitted } from './fit';
 import type { Facts, MeshSource, Pose, SceneSource, SculptShade, Setup } from './protocol';
@@ -82,7 +82,7 @@ export function buildModel({ detail, base }: Scene, start: Pose, { params }: Set
 
 /** Returns a copy of a mesh for the page to draw. */
 export function surfaceOf(mesh: Mesh, values?: Float32Array): Surface {
-  const { uvs: _, ...surface } = surfaceIn(noArrays(), mesh);
+  const { uvs: _, ...surface } = copySurface(emptyArrays(), mesh);
   // Values computed for another mesh do not belong to these vertices.
   return values && values.length === surface.vertices ? { ...surface, values: values.slice() } : surface;
 }

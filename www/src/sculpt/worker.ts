@@ -4,7 +4,7 @@ import init, { paramSpecs, type StepReport, version } from 'vesicle';
 import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
 import { transferOf } from '../worker/room';
-import { answer, stop, type Work } from '../worker/serving';
+import { reply, stop, type Task } from '../worker/serving';
 import { Course } from './course';
 import {
   buildModel,
@@ -60,8 +60,8 @@ class Session {
   #took = 0;
   /** Whether the page has drawn the last frame it was sent. */
   #shown = true;
-  #run: Work | undefined;
-  #recording: Work | undefined;
+  #run: Task | undefined;
+  #recording: Task | undefined;
   /** Resumes a run that waits for the page or for a new pose. */
   #wake: () => void = () => undefined;
 
@@ -352,5 +352,5 @@ const session = new Session();
 self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
   if (data.kind === 'shown') session.shown();
   else if (data.kind === 'pose') session.pose(data);
-  else void answer(session.handlers, data);
+  else void reply(session.handlers, data);
 };

@@ -5,20 +5,20 @@ import { errorOf } from './frames';
 import type { ComparedTrack, Setup, SurfaceError } from './protocol';
 import { buildTracker, prepared } from './source';
 
-type Tell = (part: number, phase: string) => void;
+type OnProgress = (part: number, phase: string) => void;
 
 /** Prepares the image, tracks all frames with `setup` and returns the results. Undefined if the signal aborts. */
-export async function compared(
+export async function trackForComparison(
   original: Volume,
   spec: CineSpec | undefined,
   setup: Setup,
   signal: AbortSignal,
-  tell: Tell,
+  onProgress: OnProgress,
 ): Promise<ComparedTrack | undefined> {
   const began = performance.now();
-  const volume = prepared(original, setup.preparation, (what) => tell(0, what));
+  const volume = prepared(original, setup.preparation, (what) => onProgress(0, what));
   try {
-    return await followed(volume, spec, setup, signal, tell, began);
+    return await trackAll(volume, spec, setup, signal, onProgress, began);
   } catch (error) {
     if (signal.aborted) return undefined;
     throw error;
@@ -27,18 +27,18 @@ export async function compared(
   }
 }
 
-async function followed(
+async function trackAll(
   volume: Volume,
   spec: CineSpec | undefined,
   setup: Setup,
   signal: AbortSignal,
-  tell: Tell,
+  onProgress: OnProgress,
   began: number,
 ): Promise<ComparedTrack> {
   const { tracker } = buildTracker(volume, setup);
   try {
-    await tracker.run({ signal, onStep: ({ progress, phase }) => tell(progress, phase) });
-    const took = performance.now() - began;
+    await tracker.run({ signal, onStep: ({ progress, phase }) => onProgress(progress, phase) });
+    const duration = performance.now() - began;
     const errors: SurfaceError[] = [];
     let crossings = 0;
     for (let frame = 0; frame < tracker.frames; frame++) {
@@ -49,7 +49,7 @@ async function followed(
     }
     const mean = (of: 'mean' | 'most') => errors.reduce((sum, error) => sum + error[of], 0) / errors.length;
     const error = errors.length > 0 ? { mean: mean('mean'), most: mean('most') } : undefined;
-    return { facts: tracker.facts, closing: tracker.closing, error, took, crossings };
+    return { facts: tracker.facts, closing: tracker.closing, error, duration, crossings };
   } finally {
     tracker.free();
   }

@@ -1,6 +1,6 @@
 /** Collects what the page displays of a tracked frame. */
 import type { SurfaceTracker } from 'vesicle';
-import { noArrays, surfaceIn } from '../worker/room';
+import { copySurface, emptyArrays } from '../worker/room';
 import { type CineSpec, wallDistances } from './cine';
 import type { SurfaceError, TrackedFrame } from './protocol';
 
@@ -8,7 +8,7 @@ import type { SurfaceError, TrackedFrame } from './protocol';
 export function trackedFrame(tracker: SurfaceTracker, index: number, spec: CineSpec | undefined): TrackedFrame {
   const mesh = tracker.meshAt(index);
   try {
-    const surface = surfaceIn(noArrays(), mesh);
+    const surface = copySurface(emptyArrays(), mesh);
     const facts = tracker.facts[index];
     if (!facts) throw new Error(`frame ${index} has no facts`);
     const error = spec && errorOf(spec, index, surface.positions.subarray(0, 3 * surface.vertices));

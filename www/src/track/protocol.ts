@@ -140,7 +140,7 @@ export interface ComparedTrack {
   /** Mean over all frames, if the true surface is known. */
   error: SurfaceError | undefined;
   /** Milliseconds, preparation included. */
-  took: number;
+  duration: number;
   crossings: number;
 }
 

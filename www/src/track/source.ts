@@ -1,7 +1,7 @@
 /** Opens and prepares 4D images, and builds trackers of them. Used by the worker only. */
 
 import { SurfaceTracker, Volume } from 'vesicle';
-import { readForeign } from '../foreign';
+import { importVolume } from '../foreign';
 import { text } from '../texts';
 import { invert } from '../view/anatomy';
 import { Refusal } from '../worker/refusal';
@@ -24,7 +24,7 @@ export async function filmFrom(source: FilmSource): Promise<Volume> {
       frameSeconds: CINE_SECONDS,
     });
   }
-  const foreign = await readForeign(source.files);
+  const foreign = await importVolume(source.files);
   return foreign ? new Volume(foreign) : fromParts(framesOf(source.files));
 }
 
@@ -54,10 +54,10 @@ function fromParts(parts: NamedBytes[][]): Volume {
 }
 
 /**
- * Bins and enriches an image as asked; returns a new volume, or `film` itself if there is nothing to do. `tell`
+ * Bins and enriches an image as asked; returns a new volume, or `film` itself if there is nothing to do. `onStage`
  * receives each step in words.
  */
-export function prepared(film: Volume, preparation: Preparation, tell: (what: string) => void): Volume {
+export function prepared(film: Volume, preparation: Preparation, onStage: (what: string) => void): Volume {
   const { binning, enrichment, factor } = preparation;
   let present = film;
   const take = (next: Volume) => {
@@ -66,12 +66,12 @@ export function prepared(film: Volume, preparation: Preparation, tell: (what: st
   };
   try {
     if (binning > 1) {
-      tell(text('track.binning'));
+      onStage(text('track.binning'));
       take(present.binned(factorsOf(present, binning)));
     }
     if (enrichment !== 'none' && factor !== 1) {
       const key = enrichment === 'flow' ? 'track.enrichingFlow' : 'track.enrichingLinear';
-      tell(text(key, { frames: present.frames }));
+      onStage(text(key, { frames: present.frames }));
       take(present.enrichSlices({ method: enrichment, ...(factor > 0 && { factor }) }));
     }
     return present;

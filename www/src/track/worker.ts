@@ -4,11 +4,11 @@ import init, { paramSpecs, type StepReport, type SurfaceTracker, type Volume, ve
 import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
 import { transferOf } from '../worker/room';
-import { answer, givingAway, stop, type Work } from '../worker/serving';
+import { reply, stop, type Task, withTransfer } from '../worker/serving';
 import { viewOf } from '../worker/volumes';
 import { betweenSlices } from './between';
 import { type CineSpec, trueVolume } from './cine';
-import { compared } from './comparing';
+import { trackForComparison } from './comparing';
 import { trackedFrame } from './frames';
 import type {
   BoundaryVotes,
@@ -35,7 +35,7 @@ type Handlers = {
  * Parameters that the boundary depends on. A change of any other keeps the boundary, and only the surfaces are computed
  * again.
  */
-const OF_THE_BOUNDARY = ['threshold', 'window', 'windowFrames', 'cyclic'];
+const BOUNDARY_PARAMS = ['threshold', 'window', 'windowFrames', 'cyclic'];
 
 function send(event: WorkerEvent, transfer: Transferable[] = []): void {
   self.postMessage(event, { transfer });
@@ -60,9 +60,9 @@ class Session {
   /** Number of frames whose surfaces were sent to the page. */
   #sent = 0;
   /** Saved state of the tracker when the boundary of all frames was found, before the first surface. */
-  #bounded: { state: Uint8Array; iteration: number } | undefined;
-  #run: Work | undefined;
-  #comparison: Work | undefined;
+  #boundaryState: { state: Uint8Array; iteration: number } | undefined;
+  #run: Task | undefined;
+  #comparison: Task | undefined;
 
   readonly handlers: Handlers = {
     hello: async () => {
@@ -80,7 +80,7 @@ class Session {
     save: () => this.#save(),
     restore: (saved) => this.#restore(saved),
     view: () => this.#view(),
-    tell: () => this.#standStill(),
+    tell: () => this.#reportStopped(),
     export: ({ frame, format }) => this.#export(frame, format),
     animation: () => this.#current().toGlb(),
     compare: ({ setup }) => this.#compare(setup),
@@ -103,7 +103,7 @@ class Session {
       this.#film = { name, original, spec, prepared: made, preparation: setup.preparation };
       const truth = spec && Array.from({ length: spec.frames }, (_, frame) => trueVolume(spec, frame));
       const volume = this.#view();
-      return givingAway({ ...ready, volume, dims, spacing, truth, prepared: took }, [volume.voxels]);
+      return withTransfer({ ...ready, volume, dims, spacing, truth, prepared: took }, [volume.voxels]);
     } catch (error) {
       if (made !== original) made.free();
       original.free();
@@ -126,7 +126,7 @@ class Session {
       if (film.prepared !== film.original) film.prepared.free();
       this.#film = { ...film, prepared: made, preparation: setup.preparation };
       const volume = this.#view();
-      return givingAway({ ...ready, volume }, [volume.voxels]);
+      return withTransfer({ ...ready, volume }, [volume.voxels]);
     } catch (error) {
       if (made !== film.original) made.free();
       throw error;
@@ -139,8 +139,8 @@ class Session {
     this.#tracker = tracker;
     this.#setup = setup;
     this.#suggested = suggested;
-    this.#bounded = undefined;
-    this.#standAt(0, false);
+    this.#boundaryState = undefined;
+    this.#setProgress(0, false);
     return this.#ready();
   }
 
@@ -149,7 +149,7 @@ class Session {
     return { params: { ...params }, suggested: this.#suggested, noise };
   }
 
-  #standAt(iteration: number, done: boolean): void {
+  #setProgress(iteration: number, done: boolean): void {
     this.#iteration = iteration;
     this.#done = done;
     this.#sent = this.#current().facts.length;
@@ -194,7 +194,7 @@ class Session {
       if (!signal.aborted) send({ event: 'failure', failure: toFailure(error) });
     }
     this.#run = undefined;
-    this.#standStill();
+    this.#reportStopped();
   }
 
   #stepped(report: StepReport): void {
@@ -203,7 +203,7 @@ class Session {
     this.#done = report.done;
     const { length } = tracker.facts;
     if (length === 0 && report.iteration === tracker.frames)
-      this.#bounded = { state: tracker.save(), iteration: report.iteration };
+      this.#boundaryState = { state: tracker.save(), iteration: report.iteration };
     const index = length > this.#sent ? length - 1 : undefined;
     this.#sent = length;
     const frame = index === undefined ? undefined : trackedFrame(tracker, index, this.#image().spec);
@@ -222,11 +222,11 @@ class Session {
     try {
       for (let i = 0; i < count && !this.#done; i++) this.#stepped(tracker.step(1));
     } finally {
-      this.#standStill();
+      this.#reportStopped();
     }
   }
 
-  #standStill(): undefined {
+  #reportStopped(): undefined {
     send({ event: 'state', state: this.#done ? 'done' : 'paused' });
   }
 
@@ -240,22 +240,22 @@ class Session {
     const changed = Object.keys(params).filter((name) => !Object.is(params[name], before[name]));
     const setup = { ...(this.#setup as Setup) };
     this.#setup = { ...setup, params: { ...setup.params, ...values } };
-    if (changed.some((name) => OF_THE_BOUNDARY.includes(name))) {
-      this.#bounded = undefined;
-      this.#standAt(0, false);
+    if (changed.some((name) => BOUNDARY_PARAMS.includes(name))) {
+      this.#boundaryState = undefined;
+      this.#setProgress(0, false);
     } else if (changed.length > 0 && this.#sent > 0) this.#backToBoundary(params);
     return { params, iteration: this.#iteration };
   }
 
   #backToBoundary(params: ParamValues): void {
-    if (!this.#bounded) {
+    if (!this.#boundaryState) {
       this.#adopt(this.#image().prepared, this.#setup as Setup);
       return;
     }
     const tracker = this.#current();
-    tracker.restore(this.#bounded.state);
-    tracker.setParams(Object.fromEntries(Object.entries(params).filter(([name]) => !OF_THE_BOUNDARY.includes(name))));
-    this.#standAt(this.#bounded.iteration, false);
+    tracker.restore(this.#boundaryState.state);
+    tracker.setParams(Object.fromEntries(Object.entries(params).filter(([name]) => !BOUNDARY_PARAMS.includes(name))));
+    this.#setProgress(this.#boundaryState.iteration, false);
   }
 
   #votes(frame: number): BoundaryVotes {
@@ -281,8 +281,8 @@ class Session {
     if (!fits) this.#build(setup);
     this.#current().restore(state);
     this.#setup = setup;
-    this.#bounded = undefined;
-    this.#standAt(iteration, done);
+    this.#boundaryState = undefined;
+    this.#setProgress(iteration, done);
     return { ...this.#ready(), volume: undefined };
   }
 
@@ -300,7 +300,7 @@ class Session {
     const { original, spec } = this.#image();
     const abort = new AbortController();
     const tell = (part: number, phase: string) => send({ event: 'comparing', part, phase });
-    const result = compared(original, spec, setup, abort.signal, tell);
+    const result = trackForComparison(original, spec, setup, abort.signal, tell);
     this.#comparison = { abort, ended: result };
     try {
       return await result;
@@ -320,4 +320,4 @@ starting.catch(() => undefined);
 
 const session = new Session();
 
-self.onmessage = ({ data }: MessageEvent<ToWorker>) => void answer(session.handlers, data);
+self.onmessage = ({ data }: MessageEvent<ToWorker>) => void reply(session.handlers, data);

@@ -85,7 +85,7 @@ export class AttractorControls {
     this.#list.replaceChildren(...attractors.map((attractor, index) => this.#item(attractor, index)));
   }
 
-  complain(message: string): void {
+  showError(message: string): void {
     this.#error.textContent = message;
   }
 
@@ -170,7 +170,7 @@ export class AttractorControls {
       const number = input.valueAsNumber;
       if (!Number.isFinite(number) || (key === 'radius' && number <= 0)) {
         input.valueAsNumber = value;
-        return this.complain(
+        return this.showError(
           key === 'radius' ? text('extractPanels.attractorRadiusError') : text('controls.numberError'),
         );
       }

@@ -9,7 +9,7 @@ const HEIGHT = 190;
 /** Space above the plot for the names of the marks. */
 const MARK_ROOM = 18;
 
-export interface BeatCurves {
+export interface VolumeCurves {
   volumes: number[];
   /** True volumes, if the image is computed. */
   truth: number[] | undefined;
@@ -21,13 +21,13 @@ export interface BeatCurves {
   unit: string;
 }
 
-const EMPTY: BeatCurves = { volumes: [], truth: undefined, other: undefined, frame: 0, frames: 2, unit: 'mm' };
+const EMPTY: VolumeCurves = { volumes: [], truth: undefined, other: undefined, frame: 0, frames: 2, unit: 'mm' };
 
 /**
  * Plot of the enclosed volume over the frames, with end-diastole, end-systole and the ejection fraction. A click shows
  * the frame.
  */
-export class BeatCurve {
+export class VolumeCurve {
   readonly element: HTMLElement;
   readonly #plot: uPlot;
   readonly #caption = h('figcaption', { 'data-beat': '{}' });
@@ -55,7 +55,7 @@ export class BeatCurve {
     this.show(EMPTY);
   }
 
-  show(curves: BeatCurves): void {
+  show(curves: VolumeCurves): void {
     this.#curves = curves;
     this.#pending ||= requestAnimationFrame(() => {
       this.#pending = 0;
@@ -82,7 +82,7 @@ export class BeatCurve {
     const beat = beatOf(volumes);
     this.#caption.dataset.beat = JSON.stringify(beat ?? {});
     this.#caption.textContent =
-      beat && volumes.length === frames ? told(beat, this.#curves) : text('trackPanels.curveUnfinished');
+      beat && volumes.length === frames ? describeBeat(beat, this.#curves) : text('trackPanels.curveUnfinished');
   }
 
   /** Draws vertical lines at the current frame, and at the largest and smallest volume. */
@@ -120,7 +120,7 @@ export class BeatCurve {
 }
 
 /** Describes the curve in words, for screen readers. */
-function told(beat: Beat, { truth, other, unit }: BeatCurves): string {
+function describeBeat(beat: Beat, { truth, other, unit }: VolumeCurves): string {
   const size = (volume: number) =>
     unit === 'mm' ? text('controls.millilitres', { value: (volume / 1000).toFixed(1) }) : figure(volume);
   const percent = (share: number) => text('controls.percent', { value: (100 * share).toFixed(1) });

@@ -55,7 +55,7 @@ const round = (value: number) => Number(value.toPrecision(3));
 /**
  * Table of the Track lab with the statistics of each frame, and warnings about folded triangles and jumps of the area.
  */
-export class BeatTable {
+export class FrameTable {
   readonly warnings = h('p', { class: 'warning', role: 'status', 'data-warnings': '0' });
   readonly element: HTMLElement;
   readonly #table = h('table', { class: 'times' });

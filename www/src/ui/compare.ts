@@ -69,7 +69,7 @@ export class ComparePanel {
   }
 
   /** Shows the progress, without announcing it to screen readers. */
-  tell({ run, report }: ComparingEvent): void {
+  showProgress({ run, report }: ComparingEvent): void {
     this.#progress.value = (run === 'direct' ? 0 : 1) + (Number.isFinite(report.progress) ? report.progress : 0);
     this.#cancel.textContent = text('extractPanels.compareCancel', {
       run: NAMES[run],

@@ -94,7 +94,7 @@ export class CoveragePanel {
     this.#status.textContent = text('controls.measuring');
   }
 
-  tell({ share }: CoveringEvent): void {
+  showProgress({ share }: CoveringEvent): void {
     this.#progress.value = share;
   }
 

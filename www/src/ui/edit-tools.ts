@@ -81,7 +81,7 @@ export class EditTools {
       this.#counts,
       this.#clear,
     );
-    this.#tell();
+    this.#showHelp();
     this.show({ added: [], removed: [], outside: [] });
   }
 
@@ -95,7 +95,7 @@ export class EditTools {
   }
 
   /** Deselects the tool: clicks have no effect. */
-  putAway(): void {
+  deselect(): void {
     const [first] = this.#radios;
     if (first) first.checked = true;
     this.#choose('none');
@@ -113,7 +113,7 @@ export class EditTools {
 
   #choose(tool: EditTool): void {
     this.#tool = tool;
-    this.#tell();
+    this.#showHelp();
     this.#onTool(tool);
   }
 
@@ -123,7 +123,7 @@ export class EditTools {
     if (!valid) this.#distance.valueAsNumber = DISTANCE;
   }
 
-  #tell(): void {
+  #showHelp(): void {
     const tool = this.#tool;
     this.#help.textContent = TOOLS.find((one) => one.tool === tool)?.help ?? '';
   }

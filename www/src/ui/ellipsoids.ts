@@ -122,7 +122,7 @@ export class EllipsoidControls {
     if (ellipsoid) this.#showNumbers(ellipsoid);
   }
 
-  complain(message: string): void {
+  showError(message: string): void {
     this.#error.textContent = message;
   }
 
@@ -257,7 +257,7 @@ export class EllipsoidControls {
         field.value = short(lengths[k] ?? 0);
       });
     }
-    this.complain(message);
+    this.showError(message);
   }
 }
 

@@ -24,7 +24,7 @@ export class FilmControls {
   readonly element: HTMLElement;
   readonly #events: FilmEvents;
   readonly #keys = h('div', { class: 'buttons chips', role: 'group', 'aria-label': text('sculptPanels.keyframes') });
-  readonly #says = h('p', { class: 'help', role: 'status' });
+  readonly #status = h('p', { class: 'help', role: 'status' });
   readonly #between: HTMLInputElement;
   readonly #loop: HTMLInputElement;
   readonly #seek: HTMLInputElement;
@@ -80,7 +80,7 @@ export class FilmControls {
       h('div', { class: 'buttons' }, this.#record, this.#cancel),
       this.#progress,
       this.#error,
-      this.#says,
+      this.#status,
     );
     this.show(undefined, 0);
   }
@@ -124,7 +124,7 @@ export class FilmControls {
     for (const [index, button] of [...this.#keys.children].entries())
       button.setAttribute('aria-pressed', String(index === this.#present));
     this.#remove.disabled = this.#present === undefined;
-    this.#says.textContent =
+    this.#status.textContent =
       film && 'motion' in film
         ? text('sculptPanels.motionComputed')
         : keys === 0

@@ -1,6 +1,6 @@
 import type { VolumeView } from '../protocol';
 import { text } from '../texts';
-import { h, onSchemeChange, pen, symbol, token, uniqueId } from './dom';
+import { context2d, h, onSchemeChange, symbol, token, uniqueId } from './dom';
 import { figure } from './format';
 
 /**
@@ -61,7 +61,7 @@ export class Histogram {
     this.#draw();
   }
 
-  complain(message: string): void {
+  showError(message: string): void {
     this.#error.textContent = message;
   }
 
@@ -72,7 +72,7 @@ export class Histogram {
 
   #draw(): void {
     const { clientWidth, clientHeight } = this.#canvas;
-    const context = pen(this.#canvas);
+    const context = context2d(this.#canvas);
     if (!this.#volume || !context || clientWidth === 0) return;
     const ratio = Math.min(devicePixelRatio, 2);
     this.#canvas.width = Math.round(clientWidth * ratio);
@@ -91,12 +91,13 @@ export class Histogram {
   }
 
   #describe(): void {
-    if (this.#volume) this.#canvas.setAttribute('aria-label', tellHistogram(this.#volume, this.#slider.valueAsNumber));
+    if (this.#volume)
+      this.#canvas.setAttribute('aria-label', describeHistogram(this.#volume, this.#slider.valueAsNumber));
   }
 }
 
 /** Describes the histogram in words, for screen readers. */
-function tellHistogram(
+function describeHistogram(
   { histogram, range: [low, high] }: Pick<VolumeView, 'histogram' | 'range'>,
   iso: number,
 ): string {

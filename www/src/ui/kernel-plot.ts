@@ -34,11 +34,11 @@ export class KernelPlot {
     const values = distances.map((r) => phi(kernel, r));
     const most = Math.max(...values.map(Math.abs));
     this.#plot.setData([distances, values.map((value) => value / most)]);
-    this.#caption.textContent = tell(kernel.kernel, (r) => phi(kernel, r));
+    this.#caption.textContent = describeKernel(kernel.kernel, (r) => phi(kernel, r));
   }
 }
 
-function tell(kernel: string, value: (r: number) => number): string {
+function describeKernel(kernel: string, value: (r: number) => number): string {
   const unit = text('pointPanels.kernelUnit');
   if (kernel === 'thin-plate' || kernel === 'biharmonic') return text('pointPanels.kernelUnbounded', { unit });
   const half = bisect((r) => value(r) - value(0) / 2);

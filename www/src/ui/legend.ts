@@ -1,5 +1,5 @@
 import { text } from '../texts';
-import { h, pen } from './dom';
+import { context2d, h } from './dom';
 import { figure } from './format';
 
 const STEPS = 64;
@@ -46,7 +46,7 @@ export class Legend {
 
   /** Draws the colours from `low` to 1. */
   #draw(low: number): void {
-    const context = pen(this.#bar);
+    const context = context2d(this.#bar);
     for (let i = 0; i < STEPS; i++) {
       if (!context) break;
       context.fillStyle = `rgb(${this.#color(low + ((1 - low) * i) / (STEPS - 1)).join(' ')})`;

@@ -45,7 +45,7 @@ const ROWS: { name: Name; label: string; help: string }[] = [
 ];
 
 /** A measure that only one lab has. */
-export interface MoreMeasure {
+export interface ExtraMeasure {
   name: string;
   label: string;
   help: string;
@@ -60,14 +60,14 @@ export class MeasurePanel {
   readonly #cells = new Map<Name, HTMLElement>();
   #unit: Unit = 'mm';
   #values: Partial<MeasureValues> = {};
-  readonly #more: { measure: MoreMeasure; cell: HTMLElement }[];
-  #moreValues: Record<string, unknown> = {};
+  readonly #extra: { measure: ExtraMeasure; cell: HTMLElement }[];
+  #extraValues: Record<string, unknown> = {};
 
-  /** `more` is listed after the measures that every surface has. */
-  constructor(more: MoreMeasure[] = []) {
+  /** `extra` is listed after the measures that every surface has. */
+  constructor(extra: ExtraMeasure[] = []) {
     this.element = h('dl', { class: 'measures', 'data-measures': '{}' });
     for (const row of ROWS) this.#cells.set(row.name, this.#addRow(row));
-    this.#more = more.map((measure) => ({ measure, cell: this.#addRow(measure) }));
+    this.#extra = extra.map((measure) => ({ measure, cell: this.#addRow(measure) }));
   }
 
   #addRow({ name, label, help }: { name: string; label: string; help: string }): HTMLElement {
@@ -77,24 +77,24 @@ export class MeasurePanel {
   }
 
   /** Shows the lab's own values; not every value has a row. */
-  showMore(values: Record<string, unknown>): void {
-    this.#moreValues = values;
-    for (const { measure, cell } of this.#more) {
+  showExtra(values: Record<string, unknown>): void {
+    this.#extraValues = values;
+    for (const { measure, cell } of this.#extra) {
       const value = values[measure.name];
       cell.textContent = typeof value === 'number' ? measure.text(value) : '–';
       if (measure.optional && cell.parentElement) cell.parentElement.hidden = typeof value !== 'number';
     }
-    this.#tell();
+    this.#publish();
   }
 
   /** Resets all values to unknown. */
   clear(): void {
     this.#show({});
-    this.showMore({});
+    this.showExtra({});
   }
 
-  #tell(): void {
-    this.element.dataset.measures = JSON.stringify({ ...this.#values, ...this.#moreValues });
+  #publish(): void {
+    this.element.dataset.measures = JSON.stringify({ ...this.#values, ...this.#extraValues });
   }
 
   /** Unit of length, for volume and area. */
@@ -134,7 +134,7 @@ export class MeasurePanel {
 
   #show(values: Partial<MeasureValues>): void {
     this.#values = values;
-    this.#tell();
+    this.#publish();
     for (const [name, cell] of this.#cells) {
       const value = values[name];
       const text = value === undefined ? '–' : textOf(name, value, this.#unit);

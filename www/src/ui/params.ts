@@ -19,7 +19,7 @@ const NUMBER = 'number';
 interface Control {
   element: HTMLElement;
   show(value: unknown): void;
-  complain(message: string | undefined): void;
+  showError(message: string | undefined): void;
 }
 
 /** Controls for a method's parameters, generated from their specifications. */
@@ -50,7 +50,7 @@ export class ParamControls {
   show(values: ParamValues): void {
     for (const [name, control] of this.#controls) {
       if (name in values) control.show(values[name]);
-      control.complain(undefined);
+      control.showError(undefined);
     }
   }
 
@@ -63,8 +63,8 @@ export class ParamControls {
   }
 
   /** Shows beside a control why its value was rejected. */
-  complain(name: string, message: string): void {
-    this.#controls.get(name)?.complain(message);
+  showError(name: string, message: string): void {
+    this.#controls.get(name)?.showError(message);
   }
 }
 
@@ -77,11 +77,11 @@ function controlFor(spec: ParamSpec, onChange: (value: unknown) => void): Contro
   const unit = spec.type === 'choice' ? [] : unitOf(spec);
   const value = h('span', { class: 'value' }, input.main, ...unit);
   const element = h('div', { class: 'param', 'data-param': spec.name }, label, value, ...input.extra, help, error);
-  const complain = (message: string | undefined) => {
+  const showError = (message: string | undefined) => {
     error.textContent = message ?? '';
     input.main.toggleAttribute('aria-invalid', message !== undefined);
   };
-  return { element, show: input.show, complain };
+  return { element, show: input.show, showError };
 }
 
 function unitOf({ unit }: ParamSpec): HTMLElement[] {

@@ -1,6 +1,6 @@
 import type { Photograph } from '../labs/photographs';
 import { text } from '../texts';
-import { h, pen } from './dom';
+import { context2d, h } from './dom';
 
 const THUMBNAIL = 72;
 
@@ -108,5 +108,5 @@ export class PhotoStrip {
 function draw(canvas: HTMLCanvasElement, picture: ImageBitmap, width: number): void {
   canvas.width = width;
   canvas.height = Math.round((width * picture.height) / picture.width);
-  pen(canvas)?.drawImage(picture, 0, 0, canvas.width, canvas.height);
+  context2d(canvas)?.drawImage(picture, 0, 0, canvas.width, canvas.height);
 }

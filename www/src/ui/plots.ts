@@ -26,7 +26,7 @@ export interface PlotKind {
   log: boolean;
   curves: Curve[];
   /** Describes the plot in words, for screen readers. */
-  tell: (history: History) => string;
+  describe: (history: History) => string;
 }
 
 /** Plots of the deformable model. */
@@ -38,20 +38,20 @@ export const ENERGY_PLOTS: PlotKind[] = [
       { label: text('measures.curveEnergy'), color: '--curve', of: (report) => report.residual },
       { label: text('measures.curveTolerance'), color: '--muted', dash: [4, 4], of: (report) => report.tolerance },
     ],
-    tell: tellEnergy,
+    describe: describeEnergy,
   },
   {
     title: text('measures.vertices'),
     log: false,
     curves: [{ label: text('measures.curveVertices'), color: '--curve', of: (report) => report.vertices }],
-    tell: (history) =>
-      `${tellChange(history, 'measures.verticesChange', (report) => report.vertices)} ${tellByLevel(history)}`.trim(),
+    describe: (history) =>
+      `${describeChange(history, 'measures.verticesChange', (report) => report.vertices)} ${describeByLevel(history)}`.trim(),
   },
   {
     title: text('measures.euler'),
     log: false,
     curves: [{ label: 'χ', color: '--curve', of: (report) => report.euler }],
-    tell: (history) => tellChange(history, 'measures.eulerChange', (report) => report.euler),
+    describe: (history) => describeChange(history, 'measures.eulerChange', (report) => report.euler),
   },
 ];
 
@@ -107,7 +107,7 @@ export class Plots {
       this.#pending = requestAnimationFrame(() => this.#redrawOne());
       return;
     }
-    this.#events.textContent = tellEvents(this.#history);
+    this.#events.textContent = describeEvents(this.#history);
     this.#table.update(this.#history.reports);
   }
 }
@@ -136,7 +136,7 @@ class Plot {
     const { reports } = history;
     this.#extend(reports);
     this.#plot.setData(this.#columns as uPlot.AlignedData);
-    this.#caption.textContent = reports.length > 0 ? this.#kind.tell(history) : text('measures.noSteps');
+    this.#caption.textContent = reports.length > 0 ? this.#kind.describe(history) : text('measures.noSteps');
   }
 
   /** Appends only new reports: runs have thousands of steps. */
@@ -273,7 +273,7 @@ function upright(ctx: CanvasRenderingContext2D, x: number, top: number, bottom: 
   ctx.stroke();
 }
 
-function tellEnergy({ reports }: History): string {
+function describeEnergy({ reports }: History): string {
   const last = reports.at(-1);
   if (!last) return '';
   const key = last.residual < last.tolerance ? 'measures.energyBelow' : 'measures.energyAbove';
@@ -285,7 +285,7 @@ function tellEnergy({ reports }: History): string {
 }
 
 /** Describes where each level began, and all topology changes. */
-function tellEvents({ phases, changes, reports }: History): string {
+function describeEvents({ phases, changes, reports }: History): string {
   if (reports.length === 0) return '';
   const levels = phases
     .map(({ phase, iteration }) => text('measures.phaseFrom', { phase, iteration: count(iteration) }))
@@ -294,7 +294,7 @@ function tellEvents({ phases, changes, reports }: History): string {
 }
 
 /** Describes the number of vertices at the end of each level. */
-function tellByLevel({ phases, reports }: History): string {
+function describeByLevel({ phases, reports }: History): string {
   const left = phases.slice(1).map(({ iteration }, i) => {
     const last = lastBefore(reports, iteration);
     return last && text('measures.verticesAtEnd', { vertices: count(last.vertices), phase: phases[i]?.phase ?? '' });
@@ -308,7 +308,7 @@ function lastBefore(reports: readonly StepReport[], iteration: number): StepRepo
   return undefined;
 }
 
-function tellChange({ reports }: History, key: TextKey, of: (report: StepReport) => number): string {
+function describeChange({ reports }: History, key: TextKey, of: (report: StepReport) => number): string {
   const last = reports.at(-1);
   if (!last) return '';
   let [low, high] = [of(last), of(last)];

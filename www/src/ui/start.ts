@@ -98,19 +98,19 @@ export class StartControls {
     this.#bubbles.control.valueAsNumber = choice.bubbles;
     this.#levels.control.valueAsNumber = choice.levels;
     this.#edge.control.value = choice.edge === undefined ? '' : String(choice.edge);
-    for (const field of this.#fields) field.complain(undefined);
+    for (const field of this.#fields) field.showError(undefined);
     this.#explain();
   }
 
   /** Shows an error beside the field changed last, and restores the current values. */
   refuse(message: string): void {
     this.show(this.#inForce);
-    this.#changed.complain(message);
+    this.#changed.showError(message);
   }
 
   #onChange(field: Field, onChange: () => void): void {
     this.#changed = field;
-    for (const each of this.#fields) each.complain(undefined);
+    for (const each of this.#fields) each.showError(undefined);
     this.#explain();
     if (field.control.checkValidity()) onChange();
     else this.refuse(field.need);
@@ -153,7 +153,7 @@ class Field<Control extends HTMLInputElement | HTMLSelectElement = HTMLInputElem
     this.#help.textContent = text;
   }
 
-  complain(message: string | undefined): void {
+  showError(message: string | undefined): void {
     this.#error.textContent = message ?? '';
     this.control.toggleAttribute('aria-invalid', message !== undefined);
   }

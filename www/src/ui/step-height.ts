@@ -4,10 +4,10 @@ import { h, symbol, uniqueId } from './dom';
 import { figure } from './format';
 
 /** Multiple of the noise below which noise alone is detected as boundary. */
-const SAFE = 2.5;
+const NOISE_FACTOR = 2.5;
 
 /** Control for the edge threshold τ, with the noise level it must exceed. */
-export class StepHeight {
+export class EdgeThreshold {
   readonly element: HTMLElement;
   readonly #number: HTMLInputElement;
   readonly #slider: HTMLInputElement;
@@ -68,10 +68,10 @@ export class StepHeight {
     );
   }
 
-  /** `most`: the largest possible difference of intensities. */
-  show(threshold: number, noise: number, suggested: number, most: number): void {
+  /** `largest`: the largest possible difference of intensities. */
+  show(threshold: number, noise: number, suggested: number, largest: number): void {
     this.#suggested = suggested;
-    const top = rounded(Math.max(most / 2, threshold));
+    const top = rounded(Math.max(largest / 2, threshold));
     Object.assign(this.#slider, { max: String(top), step: String(top / 500) });
     this.#slider.valueAsNumber = threshold;
     this.#slider.setAttribute('aria-valuetext', figure(threshold));
@@ -82,13 +82,13 @@ export class StepHeight {
     });
     this.#suggest.textContent = text('trackPanels.useSuggested', { suggested: figure(rounded(suggested)) });
     this.#suggest.disabled = Object.is(threshold, suggested);
-    const low = threshold < SAFE * noise;
-    const warning = low ? text('trackPanels.noiseWarning', { limit: figure(rounded(SAFE * noise)) }) : '';
+    const low = threshold < NOISE_FACTOR * noise;
+    const warning = low ? text('trackPanels.noiseWarning', { limit: figure(rounded(NOISE_FACTOR * noise)) }) : '';
     if (this.#warning.textContent !== warning) this.#warning.textContent = warning;
     this.#error.textContent = '';
   }
 
-  complain(message: string): void {
+  showError(message: string): void {
     this.#error.textContent = message;
   }
 }

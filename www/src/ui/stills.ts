@@ -24,7 +24,7 @@ const CANNY_FIELDS = [
 ] as const;
 
 /** Data for the figures, as far as it is available. */
-export interface StillsOf {
+export interface FigureData {
   subject: Subject;
   /** Window size k, and edge threshold τ. */
   window: number;
@@ -38,10 +38,10 @@ export interface StillsOf {
 }
 
 /** One of the paper's rows of figures, shown in place of the slices. */
-export class Stills {
+export class FigureRow {
   readonly element: HTMLElement;
   readonly #rows: Record<Exclude<ContentBelow, 'slices'>, HTMLElement>;
-  readonly #sorted = new FigureImage(text('trackPanels.clusteredLabel'));
+  readonly #clusters = new FigureImage(text('trackPanels.clusteredLabel'));
   readonly #boundary = new FigureImage(text('trackPanels.votesLabel'));
   readonly #canny = new FigureImage(text('trackPanels.cannyLabel'));
   readonly #time = new FigureImage(text('trackPanels.timeLineLabel'));
@@ -54,7 +54,7 @@ export class Stills {
   ].map((label) => new FigureImage(label));
   readonly #settings = { ...CANNY };
   #below: ContentBelow = 'slices';
-  #of: StillsOf | undefined;
+  #data: FigureData | undefined;
 
   /** `onVoxel` and `onFrame` are called with the voxel or frame that was clicked. */
   constructor(onVoxel: (voxel: Vec3) => void, onFrame: (frame: number) => void) {
@@ -62,7 +62,7 @@ export class Stills {
       boundary: h(
         'div',
         { class: 'stills' },
-        this.#sorted.element,
+        this.#clusters.element,
         this.#boundary.element,
         this.#canny.element,
         this.#cannyFields(),
@@ -71,12 +71,12 @@ export class Stills {
       between: h('div', { class: 'stills five' }, ...this.#between.map(({ element }) => element)),
     };
     this.element = h('div', { hidden: true, 'data-stills': '' }, ...Object.values(this.#rows));
-    this.#sorted.canvas.addEventListener('click', (event) => {
-      const { volume, voxel } = this.#of?.subject ?? {};
-      if (volume && voxel) onVoxel(voxelIn(volume, voxel, ...this.#sorted.fractionsAt(event)));
+    this.#clusters.canvas.addEventListener('click', (event) => {
+      const { volume, voxel } = this.#data?.subject ?? {};
+      if (volume && voxel) onVoxel(voxelIn(volume, voxel, ...this.#clusters.fractionsAt(event)));
     });
     this.#time.canvas.addEventListener('click', (event) => {
-      const frames = this.#of?.subject.volume.frames ?? 1;
+      const frames = this.#data?.subject.volume.frames ?? 1;
       onFrame(Math.min(frames - 1, Math.floor(this.#time.fractionsAt(event)[0] * frames)));
     });
   }
@@ -88,21 +88,21 @@ export class Stills {
     this.draw();
   }
 
-  show(of: StillsOf): void {
-    this.#of = of;
+  show(data: FigureData): void {
+    this.#data = data;
     this.draw();
   }
 
   draw(): void {
-    if (!this.#of) return;
-    if (this.#below === 'boundary') this.#drawBoundary(this.#of);
-    else if (this.#below === 'time') this.#drawTime(this.#of);
-    else if (this.#below === 'between') this.#drawBetween(this.#of);
+    if (!this.#data) return;
+    if (this.#below === 'boundary') this.#drawBoundary(this.#data);
+    else if (this.#below === 'time') this.#drawTime(this.#data);
+    else if (this.#below === 'between') this.#drawBetween(this.#data);
   }
 
-  #drawBoundary({ subject, window, threshold, votes }: StillsOf): void {
-    const split = paintWindow(this.#sorted, subject, window, threshold);
-    this.#sorted.caption = split ? text('trackPanels.clusteredVotes') : text('trackPanels.clusteredNoVote');
+  #drawBoundary({ subject, window, threshold, votes }: FigureData): void {
+    const split = paintWindow(this.#clusters, subject, window, threshold);
+    this.#clusters.caption = split ? text('trackPanels.clusteredVotes') : text('trackPanels.clusteredNoVote');
     if (votes) paintBoundary(this.#boundary, subject, votes);
     this.#boundary.caption = votes
       ? text('trackPanels.votesCaption', { threshold: Number(threshold.toPrecision(3)) })
@@ -112,18 +112,18 @@ export class Stills {
   }
 
   #drawCanny(): void {
-    if (!this.#of) return;
-    paintCanny(this.#canny, this.#of.subject, this.#settings);
+    if (!this.#data) return;
+    paintCanny(this.#canny, this.#data.subject, this.#settings);
     this.#canny.caption = text('trackPanels.cannyCaption');
   }
 
-  #drawTime({ subject, outlines }: StillsOf): void {
+  #drawTime({ subject, outlines }: FigureData): void {
     const points = paintTime(this.#time, subject, outlines());
     this.element.dataset.crossings = String(points);
     this.#time.caption = text('trackPanels.timeLineCaption', { frames: subject.volume.frames });
   }
 
-  #drawBetween({ subject, between, pair: [slice, slices] }: StillsOf): void {
+  #drawBetween({ subject, between, pair: [slice, slices] }: FigureData): void {
     if (between) paintBetween(this.#between, subject.volume, between);
     const off = (method: 'linear' | 'flow') =>
       between ? text('trackPanels.sliceError', { error: between.off[method].toFixed(1) }) : '';

@@ -87,7 +87,7 @@ export class TimingPanel {
     this.#draw();
   }
 
-  tell(timing: Timing): void {
+  add(timing: Timing): void {
     this.#timings.push(timing);
     this.#progress.value = this.#timings.length;
     this.#draw();
@@ -99,7 +99,7 @@ export class TimingPanel {
     try {
       const kernels = [...KERNELS];
       const timings = await this.#client.request('timing', { sizes: SIZES, kernels });
-      this.#status.textContent = timings ? tellGrowth(timings) : text('controls.cancelled');
+      this.#status.textContent = timings ? describeGrowth(timings) : text('controls.cancelled');
     } catch (error) {
       this.#status.textContent = text('pointPanels.measurementFailed');
       this.#onError(text('pointPanels.measurementFailed'), error);
@@ -137,7 +137,7 @@ export class TimingPanel {
 }
 
 /** Describes how the duration grows from the smallest to the largest number of constraints. */
-function tellGrowth(timings: Timing[]): string {
+function describeGrowth(timings: Timing[]): string {
   const parts = KERNELS.map((kernel) => {
     const [first, ...rest] = timings.filter((one) => one.kernel === kernel);
     const last = rest.at(-1);

@@ -5,9 +5,9 @@ import { h, uniqueId } from './dom';
 import { count, figure, milliseconds } from './format';
 
 /** The alternative with which the current run is compared. */
-export type Other = 'prediction' | 'none' | 'linear' | 'flow';
+export type Alternative = 'prediction' | 'none' | 'linear' | 'flow';
 
-const OTHERS: { value: Other; label: string }[] = [
+const ALTERNATIVES: { value: Alternative; label: string }[] = [
   { value: 'prediction', label: text('trackPanels.otherPrediction') },
   { value: 'none', label: text('trackPanels.otherNone') },
   { value: 'linear', label: text('trackPanels.otherLinear') },
@@ -15,17 +15,17 @@ const OTHERS: { value: Other; label: string }[] = [
 ];
 
 /** One of the two runs of a comparison. */
-export interface ComparedRun {
+export interface TrackingRun {
   name: string;
   facts: readonly FrameFacts[];
   closing: number | undefined;
   error: SurfaceError | undefined;
   /** Duration in milliseconds, if known. */
-  took: number | undefined;
+  duration: number | undefined;
 }
 
 export interface TrackCompareEvents {
-  onStart: (other: Other) => void;
+  onStart: (other: Alternative) => void;
   onCancel: () => void;
 }
 
@@ -49,11 +49,16 @@ export class TrackComparePanel {
     this.#select = h(
       'select',
       { id, 'data-compare': 'with' },
-      ...OTHERS.map(({ value, label }) => h('option', { value }, label)),
+      ...ALTERNATIVES.map(({ value, label }) => h('option', { value }, label)),
     );
     this.#start = h(
       'button',
-      { type: 'button', disabled: true, 'data-compare': 'start', onclick: () => onStart(this.#select.value as Other) },
+      {
+        type: 'button',
+        disabled: true,
+        'data-compare': 'start',
+        onclick: () => onStart(this.#select.value as Alternative),
+      },
       text('controls.compare'),
     );
     this.#cancel = h(
@@ -105,17 +110,17 @@ export class TrackComparePanel {
   }
 
   /** Shows the progress, without announcing it to screen readers. */
-  tell(part: number, phase: string): void {
+  showProgress(part: number, phase: string): void {
     this.#progress.value = Number.isFinite(part) ? part : 0;
     this.#cancel.textContent = text('trackPanels.cancelPhase', { phase });
   }
 
-  refuse(message: string): void {
+  reject(message: string): void {
     this.#end(message);
   }
 
-  finish(runs: [ComparedRun, ComparedRun]): void {
-    this.#end(said(runs));
+  finish(runs: [TrackingRun, TrackingRun]): void {
+    this.#end(describeResult(runs));
     this.#table.dataset.comparison = JSON.stringify(runs.map(summary));
     this.#table.replaceChildren(tableOf(runs));
   }
@@ -132,7 +137,7 @@ export class TrackComparePanel {
 }
 
 /** Returns the figures of the table, also for other programs. */
-function summary({ name, facts, closing, error, took }: ComparedRun) {
+function summary({ name, facts, closing, error, duration }: TrackingRun) {
   const mean = (of: (one: FrameFacts) => number) => facts.reduce((sum, one) => sum + of(one), 0) / (facts.length || 1);
   const later = facts.slice(1);
   const rest = later.reduce((sum, { correction }) => sum + correction, 0) / (later.length || 1);
@@ -150,13 +155,13 @@ function summary({ name, facts, closing, error, took }: ComparedRun) {
     closing,
     error: error?.mean,
     most: error?.most,
-    took,
+    took: duration,
   };
 }
 
 export type Summary = ReturnType<typeof summary>;
 
-function said(runs: [ComparedRun, ComparedRun]): string {
+function describeResult(runs: [TrackingRun, TrackingRun]): string {
   const [here, there] = runs.map(summary) as [Summary, Summary];
   const percent = (share: number | undefined) =>
     share === undefined ? '–' : text('controls.percent', { value: (100 * share).toFixed(1) });
@@ -172,7 +177,7 @@ function said(runs: [ComparedRun, ComparedRun]): string {
 
 const round = (value: number) => Number(value.toPrecision(3));
 
-function tableOf(runs: [ComparedRun, ComparedRun]): HTMLElement {
+function tableOf(runs: [TrackingRun, TrackingRun]): HTMLElement {
   const both = runs.map(summary);
   const size = (value: number | undefined) => (value === undefined ? '–' : figure(round(value)));
   const row = (label: string, text: (one: Summary) => string) =>
@@ -209,6 +214,6 @@ function tableOf(runs: [ComparedRun, ComparedRun]): HTMLElement {
 }
 
 /** Converts a tracked run to an entry of a comparison. */
-export function comparedRun(name: string, { facts, closing, error, took }: ComparedTrack): ComparedRun {
-  return { name, facts, closing, error, took };
+export function comparedRun(name: string, { facts, closing, error, duration }: ComparedTrack): TrackingRun {
+  return { name, facts, closing, error, duration };
 }

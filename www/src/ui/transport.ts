@@ -1,7 +1,7 @@
 import type { StepReport } from '../protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
-import { h, icon, wantsStillness } from './dom';
+import { h, icon, prefersReducedMotion } from './dom';
 import { count } from './format';
 
 const PLAY = 'M7 4.5v15l12-7.5z';
@@ -108,7 +108,7 @@ export class Transport {
 
   #showBusy(state: LabState): void {
     // A progress bar without a value is animated: the duration is unknown.
-    if (state === 'loading' && !wantsStillness()) this.#progress.removeAttribute('value');
+    if (state === 'loading' && !prefersReducedMotion()) this.#progress.removeAttribute('value');
     else if (!this.#progress.hasAttribute('value')) this.#progress.value = 0;
     if (state === 'done') this.#progress.value = 1;
   }
