@@ -95,7 +95,7 @@ test.each(CASES)('the settings of figure %s are known as its own', (_, preset, v
 });
 
 /** The share of the worst triangles, from what stands under a stage. */
-const worstOf = (caption: string) => Number(/below ([\d.]+)$/.exec(caption)?.[1]);
+const worstOf = (caption: string) => Number(/below quality ([\d.]+)$/.exec(caption)?.[1]);
 
 test('restructuring makes triangles better, and refining does not', () => {
   const [moved = 0, refined = 0, good = 0] = stagesOf('restructuring').map(({ caption }) => worstOf(caption));

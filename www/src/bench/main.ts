@@ -2,11 +2,12 @@ import { text, textNodes } from '../texts';
 import '../style.css';
 import './bench.css';
 import json from '../../../bench.json';
+import { LAB_IDS } from '../labs/address';
 import { h } from '../ui/dom';
 import { drawSection, rowOf, scrolling, VERDICTS } from './draw';
 import type { Report } from './report';
 import { type Chart, type Section, sectionsOf } from './sections';
-import { formatTarget, type Figure, verdict, withUnit } from './targets';
+import { type Figure, formatTarget, verdict, withUnit } from './targets';
 
 const report = json as unknown as Report;
 
@@ -54,7 +55,12 @@ function group(section: Section): HTMLElement {
 function summaryRow({ chart, figure }: Targeted): HTMLElement {
   const { name, target } = figure;
   const outcome = verdict(figure);
-  const row = rowOf([name, VERDICTS[outcome], target ? formatTarget(target, chart.unit) : '', worstValue(figure, chart.unit)]);
+  const row = rowOf([
+    name,
+    VERDICTS[outcome],
+    target ? formatTarget(target, chart.unit) : '',
+    worstValue(figure, chart.unit),
+  ]);
   row.dataset.verdict = outcome;
   return row;
 }
@@ -69,6 +75,17 @@ function worstValue({ bars, target }: Figure, unit: string): string {
 
 const hostsOf = ({ points, head }: Report) => (points ?? head ?? []).map(({ host }) => host);
 
+/** Fills the header of the page: its name, the links to the labs, and what it shows. */
+function fillHeader(): void {
+  const fill = (id: string, ...children: (Node | string)[]) => document.getElementById(id)?.append(...children);
+  const links = LAB_IDS.map((id) => h('a', { href: `./index.html#${id}` }, text(`shell.${id}`)));
+  fill('page-name', text('bench.pageName'));
+  fill('labs', ...links);
+  document.getElementById('labs')?.setAttribute('aria-label', text('shell.labs'));
+  fill('tagline', text('bench.tagline'));
+}
+
+fillHeader();
 const root = document.getElementById('bench');
 if (root) {
   const sections = sectionsOf(report);
