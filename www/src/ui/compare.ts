@@ -1,4 +1,4 @@
-import type { ComparedRun, ComparingEvent, Requests } from '../protocol';
+import type { ExtractionRun, ComparisonProgressEvent, Requests } from '../protocol';
 import { text } from '../texts';
 import { h } from './dom';
 import { count, figure, levelSymbol } from './format';
@@ -69,7 +69,7 @@ export class ComparePanel {
   }
 
   /** Shows the progress, without announcing it to screen readers. */
-  showProgress({ run, report }: ComparingEvent): void {
+  showProgress({ run, report }: ComparisonProgressEvent): void {
     this.#progress.value = (run === 'direct' ? 0 : 1) + (Number.isFinite(report.progress) ? report.progress : 0);
     this.#cancel.textContent = text('extractPanels.compareCancel', {
       run: NAMES[run],
@@ -77,7 +77,7 @@ export class ComparePanel {
     });
   }
 
-  refuse(message: string): void {
+  reject(message: string): void {
     this.#end(message);
   }
 
@@ -89,8 +89,11 @@ export class ComparePanel {
   #show(result: Result): void {
     const { direct, coarseToFine } = result;
     const factor = total(direct) / total(coarseToFine);
-    const [key, times] = factor >= 1 ? (['compareFaster', factor] as const) : (['compareSlower', 1 / factor] as const);
-    this.#end(text(`extractPanels.${key}`, { factor: figure(round(times)), difference: difference(result) }));
+    const [key, times] =
+      factor >= 1
+        ? (['extractPanels.compareFaster', factor] as const)
+        : (['extractPanels.compareSlower', 1 / factor] as const);
+    this.#end(text(key, { factor: figure(round(times)), difference: difference(result) }));
     this.#tables.dataset.comparison = JSON.stringify({ direct: summary(direct), coarseToFine: summary(coarseToFine) });
     this.#tables.replaceChildren(
       scrolling(text('extractPanels.compareTimes'), timeTable(coarseToFine, direct)),
@@ -112,11 +115,11 @@ export class ComparePanel {
 
 const round = (value: number) => Number(value.toPrecision(2));
 
-function total(run: ComparedRun): number {
+function total(run: ExtractionRun): number {
   return timeOf(addTimes(run.byLevel.map(({ times }) => new Map(Object.entries(times)))));
 }
 
-function summary(run: ComparedRun) {
+function summary(run: ExtractionRun) {
   const { vertices, components, genus, area, volume } = run.info;
   const { iteration: iterations, done } = run.report;
   return { levels: run.levels, iterations, done, milliseconds: total(run), vertices, components, genus, area, volume };
@@ -136,7 +139,7 @@ function scrolling(label: string, table: HTMLTableElement): HTMLElement {
 }
 
 /** Creates the table of times: rows T, N, F and their sum, a column per level, for both runs. */
-function timeTable(coarseToFine: ComparedRun, direct: ComparedRun): HTMLTableElement {
+function timeTable(coarseToFine: ExtractionRun, direct: ExtractionRun): HTMLTableElement {
   const levels = coarseToFine.byLevel.map(({ level }) => level);
   const head = [
     text('extractPanels.timePart'),
@@ -150,7 +153,7 @@ function timeTable(coarseToFine: ComparedRun, direct: ComparedRun): HTMLTableEle
   return h('table', { class: 'times' }, h('thead', {}, h('tr', {}, ...head)), h('tbody', {}, ...body));
 }
 
-function rowsOf(name: string, run: ComparedRun, levels: number[]): HTMLElement[] {
+function rowsOf(name: string, run: ExtractionRun, levels: number[]): HTMLElement[] {
   const byLevel = new Map(run.byLevel.map(({ level, times }) => [level, new Map(Object.entries(times))]));
   const all = addTimes([...byLevel.values()]);
   const row = (head: string, parts?: readonly string[]) => {
@@ -174,9 +177,9 @@ function rowsOf(name: string, run: ComparedRun, levels: number[]): HTMLElement[]
   return [title, ...TIME_ROWS.map(({ letter, parts }) => row(letter, parts)), sum, stepRow];
 }
 
-function outcomeTable(coarseToFine: ComparedRun, direct: ComparedRun): HTMLTableElement {
+function outcomeTable(coarseToFine: ExtractionRun, direct: ExtractionRun): HTMLTableElement {
   const runs = [coarseToFine, direct];
-  const row = (name: string, value: (run: ComparedRun) => string) =>
+  const row = (name: string, value: (run: ExtractionRun) => string) =>
     h('tr', {}, h('th', { scope: 'row' }, name), ...runs.map((run) => h('td', {}, value(run))));
   const head = [text('controls.measure'), text('extractPanels.coarseToFine'), text('extractPanels.direct')].map(
     (title) => h('th', { scope: 'col' }, title),
