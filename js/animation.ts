@@ -22,7 +22,7 @@ export function animationGlb(frames: readonly Mesh[], options: { frameSeconds?: 
   const { frameSeconds = 0.1 } = checkProperties('options', options, ['frameSeconds']);
   number('frameSeconds', frameSeconds, { min: 0.001, max: 1000 });
   const meshes = denseCopy('frames', frames);
-  if (meshes.length === 0) throw invalid('frames', 'there are none; at least one Mesh is needed');
+  if (meshes.length === 0) throw invalid('frames', 'must contain at least one Mesh');
   const handles = meshes.map((frame, at) => meshHandle(`frames[${at}]`, frame));
   const animation = call(() => new RawAnimation());
   try {

@@ -338,7 +338,7 @@ function rawStart(start: DeformableStart): RawStart {
 function unknownStart(): Error {
   return invalid(
     'start',
-    "one of 'contour', 'enclosing', { bubbles }, { seeds, radius }, { marchingCubes } or a Mesh is needed",
+    "must be one of 'contour', 'enclosing', { bubbles }, { seeds, radius }, { marchingCubes } or a Mesh",
   );
 }
 

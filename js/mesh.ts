@@ -158,13 +158,13 @@ export class Mesh {
     wrapMesh = (handle, live = false) => new Mesh(handle, live);
     meshHandle = (parameter, mesh) => {
       if (mesh instanceof Mesh) return mesh.#handle;
-      throw invalid(parameter, 'a Mesh is needed');
+      throw invalid(parameter, 'must be a Mesh');
     };
   }
 
   private constructor(handle: Handle<RawMesh>, live: boolean) {
     if (!(handle instanceof Handle)) {
-      throw invalid('Mesh', 'made by icosphere, fromArrays, parse or marchingCubes, not by `new`');
+      throw invalid('Mesh', 'has no public constructor; use icosphere, fromArrays, parse or marchingCubes');
     }
     this.#handle = handle;
     this.#live = live;
@@ -200,7 +200,7 @@ export class Mesh {
     const vertices = finite('positions', positions, 3).length / 3;
     checkIndices(typedArray('indices', indices, Uint32Array, 3), vertices);
     if (uvs !== undefined && finite('uvs', uvs, 2).length !== 2 * vertices) {
-      throw invalid('uvs', `length ${uvs.length}; two numbers a vertex are needed, ${2 * vertices}`);
+      throw invalid('uvs', `must have two numbers per vertex, ${2 * vertices}, got ${uvs.length}`);
     }
     if (texture !== undefined && uvs === undefined) throw invalid('texture', 'needs texture coordinates, uvs');
     checkTexture(texture);
@@ -285,7 +285,7 @@ export class Mesh {
    * @throws {@link VesicleError} `invalid-argument` if `out` is no such object.
    */
   copyTo(out: MeshArrays): { vertices: number; triangles: number } {
-    if (out === undefined) throw invalid('out', 'undefined; an object with positions, normals and indices is needed');
+    if (out === undefined) throw invalid('out', 'must be an object with positions, normals and indices, got undefined');
     checkProperties('out', out, ['positions', 'normals', 'indices', 'uvs', 'colors']);
     const arrays = this.#handle.use((raw) => raw.arrays());
     try {
@@ -489,7 +489,7 @@ function edgeBounds(edge: { min: number; max: number }): [number, number] {
   const { min, max } = checkProperties('edge', shallowCopy('edge', edge), ['min', 'max']);
   positive('edge.min', min);
   if (number('edge.max', max) > 2 * (min as number)) return [min as number, max as number];
-  throw invalid('edge.max', `${max}; more than twice edge.min, ${min}, is needed`);
+  throw invalid('edge.max', `must be more than twice edge.min, ${min}, got ${max}`);
 }
 
 function made(make: () => RawMesh): Mesh {
@@ -516,7 +516,7 @@ function rawTexture(texture: MeshTexture | undefined): RawTexture | undefined {
 
 function nonZero(parameter: string, vector: Float64Array<ArrayBuffer>): Float64Array<ArrayBuffer> {
   if (vector.some((entry) => entry !== 0)) return vector;
-  throw invalid(parameter, 'has no length');
+  throw invalid(parameter, 'must not be the zero vector');
 }
 
 function copyArrays(from: RawArrays, out: MeshArrays): { vertices: number; triangles: number } {

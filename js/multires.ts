@@ -278,7 +278,7 @@ function packedEllipsoids(ellipsoids: readonly ControlEllipsoid[]): Float64Array
     const at = `ellipsoids[${index}]`;
     const { center, axes } = checkProperties(at, ellipsoid, ['center', 'axes']);
     const vectors = [center, ...denseCopy(`${at}.axes`, axes ?? [])];
-    if (vectors.length !== 4) throw invalid(`${at}.axes`, `${vectors.length - 1} given; three are needed`);
+    if (vectors.length !== 4) throw invalid(`${at}.axes`, `must be three vectors, got ${vectors.length - 1}`);
     return vectors.flatMap((vector, k) => [...vec3(k === 0 ? `${at}.center` : `${at}.axes[${k - 1}]`, vector)]);
   });
   return Float64Array.from(numbers);

@@ -110,7 +110,7 @@ export class Handle<Raw extends { free(): void }> {
   /** Calls `work` with the raw object. Throws `freed` if it was freed, or lost in a crash. */
   use<T>(work: (raw: Raw) => T): T {
     const raw = this.#raw;
-    if (!raw) throw new VesicleError('freed', `this ${this.#name} was freed and cannot be used any more`);
+    if (!raw) throw new VesicleError('freed', `this ${this.#name} was freed and can no longer be used`);
     if (crash === undefined && this.#generation !== generation) {
       throw new VesicleError('freed', `this ${this.#name} was lost when the library crashed; make a new one`);
     }

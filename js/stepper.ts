@@ -123,7 +123,7 @@ export class Runner {
 
   /** Throws `invalid-argument` during a run; guards methods that would interfere with it. */
   refuseWhileRunning(what: string): void {
-    if (this.#running) throw invalid(what, 'a run of this model is under way: abort it, or wait for it to end');
+    if (this.#running) throw invalid(what, 'not allowed during a run of this model: abort it, or wait for its end');
   }
 
   /** Steps until the model is done, the run is aborted, or `maxIterations` is reached. See {@link RunOptions}. */
@@ -160,10 +160,10 @@ export function checkedRun(given: RunOptions | undefined): RunOptions {
 
 /** Throws `invalid-argument` unless `signal` is an AbortSignal or undefined. */
 export function checkSignal(signal: unknown): void {
-  if (signal !== undefined && !(signal instanceof AbortSignal)) throw invalid('signal', 'an AbortSignal is needed');
+  if (signal !== undefined && !(signal instanceof AbortSignal)) throw invalid('signal', 'must be an AbortSignal');
 }
 
 /** Throws `invalid-argument` unless `listener` is a function or undefined. */
 export function checkListener(parameter: string, listener: unknown): void {
-  if (listener !== undefined && typeof listener !== 'function') throw invalid(parameter, 'a function is needed');
+  if (listener !== undefined && typeof listener !== 'function') throw invalid(parameter, 'must be a function');
 }

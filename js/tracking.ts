@@ -126,7 +126,7 @@ export class SurfaceTracker implements Stepper {
     const known = checkProperties('options', given, OPTIONS) as TrackingOptions;
     const image = volumeHandle('volume', known.volume);
     const [box, voxels, nearest] = [corners(known.box), ends(known.voxels), point(known.component)];
-    if (box && voxels) throw invalid('voxels', 'box cannot be given together with it: it says the same');
+    if (box && voxels) throw invalid('voxels', 'give either box or voxels, not both');
     const params = shallowCopy('params', known.params ?? {});
     this.#frameSeconds = image.use((raw) => raw.frameSeconds()) || FRAME_SECONDS;
     this.#handle = new Handle('SurfaceTracker', () =>
@@ -251,7 +251,7 @@ export class SurfaceTracker implements Stepper {
   meshAt(frame: number): Mesh {
     const [frames, , done] = this.#counts();
     if (integer('frame', frame, { max: frames - 1 }) >= done) {
-      throw invalid('frame', `${frame} is not done; ${done} of ${frames} frames have their surface`);
+      throw invalid('frame', `${frame} is not tracked yet; ${done} of ${frames} frames are`);
     }
     return wrapMesh(
       new Handle('Mesh', () => this.#handle.use((raw) => raw.meshAt(frame) as import('./vesicle.js').RawMesh)),
@@ -321,7 +321,7 @@ function ends(voxels: TrackingOptions['voxels']): Uint32Array | undefined {
 
 function point(component: TrackingOptions['component']): Float64Array | undefined {
   if (component === undefined || component === 'largest') return undefined;
-  if (typeof component === 'string') throw invalid('component', `'${component}'; 'largest' or a point is needed`);
+  if (typeof component === 'string') throw invalid('component', `must be 'largest' or a point, got '${component}'`);
   return vec3('component', component);
 }
 

@@ -75,7 +75,7 @@ export class Volume {
     wrapVolume = wrap;
     volumeHandle = (parameter, volume) => {
       if (volume instanceof Volume) return volume.#handle;
-      throw invalid(parameter, 'a Volume is needed');
+      throw invalid(parameter, 'must be a Volume');
     };
   }
 
@@ -271,7 +271,7 @@ function fromInit(init: VolumeInit): RawVolume {
   const given = checkProperties('init', init, INIT);
   const { data, slope = 1, intercept = 0, frameSeconds, space = 'RAS' } = given;
   if (!ELEMENTS.some((kind) => data instanceof kind)) {
-    throw invalid('data', `a typed array is needed: ${ELEMENTS.map((kind) => kind.name).join(', ')}`);
+    throw invalid('data', `must be a typed array: ${ELEMENTS.map((kind) => kind.name).join(', ')}`);
   }
   return new RawVolume(
     data,
@@ -293,7 +293,7 @@ function dims(given: unknown): Uint32Array {
 function affine({ affine, spacing, origin }: Partial<VolumeInit>): Float64Array {
   if (affine === undefined) return placed(spacing, origin);
   if (spacing !== undefined || origin !== undefined) {
-    throw invalid('affine', 'spacing and origin cannot be given together with it: it says both');
+    throw invalid('affine', 'give either affine, or spacing and origin');
   }
   return numbers('affine', affine, 16);
 }

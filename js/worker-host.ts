@@ -47,7 +47,7 @@ const LIBRARY: Pick<Library, ClassName | FunctionName> = {
 const CLASSES = Object.keys(MEMBERS) as ClassName[];
 
 /** Abort reason of tasks aborted by the page; the page knows the real reason. */
-const ABORTED = new VesicleError('aborted', 'the run was called off');
+const ABORTED = new VesicleError('aborted', 'the run was aborted');
 
 /** Handles the page's requests in order; runs continue between them. */
 class Host {
@@ -114,12 +114,12 @@ class Host {
 
   #object({ vesicle: at, part }: Reference): LibraryObject {
     const entry = this.#objects.get(at);
-    if (!entry) throw new VesicleError('freed', 'this object was freed and cannot be used any more');
+    if (!entry) throw new VesicleError('freed', 'this object was freed and can no longer be used');
     if ('failed' in entry) throw entry.failed;
     if (part === undefined) return entry.object;
     if (lookUp<string>(MEMBERS[classOf(entry.object)], part) === 'live')
       return record(entry.object)[part] as LibraryObject;
-    throw new VesicleError('invalid-argument', `${part}: this is no object`);
+    throw new VesicleError('invalid-argument', `${part}: not an object`);
   }
 
   /** Copies the mesh into the page's buffers, which were transferred with the request and are transferred back. */

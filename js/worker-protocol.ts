@@ -181,7 +181,7 @@ export const FUNCTIONS: Names<FunctionName> = {
 export function lookUp<T>(table: Readonly<Record<string, T>>, name: string): T {
   const found = Object.hasOwn(table, name) ? table[name] : undefined;
   if (found !== undefined) return found;
-  throw new VesicleError('invalid-argument', `${name}: there is no such thing in the worker`);
+  throw new VesicleError('invalid-argument', `${name}: no such member`);
 }
 
 /** Whether a value is a reference to an object in the worker. */
@@ -215,7 +215,7 @@ export function mapObjects(
   if ((typeof value !== 'object' && typeof value !== 'function') || value === null) return value;
   const other = swap(path, value);
   if (other !== undefined) return other;
-  if (depth === MAX_DEPTH) throw new VesicleError('invalid-argument', `${path}: too many objects inside each other`);
+  if (depth === MAX_DEPTH) throw new VesicleError('invalid-argument', `${path}: objects are nested too deeply`);
   const inside = (at: string, entry: unknown) => mapObjects(at, entry, swap, depth + 1);
   if (Array.isArray(value))
     return value.map((entry, index) => (isSimple(entry) ? entry : inside(`${path}[${index}]`, entry)));

@@ -28,7 +28,7 @@ const markedForTransfer = new WeakSet<object>();
  * @returns The value itself.
  */
 export function transfer<T extends object>(value: T): T {
-  if (value === null || typeof value !== 'object') throw invalid('value', 'a typed array or an object is needed');
+  if (value === null || typeof value !== 'object') throw invalid('value', 'must be a typed array or an object');
   markedForTransfer.add(value);
   return value;
 }
@@ -100,7 +100,7 @@ function sessionOf(remote: Remote): Session {
   const { failed, session, reference, owner } = stateOf(remote);
   if (failed !== undefined) throw failed;
   const { freed } = owner ? stateOf(owner) : stateOf(remote);
-  if (freed) throw new VesicleError('freed', `this ${reference.class} was freed and cannot be used any more`);
+  if (freed) throw new VesicleError('freed', `this ${reference.class} was freed and can no longer be used`);
   if (session === currentSession()) return session;
   throw new VesicleError('freed', `this ${reference.class} was lost when its worker ended; make a new one`);
 }
@@ -141,7 +141,7 @@ function unsendable(path: string, value: object): VesicleError {
 
 /** Returns an array to be transferred with its buffer; throws `invalid-argument` for shared memory. */
 function transferable(path: string, array: ArrayBufferView): ArrayBufferView {
-  if (!(array.buffer instanceof ArrayBuffer)) throw invalid(path, 'memory that is shared cannot be handed over');
+  if (!(array.buffer instanceof ArrayBuffer)) throw invalid(path, 'shared memory cannot be transferred');
   return array.byteLength > 0 ? array : copyOfView(path, array);
 }
 
@@ -151,7 +151,7 @@ function copyOfView(path: string, array: ArrayBufferView): ArrayBufferView {
     // Works for all typed arrays, and copies also where a subclass's slice returns a view.
     return Uint8Array.prototype.slice.call(array);
   } catch {
-    throw invalid(path, 'is no typed array, or was handed over before');
+    throw invalid(path, 'not a typed array, or already transferred');
   }
 }
 

@@ -95,7 +95,7 @@ export class Session {
       this.#worker.postMessage(request, transfer);
     } catch (error) {
       const what = (error as Error).message;
-      throw new VesicleError('invalid-argument', `an argument cannot be handed over to the worker: ${what}`);
+      throw new VesicleError('invalid-argument', `an argument cannot be sent to the worker: ${what}`);
     }
   }
 
@@ -124,7 +124,7 @@ const notStarted = (what: string) => new Error(`init: the worker could not be st
 
 function errorOf(failure: Failure): Error {
   if (failure.kind === 'other') return Object.assign(failure.error, { name: failure.name });
-  if (failure.kind === 'aborted') return new VesicleError('aborted', 'the run was called off');
+  if (failure.kind === 'aborted') return new VesicleError('aborted', 'the run was aborted');
   if (failure.kind === 'error') return new VesicleError(failure.code, failure.message);
   const crash = new VesicleCrash('', { cause: failure.cause });
   crash.message = failure.message;
@@ -132,11 +132,11 @@ function errorOf(failure: Failure): Error {
 }
 
 function listen(worker: Worker | NodeWorker, receive: (reply: Reply) => void, fail: (what: string) => void): void {
-  const garbled = () => fail('a message from it could not be read');
+  const garbled = () => fail('a message could not be deserialised');
   if ('on' in worker) {
     worker.on('message', (reply) => receive(reply as Reply));
     worker.on('error', (error) => fail(error instanceof Error ? error.message : String(error)));
-    worker.on('exit', (code) => fail(`it left with code ${code}`));
+    worker.on('exit', (code) => fail(`exited with code ${code}`));
     worker.on('messageerror', garbled);
     return;
   }

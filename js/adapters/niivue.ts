@@ -42,9 +42,9 @@ const SECONDS: Record<number, number> = { 0: 1, 8: 1, 16: 1e-3, 24: 1e-6 };
  */
 export function volumeFromNiivue(volume: NiivueVolume | undefined): VolumeInit {
   const { hdr, img } = Object(volume) as NiivueVolume;
-  if (!hdr?.affine || !img) throw invalid('volume', 'a loaded volume of NiiVue is needed, as nv.volumes[0]');
+  if (!hdr?.affine || !img) throw invalid('volume', 'must be a loaded volume of NiiVue, such as nv.volumes[0]');
   const several = SEVERAL_NUMBERS[hdr.datatypeCode];
-  if (several) throw invalid('volume', `${several}; one number a voxel is needed`);
+  if (several) throw invalid('volume', `${several}; only one number per voxel is supported`);
   const grid = voxels(
     img,
     hdr.dims.slice(1, 4).map((count) => Math.max(1, count)),
@@ -115,9 +115,9 @@ export class NiivueSurface {
    */
   constructor(nv: Niivue, options: NiivueSurfaceOptions = {}) {
     const { NVMesh, name = 'vesicle', color = [1, 0.88, 0.75, 1], space = 'RAS' } = options;
-    if (typeof Object(nv).addMesh !== 'function') throw invalid('nv', 'a Niivue is needed');
+    if (typeof Object(nv).addMesh !== 'function') throw invalid('nv', 'must be a Niivue');
     const { gl, view } = nv as { gl?: WebGL2RenderingContext; view?: View10 };
-    if (!gl && !view) throw invalid('nv', 'has no canvas yet: attach it first');
+    if (!gl && !view) throw invalid('nv', 'has no canvas yet; attach one first');
     this.#reader = new MeshReader(space, 'RAS');
     const look = { name, color };
     if (view) this.#adapter = new Niivue10(nv, view, look);

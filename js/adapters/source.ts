@@ -68,7 +68,7 @@ export class MeshReader {
 function checkSource(mesh: MeshSource): void {
   const { topologyVersion, geometryVersion, arrays } = Object(mesh) as Partial<MeshSource>;
   if (typeof arrays === 'function' && Number.isFinite(topologyVersion) && Number.isFinite(geometryVersion)) return;
-  throw invalid('mesh', 'a Mesh is needed, or an object with arrays(), topologyVersion and geometryVersion');
+  throw invalid('mesh', 'must be a Mesh, or an object with arrays(), topologyVersion and geometryVersion');
 }
 
 // Arrays owned by others must not be rotated in place.
@@ -124,13 +124,13 @@ const ELEMENTS = [
  */
 export function voxels(data: unknown, sizes: readonly number[]): Pick<VolumeInit, 'data' | 'dims'> {
   if (!ELEMENTS.some((kind) => data instanceof kind)) {
-    throw invalid('volume', `has no voxels of a kind that is taken: ${ELEMENTS.map(({ name }) => name).join(', ')}`);
+    throw invalid('volume', `unsupported voxel type; supported: ${ELEMENTS.map(({ name }) => name).join(', ')}`);
   }
   const { length } = data as VoxelArray;
   const [x = 0, y = 0, z = 0] = sizes;
   const frames = length / (x * y * z);
   if (Number.isInteger(frames) && frames > 0) return { data: data as VoxelArray, dims: [x, y, z, frames] };
-  throw invalid('volume', `${length} numbers for ${x} x ${y} x ${z} voxels; one for each voxel and frame is needed`);
+  throw invalid('volume', `must have one number per voxel and frame, got ${length} for ${x} × ${y} × ${z} voxels`);
 }
 
 /**

@@ -59,17 +59,20 @@ export function volumeFromThree(volume: ThreeVolume, options: { world?: 'file' |
 function checkVolume(volume: ThreeVolume): ThreeVolume {
   const { data, xLength, yLength, zLength, matrix } = Object(volume) as ThreeVolume;
   if (data && matrix?.elements && xLength > 0 && yLength > 0 && zLength > 0) return volume;
-  throw invalid('volume', 'a loaded volume of NRRDLoader is needed: data, xLength, yLength, zLength and matrix');
+  throw invalid('volume', 'must be a loaded volume of NRRDLoader, with data, xLength, yLength, zLength and matrix');
 }
 
 function checkHeader({ sizes = [], kinds = '', endian, encoding }: Header, data: unknown): void {
   if (sizes.length > 3 && !/(list|time)$/.test(kinds.trim())) {
-    throw invalid('volume', `${sizes.length} axes, kinds '${kinds}'; one number a voxel is needed, frames last`);
+    throw invalid(
+      'volume',
+      `${sizes.length} axes, kinds '${kinds}'; only one number per voxel is supported, with frames last`,
+    );
   }
   const bytes = (data as { BYTES_PER_ELEMENT?: number }).BYTES_PER_ELEMENT ?? 1;
   const written = /^(ascii|te?xt|hex)$/.test(encoding ?? '');
   if (endian !== 'big' || bytes === 1 || written) return;
-  throw invalid('volume', 'big-endian, which NRRDLoader reads as little-endian; give the file to Volume.parse instead');
+  throw invalid('volume', 'big-endian, which NRRDLoader reads as little-endian; use Volume.parse instead');
 }
 
 /** Returns the columns of the linear part of a column-major 4 x 4 or 3 x 3 matrix. */
@@ -165,9 +168,9 @@ export class ThreeSurface {
    */
   constructor(three: ThreeClasses, object: ThreeObject, options: { space?: Space; worldSpace?: Space } = {}) {
     for (const name of ['BufferGeometry', 'BufferAttribute', 'Sphere', 'Box3'] as const) {
-      if (typeof Object(three)[name] !== 'function') throw invalid('three', `has no ${name}; THREE is needed`);
+      if (typeof Object(three)[name] !== 'function') throw invalid('three', `has no ${name}; pass THREE`);
     }
-    if (!Object(object).geometry) throw invalid('object', 'an object with a geometry is needed, as a THREE.Mesh');
+    if (!Object(object).geometry) throw invalid('object', 'must be an object with a geometry, such as a THREE.Mesh');
     this.#three = three;
     this.#object = object;
     this.#reader = new MeshReader(options.space, options.worldSpace);

@@ -56,12 +56,12 @@ const dot = (index: number[], columns: number[][], row: number): number =>
 
 function scalarsOf(image: VtkImage) {
   const { getIndexToWorld, getPointData } = Object(image) as Partial<VtkImage>;
-  if (!getIndexToWorld || !getPointData) throw invalid('image', 'a vtkImageData is needed');
+  if (!getIndexToWorld || !getPointData) throw invalid('image', 'must be a vtkImageData');
   const scalars = getPointData().getScalars();
-  if (!scalars) throw invalid('image', 'has no scalars; a vtkImageData with one number a voxel is needed');
+  if (!scalars) throw invalid('image', 'has no scalars; must be a vtkImageData with one number per voxel');
   const components = scalars.getNumberOfComponents();
   if (components === 1) return scalars;
-  throw invalid('image', `${components} numbers a voxel; one is needed`);
+  throw invalid('image', `${components} numbers per voxel; only one is supported`);
 }
 
 /**
@@ -73,10 +73,10 @@ function scalarsOf(image: VtkImage) {
  */
 export function volumeFromItk(image: ItkImage): VolumeInit {
   const { imageType, size, spacing, origin, direction, data } = Object(image) as ItkImage;
-  if (!imageType || !size || !direction) throw invalid('image', 'an Image of itk-wasm is needed');
+  if (!imageType || !size || !direction) throw invalid('image', 'must be an Image of itk-wasm');
   const { dimension, components, pixelType } = imageType;
-  if (dimension !== 3 && dimension !== 4) throw invalid('image', `${dimension}D; a 3D or 4D image is needed`);
-  if (components !== 1) throw invalid('image', `${components} numbers a voxel, ${pixelType}; one is needed`);
+  if (dimension !== 3 && dimension !== 4) throw invalid('image', `must be a 3D or 4D image, got ${dimension}D`);
+  if (components !== 1) throw invalid('image', `${components} numbers per voxel, ${pixelType}; only one is supported`);
   const cosine = (row: number, column: number) => Number(direction[column + row * dimension]);
   const columns = [0, 1, 2].map((column) => [0, 1, 2].map((row) => cosine(row, column) * Number(spacing[column])));
   return { ...voxels(data, Array.from(size)), affine: affineOf(columns, origin), space: 'LPS' };

@@ -91,9 +91,9 @@ export class VesicleLab extends HTMLElement {
     const method = (this.getAttribute('method') ?? 'deformable') as LabMethod;
     const make = MODELS[method];
     if (!Object.hasOwn(MODELS, method))
-      throw invalid('method', `'${method}'; there are ${Object.keys(MODELS).join(', ')}`);
+      throw invalid('method', `must be one of ${Object.keys(MODELS).join(', ')}, got '${method}'`);
     const src = this.getAttribute('src');
-    if (!src) throw invalid('src', 'the address of a file is needed');
+    if (!src) throw invalid('src', 'must be the address of a file');
     const told = {
       start: parseStart(this.getAttribute('start')),
       levels: Number(this.getAttribute('levels') ?? 0),
@@ -224,7 +224,7 @@ class Parts {
       return new View(this.#canvas);
     } catch {
       const words = document.createElement('p');
-      words.textContent = 'This browser gives no WebGL: there are numbers, but no picture.';
+      words.textContent = 'WebGL is not available; only figures are shown.';
       this.#canvas.replaceWith(words);
       return undefined;
     }
@@ -255,6 +255,6 @@ function canvas(): HTMLCanvasElement {
   made.tabIndex = 0;
   made.setAttribute('part', 'view');
   made.setAttribute('role', 'img');
-  made.setAttribute('aria-label', 'The surface. Arrow keys turn it, plus and minus zoom.');
+  made.setAttribute('aria-label', 'The surface. Arrow keys rotate it, plus and minus zoom.');
   return made;
 }

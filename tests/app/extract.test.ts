@@ -182,7 +182,7 @@ describe('the mean edge', () => {
     await edge().fill(value);
     await edge().press('Enter');
     await expect.poll(() => edge().inputValue()).toBe('1');
-    expect(await complaint().allTextContents()).toEqual([expect.stringMatching(/accepted|needed/)]);
+    expect(await complaint().allTextContents()).toEqual([expect.stringMatching(/accepted|Must be/)]);
     await reach(app.page, 'done');
     expect(await measures(app.page)).toEqual(before);
   });
