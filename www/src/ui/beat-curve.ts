@@ -71,7 +71,9 @@ export class VolumeCurve {
       Array.from({ length: all }, (_, i) => (values?.[i] === undefined ? null : scale * (values[i] ?? 0)));
     const x = Array.from({ length: all }, (_, i) => i + 1);
     this.#plot.setData([x, column(volumes), column(truth), column(other?.volumes)] as uPlot.AlignedData);
-    this.#title.textContent = text('trackPanels.volumeByFrame', { unit: unit === 'mm' ? 'ml' : `${unit || 'unit'}³` });
+    this.#title.textContent = text('trackPanels.volumeByFrame', {
+      unit: unit === 'mm' ? 'ml' : `${unit || text('view.unknownUnit')}³`,
+    });
     const key = (name: string, text: string) =>
       h('span', {}, h('span', { class: `mark ${name}`, 'aria-hidden': 'true' }), text);
     this.#legend.replaceChildren(

@@ -216,37 +216,37 @@ export class EllipsoidControls {
     const ellipsoid = this.#ellipsoid;
     if (!ellipsoid) return;
     if (!Number.isFinite(value)) {
-      this.#refuse(text('controls.numberError'));
+      this.#reject(text('controls.numberError'));
       return;
     }
     const center: Vec3 = [...ellipsoid.center];
     center[k] = value;
-    this.#events.onChange({ ...ellipsoid, center }, 'move');
+    this.#events.onChange({ ...ellipsoid, center }, text('sculpt.moved'));
   }
 
   #setLength(k: number, value: number): void {
     const ellipsoid = this.#ellipsoid;
     if (!ellipsoid) return;
     if (!(value > 0)) {
-      this.#refuse(text('sculptPanels.lengthError'));
+      this.#reject(text('sculptPanels.lengthError'));
       return;
     }
     const lengths = lengthsOf(ellipsoid);
     lengths[k] = value;
-    this.#events.onChange(withLengths(ellipsoid, lengths), 'size');
+    this.#events.onChange(withLengths(ellipsoid, lengths), text('sculpt.scaled'));
   }
 
   #turn(k: number): void {
     const [ellipsoid, about, degrees] = [this.#ellipsoid, DIRECTIONS[k], this.#degrees.valueAsNumber];
     if (!ellipsoid || !about) return;
     if (!Number.isFinite(degrees)) {
-      this.#refuse(text('sculptPanels.angleError'));
+      this.#reject(text('sculptPanels.angleError'));
       return;
     }
-    this.#events.onChange(turned(ellipsoid, about, (degrees * Math.PI) / 180), 'turn');
+    this.#events.onChange(turned(ellipsoid, about, (degrees * Math.PI) / 180), text('sculpt.rotated'));
   }
 
-  #refuse(message: string): void {
+  #reject(message: string): void {
     const ellipsoid = this.#ellipsoid;
     if (ellipsoid) {
       const lengths = lengthsOf(ellipsoid);
