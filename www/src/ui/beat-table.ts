@@ -34,8 +34,8 @@ const COLUMNS: Column[] = [
     text: ({ steps }) => figure(round(steps)),
   },
   {
-    head: text('trackPanels.columnLimited'),
-    help: text('trackPanels.columnLimitedHelp'),
+    head: text('trackPanels.columnHeld'),
+    help: text('trackPanels.columnHeldHelp'),
     text: ({ held }) => count(held),
   },
   {
@@ -44,8 +44,8 @@ const COLUMNS: Column[] = [
     text: ({ rejected }) => count(rejected),
   },
   {
-    head: text('trackPanels.columnNoBoundary'),
-    help: text('trackPanels.columnNoBoundaryHelp'),
+    head: text('trackPanels.columnRetracted'),
+    help: text('trackPanels.columnRetractedHelp'),
     text: ({ retracted }) => count(retracted),
   },
 ];
