@@ -22,7 +22,7 @@ async function openAt(hash: string): Promise<void> {
 }
 
 /** Iterations of the chain of figure 7 from the start to rest. */
-const CHAIN = PRESETS.find(({ id }) => id === 'figure-7')?.variants[0].outcome.iterations;
+const CHAIN = PRESETS.find(({ id }) => id === 'figure-7')?.variants[0].expected.iterations;
 
 const text = (selector: string) => app.page.locator(selector).textContent();
 /** Of a canvas as it is shown. */

@@ -10,7 +10,7 @@ import { otsu, quantiles } from '../../www/src/threshold';
 import { History } from '../../www/src/ui/history';
 import { anatomyOf, type Grid, invert, sliceOrientations, slicePlane, toWorld } from '../../www/src/view/anatomy';
 import { componentRoots } from '../../www/src/view/components';
-import { diverging, robustRange, shadeColors, shadeTitle } from '../../www/src/view/shading';
+import { diverging, quantityTitle, robustRange, shadeColors } from '../../www/src/view/shading';
 import { ballSection, levelIndex, paintSlice, projectSegments } from '../../www/src/view/slicing';
 
 /** A grid with the given columns as voxel axes. */
@@ -251,8 +251,8 @@ describe('numbers as colours', () => {
   });
 
   test('are told with the unit they are one over', () => {
-    expect(shadeTitle('mean curvature', 'mm')).toBe('Mean curvature, 1/mm');
-    expect(shadeTitle('gaussian curvature', '')).toBe('Gaussian curvature, 1/unit²');
+    expect(quantityTitle('mean curvature', 'mm')).toBe('Mean curvature, 1/mm');
+    expect(quantityTitle('gaussian curvature', '')).toBe('Gaussian curvature, 1/unit²');
   });
 
   test('reach the GPU as linear light, and NaN as zero', () => {

@@ -4,7 +4,7 @@ import { preloadWorker } from './channel';
 import { spawnExtract } from './client';
 import { GUIDES } from './guides';
 import { labOf } from './labs/address';
-import type { Lab, LabKind, PassedOn } from './labs/labs';
+import type { Handoff, Lab, LabKind } from './labs/labs';
 import { workOffline } from './offline';
 import { spawnReconstruct } from './reconstruct/client';
 import { spawnSculpt } from './sculpt/client';
@@ -77,7 +77,7 @@ class Labs {
     if (kind ? kind !== this.#kind : !this.#kind) void this.#open(kind ?? LABS[0]);
   }
 
-  async #open(kind: LabKind, passedOn?: PassedOn): Promise<void> {
+  async #open(kind: LabKind, passedOn?: Handoff): Promise<void> {
     this.#lab?.close();
     this.#lab = undefined;
     this.#kind = kind;
@@ -99,7 +99,7 @@ class Labs {
     }
   }
 
-  #passOn(passedOn: PassedOn): void {
+  #passOn(passedOn: Handoff): void {
     this.#remember();
     const kind = LABS.find(({ id }) => id === passedOn.lab) ?? LABS[0];
     // pushState fires no hashchange: the lab is opened here, with the data passed on.

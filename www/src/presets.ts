@@ -19,15 +19,15 @@ export interface Variant {
   name: string;
   params: ParamValues;
   /** Result in this app, as a sentence. */
-  came: string;
-  outcome: Outcome;
+  ourResult: string;
+  expected: Outcome;
 }
 
 /** A figure of the paper, as an example of the Extract lab. */
 export interface Preset extends Example {
   start: { kind: 'enclosing' } | { kind: 'bubbles'; bubbles: number } | { kind: 'isosurface' };
   /** Result reported in the paper, as a sentence. */
-  saw: string;
+  paperResult: string;
   /** The pictures of the figure; the preset opens with the first. */
   variants: [Variant, ...Variant[]];
   /**
@@ -66,14 +66,14 @@ export const PRESETS: Preset[] = [
     edge: 3.15,
     params: { ...BARE, iso: 127.5, rigidity: 0.1, stiffness: 0.1 },
     credit: text('extractPresets.figure7Credit'),
-    saw: text('extractPresets.figure7Paper'),
+    paperResult: text('extractPresets.figure7Paper'),
     variants: [
       {
         id: '7',
         name: text('extractPresets.figure7PictureName'),
         params: {},
-        came: text('extractPresets.figure7PictureHere'),
-        outcome: { iterations: 73, vertices: 464, components: 2, genus: 2 },
+        ourResult: text('extractPresets.figure7PictureHere'),
+        expected: { iterations: 73, vertices: 464, components: 2, genus: 2 },
       },
     ],
   },
@@ -87,14 +87,14 @@ export const PRESETS: Preset[] = [
     edge: 1.65,
     params: { ...BARE, iso: 127.5 },
     credit: text('extractPresets.figure8Credit'),
-    saw: text('extractPresets.figure8Paper'),
+    paperResult: text('extractPresets.figure8Paper'),
     variants: [
       {
         id: '8',
         name: text('extractPresets.figure8PictureName'),
         params: {},
-        came: text('extractPresets.figure8PictureHere'),
-        outcome: { iterations: 37, vertices: 2596, components: 2, genus: 2 },
+        ourResult: text('extractPresets.figure8PictureHere'),
+        expected: { iterations: 37, vertices: 2596, components: 2, genus: 2 },
       },
     ],
   },
@@ -107,14 +107,14 @@ export const PRESETS: Preset[] = [
     levels: 3,
     params: { ...BARE, iso: 102, rigidity: 0.05, stiffness: 0.001 },
     credit: text('extractPresets.figure14Credit'),
-    saw: text('extractPresets.figure14Paper'),
+    paperResult: text('extractPresets.figure14Paper'),
     variants: [
       {
         id: '14',
         name: text('extractPresets.figure14PictureName'),
         params: {},
-        came: text('extractPresets.figure14PictureHere'),
-        outcome: { iterations: 236, vertices: 66966, components: 1, genus: 1409 },
+        ourResult: text('extractPresets.figure14PictureHere'),
+        expected: { iterations: 236, vertices: 66966, components: 1, genus: 1409 },
       },
     ],
   },
@@ -127,14 +127,14 @@ export const PRESETS: Preset[] = [
     levels: 3,
     params: { ...BARE, iso: 130, rigidity: 0.4 },
     credit: `${COMPUTED} ${text('extractPresets.figure15And16Credit')}`,
-    saw: text('extractPresets.figure15And16Paper'),
+    paperResult: text('extractPresets.figure15And16Paper'),
     variants: [
       {
         id: '16',
         name: text('extractPresets.figure15And16PictureName'),
         params: {},
-        came: text('extractPresets.figure15And16PictureHere'),
-        outcome: { iterations: 202, vertices: 15870, components: 1, genus: 5 },
+        ourResult: text('extractPresets.figure15And16PictureHere'),
+        expected: { iterations: 202, vertices: 15870, components: 1, genus: 5 },
       },
     ],
     compares: true,
@@ -149,14 +149,14 @@ export const PRESETS: Preset[] = [
     levels: 3,
     params: { ...BARE, iso: 12.75, rigidity: 0.07 },
     credit: `${COMPUTED} ${text('extractPresets.figure20Credit')}`,
-    saw: text('extractPresets.figure20Paper'),
+    paperResult: text('extractPresets.figure20Paper'),
     variants: [
       {
         id: '20',
         name: text('extractPresets.figure20PictureName'),
         params: {},
-        came: text('extractPresets.figure20PictureHere'),
-        outcome: { iterations: 240, vertices: 7883, components: 1, genus: 1 },
+        ourResult: text('extractPresets.figure20PictureHere'),
+        expected: { iterations: 240, vertices: 7883, components: 1, genus: 1 },
       },
     ],
     compares: true,
@@ -171,28 +171,28 @@ export const PRESETS: Preset[] = [
     levels: 2,
     params: { ...BARE, iso: 130, rigidity: 0.2 },
     credit: `${COMPUTED} ${text('extractPresets.figure21Credit')}`,
-    saw: text('extractPresets.figure21Paper'),
+    paperResult: text('extractPresets.figure21Paper'),
     variants: [
       {
         id: '21c',
         name: text('extractPresets.figure21cName'),
         params: {},
-        came: text('extractPresets.figure21cHere'),
-        outcome: { iterations: 169, vertices: 16267, components: 1, genus: 5 },
+        ourResult: text('extractPresets.figure21cHere'),
+        expected: { iterations: 169, vertices: 16267, components: 1, genus: 5 },
       },
       {
         id: '21d',
         name: text('extractPresets.figure21dName'),
         params: { iso: 38 },
-        came: text('extractPresets.figure21dHere'),
-        outcome: { iterations: 93, vertices: 15666, components: 1, genus: 0 },
+        ourResult: text('extractPresets.figure21dHere'),
+        expected: { iterations: 93, vertices: 15666, components: 1, genus: 0 },
       },
       {
         id: '21e',
         name: text('extractPresets.figure21eName'),
         params: { ...RIDGE, gradientNormal: 1, gradientTangent: 0.5, rigidity: 0.4, stiffness: 0.1 },
-        came: text('extractPresets.figure21eHere'),
-        outcome: { iterations: 345, vertices: 8828, components: 1, genus: 0 },
+        ourResult: text('extractPresets.figure21eHere'),
+        expected: { iterations: 345, vertices: 8828, components: 1, genus: 0 },
       },
     ],
     startsOver: true,
@@ -206,14 +206,14 @@ export const PRESETS: Preset[] = [
     levels: 1,
     params: { ...RIDGE, iso: 120, gradientNormal: 1, stiffness: 0.2, rigidity: 1.5, integrator: 'runge-kutta' },
     credit: `${COMPUTED} ${text('extractPresets.figure22Credit')}`,
-    saw: text('extractPresets.figure22Paper'),
+    paperResult: text('extractPresets.figure22Paper'),
     variants: [
       {
         id: '22',
         name: text('extractPresets.figure22PictureName'),
         params: {},
-        came: text('extractPresets.figure22PictureHere'),
-        outcome: { iterations: 245, vertices: 3149, components: 1, genus: 0 },
+        ourResult: text('extractPresets.figure22PictureHere'),
+        expected: { iterations: 245, vertices: 3149, components: 1, genus: 0 },
       },
     ],
   },
@@ -226,14 +226,14 @@ export const PRESETS: Preset[] = [
     levels: 0,
     params: { ...BARE, iso: 95, rigidity: 0.3 },
     credit: text('extractPresets.figure23Credit'),
-    saw: text('extractPresets.figure23Paper'),
+    paperResult: text('extractPresets.figure23Paper'),
     variants: [
       {
         id: '23',
         name: text('extractPresets.figure23PictureName'),
         params: {},
-        came: text('extractPresets.figure23PictureHere'),
-        outcome: { iterations: 139, vertices: 33987, components: 5, genus: 46 },
+        ourResult: text('extractPresets.figure23PictureHere'),
+        expected: { iterations: 139, vertices: 33987, components: 5, genus: 46 },
       },
     ],
   },
@@ -246,28 +246,28 @@ export const PRESETS: Preset[] = [
     levels: 1,
     params: { ...BARE, iso: 76.5, rigidity: 0.2 },
     credit: `${COMPUTED} ${text('extractPresets.figure24Credit')}`,
-    saw: text('extractPresets.figure24Paper'),
+    paperResult: text('extractPresets.figure24Paper'),
     variants: [
       {
         id: '24b',
         name: text('extractPresets.figure24bName'),
         params: {},
-        came: text('extractPresets.figure24bHere'),
-        outcome: { iterations: 86, vertices: 5182, components: 1, genus: 0 },
+        ourResult: text('extractPresets.figure24bHere'),
+        expected: { iterations: 86, vertices: 5182, components: 1, genus: 0 },
       },
       {
         id: '24c',
         name: text('extractPresets.figure24cName'),
         params: { iso: 114.75 },
-        came: text('extractPresets.figure24cHere'),
-        outcome: { iterations: 100, vertices: 3802, components: 1, genus: 0 },
+        ourResult: text('extractPresets.figure24cHere'),
+        expected: { iterations: 100, vertices: 3802, components: 1, genus: 0 },
       },
       {
         id: '24d',
         name: text('extractPresets.figure24dName'),
         params: { iso: 191.25 },
-        came: text('extractPresets.figure24dHere'),
-        outcome: { iterations: 141, vertices: 1038, components: 3, genus: 0 },
+        ourResult: text('extractPresets.figure24dHere'),
+        expected: { iterations: 141, vertices: 1038, components: 3, genus: 0 },
       },
     ],
   },
@@ -283,13 +283,13 @@ export function isPreset(example: Example | undefined): example is Preset {
 }
 
 /** Returns the variant of a figure whose parameters are all in force, if there is one. */
-export function variantOf(preset: Preset, params: ParamValues): Variant | undefined {
+export function variantInForce(preset: Preset, params: ParamValues): Variant | undefined {
   return preset.variants.find((one) =>
     Object.entries({ ...preset.params, ...one.params }).every(([name, value]) => Object.is(params[name], value)),
   );
 }
 
 /** Returns the suitable start shape: a preset's own, else the contour, for other examples and for files. */
-export function startOf(example: Example | undefined): Preset['start'] | typeof CONTOUR {
+export function defaultStart(example: Example | undefined): Preset['start'] | typeof CONTOUR {
   return isPreset(example) ? example.start : CONTOUR;
 }

@@ -16,9 +16,9 @@ import type {
   Requests,
   SavedRun,
   Setup,
-  Shade,
   SurfaceBuffers,
   ToWorker,
+  VertexQuantity,
   VolumeSource,
   WorkerEvent,
 } from './protocol';
@@ -64,7 +64,7 @@ class Session {
   /** The intensities displayed as black and as white. */
   #window: [number, number] = [0, 1];
   #planes: Plane[] = [];
-  #shade: Shade | undefined;
+  #quantity: VertexQuantity | undefined;
   #free: SurfaceBuffers[] = Array.from({ length: BUFFER_SETS }, emptyArrays);
   /** Reports of steps that were not sent to the page yet. */
   #reports: StepReport[] = [];
@@ -92,7 +92,7 @@ class Session {
     export: ({ format }) => this.#export(format),
     pyramid: ({ levels }) => this.#pyramid(levels),
     setAttractors: (attractors) => this.#setAttractors(attractors),
-    shade: (shade) => this.#setShade(shade),
+    quantity: (quantity) => this.#setQuantity(quantity),
     save: () => this.#save(),
     restore: (saved) => this.#restore(saved),
     compare: (setup) => this.#compare(setup),
@@ -233,8 +233,8 @@ class Session {
     );
   }
 
-  #setShade(shade: Shade | undefined): undefined {
-    this.#shade = shade;
+  #setQuantity(quantity: VertexQuantity | undefined): undefined {
+    this.#quantity = quantity;
     if (this.#model && !this.#run) this.#snapshot('checked');
   }
 
@@ -343,7 +343,7 @@ class Session {
     const measures = detail === 'plain' ? undefined : this.#measure(mesh, detail === 'checked');
     const reports = this.#reports;
     this.#reports = [];
-    if (this.#shade) surface.values = valuesFor(model, this.#shade);
+    if (this.#quantity) surface.values = valuesFor(model, this.#quantity);
     send({ event: 'snapshot', surface, level, sections, reports, ...(measures && { measures }) }, [
       ...transferOf(surface),
       ...buffersOf(sections),

@@ -20,13 +20,13 @@ export function showAddress(hash: string): void {
 }
 
 /** Note to a copied link while one of the user's own files is open. */
-export const FILE_LACKS = text('labs.linkLacksFile');
+export const FILE_NOTE = text('labs.linkLacksFile');
 
 /**
  * Copies the page's address to the clipboard, and says so in the status line, with the notes on what the link lacks.
  */
-export async function copyAddress(status: StatusLine, lacks: (string | false)[]): Promise<void> {
-  const say = (done: string) => status.say([done, ...lacks].filter(Boolean).join(' '));
+export async function copyAddress(status: StatusLine, notes: (string | false)[]): Promise<void> {
+  const say = (done: string) => status.say([done, ...notes].filter(Boolean).join(' '));
   try {
     await navigator.clipboard.writeText(location.href);
     say(text('labs.linkCopied'));

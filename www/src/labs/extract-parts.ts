@@ -1,6 +1,6 @@
 import { EXAMPLES, type Example } from '../examples';
 import { COVERAGE_GUIDE } from '../guides';
-import { isPreset, PRESETS, type Preset, type Variant, variantOf } from '../presets';
+import { isPreset, PRESETS, type Preset, type Variant, variantInForce } from '../presets';
 import type { Attractor, MeshFormat, ParamSpec, ParamValues, Plane, VolumeView } from '../protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
@@ -218,7 +218,7 @@ export class ExtractParts {
   showParams(params: ParamValues, example: Example | undefined): void {
     this.#params?.show(params);
     if (typeof params.iso === 'number') this.histogram.setIso(params.iso);
-    if (isPreset(example)) this.#figure.show(example, variantOf(example, params));
+    if (isPreset(example)) this.#figure.show(example, variantInForce(example, params));
     else this.#figure.show(undefined);
   }
 

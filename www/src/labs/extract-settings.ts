@@ -7,7 +7,7 @@ import type { StartChoice } from '../ui/start';
 import type { ExtractParts } from './extract-parts';
 import type { ExtractResults } from './extract-results';
 import type { LabStates } from './lab-states';
-import { type Moment, Rewinder } from './rewinder';
+import { type SavedMoment, UndoHistory } from './rewinder';
 
 /** Radius of the sphere placed at the crosshair, as a fraction of the volume's shortest side. */
 const SPHERE_PART = 0.1;
@@ -33,7 +33,7 @@ export class ExtractSettings {
   readonly #states: LabStates;
   readonly #results: ExtractResults;
   readonly #onChange: () => void;
-  readonly #rewinder: Rewinder<PageState, SavedRun>;
+  readonly #undo: UndoHistory<PageState, SavedRun>;
   #volume: VolumeView | undefined;
   /** The parameters in force; a reset keeps them. */
   #params: ParamValues = {};
@@ -47,7 +47,7 @@ export class ExtractSettings {
     this.#states = states;
     this.#results = results;
     this.#onChange = onChange;
-    this.#rewinder = new Rewinder<PageState, SavedRun>(
+    this.#undo = new UndoHistory<PageState, SavedRun>(
       client,
       () => this.#pageState(),
       (undoable, redoable) => ui.transport.showUndo(undoable, redoable),
@@ -68,8 +68,8 @@ export class ExtractSettings {
   }
 
   /** The newest saved state, to resume from after a restart of the engine. */
-  get newest(): Moment<PageState, SavedRun> | undefined {
-    return this.#rewinder.newest;
+  get newest(): SavedMoment<PageState, SavedRun> | undefined {
+    return this.#undo.newest;
   }
 
   /** Returns all that a model of the present volume is built from. */
@@ -81,7 +81,7 @@ export class ExtractSettings {
   /** Adopts another volume and its new model, and clears the undo history. */
   adopt(volume: VolumeView, choice: StartChoice, params: ParamValues, attractors: Attractor[]): void {
     this.#volume = volume;
-    this.#rewinder.clear();
+    this.#undo.clear();
     this.#ui.attractors.radius = ATTRACTOR_PART * this.#smallestSide;
     this.#attractors = attractors;
     this.#ui.showAttractors(attractors);
@@ -90,23 +90,23 @@ export class ExtractSettings {
 
   /** Adopts a new model of the present volume, before its first step. */
   begin(choice: StartChoice, params: ParamValues): void {
-    this.#states.stand(text('labs.readyToStart'));
+    this.#states.idle(text('labs.readyToStart'));
     this.#adoptModel(choice, params);
   }
 
   /** Saves the present state, in case the user cancels opening something else. */
-  keep(): void {
-    void this.#rewinder.keep();
+  save(): void {
+    void this.#undo.save();
   }
 
   /** Settles when all pending saves are complete. */
-  get kept(): Promise<unknown> {
-    return this.#rewinder.kept;
+  get saved(): Promise<unknown> {
+    return this.#undo.saved;
   }
 
   /** Saves the present state for undo, before a change. Returns a function that forgets it. */
-  remember(label: string, together = ''): () => void {
-    return this.#rewinder.remember(label, together);
+  checkpoint(label: string, mergeKey = ''): () => void {
+    return this.#undo.checkpoint(label, mergeKey);
   }
 
   /**
@@ -141,20 +141,20 @@ export class ExtractSettings {
 
   /** Rebuilds the model from the chosen start, and runs it. If the start is rejected, the previous model continues. */
   async restart(): Promise<void> {
-    if (!this.#states.canChange) return this.#ui.start.refuse(this.#why(text('extract.notWhileOpening')));
-    await this.#states.inTurn(async () => {
+    if (!this.#states.canChange) return this.#ui.start.reject(this.#why(text('extract.notWhileOpening')));
+    await this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
       const running = this.#states.value === 'running';
-      const forget = this.remember(text('extract.startChange'));
+      const forget = this.checkpoint(text('extract.startChange'));
       try {
         await this.#rebuild(this.#ui.start.value, this.#params);
         await this.#client.request('play', undefined);
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);
-        this.#ui.start.refuse(message);
+        this.#ui.start.reject(message);
         if (code === 'internal') return this.#states.fail(text('labs.buildFailed'), error);
-        this.#states.back((state) => this.#results.describe(state));
+        this.#states.restore((state) => this.#results.describe(state));
         if (running) this.#play();
       }
     });
@@ -162,10 +162,10 @@ export class ExtractSettings {
 
   /** Sets a parameter of the live model; a run continues, and a converged one is resumed. */
   setParam(name: string, value: unknown): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (this.#states.engineBroken) return this.#refuseParam(name, BROKEN);
       if (!this.#states.canChange) return this.#onChange();
-      const forget = this.remember(text('labs.changeOf', { name: this.#ui.labelOf(name) }), name);
+      const forget = this.checkpoint(text('labs.changeOf', { name: this.#ui.labelOf(name) }), name);
       try {
         this.#take(await this.#client.request('setParams', { [name]: value }));
         this.#goOn();
@@ -183,9 +183,9 @@ export class ExtractSettings {
    * one.
    */
   setAttractors(attractors: Attractor[], what: string, tuning: boolean): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return this.#ui.attractors.show(this.#attractors);
-      const forget = this.remember(what, tuning ? what : '');
+      const forget = this.checkpoint(what, tuning ? what : '');
       try {
         await this.#client.request('setAttractors', attractors);
         this.#attractors = attractors;
@@ -203,13 +203,13 @@ export class ExtractSettings {
   }
 
   travel(way: 'undo' | 'redo'): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
       this.#states.load(way === 'undo' ? text('labs.undoing') : text('labs.redoing'));
       try {
-        const moment = await this.#rewinder.travel(way);
+        const moment = await this.#undo.step(way);
         if (moment) this.adoptMoment(moment);
-        else this.#states.back((state) => this.#results.describe(state));
+        else this.#states.restore((state) => this.#results.describe(state));
       } catch (error) {
         this.#states.fail(text('labs.requestFailed'), error);
       }
@@ -217,27 +217,27 @@ export class ExtractSettings {
   }
 
   /** Restores the page to a saved state that the model has already been restored to. */
-  adoptMoment({ saved, page }: Moment<PageState, SavedRun>): void {
+  adoptMoment({ saved, page }: SavedMoment<PageState, SavedRun>): void {
     this.#ui.start.show(page.choice);
     this.#attractors = page.attractors;
     this.#ui.showAttractors(page.attractors);
     this.#results.rewind(page.mark(saved.iteration));
     this.#take(page.params);
     const state = saved.done ? 'done' : 'paused';
-    this.#states.stand(this.#results.describe(state), state);
+    this.#states.idle(this.#results.describe(state), state);
     this.#showPyramid(page.choice);
   }
 
   /** Does a change that undo can revert; if it fails, the previous state stays. */
-  #change(label: string, complaint: string, work: () => Promise<void>): Promise<void> {
-    return this.#states.inTurn(async () => {
+  #change(label: string, errorTitle: string, work: () => Promise<void>): Promise<void> {
+    return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
-      const forget = this.remember(label);
+      const forget = this.checkpoint(label);
       try {
         await work();
       } catch (error) {
         forget();
-        this.#states.fail(complaint, error);
+        this.#states.fail(errorTitle, error);
       }
     });
   }
@@ -263,7 +263,7 @@ export class ExtractSettings {
 
   /** Resumes a converged run: under other forces it can move on. */
   #goOn(): void {
-    if (this.#states.beneath === 'done') this.#play();
+    if (this.#states.modelState === 'done') this.#play();
   }
 
   #play(): void {

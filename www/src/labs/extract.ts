@@ -1,6 +1,6 @@
 import { Client, RequestError, toFailure } from '../client';
 import { GUIDES } from '../guides';
-import type { Shade, WorkerEvent } from '../protocol';
+import type { VertexQuantity, WorkerEvent } from '../protocol';
 import type { LabState } from '../state';
 import { plural, text } from '../texts';
 import { History } from '../ui/history';
@@ -12,7 +12,7 @@ import { ExtractResults } from './extract-results';
 import { ExtractSettings } from './extract-settings';
 import { ExtractSharing } from './extract-sharing';
 import { LabStates } from './lab-states';
-import type { Lab, PassedOn, PassOn } from './labs';
+import type { Handoff, Lab, OpenInLab } from './labs';
 
 /**
  * The Extract lab: a deformable surface is fitted to a volume. This class connects the lab's parts; opening, settings,
@@ -29,11 +29,11 @@ export class ExtractLab implements Lab {
   readonly #settings: ExtractSettings;
   readonly #opening: ExtractOpening;
   readonly #sharing: ExtractSharing;
-  readonly #passOn: PassOn;
+  readonly #passOn: OpenInLab;
   /** The quantity requested for each vertex. */
-  #shade: Shade | undefined;
+  #quantity: VertexQuantity | undefined;
 
-  constructor(root: HTMLElement, help: HTMLElement, passOn: PassOn) {
+  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
     this.#root = root;
     this.#passOn = passOn;
     const { signal } = this.#closing;
@@ -52,15 +52,15 @@ export class ExtractLab implements Lab {
     this.#results = new ExtractResults(client, ui, states, history);
     this.#settings = new ExtractSettings(client, ui, states, this.#results, () => this.#showSettings());
     this.#opening = new ExtractOpening(client, ui, states, this.#settings, this.#results, () =>
-      client.request('shade', this.#shade),
+      client.request('quantity', this.#quantity),
     );
     this.#sharing = new ExtractSharing(client, ui, states, this.#settings, this.#opening);
-    states.follow((state) => this.#showState(state));
+    states.subscribe((state) => this.#showState(state));
     offerShortcuts(this.#shortcuts(), help, GUIDES.extract, signal);
   }
 
   /** Opens what another lab passes on, or what the address asks for, or else the first example, and runs it. */
-  async start(passedOn?: PassedOn): Promise<void> {
+  async start(passedOn?: Handoff): Promise<void> {
     if (!passedOn) ExtractOpening.fetchLinked();
     const open = passedOn && (() => this.#opening.passedOn(passedOn));
     await this.#opening.start(this.#closing.signal, () => this.#sharing.updateAddress(), open);
@@ -135,9 +135,9 @@ export class ExtractLab implements Lab {
   }
 
   #setOptions({ color }: ViewOptions): void {
-    const shade = color === 'plain' || color === 'component' ? undefined : color;
-    if (shade !== this.#shade) this.#ask(this.#client.request('shade', shade));
-    this.#shade = shade;
+    const quantity = color === 'plain' || color === 'component' ? undefined : color;
+    if (quantity !== this.#quantity) this.#ask(this.#client.request('quantity', quantity));
+    this.#quantity = quantity;
     this.#sharing.updateAddress();
   }
 
@@ -145,34 +145,34 @@ export class ExtractLab implements Lab {
     const running = this.#states.value === 'running';
     if (!running && !this.#states.canRun) return;
     this.#ui.banner.hide();
-    if (!running) this.#settings.remember(text('labs.play'));
+    if (!running) this.#settings.checkpoint(text('labs.play'));
     this.#ask(this.#client.request(running ? 'pause' : 'play', undefined));
   }
 
   #step(steps: number): void {
     if (!this.#states.canRun) return;
     this.#ui.banner.hide();
-    this.#settings.remember(plural('counts.step', steps));
+    this.#settings.checkpoint(plural('counts.step', steps));
     this.#ask(this.#client.request('step', { count: steps }));
   }
 
   async #reset(): Promise<void> {
     const { ready, engineBroken, value } = this.#states;
     if (!ready || value === 'loading') return;
-    await (engineBroken ? this.#opening.again() : this.#settings.startOver());
+    await (engineBroken ? this.#opening.reopen() : this.#settings.startOver());
   }
 
   /** Runs the same extraction twice, direct and coarse to fine, and shows the comparison. */
   async #compare(): Promise<void> {
     if (!this.#states.canChange) return;
     const { compare, start } = this.#ui;
-    if (start.value.levels === 0) return compare.refuse(text('extract.compareNeedsLevel'));
+    if (start.value.levels === 0) return compare.reject(text('extract.compareNeedsLevel'));
     compare.begin();
     try {
       const setup = this.#settings.setup(start.value, this.#settings.params, []);
       compare.finish(await this.#client.request('compare', setup));
     } catch (error) {
-      compare.refuse(text('extract.compareFailed', { message: toFailure(error).message }));
+      compare.reject(text('extract.compareFailed', { message: toFailure(error).message }));
     }
   }
 
@@ -196,12 +196,12 @@ export class ExtractLab implements Lab {
     else if (event.event === 'comparing') this.#ui.compare.showProgress(event);
     else if (event.event === 'covering') this.#ui.coverage.showProgress(event);
     else if (event.event !== 'state') this.#results.take(event);
-    else if (this.#states.enter(event.state)) this.#results.showState(event.state);
+    else if (this.#states.setModelState(event.state)) this.#results.showState(event.state);
   }
 
   #showState(state: LabState): void {
-    const { beneath, ready } = this.#states;
-    this.#ui.showState(state, beneath, ready);
+    const { modelState, ready } = this.#states;
+    this.#ui.showState(state, modelState, ready);
     if (state === 'done' || state === 'paused') this.#sharing.updateAddress();
   }
 

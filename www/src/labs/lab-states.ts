@@ -14,7 +14,7 @@ export class LabStates {
   /** Whether something else is being opened; the state of the present model is then ignored. */
   #opening = false;
   /** Settles when the last queued change is complete. */
-  #turns: Promise<unknown> = Promise.resolve();
+  #queue: Promise<unknown> = Promise.resolve();
   /** Whether there is a model. */
   ready = false;
   /** Whether the worker has to be restarted before it can serve requests. */
@@ -28,10 +28,10 @@ export class LabStates {
   }
 
   /** Calls `subscriber` now and at every change. */
-  follow(follower: (state: LabState) => void): void {
+  subscribe(subscriber: (state: LabState) => void): void {
     this.#state.subscribe((state) => {
       if (state !== 'loading' && state !== 'error') this.#model = state;
-      follower(state);
+      subscriber(state);
     });
   }
 
@@ -40,7 +40,7 @@ export class LabStates {
   }
 
   /** The state beneath a displayed error. */
-  get beneath(): LabState {
+  get modelState(): LabState {
     return this.value === 'error' ? this.#model : this.value;
   }
 
@@ -51,7 +51,7 @@ export class LabStates {
 
   /** Whether the model can be run or stepped. */
   get canRun(): boolean {
-    return this.ready && !this.engineBroken && this.beneath === 'paused';
+    return this.ready && !this.engineBroken && this.modelState === 'paused';
   }
 
   /** Enters the loading state, with a text for the status line. */
@@ -62,30 +62,30 @@ export class LabStates {
   }
 
   /**
-   * Prepares for opening something else: waits until queued changes are complete. Until {@link opened} is called, the
+   * Prepares for opening something else: waits until queued changes are complete. Until {@link finishOpening} is called, the
    * present model's state is ignored.
    */
   async open(text: string): Promise<void> {
     this.#opening = true;
     this.load(text);
-    await this.#turns;
+    await this.#queue;
   }
 
-  /** Ends {@link open}. From now on the state is that of the new model if `isThere`, else that of the previous one. */
-  opened(isThere: boolean): void {
+  /** Ends {@link open}. From now on the state is that of the new model if `hasModel`, else that of the previous one. */
+  finishOpening(hasModel: boolean): void {
     this.#opening = false;
-    if (isThere) this.#model = 'paused';
+    if (hasModel) this.#model = 'paused';
   }
 
   /** Queues changes, so that each starts from the result of the previous one. */
-  inTurn(work: () => Promise<void>): Promise<void> {
-    const turn = this.#turns.then(work);
-    this.#turns = turn.catch(() => undefined);
+  enqueue(work: () => Promise<void>): Promise<void> {
+    const turn = this.#queue.then(work);
+    this.#queue = turn.catch(() => undefined);
     return turn;
   }
 
   /** Ends loading with a model that is not running. */
-  stand(text: string, state: 'paused' | 'done' = 'paused'): void {
+  idle(text: string, state: 'paused' | 'done' = 'paused'): void {
     if (this.#opening) return;
     this.#state.value = state;
     this.#status.say(text);
@@ -95,7 +95,7 @@ export class LabStates {
    * Returns to the model's state after loading has failed or changed nothing; `describe` gives the text for the status
    * line.
    */
-  back(describe: (state: LabState) => string): void {
+  restore(describe: (state: LabState) => string): void {
     if (this.#opening) return;
     this.#state.value = this.#model;
     this.#status.say(describe(this.#model));
@@ -105,7 +105,7 @@ export class LabStates {
    * Enters the model's new state. Returns false if it is ignored: during loading, all states but 'running'; while
    * something else is being opened, all.
    */
-  enter(state: 'running' | 'paused' | 'done'): boolean {
+  setModelState(state: 'running' | 'paused' | 'done'): boolean {
     this.#model = state;
     if (this.#opening || (this.value === 'loading' && state !== 'running')) return false;
     this.#state.value = state;

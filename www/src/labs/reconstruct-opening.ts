@@ -8,7 +8,7 @@ import type { LabStates } from './lab-states';
 import { Opening, type Source } from './opening';
 import type { Photograph } from './photographs';
 import { NO_EDITS } from './picking';
-import { type Opened as Data, fromExample, fromFiles } from './point-files';
+import { type PointFiles as Data, fromExample, fromFiles } from './point-files';
 import { fromHash, type LinkedCloud, withLink } from './reconstruct-link';
 import type { ReconstructParts } from './reconstruct-parts';
 import type { ReconstructSettings } from './reconstruct-settings';
@@ -47,7 +47,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     this.#onOpened = onOpened;
   }
 
-  protected override greeted(specs: ParamSpec[]): void {
+  protected override onEngineReady(specs: ParamSpec[]): void {
     this.defaults = Object.fromEntries(specs.map(({ name, default: value }) => [name, value]));
   }
 
@@ -61,12 +61,12 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
 
   protected fromExample(example: CloudExample): CloudOrigin {
     const name = 'file' in example.source ? example.source.file : example.source.shape;
-    return { name, opened: () => fromExample(example), example };
+    return { name, load: () => fromExample(example), example };
   }
 
   protected fromFiles(files: File[]): CloudOrigin {
     const points = files.find((file) => !/\.(json|png|jpe?g|webp)$/i.test(file.name))?.name;
-    return { name: points ?? files.map((file) => file.name).join(' + '), opened: () => fromFiles(files) };
+    return { name: points ?? files.map((file) => file.name).join(' + '), load: () => fromFiles(files) };
   }
 
   protected async load(origin: CloudOrigin, { source, photographs }: Data): Promise<OpenedCloud> {
@@ -77,9 +77,13 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
   }
 
   /** If only cameras were opened, the source is the present points, now with these cameras. */
-  protected override asOpen(origin: CloudOrigin, { from, photographs }: OpenedCloud, { source }: Data): CloudOrigin {
+  protected override sourceToRemember(
+    origin: CloudOrigin,
+    { from, photographs }: OpenedCloud,
+    { source }: Data,
+  ): CloudOrigin {
     if (source) return origin;
-    return { ...origin, name: this.source?.name ?? origin.name, opened: async () => ({ source: from, photographs }) };
+    return { ...origin, name: this.source?.name ?? origin.name, load: async () => ({ source: from, photographs }) };
   }
 
   protected adopt(opened: OpenedCloud, origin: CloudOrigin): Promise<void> {
@@ -89,7 +93,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
   /** Returns the present points, for cameras that are opened after them. */
   async #presentPoints(): Promise<CloudSource> {
     if (!this.source) throw new Error(text('reconstruct.camerasNeedPoints'));
-    const { source } = await this.source.opened();
+    const { source } = await this.source.load();
     if (!source) throw new Error(text('reconstruct.camerasWithPoints'));
     return source;
   }
@@ -110,7 +114,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
    */
   #usual({ example, linked }: CloudOrigin, samePoints: boolean): CloudChoice & { params: ParamValues } {
     if (example) {
-      const first = variantOf(example);
+      const first = firstVariant(example);
       const params = { ...this.defaults, ...example.params, ...(linked ? {} : first?.params) };
       return { params, maxPoints: first?.maxPoints ?? example.maxPoints, keepComponents: example.keepComponents };
     }
@@ -124,6 +128,6 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
   }
 }
 
-function variantOf(example: CloudExample): CloudVariant | undefined {
+function firstVariant(example: CloudExample): CloudVariant | undefined {
   return isCloudPreset(example) ? example.variants[0] : undefined;
 }

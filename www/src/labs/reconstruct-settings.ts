@@ -5,7 +5,7 @@ import { text } from '../texts';
 import type { CloudChoice } from '../ui/cloud-setup';
 import type { Hit } from '../view/reconstruction';
 import type { LabStates } from './lab-states';
-import { editedBy, NO_EDITS, without } from './picking';
+import { applyClick, NO_EDITS, withoutRemoved } from './picking';
 import type { ReconstructParts } from './reconstruct-parts';
 import type { ReconstructResults } from './reconstruct-results';
 import type { RunControl } from './reconstruct-running';
@@ -32,7 +32,7 @@ export class ReconstructSettings {
   readonly #running: RunControl;
   readonly #onParams: (params: ParamValues) => void;
   readonly #undo = new UndoStack<Settings>(UNDO_LIMITS);
-  #lastChange = { together: '', at: 0 };
+  #lastChange = { mergeKey: '', at: 0 };
   #cloud: Cloud | undefined;
   #params: ParamValues = {};
   #edits: Edits = NO_EDITS;
@@ -87,21 +87,21 @@ export class ReconstructSettings {
    * Changes settings; the surface stays until the new one is complete. If the settings are rejected, nothing changes.
    */
   change(changed: Partial<Settings>, label: string): Promise<void> {
-    return this.#states.inTurn(() => this.#change(changed, label));
+    return this.#states.enqueue(() => this.#change(changed, label));
   }
 
   /** Sets a parameter of the live model; a run continues, and a finished one is resumed. */
   setParam(name: string, value: unknown): Promise<void> {
-    return this.#states.inTurn(() => this.#setParam(name, value));
+    return this.#states.enqueue(() => this.#setParam(name, value));
   }
 
   /** Handles a click in the view with the selected tool. */
   pick(hit: Hit): Promise<void> {
     const { tool, distance } = this.#ui.tools;
     const length = distance * this.#ui.view.size;
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (!this.#cloud || !this.#states.canChange) return;
-      const edits = editedBy(tool, hit, length, this.#edits, this.#cloud.points);
+      const edits = applyClick(tool, hit, length, this.#edits, this.#cloud.points);
       if (edits) await this.#change({ edits }, text('reconstruct.editChange'));
       else if (tool === 'remove') this.#ui.status.say(text('reconstruct.noPointsNear'));
     });
@@ -112,18 +112,18 @@ export class ReconstructSettings {
   }
 
   travel(way: 'undo' | 'redo'): Promise<void> {
-    return this.#states.inTurn(() => this.#travel(way));
+    return this.#states.enqueue(() => this.#travel(way));
   }
 
   /** Builds a new model with the same settings, before its first step. */
   rebuild(): Promise<void> {
-    return this.#states.inTurn(async () => this.showParams(await this.#handOver(this.#now)));
+    return this.#states.enqueue(async () => this.showParams(await this.#handOver(this.#now)));
   }
 
   async #change(changed: Partial<Settings>, label: string): Promise<void> {
     if (!this.#states.canChange) return;
     const before = this.#now;
-    if (await this.#apply({ ...before, ...changed })) this.#remember(before, label);
+    if (await this.#apply({ ...before, ...changed })) this.#checkpoint(before, label);
   }
 
   async #setParam(name: string, value: unknown): Promise<void> {
@@ -131,9 +131,9 @@ export class ReconstructSettings {
     const before = this.#now;
     try {
       const params = await this.#client.request('setParams', { [name]: value });
-      this.#remember(before, text('labs.changeOf', { name }), name);
+      this.#checkpoint(before, text('labs.changeOf', { name }), name);
       this.showParams(params);
-      if (this.#states.beneath === 'done') {
+      if (this.#states.modelState === 'done') {
         this.#results.startOver();
         this.#running.ask(this.#running.play());
       }
@@ -148,7 +148,7 @@ export class ReconstructSettings {
     if (!this.#states.canChange) return;
     const state = this.#now;
     const back = this.#undo[way]({ bytes: sizeOf(state), state });
-    this.#lastChange.together = '';
+    this.#lastChange.mergeKey = '';
     this.#showUndo();
     if (back) await this.#apply(back);
   }
@@ -191,10 +191,10 @@ export class ReconstructSettings {
     return ready.params;
   }
 
-  #remember(state: Settings, label: string, together = ''): void {
+  #checkpoint(state: Settings, label: string, mergeKey = ''): void {
     const now = performance.now();
-    const isOne = together !== '' && together === this.#lastChange.together && now - this.#lastChange.at < TOGETHER;
-    this.#lastChange = { together, at: now };
+    const isOne = mergeKey !== '' && mergeKey === this.#lastChange.mergeKey && now - this.#lastChange.at < TOGETHER;
+    this.#lastChange = { mergeKey, at: now };
     if (!isOne) this.#undo.push({ label, bytes: sizeOf(state), state });
     this.#showUndo();
   }
@@ -208,7 +208,7 @@ export class ReconstructSettings {
     if (!this.#cloud) return;
     const { points, colors } = this.#cloud;
     const { added, removed, outside } = this.#edits;
-    this.#ui.view.showPoints(without(points, removed), colors && without(colors, removed));
+    this.#ui.view.showPoints(withoutRemoved(points, removed), colors && withoutRemoved(colors, removed));
     this.#ui.view.showByHand(Float32Array.from(added.flat()), Float32Array.from(outside.flat()));
   }
 }

@@ -1,8 +1,8 @@
 import type { ReconstructClient } from '../reconstruct/client';
 import { text } from '../texts';
-import { copyAddress, FILE_LACKS, showAddress } from './address';
+import { copyAddress, FILE_NOTE, showAddress } from './address';
 import type { LabStates } from './lab-states';
-import type { PassOn } from './labs';
+import type { OpenInLab } from './labs';
 import { fits, linkOf, toHash } from './reconstruct-link';
 import type { ReconstructOpening } from './reconstruct-opening';
 import type { ReconstructParts } from './reconstruct-parts';
@@ -58,7 +58,7 @@ export class ReconstructSharing {
     this.updateAddress();
     const fit = fits(this.#settings.edits);
     await copyAddress(this.#ui.status, [
-      !this.#opening.source?.example && FILE_LACKS,
+      !this.#opening.source?.example && FILE_NOTE,
       !fit && text('reconstruct.linkLacksEdits'),
     ]);
   }
@@ -71,7 +71,7 @@ export class ReconstructSharing {
   }
 
   /** Passes f on to the Extract lab as a volume; inside is above the level. */
-  toExtract(passOn: PassOn): void {
+  toExtract(passOn: OpenInLab): void {
     this.#ui.status.say(text('reconstruct.samplingVolume'));
     this.#tryTo(async () => {
       const { bytes, level } = await this.#client.request('volume', { size: VOLUME_SIZE });
@@ -85,7 +85,7 @@ export class ReconstructSharing {
   }
 
   /** Passes the surface on as a mesh to deform. */
-  toSculpt(passOn: PassOn): void {
+  toSculpt(passOn: OpenInLab): void {
     this.#tryTo(async () => {
       const bytes = await this.#client.request('export', { format: 'ply' });
       passOn({ lab: 'sculpt', name: text('labs.surfaceName', { name: this.#ui.saving.name }), bytes, params: {} });

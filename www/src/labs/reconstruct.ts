@@ -2,14 +2,14 @@ import { RequestError } from '../channel';
 import { GUIDES } from '../guides';
 import { ReconstructClient } from '../reconstruct/client';
 import { type CloudPreset, type CloudVariant, isCloudPreset, variantInForce } from '../reconstruct/presets';
-import type { ParamValues, PointShade, WorkerEvent } from '../reconstruct/protocol';
+import type { ParamValues, PointQuantity, WorkerEvent } from '../reconstruct/protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import type { CloudViewOptions } from '../view/reconstruction';
 import { LabStates } from './lab-states';
-import type { Lab, PassOn } from './labs';
+import type { Lab, OpenInLab } from './labs';
 import { photoFor } from './reconstruct-link';
 import { type CloudOrigin, type OpenedCloud, ReconstructOpening } from './reconstruct-opening';
 import { type PartEvents, ReconstructParts } from './reconstruct-parts';
@@ -24,7 +24,7 @@ import { ReconstructSharing } from './reconstruct-sharing';
  */
 export class ReconstructLab implements Lab {
   readonly #root: HTMLElement;
-  readonly #passOn: PassOn;
+  readonly #passOn: OpenInLab;
   readonly #closing = new AbortController();
   readonly #client = new ReconstructClient((event) => this.#onEvent(event));
   readonly #ui: ReconstructParts;
@@ -34,9 +34,9 @@ export class ReconstructLab implements Lab {
   readonly #settings: ReconstructSettings;
   readonly #opening: ReconstructOpening;
   readonly #sharing: ReconstructSharing;
-  #shade: PointShade | undefined;
+  #quantity: PointQuantity | undefined;
 
-  constructor(root: HTMLElement, help: HTMLElement, passOn: PassOn) {
+  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
     this.#root = root;
     this.#passOn = passOn;
     const { signal } = this.#closing;
@@ -55,7 +55,7 @@ export class ReconstructLab implements Lab {
       this.#adopt(opened, origin),
     );
     this.#sharing = new ReconstructSharing(client, ui, states, this.#settings, this.#opening);
-    states.follow((state) => this.#showState(state));
+    states.subscribe((state) => this.#showState(state));
     offerShortcuts(this.#shortcuts(), help, GUIDES.reconstruct, signal);
   }
 
@@ -158,9 +158,9 @@ export class ReconstructLab implements Lab {
   }
 
   #setOptions({ color }: CloudViewOptions): void {
-    const shade = color === 'mean curvature' || color === 'distance' ? color : undefined;
-    if (shade !== this.#shade) this.#running.ask(this.#client.request('shade', shade));
-    this.#shade = shade;
+    const quantity = color === 'mean curvature' || color === 'distance' ? color : undefined;
+    if (quantity !== this.#quantity) this.#running.ask(this.#client.request('quantity', quantity));
+    this.#quantity = quantity;
     this.#sharing.updateAddress();
   }
 
@@ -168,12 +168,12 @@ export class ReconstructLab implements Lab {
   async #reset(): Promise<void> {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
-    if (engineBroken) return this.#opening.again();
+    if (engineBroken) return this.#opening.reopen();
     this.#states.load(text('labs.resetting'));
     try {
       await this.#settings.rebuild();
       this.#results.clear();
-      this.#states.stand(text('labs.readyToStart'));
+      this.#states.idle(text('labs.readyToStart'));
     } catch (error) {
       this.#states.fail(text('labs.buildFailed'), error);
     }
@@ -182,13 +182,13 @@ export class ReconstructLab implements Lab {
   #onEvent(event: WorkerEvent): void {
     if (event.event === 'failure') this.#states.fail(text('labs.runFailed'), new RequestError(event.failure));
     else if (event.event !== 'state') this.#results.take(event);
-    else if (this.#states.enter(event.state)) this.#results.showState(event.state);
+    else if (this.#states.setModelState(event.state)) this.#results.showState(event.state);
   }
 
   #showState(state: LabState): void {
-    const { beneath, ready } = this.#states;
+    const { modelState, ready } = this.#states;
     this.#root.dataset.state = state;
-    this.#ui.showState(beneath, ready, state !== 'loading' && this.#results.complete);
+    this.#ui.showState(modelState, ready, state !== 'loading' && this.#results.complete);
   }
 
   /** Handles Escape: dismisses the message, else deselects the tool, else leaves the photograph. */

@@ -56,7 +56,7 @@ export class Filming {
   seek(frame: number): void {
     const { film } = this.#settings;
     if (!film || !this.#states.canChange) return;
-    this.#settings.remember(text('sculpt.frameChange', { frame }), 'seek');
+    this.#settings.checkpoint(text('sculpt.frameChange', { frame }), 'seek');
     this.#settings.send(poseAt(film, frame), false);
     void this.#settings.setFilm(film, frame).catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
@@ -78,7 +78,7 @@ export class Filming {
 
   #change(film: Film | undefined, what: string, frame: number): void {
     if (!this.#states.canChange) return;
-    this.#settings.remember(what);
+    this.#settings.checkpoint(what);
     void this.#settings.setFilm(film, frame).catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 }

@@ -2,7 +2,7 @@ import type { Texture } from 'three';
 import type { SculptClient } from '../sculpt/client';
 import { SCENES, type SculptExample } from '../sculpt/examples';
 import { posesOf, SCULPT_PRESETS, type SculptPreset, type SculptVariant } from '../sculpt/presets';
-import type { MeshTexture, Opened, ParamSpec, ParamValues } from '../sculpt/protocol';
+import type { MeshTexture, OpenedScene, ParamSpec, ParamValues } from '../sculpt/protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { h } from '../ui/dom';
@@ -21,10 +21,10 @@ import { ErrorBanner, StatusLine } from '../ui/status';
 import { Transport, type TransportEvents } from '../ui/transport';
 import { pictureOf } from '../view/picture';
 import { SculptureView, type SculptViewOptions } from '../view/sculpture';
-import { Answers } from './answers';
+import { DragLatency } from './answers';
 import { ACCEPT } from './mesh-files';
 import { Saving } from './saving';
-import { Ahead } from './sculpt-ahead';
+import { SurfaceCarrier } from './sculpt-ahead';
 import { SCULPT_PLOTS, SCULPT_ROWS } from './sculpt-measures';
 import { layOut, ScenePanel } from './sculpt-page';
 
@@ -54,11 +54,11 @@ export class SculptParts {
     'aria-label': text('sculpt.viewLabel'),
   });
   readonly view = new SculptureView(this.#canvas, INITIAL_VIEW);
-  readonly ahead = new Ahead(this.view);
-  readonly answer = new Answers();
+  readonly carrier = new SurfaceCarrier(this.view);
+  readonly latency = new DragLatency();
   readonly status = new StatusLine();
   readonly measures = new MeasurePanel(SCULPT_ROWS);
-  readonly coarse = h('p', { class: 'coarse', hidden: true }, text('sculpt.coarsePreview'));
+  readonly previewNote = h('p', { class: 'coarse', hidden: true }, text('sculpt.coarsePreview'));
   readonly banner: ErrorBanner;
   readonly data: ScenePanel;
   readonly options: SculptOptionControls;
@@ -128,7 +128,7 @@ export class SculptParts {
       cancel: this.#cancel,
       options: this.options.element,
       legend: this.view.legend.element,
-      coarse: this.coarse,
+      coarse: this.previewNote,
       captions: this.#captions,
       banner: this.banner.element,
       status: this.status.element,
@@ -151,7 +151,7 @@ export class SculptParts {
 
   /** Shows a newly opened scene. */
   adopt(
-    { box, start, pose, detail, bands, made, texture }: Opened,
+    { box, start, pose, detail, bands, buildMs, texture }: OpenedScene,
     example: SculptExample | undefined,
     name: string,
   ): void {
@@ -159,7 +159,7 @@ export class SculptParts {
     this.measures.unit = '';
     this.view.setScene(box, example?.up ?? 'y', start, [pose, ...posesOf(example)]);
     this.#showTexture(texture);
-    this.data.show({ name, detail, bands, made }, example);
+    this.data.show({ name, detail, bands, made: buildMs }, example);
   }
 
   /** Decodes and shows a texture. If that fails, the surface stays without one. */

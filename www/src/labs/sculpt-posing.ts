@@ -41,7 +41,7 @@ export class Posing {
     this.#ui = ui;
     this.#settings = settings;
     ui.view.onPick = (index) => settings.choose(index);
-    ui.view.handles.onDragStart = () => this.#remember(DONE[this.#mode], false);
+    ui.view.handles.onDragStart = () => this.#checkpoint(DONE[this.#mode], false);
     ui.view.handles.onDrag = (ellipsoid, dragging) => this.#drag(ellipsoid, dragging);
     ui.view.takesKey = (event, directions) => this.#key(event, directions);
   }
@@ -55,7 +55,7 @@ export class Posing {
 
   /** Replaces the selected ellipsoid by one entered as numbers. */
   change(ellipsoid: ControlEllipsoid, what: string): void {
-    this.#remember(what, true);
+    this.#checkpoint(what, true);
     this.#send(ellipsoid, false);
     this.#announce(what);
   }
@@ -71,7 +71,7 @@ export class Posing {
       [0, size, 0],
       [0, 0, size],
     ];
-    this.#settings.remember(text('sculpt.newEllipsoidChange'));
+    this.#settings.checkpoint(text('sculpt.newEllipsoidChange'));
     this.#settings.send([...pose, { center, axes: [x, y, z] }], false, [...names, '']);
     this.#settings.choose(pose.length);
   }
@@ -82,7 +82,7 @@ export class Posing {
     if (chosen === undefined || pose.length < 2) return;
     const name = this.#settings.nameOf(chosen);
     const others = <T>(list: T[]) => list.filter((_, index) => index !== chosen);
-    this.#settings.remember(text('sculpt.removedEllipsoidChange'));
+    this.#settings.checkpoint(text('sculpt.removedEllipsoidChange'));
     this.#settings.send(others(pose), false, others(names));
     this.#settings.choose(undefined);
     this.#ui.status.say(text('sculpt.ellipsoidRemoved', { name }));
@@ -105,11 +105,11 @@ export class Posing {
     this.#settings.send(next, dragging);
   }
 
-  #remember(what: string, together: boolean): void {
+  #checkpoint(what: string, merge: boolean): void {
     const { chosen } = this.#settings;
     if (chosen === undefined) return;
     const label = text('sculpt.ellipsoidChange', { name: this.#settings.nameOf(chosen), what });
-    this.#settings.remember(label, together ? label : '');
+    this.#settings.checkpoint(label, merge ? label : '');
   }
 
   /** Describes the ellipsoid's new position in the status line, once the change has ended. */
@@ -153,7 +153,7 @@ export class Posing {
         turned(ellipsoid, [up, right, near][step.axis] ?? up, ROTATION_STEP * much * TURN_SIGNS[step.axis] * step.sign),
       size: () => sized(ellipsoid, step, much),
     };
-    this.#remember(DONE[this.#mode], true);
+    this.#checkpoint(DONE[this.#mode], true);
     this.#send(change[this.#mode](), true);
     clearTimeout(this.#resting);
     this.#resting = window.setTimeout(() => this.#rest(), IDLE_MS);

@@ -50,8 +50,8 @@ export class SculptResults {
     this.#measured = undefined;
     this.#originals = false;
     this.#more = {};
-    this.#ui.ahead.clear();
-    this.#ui.answer.clear();
+    this.#ui.carrier.clear();
+    this.#ui.latency.clear();
     this.#ui.measures.clear();
     this.startOver();
   }
@@ -94,7 +94,7 @@ export class SculptResults {
   }
 
   showState(state: LabState): void {
-    if (state === 'paused' || state === 'done') this.#ui.ahead.rest();
+    if (state === 'paused' || state === 'done') this.#ui.carrier.stop();
     this.#showHistory();
     this.#ui.status.say(this.describe(state));
   }
@@ -141,28 +141,28 @@ export class SculptResults {
   }
 
   #show(frame: FrameEvent): void {
-    const { view, ahead, measures, coarse } = this.#ui;
+    const { view, carrier, measures, previewNote } = this.#ui;
     view.show('S1dash', frame.result);
     view.show('S0dash', frame.base);
-    ahead.shown(frame);
+    carrier.frameShown(frame);
     view.show('T', frame.link);
     if (frame.levels) view.showStages(frame.levels);
-    coarse.hidden = !frame.coarse;
+    previewNote.hidden = !frame.preview;
     this.#follow(frame);
-    this.#showLatency(frame.turn);
-    this.#more.frameMs = frame.took;
+    this.#showLatency(frame.poseId);
+    this.#more.frameMs = frame.durationMs;
     const last = frame.reports.at(-1);
     if (last) measures.showReport({ ...last, vertices: frame.result.vertices, triangles: frame.result.triangles });
     measures.showExtra(this.#more);
     if (performance.now() - this.#shownAt > SHOW_EVERY) this.#showHistory();
   }
 
-  #showLatency(turn: number): void {
-    const { answer } = this.#ui;
-    if (!answer.drawn(turn, performance.now()) || !answer.last) return;
-    if (answer.alongMs !== undefined) this.#more.alongMs = Math.round(answer.alongMs);
-    this.#more.answerMs = Math.round(answer.last.milliseconds);
-    this.#more.answerFrames = answer.last.frames;
+  #showLatency(poseId: number): void {
+    const { latency } = this.#ui;
+    if (!latency.frameDrawn(poseId, performance.now()) || !latency.last) return;
+    if (latency.displayMs !== undefined) this.#more.alongMs = Math.round(latency.displayMs);
+    this.#more.answerMs = Math.round(latency.last.milliseconds);
+    this.#more.answerFrames = latency.last.frames;
   }
 
   #showHistory(): void {

@@ -6,7 +6,7 @@ import type { FrameEvent, ParamValues, Pose, SavedPose } from '../sculpt/protoco
 import { text } from '../texts';
 import type { History, HistoryMark } from '../ui/history';
 import type { LabStates } from './lab-states';
-import { Rewinder } from './rewinder';
+import { UndoHistory } from './rewinder';
 import type { SculptParts } from './sculpt-parts';
 
 /** State of the page besides the model, which undo restores. */
@@ -34,7 +34,7 @@ export class SculptSettings {
   readonly #states: LabStates;
   readonly #history: History;
   readonly #onChange: () => void;
-  readonly #rewinder: Rewinder<PageState, SavedPose>;
+  readonly #undo: UndoHistory<PageState, SavedPose>;
   #params: ParamValues = {};
   #pose: Pose = [];
   #names: string[] = [];
@@ -43,7 +43,7 @@ export class SculptSettings {
   #film: Film | undefined;
   #frame = 0;
   /** Number of the last pose sent. */
-  #turn = 0;
+  #poseId = 0;
 
   /** `onChange` is called whenever the settings in force may have changed. */
   constructor(client: SculptClient, ui: SculptParts, states: LabStates, history: History, onChange: () => void) {
@@ -52,7 +52,7 @@ export class SculptSettings {
     this.#states = states;
     this.#history = history;
     this.#onChange = onChange;
-    this.#rewinder = new Rewinder<PageState, SavedPose>(
+    this.#undo = new UndoHistory<PageState, SavedPose>(
       client,
       () => ({ names: this.#names, posed: this.#posed, film: this.#film, mark: history.marker() }),
       (undoable, redoable) => ui.transport.showUndo(undoable, redoable),
@@ -94,7 +94,7 @@ export class SculptSettings {
 
   /** Adopts another scene, and clears the undo history. */
   adopt({ pose, names, posed, film, params }: Adopted): void {
-    this.#rewinder.clear();
+    this.#undo.clear();
     this.#pose = pose;
     this.#names = named(names, pose.length);
     this.#posed = posed;
@@ -117,11 +117,11 @@ export class SculptSettings {
   }
 
   /**
-   * Saves the present state for undo, before a change; changes with the same `together` in short succession count as
+   * Saves the present state for undo, before a change; changes with the same `mergeKey` in short succession count as
    * one. Returns a function that forgets it.
    */
-  remember(label: string, together = ''): () => void {
-    return this.#rewinder.remember(label, together);
+  checkpoint(label: string, mergeKey = ''): () => void {
+    return this.#undo.checkpoint(label, mergeKey);
   }
 
   /** Sends the worker a target pose; `names` if the ellipsoids themselves have changed. */
@@ -131,21 +131,21 @@ export class SculptSettings {
     this.#pose = pose;
     this.#names = named(names, pose.length);
     this.#posed = true;
-    this.#turn = this.#client.pose(pose, dragging);
-    this.#answer(dragging);
+    this.#poseId = this.#client.pose(pose, dragging);
+    this.#measureLatency(dragging);
     if (this.#chosen !== undefined && this.#chosen >= pose.length) this.#chosen = undefined;
     this.#showPose();
     if (!dragging) this.#onChange();
   }
 
   /** During a drag, carries the displayed surface along at once; the model follows. Records both latencies. */
-  #answer(dragging: boolean): void {
-    const { ahead, answer } = this.#ui;
+  #measureLatency(dragging: boolean): void {
+    const { carrier, latency } = this.#ui;
     const at = performance.now();
-    answer.sent(this.#turn, at);
+    latency.poseSent(this.#poseId, at);
     // After the drawing, which has requested the same animation frame.
-    if (dragging && ahead.follow(this.#pose, this.#turn))
-      requestAnimationFrame(() => answer.along(performance.now() - at));
+    if (dragging && carrier.dragTo(this.#pose, this.#poseId))
+      requestAnimationFrame(() => latency.carried(performance.now() - at));
   }
 
   get names(): string[] {
@@ -161,8 +161,8 @@ export class SculptSettings {
   }
 
   /** Takes the film's frame and the target pose from a frame of the model, unless a newer pose was sent. */
-  follow({ turn, frame, pose }: FrameEvent, playing: boolean): void {
-    if (turn < this.#turn) return;
+  follow({ poseId, frame, pose }: FrameEvent, playing: boolean): void {
+    if (poseId < this.#poseId) return;
     if (playing && frame !== this.#frame) this.#posed = false;
     this.#frame = frame;
     if (!samePose(pose, this.#pose)) {
@@ -174,7 +174,7 @@ export class SculptSettings {
   }
 
   /** Returns to the previous target after the worker has rejected a pose. */
-  refuse(pose: Pose, why: string): void {
+  reject(pose: Pose, why: string): void {
     this.#pose = pose;
     this.#names = named(this.#names, pose.length);
     this.#showPose();
@@ -183,12 +183,12 @@ export class SculptSettings {
 
   /** Sets parameters of the live model; a run continues, and a model at rest is resumed. */
   setParams(values: ParamValues, what: string): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return this.show();
-      const forget = this.remember(text('labs.changeOf', { name: what }), what);
+      const forget = this.checkpoint(text('labs.changeOf', { name: what }), what);
       try {
         this.#params = await this.#client.request('setParams', values);
-        if (this.#states.beneath === 'done') await this.#client.request('settle', undefined);
+        if (this.#states.modelState === 'done') await this.#client.request('settle', undefined);
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);
@@ -202,10 +202,10 @@ export class SculptSettings {
   }
 
   travel(way: 'undo' | 'redo'): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
       try {
-        const moment = await this.#rewinder.travel(way);
+        const moment = await this.#undo.step(way);
         if (moment) await this.#goTo(moment.saved, moment.page);
       } catch (error) {
         this.#states.fail(way === 'undo' ? text('labs.undoFailed') : text('labs.redoFailed'), error);
@@ -215,9 +215,9 @@ export class SculptSettings {
 
   /** Builds a new model of the same meshes with the parameters in force, before its first step. */
   rebuild(start: Pose | undefined): Promise<void> {
-    return this.#states.inTurn(async () => {
+    return this.#states.enqueue(async () => {
       const ready = await this.#client.request('rebuild', { start, params: this.#params, pose: undefined });
-      this.#rewinder.clear();
+      this.#undo.clear();
       this.#pose = ready.pose;
       this.#names = named(this.#names, ready.pose.length);
       this.#params = ready.params;

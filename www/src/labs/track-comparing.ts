@@ -1,7 +1,7 @@
 import { text } from '../texts';
 import type { TrackClient } from '../track/client';
-import type { Enrichment, Setup, SurfaceError } from '../track/protocol';
-import { type Alternative, comparedRun, type TrackingRun } from '../ui/track-compare';
+import type { Alternative, Enrichment, Setup, SurfaceError } from '../track/protocol';
+import { comparedRun, type TrackingRun } from '../ui/track-compare';
 import type { TrackResults } from './track-results';
 import type { TrackSettings } from './track-settings';
 
@@ -43,5 +43,5 @@ function otherwise(setup: Setup, other: Alternative, predicted: boolean): Setup 
 function meanOf(errors: SurfaceError[]): SurfaceError | undefined {
   if (errors.length === 0) return undefined;
   const mean = (of: keyof SurfaceError) => errors.reduce((sum, error) => sum + error[of], 0) / errors.length;
-  return { mean: mean('mean'), most: mean('most') };
+  return { mean: mean('mean'), p95: mean('p95') };
 }

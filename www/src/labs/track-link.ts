@@ -1,6 +1,6 @@
 /** Converts the Track lab's settings to the hash of an address, `#track?…`, and back. */
 import type { ParamValues, Vec3 } from '../protocol';
-import { FILMS, OWN_PREPARATION, type TrackExample } from '../track/examples';
+import { IMAGES, OWN_PREPARATION, type TrackExample } from '../track/examples';
 import { viewOf } from '../track/presets';
 import type { Box, Enrichment, Preparation, Setup } from '../track/protocol';
 import type { TrackViewOptions } from '../view/beating';
@@ -48,7 +48,7 @@ export function linkOf({ example, file, setup, view }: LinkableTrack): LinkedTra
   const same = (one: unknown, other: unknown) => JSON.stringify(one) === JSON.stringify(other);
   return {
     ...(!example && { file }),
-    ...(example && example !== FILMS[0] && { example: example.id }),
+    ...(example && example !== IMAGES[0] && { example: example.id }),
     params: differing(setup.params, usual.params),
     preparation: differing({ ...setup.preparation }, { ...usual.preparation }),
     ...(!same(setup.box, usual.box) && { box: setup.box ?? 'whole' }),

@@ -65,7 +65,7 @@ export function moreOf({ frames, count, frame, closing, noise }: Tracked): Recor
     frames: count,
     tracked: frames.length,
     ...(shown && { folded: shown.facts.folded }),
-    ...(shown?.error && { errorMean: shown.error.mean, errorMost: shown.error.most }),
+    ...(shown?.error && { errorMean: shown.error.mean, errorMost: shown.error.p95 }),
     ...(beat && { ejection: beat.ejection, largest: beat.largest, smallest: beat.smallest }),
     ...(closing !== undefined && { closing }),
   };
@@ -83,7 +83,7 @@ export function framesCsv(frames: readonly TrackedFrame[], truth: readonly numbe
     i + 1,
     ...COLUMNS.map((name) => facts[name as keyof typeof facts]),
     measures.report?.selfIntersections ?? '',
-    ...(known ? [error?.mean ?? '', error?.most ?? '', truth?.[i] ?? ''] : []),
+    ...(known ? [error?.mean ?? '', error?.p95 ?? '', truth?.[i] ?? ''] : []),
   ]);
   return `${[head, ...lines].map((line) => line.join(',')).join('\n')}\n`;
 }

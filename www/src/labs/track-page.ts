@@ -1,6 +1,6 @@
 import { text } from '../texts';
 import type { TrackExample } from '../track/examples';
-import type { Opened } from '../track/protocol';
+import type { OpenedImage } from '../track/protocol';
 import { h, section, uniqueId } from '../ui/dom';
 import { figure, milliseconds } from '../ui/format';
 import { folded } from './extract-page';
@@ -90,7 +90,7 @@ const FACTS = [
 ];
 
 /** Panel that shows the open image and opens others. */
-export class FilmPanel {
+export class ImagePanel {
   readonly element: HTMLElement;
   readonly #examples: HTMLSelectElement;
   readonly #own = h('option', { value: '', hidden: true }, text('labs.yourFile'));
@@ -137,7 +137,7 @@ export class FilmPanel {
   }
 
   show(
-    opened: Pick<Opened, 'dims' | 'spacing' | 'volume' | 'prepared'> | undefined,
+    opened: Pick<OpenedImage, 'dims' | 'spacing' | 'volume' | 'openingMs'> | undefined,
     example: TrackExample | undefined,
     name: string,
   ): void {
@@ -150,7 +150,7 @@ export class FilmPanel {
       sizes(opened.dims),
       `${sizes(opened.spacing)} ${unit}`.trim(),
       `${sizes(opened.volume.dims)}`,
-      milliseconds(opened.prepared),
+      milliseconds(opened.openingMs),
     ];
     const rows = FACTS.map((fact, i) => h('div', {}, h('dt', {}, fact), h('dd', {}, known?.[i] ?? '–')));
     this.#facts.replaceChildren(...rows);

@@ -3,9 +3,9 @@ import type { LabState } from '../state';
 import { text } from '../texts';
 import type { VoxelBox } from '../track/box';
 import type { TrackClient } from '../track/client';
-import { FILMS, type TrackExample } from '../track/examples';
+import { IMAGES, type TrackExample } from '../track/examples';
 import { TRACK_PRESETS, type TrackPreset, type TrackVariant } from '../track/presets';
-import type { Opened, ParamSpec, ParamValues, Preparation, Vec3 } from '../track/protocol';
+import type { Alternative, OpenedImage, ParamSpec, ParamValues, Preparation, Vec3 } from '../track/protocol';
 import { VolumeCurve } from '../ui/beat-curve';
 import { FrameTable } from '../ui/beat-table';
 import { h } from '../ui/dom';
@@ -21,13 +21,13 @@ import { RegionControls, type RegionEvents } from '../ui/region';
 import { ErrorBanner, StatusLine } from '../ui/status';
 import { EdgeThreshold } from '../ui/step-height';
 import { FigureRow } from '../ui/stills';
-import { type Alternative, TrackComparePanel } from '../ui/track-compare';
+import { TrackComparePanel } from '../ui/track-compare';
 import { TrackOptionControls } from '../ui/track-options';
 import { Transport, type TransportEvents } from '../ui/transport';
 import { TrackView, type TrackViewOptions } from '../view/beating';
 import { Saving } from './saving';
 import { TRACK_ROWS } from './track-measures';
-import { FilmPanel, layOut } from './track-page';
+import { ImagePanel, layOut } from './track-page';
 
 export const INITIAL_VIEW: TrackViewOptions = {
   surface: true,
@@ -74,7 +74,7 @@ export class TrackParts {
   readonly measures = new MeasurePanel(TRACK_ROWS);
   readonly table = new FrameTable();
   readonly banner: ErrorBanner;
-  readonly data: FilmPanel;
+  readonly data: ImagePanel;
   readonly options: TrackOptionControls;
   readonly preparation: PreparationControls;
   readonly region: RegionControls;
@@ -102,7 +102,7 @@ export class TrackParts {
     this.#root = root;
     this.#events = events;
     this.banner = new ErrorBanner(events.onDismiss);
-    this.data = new FilmPanel(FILMS, TRACK_PRESETS, fileChooser(events.onFiles), events.onExample);
+    this.data = new ImagePanel(IMAGES, TRACK_PRESETS, fileChooser(events.onFiles), events.onExample);
     this.#figure = new FigurePanel<TrackVariant, TrackPreset>(events.onVariant);
     this.preparation = new PreparationControls(events.onPreparation);
     this.region = new RegionControls(events);
@@ -195,7 +195,7 @@ export class TrackParts {
   }
 
   /** Shows a newly opened image. */
-  adopt(opened: Opened, example: TrackExample | undefined, name: string): void {
+  adopt(opened: OpenedImage, example: TrackExample | undefined, name: string): void {
     this.saving.name = (example?.id ?? name).replace(/^.*\//, '');
     this.measures.unit = example?.unit ?? 'mm';
     this.data.show(opened, example, name);

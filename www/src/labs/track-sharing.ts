@@ -5,9 +5,9 @@
 import { zipSync } from 'three/addons/libs/fflate.module.js';
 import { text } from '../texts';
 import type { TrackClient } from '../track/client';
-import { copyAddress, FILE_LACKS, showAddress } from './address';
+import { copyAddress, FILE_NOTE, showAddress } from './address';
 import type { LabStates } from './lab-states';
-import type { PassOn } from './labs';
+import type { OpenInLab } from './labs';
 import { linkOf, toHash } from './track-link';
 import { framesCsv } from './track-measures';
 import type { TrackOpening } from './track-opening';
@@ -50,7 +50,7 @@ export class TrackSharing {
 
   async copyLink(): Promise<void> {
     this.updateAddress();
-    await copyAddress(this.#ui.status, [!this.#opening.source?.example && FILE_LACKS]);
+    await copyAddress(this.#ui.status, [!this.#opening.source?.example && FILE_NOTE]);
   }
 
   save(what: 'frames' | 'animation' | 'table'): void {
@@ -59,7 +59,7 @@ export class TrackSharing {
   }
 
   /** Passes the displayed frame's surface on as a mesh to deform. */
-  toSculpt(passOn: PassOn): void {
+  toSculpt(passOn: OpenInLab): void {
     const { frame } = this.#results;
     this.#client.request('export', { frame, format: 'ply' }).then(
       (bytes) =>

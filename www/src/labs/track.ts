@@ -5,16 +5,15 @@ import { plural, text } from '../texts';
 import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
 import { TrackClient } from '../track/client';
 import { isTrackPreset, type TrackPreset, type TrackVariant, variantInForce, viewOf } from '../track/presets';
-import type { StepEvent, VolumeView, WorkerEvent } from '../track/protocol';
+import type { Alternative, StepEvent, VolumeView, WorkerEvent } from '../track/protocol';
 import { prefersReducedMotion } from '../ui/dom';
 import { History } from '../ui/history';
 import { offerShortcuts, type Shortcut } from '../ui/shortcuts';
-import type { Alternative } from '../ui/track-compare';
 import { invert, sliceOrientations } from '../view/anatomy';
 import { LabStates } from './lab-states';
-import type { Lab, PassedOn, PassOn } from './labs';
+import type { Handoff, Lab, OpenInLab } from './labs';
 import { compareWith } from './track-comparing';
-import { type Opened, TrackOpening, type TrackSource } from './track-opening';
+import { type OpenedTrack, TrackOpening, type TrackSource } from './track-opening';
 import { type PartEvents, TrackParts } from './track-parts';
 import { TrackResults } from './track-results';
 import { TrackSettings } from './track-settings';
@@ -34,7 +33,7 @@ export class TrackLab implements Lab {
   readonly #settings: TrackSettings;
   readonly #opening: TrackOpening;
   readonly #sharing: TrackSharing;
-  readonly #passOn: PassOn;
+  readonly #passOn: OpenInLab;
   #volume: VolumeView | undefined;
   /** Number of slices of the image before its preparation. */
   #slices = 1;
@@ -43,7 +42,7 @@ export class TrackLab implements Lab {
   #began: number | undefined;
   #duration: number | undefined;
 
-  constructor(root: HTMLElement, help: HTMLElement, passOn: PassOn) {
+  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
     this.#root = root;
     this.#passOn = passOn;
     const { signal } = this.#closing;
@@ -62,12 +61,12 @@ export class TrackLab implements Lab {
     );
     this.#opening = new TrackOpening(this.#client, ui, states, (opened, source) => this.#adopt(opened, source));
     this.#sharing = new TrackSharing(this.#client, ui, states, this.#results, this.#settings, this.#opening);
-    states.follow((state) => this.#showState(state));
+    states.subscribe((state) => this.#showState(state));
     offerShortcuts(this.#shortcuts(), help, GUIDES.track, signal);
   }
 
   /** Opens what the address asks for, or else the first example, and runs it. */
-  async start(_passedOn?: PassedOn): Promise<void> {
+  async start(_passedOn?: Handoff): Promise<void> {
     await this.#opening.start(this.#closing.signal, () => this.#sharing.updateAddress());
   }
 
@@ -92,7 +91,7 @@ export class TrackLab implements Lab {
       onParam: (name, value) => void this.#settings.setParams({ [name]: value }, this.#ui.labelOf(name)),
       onOptions: () => this.#optionsChanged(),
       onFrame: (frame) => this.#results.choose(frame),
-      onMoved: () => this.#results?.showStills(),
+      onMoved: () => this.#results?.showFigures(),
       onCompare: (other) => void this.#compare(other),
       onCancelCompare: () => this.#ask(this.#client.request('cancelCompare', undefined)),
       onSave: (what) => this.#sharing.save(what),
@@ -134,7 +133,7 @@ export class TrackLab implements Lab {
   }
 
   /** Displays an opened image, with the settings of its example or link, and starts tracking. */
-  async #adopt(opened: Opened, { name, example, linked }: TrackSource): Promise<void> {
+  async #adopt(opened: OpenedTrack, { name, example, linked }: TrackSource): Promise<void> {
     const { setup } = opened;
     this.#states.ready = true;
     this.#slices = opened.dims[2];
@@ -153,7 +152,7 @@ export class TrackLab implements Lab {
 
   #takeVolume(volume: VolumeView, keep: boolean): void {
     this.#volume = volume;
-    this.#results.setFilm(volume, this.#slices, this.#truth, keep);
+    this.#results.setImage(volume, this.#slices, this.#truth, keep);
   }
 
   /** The region of interest in voxels; the whole image by default. */
@@ -206,7 +205,7 @@ export class TrackLab implements Lab {
 
   #optionsChanged(): void {
     if (!this.#states?.ready) return;
-    this.#results.showStills();
+    this.#results.showFigures();
     this.#sharing.updateAddress();
   }
 
@@ -225,7 +224,7 @@ export class TrackLab implements Lab {
     if (!this.#states.canRun || this.#states.value === 'running') return;
     this.#ui.banner.hide();
     this.#results.follow();
-    this.#settings.remember(plural('counts.step', steps));
+    this.#settings.checkpoint(plural('counts.step', steps));
     this.#client.request('step', { count: steps }).catch((error) => this.#states.fail(text('track.stepFailed'), error));
   }
 
@@ -233,11 +232,11 @@ export class TrackLab implements Lab {
   async #reset(): Promise<void> {
     const { ready, value, engineBroken } = this.#states;
     if (!ready || value === 'loading') return;
-    if (engineBroken) return this.#opening.again();
+    if (engineBroken) return this.#opening.reopen();
     this.#states.load(text('labs.resetting'));
     try {
       await this.#settings.rebuild();
-      this.#states.stand(text('labs.readyToStart'));
+      this.#states.idle(text('labs.readyToStart'));
     } catch (error) {
       this.#states.fail(text('track.buildFailed'), error);
     }
@@ -272,7 +271,7 @@ export class TrackLab implements Lab {
     else if (event.event === 'step') {
       this.#results.take(event);
       this.#report(event);
-    } else if (this.#states.enter(event.state)) this.#settled(event.state);
+    } else if (this.#states.setModelState(event.state)) this.#settled(event.state);
   }
 
   /** Reports progress to screen readers occasionally: every frame would be too often. */
@@ -302,10 +301,10 @@ export class TrackLab implements Lab {
   }
 
   #showState(state: LabState): void {
-    const { beneath, ready } = this.#states;
+    const { modelState, ready } = this.#states;
     const { frames, frame } = this.#results;
     this.#root.dataset.state = state;
-    this.#ui.showState(beneath, ready, frames.length, frames[frame] !== undefined);
+    this.#ui.showState(modelState, ready, frames.length, frames[frame] !== undefined);
     if (state === 'done' || state === 'paused') this.#sharing.updateAddress();
   }
 

@@ -6,14 +6,14 @@ import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
 import { copySurface, emptyArrays, transferOf } from '../worker/room';
 import { buffersOf, reply, stop, type Task } from '../worker/serving';
-import { buildModel, cloudFrom, cubicDims, edited, fitOf, levelOf, packed, valuesFor } from './model';
+import { applyEdits, buildModel, cloudFrom, cubicDims, fitOf, levelOf, toPointEdits, valuesFor } from './model';
 import type {
   CameraView,
   Cloud,
   Edits,
   Loaded,
   ParamValues,
-  PointShade,
+  PointQuantity,
   Ready,
   RequestKind,
   Requests,
@@ -40,7 +40,7 @@ class Session {
   #cameras: CameraView[] = [];
   #setup: Setup | undefined;
   #model: ImplicitSurface | undefined;
-  #shade: PointShade | undefined;
+  #quantity: PointQuantity | undefined;
   /** Reports of steps that were not sent to the page yet. */
   #reports: StepReport[] = [];
   #reportedAt = 0;
@@ -68,7 +68,7 @@ class Session {
     setEdits: (edits) => this.#setEdits(edits),
     export: ({ format }) => this.#current().mesh.toBytes(format),
     volume: ({ size }) => this.#volume(size),
-    shade: (shade) => this.#setShade(shade),
+    quantity: (quantity) => this.#setQuantity(quantity),
     timing: (body) => this.#time(body),
     cancelTiming: () => stop(this.#timing),
   };
@@ -117,7 +117,7 @@ class Session {
 
   #pointsInForce(): Float32Array {
     const { points } = this.#points();
-    return this.#setup ? edited(points, this.#setup.edits) : points;
+    return this.#setup ? applyEdits(points, this.#setup.edits) : points;
   }
 
   #current(): ImplicitSurface {
@@ -200,13 +200,13 @@ class Session {
 
   /** Replaces the edits; a run continues with them. */
   #setEdits(edits: Edits): undefined {
-    this.#current().setEdits(packed(edits));
+    this.#current().setEdits(toPointEdits(edits));
     if (this.#setup) this.#setup = { ...this.#setup, edits };
     this.#startOver();
   }
 
-  #setShade(shade: PointShade | undefined): undefined {
-    this.#shade = shade;
+  #setQuantity(quantity: PointQuantity | undefined): undefined {
+    this.#quantity = quantity;
     this.#sent = '';
     if (!this.#run) this.#showSurface();
   }
@@ -231,7 +231,7 @@ class Session {
     const version = `${mesh.topologyVersion} ${mesh.geometryVersion} ${this.#last?.done}`;
     if (version === this.#sent) return;
     this.#sent = version;
-    const values = this.#shade && valuesFor(model, this.#pointsInForce(), this.#shade);
+    const values = this.#quantity && valuesFor(model, this.#pointsInForce(), this.#quantity);
     this.#sendSurface({ ...copySurface(emptyArrays(), mesh), ...(values && { values }) }, false);
   }
 

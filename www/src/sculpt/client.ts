@@ -19,10 +19,10 @@ export class SculptClient extends Channel<Requests, WorkerEvent> {
     this.post(message);
   }
 
-  /** Sends a target pose of the ellipsoids; returns its number, which the frames that follow it report as `turn`. */
+  /** Sends a target pose of the ellipsoids; returns its number, which the frames that follow it report as `poseId`. */
   pose(pose: Pose, dragging: boolean): number {
     this.#lastPoseId += 1;
-    const message: PoseMessage = { kind: 'pose', pose, turn: this.#lastPoseId, dragging };
+    const message: PoseMessage = { kind: 'pose', pose, poseId: this.#lastPoseId, dragging };
     this.post(message);
     return this.#lastPoseId;
   }

@@ -21,13 +21,13 @@ export interface SculptVariant {
   params: ParamValues;
   /** Pose that the ellipsoids move to. */
   pose?: Pose;
-  came: string;
-  outcome?: SculptOutcome;
+  ourResult: string;
+  expected?: SculptOutcome;
 }
 
 /** A figure of the paper, as an example of the Sculpt lab. */
 export interface SculptPreset extends SculptExample {
-  saw: string;
+  paperResult: string;
   variants: [SculptVariant, ...SculptVariant[]];
   hint?: string;
   view?: Partial<SculptViewOptions>;
@@ -78,15 +78,15 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     ...BUST_SCENE,
     layout: 'row',
     view: { ellipsoids: false },
-    saw: text('sculptPresets.figure1Paper'),
+    paperResult: text('sculptPresets.figure1Paper'),
     variants: [
       {
         id: '1',
         name: text('sculptPresets.figure1PictureName'),
         params: {},
         pose: LOOKING_ASIDE,
-        came: text('sculptPresets.figure1PictureHere'),
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.4, 1], areaHigh: [1, 2.2] },
+        ourResult: text('sculptPresets.figure1PictureHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.4, 1], areaHigh: [1, 2.2] },
       },
     ],
     hint: text('sculptPresets.figure1Hint'),
@@ -99,13 +99,13 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     start: ONE_BALL,
     layout: 'stages',
     credit: text('sculptPresets.figure3Credit'),
-    saw: text('sculptPresets.figure3Paper'),
+    paperResult: text('sculptPresets.figure3Paper'),
     variants: [
       {
         id: '3',
         name: text('sculptPresets.figure3PictureName'),
         params: {},
-        came: text('sculptPresets.figure3PictureHere'),
+        ourResult: text('sculptPresets.figure3PictureHere'),
       },
     ],
     stages: 'restructuring',
@@ -118,13 +118,13 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     start: ONE_BALL,
     layout: 'stages',
     credit: text('sculptPresets.figure6Credit'),
-    saw: text('sculptPresets.figure6Paper'),
+    paperResult: text('sculptPresets.figure6Paper'),
     variants: [
       {
         id: '6',
         name: text('sculptPresets.figure6PictureName'),
         params: {},
-        came: text('sculptPresets.figure6PictureHere'),
+        ourResult: text('sculptPresets.figure6PictureHere'),
       },
     ],
     hint: text('sculptPresets.figure6Hint'),
@@ -141,13 +141,13 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     color: 'plain',
     layout: 'result',
     credit: text('sculptPresets.figure7Credit'),
-    saw: text('sculptPresets.figure7Paper'),
+    paperResult: text('sculptPresets.figure7Paper'),
     variants: [
       {
         id: '7',
         name: text('sculptPresets.figure7PictureName'),
         params: {},
-        came: text('sculptPresets.figure7PictureHere'),
+        ourResult: text('sculptPresets.figure7PictureHere'),
       },
     ],
     hint: text('sculptPresets.figure7Hint'),
@@ -162,14 +162,14 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     layout: 'levels',
     params: { edgeMin: 0.05, edgeMax: 0.115, levels: 2, refineFactor: 0.5 },
     credit: text('sculptPresets.figure8Credit'),
-    saw: text('sculptPresets.figure8Paper'),
+    paperResult: text('sculptPresets.figure8Paper'),
     variants: [
       {
         id: '8',
         name: text('sculptPresets.figure8PictureName'),
         params: { edgeMin: 0.05, edgeMax: 0.115, levels: 2, refineFactor: 0.5 },
-        came: text('sculptPresets.figure8PictureHere'),
-        outcome: { components: [1, 1], folded: [0, 0] },
+        ourResult: text('sculptPresets.figure8PictureHere'),
+        expected: { components: [1, 1], folded: [0, 0] },
       },
     ],
   },
@@ -179,31 +179,31 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     ...BUST_SCENE,
     layout: 'pair',
     view: { ellipsoids: false },
-    saw: text('sculptPresets.figure9Paper'),
+    paperResult: text('sculptPresets.figure9Paper'),
     variants: [
       {
         id: '9a',
         name: text('sculptPresets.figure9aName'),
         params: {},
         pose: LONG_NECK,
-        came: text('sculptPresets.figure9aHere'),
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [1, 2.2] },
+        ourResult: text('sculptPresets.figure9aHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [1, 2.2] },
       },
       {
         id: '9b',
         name: text('sculptPresets.figure9bName'),
         params: {},
         pose: WIDE_CROWN,
-        came: text('sculptPresets.figure9bHere'),
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [1, 2.2] },
+        ourResult: text('sculptPresets.figure9bHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [1, 2.2] },
       },
       {
         id: '9c',
         name: text('sculptPresets.figure9cName'),
         params: {},
         pose: LOOKING_ASIDE,
-        came: text('sculptPresets.figure9cHere'),
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [1, 2.2] },
+        ourResult: text('sculptPresets.figure9cHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [1, 2.2] },
       },
     ],
   },
@@ -219,31 +219,31 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     layout: 'pair',
     view: { ellipsoids: false },
     credit: text('sculptPresets.figure10Credit'),
-    saw: text('sculptPresets.figure10Paper'),
+    paperResult: text('sculptPresets.figure10Paper'),
     variants: [
       {
         id: '10a',
         name: text('sculptPresets.figure10aName'),
         params: {},
         pose: APART,
-        came: text('sculptPresets.figure10aHere'),
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [0.7, 3] },
+        ourResult: text('sculptPresets.figure10aHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.3, 1], areaHigh: [0.7, 3] },
       },
       {
         id: '10b',
         name: text('sculptPresets.figure10bName'),
         params: {},
         pose: LENS,
-        came: text('sculptPresets.figure10bHere'),
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.2, 1], areaHigh: [0.7, 3] },
+        ourResult: text('sculptPresets.figure10bHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.2, 1], areaHigh: [0.7, 3] },
       },
       {
         id: '10c',
         name: text('sculptPresets.figure10cName'),
         params: {},
         pose: BOW,
-        came: text('sculptPresets.figure10cHere'),
-        outcome: { components: [1, 1], folded: [0, 0], areaLow: [0.2, 1], areaHigh: [0.7, 3] },
+        ourResult: text('sculptPresets.figure10cHere'),
+        expected: { components: [1, 1], folded: [0, 0], areaLow: [0.2, 1], areaHigh: [0.7, 3] },
       },
     ],
     hint: text('sculptPresets.figure10Hint'),

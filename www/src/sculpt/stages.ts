@@ -6,13 +6,13 @@ import { surfaceOf } from './model';
 import type { Stage, StageKind, Surface } from './protocol';
 
 /** Most meshes in a row. */
-const MOST = 5;
+const MAX_MESHES = 5;
 
 /** Returns the meshes that the membrane was solved on, from coarse to fine; the finest ones if there are too many. */
 export function levelsOf(model: MultiresolutionModel): Stage[] {
   const levels = model.levelMeshes();
   try {
-    return levels.slice(-MOST).map((mesh) => ({ caption: sizeOf(mesh), surface: surfaceOf(mesh) }));
+    return levels.slice(-MAX_MESHES).map((mesh) => ({ caption: sizeOf(mesh), surface: surfaceOf(mesh) }));
   } finally {
     for (const mesh of levels) mesh.free();
   }
@@ -24,21 +24,21 @@ function sizeOf(mesh: Mesh): string {
 }
 
 /**
- * Returns a mesh with its caption: the number of triangles, and the quality that a share `WORST` of them falls below; 1
+ * Returns a mesh with its caption: the number of triangles, and the quality that a share `WORST_SHARE` of them falls below; 1
  * is equilateral.
  */
-function staged(mesh: Mesh, what: string): Stage {
+function withCaption(mesh: Mesh, name: string): Stage {
   const surface = surfaceOf(mesh);
   const shapes = shapesOf(surface).sort();
-  const worst = shapes[Math.floor(WORST * shapes.length)] ?? 0;
+  const worst = shapes[Math.floor(WORST_SHARE * shapes.length)] ?? 0;
   return {
-    caption: text('sculpt.stageQuality', { name: what, triangles: mesh.triangleCount, quality: worst.toFixed(2) }),
+    caption: text('sculpt.stageQuality', { name: name, triangles: mesh.triangleCount, quality: worst.toFixed(2) }),
     surface,
   };
 }
 
 /** Share of the triangles that are counted as the worst. */
-const WORST = 0.05;
+const WORST_SHARE = 0.05;
 
 /**
  * Returns the quality of each triangle: its area over that of an equilateral triangle with the same mean squared edge
@@ -92,9 +92,9 @@ function restructured(mesh: Mesh): Stage[] {
     refined.refine();
     for (let round = 0; round < ROUNDS; round++) good.restructure(BOUNDS);
     return [
-      staged(mesh, text('sculpt.stageDeformed')),
-      staged(refined, text('sculpt.stageRefined')),
-      staged(good, text('sculpt.stageRestructured')),
+      withCaption(mesh, text('sculpt.stageDeformed')),
+      withCaption(refined, text('sculpt.stageRefined')),
+      withCaption(good, text('sculpt.stageRestructured')),
     ];
   } finally {
     refined.free();
@@ -111,17 +111,17 @@ const BOUNDS = { min: 0.6 * EDGE, max: 1.35 * EDGE };
 function passes(mesh: Mesh): Stage[] {
   const at = mesh.clone();
   try {
-    const stages = [staged(at, text('sculpt.passDeformed'))];
+    const stages = [withCaption(at, text('sculpt.passDeformed'))];
     for (const [pass, name] of [
       ['collapse', text('sculpt.passCollapsed')],
       ['split', text('sculpt.passSplit')],
       ['flip', text('sculpt.passFlipped')],
     ] as const) {
       at.restructure(BOUNDS, [pass]);
-      stages.push(staged(at, name));
+      stages.push(withCaption(at, name));
     }
     for (let round = 1; round < ROUNDS; round++) at.restructure(BOUNDS);
-    return [...stages, staged(at, text('sculpt.passRounds', { rounds: ROUNDS }))];
+    return [...stages, withCaption(at, text('sculpt.passRounds', { rounds: ROUNDS }))];
   } finally {
     at.free();
   }

@@ -3,7 +3,7 @@ import type { Volume } from 'vesicle';
 import type { CineSpec } from './cine';
 import { errorOf } from './frames';
 import type { ComparedTrack, Setup, SurfaceError } from './protocol';
-import { buildTracker, prepared } from './source';
+import { buildTracker, prepare } from './source';
 
 type OnProgress = (part: number, phase: string) => void;
 
@@ -16,7 +16,7 @@ export async function trackForComparison(
   onProgress: OnProgress,
 ): Promise<ComparedTrack | undefined> {
   const began = performance.now();
-  const volume = prepared(original, setup.preparation, (what) => onProgress(0, what));
+  const volume = prepare(original, setup.preparation, (what) => onProgress(0, what));
   try {
     return await trackAll(volume, spec, setup, signal, onProgress, began);
   } catch (error) {
@@ -40,16 +40,16 @@ async function trackAll(
     await tracker.run({ signal, onStep: ({ progress, phase }) => onProgress(progress, phase) });
     const duration = performance.now() - began;
     const errors: SurfaceError[] = [];
-    let crossings = 0;
+    let selfIntersections = 0;
     for (let frame = 0; frame < tracker.frames; frame++) {
       const mesh = tracker.meshAt(frame);
-      crossings += mesh.check().selfIntersections;
+      selfIntersections += mesh.check().selfIntersections;
       if (spec) errors.push(errorOf(spec, frame, mesh.arrays().positions));
       mesh.free();
     }
-    const mean = (of: 'mean' | 'most') => errors.reduce((sum, error) => sum + error[of], 0) / errors.length;
-    const error = errors.length > 0 ? { mean: mean('mean'), most: mean('most') } : undefined;
-    return { facts: tracker.facts, closing: tracker.closing, error, duration, crossings };
+    const mean = (of: 'mean' | 'p95') => errors.reduce((sum, error) => sum + error[of], 0) / errors.length;
+    const error = errors.length > 0 ? { mean: mean('mean'), p95: mean('p95') } : undefined;
+    return { facts: tracker.facts, closing: tracker.closing, error, duration, selfIntersections };
   } finally {
     tracker.free();
   }

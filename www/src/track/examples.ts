@@ -1,7 +1,7 @@
 import type { Unit } from '../examples';
 import type { ParamValues, Vec3 } from '../protocol';
 import { text } from '../texts';
-import { type CineSpec, middleOf } from './cine';
+import { type CineSpec, centreOf } from './cine';
 import type { Box, Preparation } from './protocol';
 
 /** An example of the Track lab: a 4D image, suitable settings and credits. */
@@ -59,7 +59,7 @@ const VENTRICLE: CineSpec = {
 const THICK: CineSpec = { dims: [48, 48, 12], spacing: [1.6, 1.6, 5], frames: 12, noise: 8, size: 26, papillary: true };
 
 /** The examples of the Track lab. The first one opens by default. */
-export const FILMS: [TrackExample, ...TrackExample[]] = [
+export const IMAGES: [TrackExample, ...TrackExample[]] = [
   { id: 'heart', name: text('trackPresets.heartName'), ...HEART },
   {
     id: 'ventricle',
@@ -67,8 +67,8 @@ export const FILMS: [TrackExample, ...TrackExample[]] = [
     source: { cine: VENTRICLE },
     unit: 'mm',
     preparation: PLAIN,
-    box: around(middleOf(VENTRICLE), 29),
-    at: middleOf(VENTRICLE),
+    box: around(centreOf(VENTRICLE), 29),
+    at: centreOf(VENTRICLE),
     params: { threshold: 60, cyclic: true },
     credit: text('trackPresets.ventricleCredit'),
   },
@@ -78,8 +78,8 @@ export const FILMS: [TrackExample, ...TrackExample[]] = [
     source: { cine: THICK },
     unit: 'mm',
     preparation: { binning: 1, enrichment: 'flow', factor: 0 },
-    box: around(middleOf(THICK), 32),
-    at: middleOf(THICK),
+    box: around(centreOf(THICK), 32),
+    at: centreOf(THICK),
     params: { threshold: 60, cyclic: true },
     credit: text('trackPresets.thickSlicesCredit'),
   },

@@ -22,5 +22,5 @@ export function trackedFrame(tracker: SurfaceTracker, index: number, spec: CineS
 export function errorOf(spec: CineSpec, frame: number, points: Float32Array): SurfaceError {
   const distances = wallDistances(spec, frame, points);
   const mean = distances.reduce((sum, distance) => sum + distance, 0) / (distances.length || 1);
-  return { mean, most: distances[Math.floor(0.95 * distances.length)] ?? 0 };
+  return { mean, p95: distances[Math.floor(0.95 * distances.length)] ?? 0 };
 }

@@ -3,13 +3,13 @@
 import type { ParamValues } from '../protocol';
 import { text } from '../texts';
 import type { TrackViewOptions } from '../view/beating';
-import { FILMS, HEART, type TrackExample } from './examples';
+import { HEART, IMAGES, type TrackExample } from './examples';
 
 /** One picture of a figure: the same image with other parameters and view options. */
 export interface TrackVariant {
   id: string;
   name: string;
-  came: string;
+  ourResult: string;
   /** Parameters that differ from the figure's. */
   params: ParamValues;
   view: Partial<TrackViewOptions>;
@@ -17,7 +17,7 @@ export interface TrackVariant {
 
 /** A figure of the paper, as an example of the Track lab. */
 export interface TrackPreset extends TrackExample {
-  saw: string;
+  paperResult: string;
   variants: [TrackVariant, ...TrackVariant[]];
   hint?: string;
 }
@@ -36,14 +36,14 @@ export const TRACK_PRESETS: TrackPreset[] = [
     id: 'figure-2',
     name: text('trackPresets.figure2Name'),
     ...HEART,
-    saw: text('trackPresets.figure2Paper'),
+    paperResult: text('trackPresets.figure2Paper'),
     variants: [
       {
         id: '2',
         name: text('trackPresets.figure2PictureName'),
         params: {},
         view: { votes: 'near' },
-        came: text('trackPresets.figure2PictureHere'),
+        ourResult: text('trackPresets.figure2PictureHere'),
       },
     ],
     hint: text('trackPresets.figure2Hint'),
@@ -52,21 +52,21 @@ export const TRACK_PRESETS: TrackPreset[] = [
     id: 'figure-3',
     name: text('trackPresets.figure3Name'),
     ...HEART,
-    saw: text('trackPresets.figure3Paper'),
+    paperResult: text('trackPresets.figure3Paper'),
     variants: [
       {
         id: '3',
         name: text('trackPresets.figure3PictureName'),
         params: { prediction: true },
         view: { below: 'time' },
-        came: text('trackPresets.figure3PictureHere'),
+        ourResult: text('trackPresets.figure3PictureHere'),
       },
       {
         id: '3-without',
         name: text('trackPresets.figure3WithoutName'),
         params: { prediction: false },
         view: { below: 'time' },
-        came: text('trackPresets.figure3WithoutHere'),
+        ourResult: text('trackPresets.figure3WithoutHere'),
       },
     ],
     hint: text('trackPresets.figure3Hint'),
@@ -77,14 +77,14 @@ export const TRACK_PRESETS: TrackPreset[] = [
     ...HEART,
     // On the wall between the ventricles.
     crosshair: [14.19, 36.43, -5.39],
-    saw: text('trackPresets.figure4Paper'),
+    paperResult: text('trackPresets.figure4Paper'),
     variants: [
       {
         id: '4',
         name: text('trackPresets.figure4PictureName'),
         params: {},
         view: { below: 'boundary', surface: true, votes: 'near' },
-        came: text('trackPresets.figure4PictureHere'),
+        ourResult: text('trackPresets.figure4PictureHere'),
       },
     ],
     hint: text('trackPresets.figure4Hint'),
@@ -93,14 +93,14 @@ export const TRACK_PRESETS: TrackPreset[] = [
     id: 'figure-5',
     name: text('trackPresets.figure5Name'),
     ...HEART,
-    saw: text('trackPresets.figure5Paper'),
+    paperResult: text('trackPresets.figure5Paper'),
     variants: [
       {
         id: '5',
         name: text('trackPresets.figure5PictureName'),
         params: {},
         view: { below: 'between' },
-        came: text('trackPresets.figure5PictureHere'),
+        ourResult: text('trackPresets.figure5PictureHere'),
       },
     ],
     hint: text('trackPresets.figure5Hint'),
@@ -109,14 +109,14 @@ export const TRACK_PRESETS: TrackPreset[] = [
     id: 'figure-6',
     name: text('trackPresets.figure6Name'),
     ...HEART,
-    saw: text('trackPresets.figure6Paper'),
+    paperResult: text('trackPresets.figure6Paper'),
     variants: [
       {
         id: '6',
         name: text('trackPresets.figure6PictureName'),
         params: {},
         view: { votes: 'near', edges: true },
-        came: text('trackPresets.figure6PictureHere'),
+        ourResult: text('trackPresets.figure6PictureHere'),
       },
     ],
     hint: text('trackPresets.figure6Hint'),
@@ -129,8 +129,8 @@ export function viewOf(example: TrackExample | undefined): TrackViewOptions {
 }
 
 /** Returns the example or preset with this id. */
-export function filmById(id: string): TrackExample | undefined {
-  return [...FILMS, ...TRACK_PRESETS].find((one) => one.id === id);
+export function imageById(id: string): TrackExample | undefined {
+  return [...IMAGES, ...TRACK_PRESETS].find((one) => one.id === id);
 }
 
 export function isTrackPreset(example: TrackExample | undefined): example is TrackPreset {

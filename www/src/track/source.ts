@@ -8,13 +8,13 @@ import { Refusal } from '../worker/refusal';
 import { parseFiles } from '../worker/volumes';
 import { voxelsOf } from './box';
 import { cineVoxels } from './cine';
-import type { FilmSource, NamedBytes, Preparation, Setup } from './protocol';
+import type { ImageSource, NamedBytes, Preparation, Setup } from './protocol';
 
 /** Seconds between frames of a computed image. */
 const CINE_SECONDS = 0.04;
 
 /** Opens a 4D image from files or computes it. */
-export async function filmFrom(source: FilmSource): Promise<Volume> {
+export async function openImage(source: ImageSource): Promise<Volume> {
   if ('cine' in source) {
     const { dims, spacing, frames } = source.cine;
     return new Volume({
@@ -54,14 +54,14 @@ function fromParts(parts: NamedBytes[][]): Volume {
 }
 
 /**
- * Bins and enriches an image as asked; returns a new volume, or `film` itself if there is nothing to do. `onStage`
+ * Bins and enriches an image as asked; returns a new volume, or `image` itself if there is nothing to do. `onStage`
  * receives each step in words.
  */
-export function prepared(film: Volume, preparation: Preparation, onStage: (what: string) => void): Volume {
+export function prepare(image: Volume, preparation: Preparation, onStage: (what: string) => void): Volume {
   const { binning, enrichment, factor } = preparation;
-  let present = film;
+  let present = image;
   const take = (next: Volume) => {
-    if (present !== film) present.free();
+    if (present !== image) present.free();
     present = next;
   };
   try {
@@ -76,7 +76,7 @@ export function prepared(film: Volume, preparation: Preparation, onStage: (what:
     }
     return present;
   } catch (error) {
-    if (present !== film) present.free();
+    if (present !== image) present.free();
     throw error;
   }
 }

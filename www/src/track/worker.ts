@@ -6,14 +6,14 @@ import { Refusal, toFailure } from '../worker/refusal';
 import { transferOf } from '../worker/room';
 import { reply, stop, type Task, withTransfer } from '../worker/serving';
 import { viewOf } from '../worker/volumes';
-import { betweenSlices } from './between';
+import { interpolateSlice } from './between';
 import { type CineSpec, trueVolume } from './cine';
 import { trackForComparison } from './comparing';
 import { trackedFrame } from './frames';
 import type {
   BoundaryVotes,
   ComparedTrack,
-  Opened,
+  OpenedImage,
   ParamValues,
   Preparation,
   Ready,
@@ -25,7 +25,7 @@ import type {
   VolumeView,
   WorkerEvent,
 } from './protocol';
-import { buildTracker, filmFrom, prepared } from './source';
+import { buildTracker, openImage, prepare } from './source';
 
 type Handlers = {
   [K in RequestKind]: (body: Requests[K]['body']) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
@@ -42,16 +42,16 @@ function send(event: WorkerEvent, transfer: Transferable[] = []): void {
 }
 
 /** An image as opened, and as prepared. */
-interface Film {
+interface LoadedImage {
   name: string;
   original: Volume;
   spec: CineSpec | undefined;
-  prepared: Volume;
+  preparedVolume: Volume;
   preparation: Preparation;
 }
 
 class Session {
-  #film: Film | undefined;
+  #loaded: LoadedImage | undefined;
   #tracker: SurfaceTracker | undefined;
   #setup: Setup | undefined;
   #suggested = 0;
@@ -76,34 +76,34 @@ class Session {
     step: ({ count }) => this.#step(count),
     setParams: (params) => this.#setParams(params),
     votes: ({ frame }) => this.#votes(frame),
-    between: ({ frame, slice, window }) => betweenSlices(this.#image().original, frame, slice, window),
+    between: ({ frame, slice, window }) => interpolateSlice(this.#image().original, frame, slice, window),
     save: () => this.#save(),
     restore: (saved) => this.#restore(saved),
     view: () => this.#view(),
-    tell: () => this.#reportStopped(),
+    sendState: () => this.#reportStopped(),
     export: ({ frame, format }) => this.#export(frame, format),
     animation: () => this.#current().toGlb(),
     compare: ({ setup }) => this.#compare(setup),
     cancelCompare: () => stop(this.#comparison),
   };
 
-  async #open({ name, source, setup }: Requests['open']['body']): Promise<Opened> {
+  async #open({ name, source, setup }: Requests['open']['body']): Promise<OpenedImage> {
     await this.#pause();
     const tell = (what: string) => send({ event: 'preparing', what });
     const began = performance.now();
-    const original = await filmFrom(source);
+    const original = await openImage(source);
     const spec = 'cine' in source ? source.cine : undefined;
     let made: Volume = original;
     try {
-      made = prepared(original, setup.preparation, tell);
+      made = prepare(original, setup.preparation, tell);
       const took = performance.now() - began;
       const ready = this.#adopt(made, setup);
       const { dims, spacing } = original;
-      this.#forgetFilm();
-      this.#film = { name, original, spec, prepared: made, preparation: setup.preparation };
+      this.#freeImage();
+      this.#loaded = { name, original, spec, preparedVolume: made, preparation: setup.preparation };
       const truth = spec && Array.from({ length: spec.frames }, (_, frame) => trueVolume(spec, frame));
       const volume = this.#view();
-      return withTransfer({ ...ready, volume, dims, spacing, truth, prepared: took }, [volume.voxels]);
+      return withTransfer({ ...ready, volume, dims, spacing, truth, openingMs: took }, [volume.voxels]);
     } catch (error) {
       if (made !== original) made.free();
       original.free();
@@ -118,17 +118,18 @@ class Session {
 
   /** Builds a tracker of the present image, which is prepared again if the preparation has changed. */
   #build(setup: Setup): Ready {
-    const film = this.#image();
-    if (same(film.preparation, setup.preparation)) return { ...this.#adopt(film.prepared, setup), volume: undefined };
-    const made = prepared(film.original, setup.preparation, (what) => send({ event: 'preparing', what }));
+    const loaded = this.#image();
+    if (same(loaded.preparation, setup.preparation))
+      return { ...this.#adopt(loaded.preparedVolume, setup), volume: undefined };
+    const made = prepare(loaded.original, setup.preparation, (what) => send({ event: 'preparing', what }));
     try {
       const ready = this.#adopt(made, setup);
-      if (film.prepared !== film.original) film.prepared.free();
-      this.#film = { ...film, prepared: made, preparation: setup.preparation };
+      if (loaded.preparedVolume !== loaded.original) loaded.preparedVolume.free();
+      this.#loaded = { ...loaded, preparedVolume: made, preparation: setup.preparation };
       const volume = this.#view();
       return withTransfer({ ...ready, volume }, [volume.voxels]);
     } catch (error) {
-      if (made !== film.original) made.free();
+      if (made !== loaded.original) made.free();
       throw error;
     }
   }
@@ -156,13 +157,13 @@ class Session {
   }
 
   #view(): VolumeView {
-    const { name, prepared } = this.#image();
-    return viewOf(prepared, name, prepared.frames);
+    const { name, preparedVolume } = this.#image();
+    return viewOf(preparedVolume, name, preparedVolume.frames);
   }
 
-  #image(): Film {
-    if (!this.#film) throw new Refusal('invalid-argument', text('track.noImage'));
-    return this.#film;
+  #image(): LoadedImage {
+    if (!this.#loaded) throw new Refusal('invalid-argument', text('track.noImage'));
+    return this.#loaded;
   }
 
   #current(): SurfaceTracker {
@@ -170,11 +171,11 @@ class Session {
     return this.#tracker;
   }
 
-  #forgetFilm(): void {
-    const film = this.#film;
-    if (!film) return;
-    if (film.prepared !== film.original) film.prepared.free();
-    film.original.free();
+  #freeImage(): void {
+    const loaded = this.#loaded;
+    if (!loaded) return;
+    if (loaded.preparedVolume !== loaded.original) loaded.preparedVolume.free();
+    loaded.original.free();
   }
 
   async #play(): Promise<undefined> {
@@ -249,7 +250,7 @@ class Session {
 
   #backToBoundary(params: ParamValues): void {
     if (!this.#boundaryState) {
-      this.#adopt(this.#image().prepared, this.#setup as Setup);
+      this.#adopt(this.#image().preparedVolume, this.#setup as Setup);
       return;
     }
     const tracker = this.#current();

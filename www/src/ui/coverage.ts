@@ -1,4 +1,4 @@
-import type { CoveringEvent, MeasuredCoverage, UncoveredPart, Vec3 } from '../protocol';
+import type { CoverageProgressEvent, MeasuredCoverage, UncoveredPart, Vec3 } from '../protocol';
 import { plural, text } from '../texts';
 import { h } from './dom';
 import { count, figure } from './format';
@@ -94,7 +94,7 @@ export class CoveragePanel {
     this.#status.textContent = text('controls.measuring');
   }
 
-  showProgress({ share }: CoveringEvent): void {
+  showProgress({ share }: CoverageProgressEvent): void {
     this.#progress.value = share;
   }
 

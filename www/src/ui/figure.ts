@@ -6,13 +6,13 @@ interface FigureVariant {
   /** Name on its button. */
   name: string;
   /** The result here. */
-  came: string;
+  ourResult: string;
 }
 
 /** A figure of a paper. */
 interface PaperFigure<One extends FigureVariant> {
   /** The result in the paper. */
-  saw: string;
+  paperResult: string;
   variants: [One, ...One[]];
   /** Hint at further details to observe. */
   hint?: string;
@@ -45,7 +45,7 @@ export class FigurePanel<Variant extends FigureVariant, Preset extends PaperFigu
     const group = h('div', { class: 'buttons', role: 'group', 'aria-label': text('controls.figureImages') });
     group.append(...this.#buttons.map(({ button }) => button));
     this.element.replaceChildren(
-      h('p', {}, h('strong', {}, text('controls.figurePaper')), preset.saw),
+      h('p', {}, h('strong', {}, text('controls.figurePaper')), preset.paperResult),
       this.#ourResult,
       ...(several ? [group] : []),
       ...(preset.hint ? [h('p', { class: 'help' }, preset.hint)] : []),
@@ -53,7 +53,7 @@ export class FigurePanel<Variant extends FigureVariant, Preset extends PaperFigu
   }
 
   #choose(variant: Variant | undefined): void {
-    this.#ourResult.textContent = variant?.came ?? text('controls.figureChanged');
+    this.#ourResult.textContent = variant?.ourResult ?? text('controls.figureChanged');
     for (const { variant: one, button } of this.#buttons) button.setAttribute('aria-pressed', String(one === variant));
   }
 

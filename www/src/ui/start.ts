@@ -103,7 +103,7 @@ export class StartControls {
   }
 
   /** Shows an error beside the field changed last, and restores the current values. */
-  refuse(message: string): void {
+  reject(message: string): void {
     this.show(this.#inForce);
     this.#changed.showError(message);
   }
@@ -113,7 +113,7 @@ export class StartControls {
     for (const each of this.#fields) each.showError(undefined);
     this.#explain();
     if (field.control.checkValidity()) onChange();
-    else this.refuse(field.need);
+    else this.reject(field.need);
   }
 
   #explain(): void {

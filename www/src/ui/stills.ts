@@ -1,7 +1,7 @@
 import type { Vec3 } from '../protocol';
 import { text } from '../texts';
 import type { CannySettings } from '../track/canny';
-import type { Between, BoundaryVotes } from '../track/protocol';
+import type { BoundaryVotes, InterpolatedSlice } from '../track/protocol';
 import type { ContentBelow } from '../view/beating';
 import {
   FigureImage,
@@ -30,7 +30,7 @@ export interface FigureData {
   window: number;
   threshold: number;
   votes: BoundaryVotes | undefined;
-  between: Between | undefined;
+  between: InterpolatedSlice | undefined;
   /** The slice that `between` replaces, and the number of slices. */
   pair: [number, number];
   /** Returns the outline in the slice for each frame; called only while it is shown. */
@@ -126,7 +126,7 @@ export class FigureRow {
   #drawBetween({ subject, between, pair: [slice, slices] }: FigureData): void {
     if (between) paintBetween(this.#between, subject.volume, between);
     const off = (method: 'linear' | 'flow') =>
-      between ? text('trackPanels.sliceError', { error: between.off[method].toFixed(1) }) : '';
+      between ? text('trackPanels.sliceError', { error: between.rmsError[method].toFixed(1) }) : '';
     const captions = [
       text('trackPanels.sliceNumberOf', { number: slice, slices }),
       text('trackPanels.byFlowCaption', { error: off('flow') }),

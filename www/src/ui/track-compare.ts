@@ -1,11 +1,8 @@
 import { text } from '../texts';
 import { beatOf } from '../track/curve';
-import type { ComparedTrack, FrameFacts, Preparation, SurfaceError } from '../track/protocol';
+import type { Alternative, ComparedTrack, FrameFacts, Preparation, SurfaceError } from '../track/protocol';
 import { h, uniqueId } from './dom';
 import { count, figure, milliseconds } from './format';
-
-/** The alternative with which the current run is compared. */
-export type Alternative = 'prediction' | 'none' | 'linear' | 'flow';
 
 const ALTERNATIVES: { value: Alternative; label: string }[] = [
   { value: 'prediction', label: text('trackPanels.otherPrediction') },
@@ -154,7 +151,7 @@ function summary({ name, facts, closing, error, duration }: TrackingRun) {
     area: mean(({ area }) => area),
     closing,
     error: error?.mean,
-    most: error?.most,
+    most: error?.p95,
     took: duration,
   };
 }

@@ -1,4 +1,4 @@
-import type { Shade } from '../protocol';
+import type { VertexQuantity } from '../protocol';
 import { text } from '../texts';
 import { h, uniqueId } from './dom';
 
@@ -6,7 +6,7 @@ import { h, uniqueId } from './dom';
 export type SlicePlacement = 'walls' | 'in place' | 'hidden';
 
 /** Colouring of the surface in the Extract lab. */
-export type ColorMode = 'plain' | 'component' | Shade;
+export type ColorMode = 'plain' | 'component' | VertexQuantity;
 
 export interface ViewOptions {
   surface: boolean;

@@ -2,7 +2,7 @@ import { Box3, Vector3 } from 'three';
 import type { LevelView, Surface, Vec3, VolumeView } from '../protocol';
 import type { VoxelBox } from '../track/box';
 import { sliceVotes } from '../track/clusters';
-import { cutBy } from '../track/cut';
+import { crossSection } from '../track/cut';
 import type { BoundaryVotes } from '../track/protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import type { SlicePlacement } from '../ui/view-options';
@@ -217,7 +217,7 @@ export class TrackView {
     const panel = scene?.panels[axis];
     if (!scene || !panel) return new Float32Array(0);
     const plane = slicePlane(scene.volume.affine, scene.inverse, axis, this.#crosshair[axis]);
-    return projectSegments(cutBy(surface, plane), scene.inverse, scene.volume, panel.orientation);
+    return projectSegments(crossSection(surface, plane), scene.inverse, scene.volume, panel.orientation);
   }
 
   dispose(): void {
@@ -257,7 +257,7 @@ export class TrackView {
     if (!scene) return;
     for (const axis of [0, 1, 2] as const) {
       const plane = slicePlane(scene.volume.affine, scene.inverse, axis, this.#crosshair[axis]);
-      const section = this.#shown ? cutBy(this.#shown, plane) : new Float32Array(0);
+      const section = this.#shown ? crossSection(this.#shown, plane) : new Float32Array(0);
       scene.panels[axis]?.setOutline(section);
       scene.planes[axis]?.showSection(section);
     }

@@ -2,9 +2,9 @@
 import type { Vec3, VolumeView } from '../protocol';
 import { type CannySettings, canny } from '../track/canny';
 import { boundaryImage, hasBoundary, twoMeans, windowAt } from '../track/clusters';
-import { crossings } from '../track/cut';
-import type { Between, BoundaryVotes } from '../track/protocol';
-import { h, context2d, token } from '../ui/dom';
+import { intersectionsWithRow } from '../track/cut';
+import type { BoundaryVotes, InterpolatedSlice } from '../track/protocol';
+import { context2d, h, token } from '../ui/dom';
 import { invert, sliceOrientations } from './anatomy';
 import { voxelsOfFrame } from './beating';
 import { greysOf, slicePicture } from './slicing';
@@ -162,7 +162,7 @@ export function paintTime(
   picture.paint(small, [(3.6 * length) / frames, 1], (context, scaleX, scaleY) => {
     context.fillStyle = token('--outline');
     for (const [t, outline] of outlines.entries())
-      for (const x of outline ? crossings(outline, row + 0.5) : []) {
+      for (const x of outline ? intersectionsWithRow(outline, row + 0.5) : []) {
         count += 1;
         context.beginPath();
         context.arc((t + 0.5) * scaleX, x * scaleY, 3.4, 0, 2 * Math.PI);
@@ -179,7 +179,7 @@ export function paintTime(
 export function paintBetween(
   pictures: readonly FigureImage[],
   volume: VolumeView,
-  { width, height, before, flow, measured, linear, after }: Between,
+  { width, height, before, flow, measured, linear, after }: InterpolatedSlice,
 ): void {
   const side = sliceSide(volume);
   const pixel = pixelOfSide(volume, side);

@@ -5,7 +5,7 @@ import { Legend } from '../ui/legend';
 import { CameraMarks } from './cameras';
 import { PointCloud } from './cloud';
 import type { PinholeCamera } from './eye';
-import { diverging, isShade, SHADES, shadeTitle } from './shading';
+import { diverging, isQuantity, QUANTITIES, quantityTitle } from './shading';
 import { type SurfaceColor, SurfaceObject } from './surface';
 import { Viewport } from './viewport';
 
@@ -198,8 +198,8 @@ export class ReconstructionView {
   #showLegend(): void {
     const { color, surface } = this.#options;
     const { range } = this.#surface;
-    if (surface && range > 0 && isShade(color))
-      this.legend.show({ ...SHADES[color], title: shadeTitle(color, '') }, range);
+    if (surface && range > 0 && isQuantity(color))
+      this.legend.show({ ...QUANTITIES[color], title: quantityTitle(color, '') }, range);
     else this.legend.hide();
   }
 

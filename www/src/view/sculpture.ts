@@ -6,7 +6,7 @@ import { text } from '../texts';
 import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import { EllipsoidHandles, type HandleMode } from './handles';
-import { diverging, isShade, SHADES, shadeTitle } from './shading';
+import { diverging, isQuantity, QUANTITIES, quantityTitle } from './shading';
 import { type SurfaceColor, SurfaceObject } from './surface';
 import { Viewport } from './viewport';
 
@@ -250,7 +250,8 @@ export class SculptureView {
     const { color } = this.#options;
     const ranges = this.#row.map((name) => this.#meshes.get(name)?.surface.range ?? 0);
     const range = Math.max(...ranges);
-    if (range > 0 && isShade(color)) this.legend.show({ ...SHADES[color], title: shadeTitle(color, '') }, range);
+    if (range > 0 && isQuantity(color))
+      this.legend.show({ ...QUANTITIES[color], title: quantityTitle(color, '') }, range);
     else this.legend.hide();
   }
 

@@ -1,9 +1,9 @@
 /** Colour map for values on the surface: diverging, blue below zero, red above, light at zero (ColorBrewer RdBu). */
-import type { Shade } from '../protocol';
+import type { VertexQuantity } from '../protocol';
 import { text } from '../texts';
 
 /** Values at the vertices that can be shown as colours. */
-export type ValueShade = Shade | 'distance' | 'area distortion' | 'angle distortion';
+export type ShownQuantity = VertexQuantity | 'distance' | 'area distortion' | 'angle distortion';
 
 type Rgb = readonly [number, number, number];
 
@@ -26,7 +26,7 @@ const SAMPLES = 4096;
 const TABLE = 256;
 
 /** Title, labels and smallest range of the legend for each kind of value. */
-export const SHADES: Record<ValueShade, ShadeText> = {
+export const QUANTITIES: Record<ShownQuantity, QuantityText> = {
   speed: { title: text('view.speed'), below: text('view.inwards'), above: text('view.outwards'), least: 1e-4 },
   'mean curvature': {
     title: text('view.meanCurvature'),
@@ -65,7 +65,7 @@ export const SHADES: Record<ValueShade, ShadeText> = {
   },
 };
 
-interface ShadeText {
+interface QuantityText {
   title: string;
   /** Power of inverse length in the unit; −1 for a length. */
   power?: 1 | 2 | -1;
@@ -78,13 +78,13 @@ interface ShadeText {
 }
 
 /** Whether a colouring represents values. */
-export function isShade(color: string): color is ValueShade {
-  return color in SHADES;
+export function isQuantity(color: string): color is ShownQuantity {
+  return color in QUANTITIES;
 }
 
 /** Returns the legend's title with the unit, for lengths in `unit`. */
-export function shadeTitle(shade: ValueShade, unit: string): string {
-  const { title, power } = SHADES[shade];
+export function quantityTitle(quantity: ShownQuantity, unit: string): string {
+  const { title, power } = QUANTITIES[quantity];
   if (!power) return title;
   if (power === -1) return unit ? text('view.titleUnit', { title, unit }) : title;
   return text(power === 2 ? 'view.perUnitSquared' : 'view.perUnit', { title, unit: unit || text('view.unknownUnit') });

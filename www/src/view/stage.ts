@@ -8,7 +8,7 @@ import { VolumeBox } from './frame';
 import { AttractorMarks, UncoveredMarks } from './markers';
 import { AXIS_TOKENS, SlicePanel } from './panel';
 import { SlicePlane } from './planes';
-import { diverging, SHADES, shadeTitle } from './shading';
+import { diverging, QUANTITIES, quantityTitle } from './shading';
 import { levelIndex, slicePicture } from './slicing';
 import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
@@ -220,7 +220,7 @@ export class Stage {
     const { color } = this.#options;
     const { range } = this.#surface;
     if (color === 'plain' || color === 'component' || range === 0) this.legend.hide();
-    else this.legend.show({ ...SHADES[color], title: shadeTitle(color, this.unit) }, range);
+    else this.legend.show({ ...QUANTITIES[color], title: quantityTitle(color, this.unit) }, range);
   }
 
   #placeSlices(viewer: Vector3): void {

@@ -1,6 +1,6 @@
 /** Runs the same extraction twice: on the volume itself, and coarse to fine (section 5.2 of the paper). */
 import type { StepReport, Volume } from 'vesicle';
-import type { ComparedRun, ComparingEvent, Requests, Setup } from '../protocol';
+import type { ComparisonProgressEvent, ExtractionRun, Requests, Setup } from '../protocol';
 import { buildModel } from './models';
 
 /** Largest number of iterations of a run; one that has not converged by then is compared in its present state. */
@@ -8,7 +8,7 @@ const MOST_ITERATIONS = 4000;
 /** Milliseconds between two reports to the page. */
 const TELL_EVERY = 150;
 
-type OnReport = (run: ComparingEvent['run'], report: StepReport) => void;
+type OnReport = (run: ComparisonProgressEvent['run'], report: StepReport) => void;
 
 /** Compares the two runs; resolves with undefined when the signal aborts. */
 export async function compare(
@@ -32,7 +32,7 @@ async function once(
   setup: Setup,
   signal: AbortSignal,
   onReport: (report: StepReport) => void,
-): Promise<ComparedRun> {
+): Promise<ExtractionRun> {
   const model = buildModel(volume, setup);
   try {
     const byLevel = Array.from({ length: setup.levels + 1 }, (_, i) => ({
