@@ -2,7 +2,7 @@ import { text } from '../texts';
 import { h } from '../ui/dom';
 import { scaleOf } from './scale';
 import type { Chart, Section } from './sections';
-import { formatTarget, type Bar, type Figure, meetsTarget, type Target, verdict, withUnit } from './targets';
+import { type Bar, type Figure, formatTarget, meetsTarget, type Target, verdict, withUnit } from './targets';
 
 /** Draws one benchmark: what was measured and how, its charts, and the same numbers as tables. */
 export function drawSection({ id, title, measured, command, notes, charts }: Section): HTMLElement {

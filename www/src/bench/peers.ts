@@ -41,7 +41,8 @@ function barOf(row: PeerRow): Bar {
   return { label, value: row.ratio, remark: [ours, theirs].map(describeSide).join('; ') };
 }
 
-const describeSide = ([whose, figure, ...rest]: string[]) => `${whose} ${figure}${rest.map((one) => `, ${one}`).join('')}`;
+const describeSide = ([whose, figure, ...rest]: string[]) =>
+  `${whose} ${figure}${rest.map((one) => `, ${one}`).join('')}`;
 
 /** Removes the post-release suffix of a version. */
 export const shortVersion = (version: string) => version.replace(/\.post\d+$/, '');

@@ -1,4 +1,4 @@
-import type { ExtractionRun, ComparisonProgressEvent, Requests } from '../protocol';
+import type { ComparisonProgressEvent, ExtractionRun, Requests } from '../protocol';
 import { text } from '../texts';
 import { h } from './dom';
 import { count, figure, levelSymbol } from './format';

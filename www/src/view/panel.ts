@@ -1,6 +1,6 @@
 import type { Attractor, LevelView, UncoveredPart, Vec3, VolumeView } from '../protocol';
 import { text } from '../texts';
-import { h, context2d, token, uniqueId } from '../ui/dom';
+import { context2d, h, token, uniqueId } from '../ui/dom';
 import { SLICE_NAMES, type SliceOrientation } from './anatomy';
 import { ballSection, paintLevel, paintSlice, pictureSize, projectSegments } from './slicing';
 
