@@ -20,10 +20,6 @@ export function milliseconds(value: number): string {
     : text('controls.seconds', { value: (value / 1000).toFixed(2) });
 }
 
-export function plural(value: number, one: string, many = `${one}s`): string {
-  return `${count(value)} ${value === 1 ? one : many}`;
-}
-
 /** Returns the paper's symbol of the image on a pyramid level: I₀ is the volume itself. */
 export function levelSymbol(level: number): string {
   return `I${[...String(level)].map((digit) => '₀₁₂₃₄₅₆₇₈₉'[Number(digit)]).join('')}`;
