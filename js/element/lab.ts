@@ -3,7 +3,7 @@ import { invalid } from '../check.js';
 import type { MeshArrays } from '../mesh.js';
 import type { StepReport } from '../stepper.js';
 import init, { type Stepper, type Vec3 } from '../worker.js';
-import { fetched, json, MODELS, type ModelWithView, parseStart } from './making.js';
+import { fetched, json, MODELS, type ModelWithView, parseStart } from './models.js';
 import { STYLE } from './style.js';
 import { View } from './view.js';
 

@@ -2,7 +2,7 @@
 import { readFile } from 'node:fs/promises';
 import init, { Mesh } from 'vesicle';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
-import { describedIn } from '../../www/src/foreign/tiff-description';
+import { describedIn } from '../../www/src/importers/tiff-description';
 import { type App, measures, openApp, reach } from './browser';
 import { dicomSeries, type Given, tiffStack } from './pictures';
 

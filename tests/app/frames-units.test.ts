@@ -1,8 +1,8 @@
 /** What surfaces on their way to the screen are made of, without a browser. */
 import { beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
-import { type FineMesh, simplifiedIndices } from '../../www/src/view/coarse';
-import { capacityFor, copySurface, emptyArrays } from '../../www/src/worker/room';
+import { type FineMesh, simplifiedIndices } from '../../www/src/view/simplify';
+import { capacityFor, copySurface, emptyArrays } from '../../www/src/worker/surface-buffers';
 
 beforeAll(() => init());
 

@@ -1,10 +1,10 @@
 /** Parts of the Sculpt lab that need no browser. */
 import { beforeAll, describe, expect, test } from 'vitest';
 import init, { type ControlEllipsoid, Mesh, MultiresolutionModel } from '../../pkg/index.js';
-import { DragLatency } from '../../www/src/labs/answers';
-import { SurfaceCarrier } from '../../www/src/labs/sculpt-ahead';
+import { DragLatency } from '../../www/src/labs/drag-latency';
+import { SurfaceCarrier } from '../../www/src/labs/sculpt-carrier';
 import { filmOf, fromHash, linkOf, toHash } from '../../www/src/labs/sculpt-link';
-import { deformPoints } from '../../www/src/sculpt/carry';
+import { deformPoints } from '../../www/src/sculpt/deform';
 import {
   ball,
   between,

@@ -26,8 +26,8 @@ import { text } from './texts';
 import { compare } from './worker/compare';
 import { buildModel, valuesFor } from './worker/models';
 import { Refusal, toFailure } from './worker/refusal';
-import { copySurface, emptyArrays, transferOf } from './worker/room';
 import { buffersOf, reply, stop, type Task, withTransfer } from './worker/serving';
+import { copySurface, emptyArrays, transferOf } from './worker/surface-buffers';
 import { levelsOf, viewOf, volumeFrom } from './worker/volumes';
 
 /**

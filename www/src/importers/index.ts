@@ -29,7 +29,8 @@ export async function importVolume(files: NamedBytes[]): Promise<VolumeInit | un
   // DICOM folders contain other files as well, and DICOM files without that extension.
   const series = files.filter(isDicom);
   if (series.length > 0) return rejectSingleSlice('DICOM', await (await import('./dicom')).readSeries(series));
-  if (files.length > 0 && files.every(isTiff)) return rejectSingleSlice('TIFF', await (await import('./tiff')).readStack(files));
+  if (files.length > 0 && files.every(isTiff))
+    return rejectSingleSlice('TIFF', await (await import('./tiff')).readStack(files));
   return undefined;
 }
 

@@ -7,7 +7,7 @@ import type { StartChoice } from '../ui/start';
 import type { ExtractParts } from './extract-parts';
 import type { ExtractResults } from './extract-results';
 import type { LabStates } from './lab-states';
-import { type SavedMoment, UndoHistory } from './rewinder';
+import { type SavedMoment, UndoHistory } from './undo-history';
 
 /** Radius of the sphere placed at the crosshair, as a fraction of the volume's shortest side. */
 const SPHERE_PART = 0.1;

@@ -1,4 +1,4 @@
-import { deformPoints } from '../sculpt/carry';
+import { deformPoints } from '../sculpt/deform';
 import { samePose } from '../sculpt/ellipsoids';
 import type { FrameEvent, Pose, Surface } from '../sculpt/protocol';
 import type { SculptureView } from '../view/sculpture';

@@ -21,10 +21,10 @@ import { ErrorBanner, StatusLine } from '../ui/status';
 import { Transport, type TransportEvents } from '../ui/transport';
 import { pictureOf } from '../view/picture';
 import { SculptureView, type SculptViewOptions } from '../view/sculpture';
-import { DragLatency } from './answers';
+import { DragLatency } from './drag-latency';
 import { ACCEPT } from './mesh-files';
 import { Saving } from './saving';
-import { SurfaceCarrier } from './sculpt-ahead';
+import { SurfaceCarrier } from './sculpt-carrier';
 import { SCULPT_PLOTS, SCULPT_ROWS } from './sculpt-measures';
 import { layOut, ScenePanel } from './sculpt-page';
 

@@ -6,8 +6,8 @@ import type { FrameEvent, ParamValues, Pose, SavedPose } from '../sculpt/protoco
 import { text } from '../texts';
 import type { History, HistoryMark } from '../ui/history';
 import type { LabStates } from './lab-states';
-import { UndoHistory } from './rewinder';
 import type { SculptParts } from './sculpt-parts';
+import { UndoHistory } from './undo-history';
 
 /** State of the page besides the model, which undo restores. */
 interface PageState {

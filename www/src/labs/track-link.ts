@@ -3,7 +3,7 @@ import type { ParamValues, Vec3 } from '../protocol';
 import { IMAGES, OWN_PREPARATION, type TrackExample } from '../track/examples';
 import { viewOf } from '../track/presets';
 import type { Box, Enrichment, Preparation, Setup } from '../track/protocol';
-import type { TrackViewOptions } from '../view/beating';
+import type { TrackViewOptions } from '../view/track';
 import { differing, readValue } from './link';
 
 const ADDRESS = '#track';

@@ -4,9 +4,9 @@ import { text } from '../texts';
 import type { TrackClient } from '../track/client';
 import type { Ready, SavedTrack, Setup, VolumeView } from '../track/protocol';
 import type { LabStates } from './lab-states';
-import { UndoHistory } from './rewinder';
 import type { TrackParts } from './track-parts';
 import type { TrackRecord, TrackResults } from './track-results';
+import { UndoHistory } from './undo-history';
 
 /** State of the page besides the tracker, which undo restores. */
 interface PageState {

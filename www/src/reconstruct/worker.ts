@@ -4,8 +4,8 @@ import init, { type ImplicitSurface, paramSpecs, type StepReport, version } from
 import type { Surface } from '../protocol';
 import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
-import { copySurface, emptyArrays, transferOf } from '../worker/room';
 import { buffersOf, reply, stop, type Task } from '../worker/serving';
+import { copySurface, emptyArrays, transferOf } from '../worker/surface-buffers';
 import { applyEdits, buildModel, cloudFrom, cubicDims, fitOf, levelOf, toPointEdits, valuesFor } from './model';
 import type {
   CameraView,

@@ -2,7 +2,7 @@
 
 import { Mesh, MultiresolutionModel, type MultiresParams } from 'vesicle';
 import type { Surface } from '../protocol';
-import { copySurface, emptyArrays, texturedSurface } from '../worker/room';
+import { copySurface, emptyArrays, texturedSurface } from '../worker/surface-buffers';
 import { scaled } from './ellipsoids';
 import { fitted } from './fit';
 import type { Facts, MeshSource, Pose, SceneSource, SculptQuantity, Setup } from './protocol';

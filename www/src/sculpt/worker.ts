@@ -3,9 +3,8 @@
 import init, { paramSpecs, type StepReport, version } from 'vesicle';
 import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
-import { transferOf } from '../worker/room';
 import { reply, stop, type Task } from '../worker/serving';
-import { TargetPath } from './course';
+import { transferOf } from '../worker/surface-buffers';
 import {
   buildModel,
   factsOf,
@@ -35,6 +34,7 @@ import type {
 } from './protocol';
 import { recorded } from './recording';
 import { levelsOf, stagesOf } from './stages';
+import { TargetPath } from './target-path';
 
 type Model = ReturnType<typeof buildModel>;
 type Handlers = {

@@ -1,6 +1,6 @@
 /** Collects what the page displays of a tracked frame. */
 import type { SurfaceTracker } from 'vesicle';
-import { copySurface, emptyArrays } from '../worker/room';
+import { copySurface, emptyArrays } from '../worker/surface-buffers';
 import { type CineSpec, wallDistances } from './cine';
 import type { SurfaceError, TrackedFrame } from './protocol';
 

@@ -2,7 +2,7 @@
 
 import type { ParamValues } from '../protocol';
 import { text } from '../texts';
-import type { TrackViewOptions } from '../view/beating';
+import type { TrackViewOptions } from '../view/track';
 import { HEART, IMAGES, type TrackExample } from './examples';
 
 /** One picture of a figure: the same image with other parameters and view options. */

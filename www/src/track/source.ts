@@ -1,7 +1,7 @@
 /** Opens and prepares 4D images, and builds trackers of them. Used by the worker only. */
 
 import { SurfaceTracker, Volume } from 'vesicle';
-import { importVolume } from '../foreign';
+import { importVolume } from '../importers';
 import { text } from '../texts';
 import { invert } from '../view/anatomy';
 import { Refusal } from '../worker/refusal';

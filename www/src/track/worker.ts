@@ -3,13 +3,13 @@
 import init, { paramSpecs, type StepReport, type SurfaceTracker, type Volume, version } from 'vesicle';
 import { text } from '../texts';
 import { Refusal, toFailure } from '../worker/refusal';
-import { transferOf } from '../worker/room';
 import { reply, stop, type Task, withTransfer } from '../worker/serving';
+import { transferOf } from '../worker/surface-buffers';
 import { viewOf } from '../worker/volumes';
-import { interpolateSlice } from './between';
 import { type CineSpec, trueVolume } from './cine';
 import { trackForComparison } from './comparing';
 import { trackedFrame } from './frames';
+import { interpolateSlice } from './interpolate-slice';
 import type {
   BoundaryVotes,
   ComparedTrack,

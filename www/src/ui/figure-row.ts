@@ -2,7 +2,6 @@ import type { Vec3 } from '../protocol';
 import { text } from '../texts';
 import type { CannySettings } from '../track/canny';
 import type { BoundaryVotes, InterpolatedSlice } from '../track/protocol';
-import type { ContentBelow } from '../view/beating';
 import {
   FigureImage,
   paintBetween,
@@ -12,7 +11,8 @@ import {
   paintWindow,
   type Subject,
   voxelIn,
-} from '../view/pictures';
+} from '../view/figure-images';
+import type { ContentBelow } from '../view/track';
 import { h, uniqueId } from './dom';
 
 /** Default settings of Canny's detector for greys of 0 to 255; the paper used 1.5, 10 and 20 for its image. */

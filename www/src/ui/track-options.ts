@@ -1,5 +1,5 @@
 import { text } from '../texts';
-import type { ContentBelow, TrackViewOptions, VisibleVotes } from '../view/beating';
+import type { ContentBelow, TrackViewOptions, VisibleVotes } from '../view/track';
 import { h } from './dom';
 import { choice, PLACEMENTS } from './view-options';
 

@@ -1,6 +1,6 @@
 import { Vector3 } from 'three';
-import { type PinholeCamera, poseOf } from './eye';
 import { Lines } from './lines';
+import { type PinholeCamera, poseOf } from './pinhole';
 
 /**
  * Cameras in the 3D view as small pyramids: the apex is the camera centre, the base its image, with a mark at the upper

@@ -2,12 +2,12 @@
 import type { Vec3, VolumeView } from '../protocol';
 import { type CannySettings, canny } from '../track/canny';
 import { boundaryImage, hasBoundary, twoMeans, windowAt } from '../track/clusters';
-import { intersectionsWithRow } from '../track/cut';
+import { intersectionsWithRow } from '../track/cross-section';
 import type { BoundaryVotes, InterpolatedSlice } from '../track/protocol';
 import { context2d, h, token } from '../ui/dom';
 import { invert, sliceOrientations } from './anatomy';
-import { voxelsOfFrame } from './beating';
 import { greysOf, slicePicture } from './slicing';
+import { voxelsOfFrame } from './track';
 import { votesIn } from './votes';
 
 /** Size of an image's longer side in pixels; sharp on high-resolution screens, too. */

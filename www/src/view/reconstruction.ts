@@ -4,7 +4,7 @@ import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import { CameraMarks } from './cameras';
 import { PointCloud } from './cloud';
-import type { PinholeCamera } from './eye';
+import type { PinholeCamera } from './pinhole';
 import { diverging, isQuantity, QUANTITIES, quantityTitle } from './shading';
 import { type SurfaceColor, SurfaceObject } from './surface';
 import { Viewport } from './viewport';

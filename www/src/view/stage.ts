@@ -4,7 +4,6 @@ import { onSchemeChange, token } from '../ui/dom';
 import { Legend } from '../ui/legend';
 import type { ViewOptions } from '../ui/view-options';
 import { invert, sliceOrientations, slicePlane, toWorld } from './anatomy';
-import { VolumeBox } from './frame';
 import { AttractorMarks, UncoveredMarks } from './markers';
 import { AXIS_TOKENS, SlicePanel } from './panel';
 import { SlicePlane } from './planes';
@@ -12,6 +11,7 @@ import { diverging, QUANTITIES, quantityTitle } from './shading';
 import { levelIndex, slicePicture } from './slicing';
 import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
+import { VolumeBox } from './volume-box';
 
 /** The objects on screen that belong to one volume. */
 interface Scene {

@@ -15,9 +15,9 @@ import {
 } from 'three';
 import type { Surface } from '../protocol';
 import type { ColorMode } from '../ui/view-options';
-import { simplifiedIndices } from './coarse';
 import { componentColors } from './components';
 import { isQuantity, linearColors, QUANTITIES, robustRange, type ShownQuantity, shadeColors } from './shading';
+import { simplifiedIndices } from './simplify';
 
 const BONE: ColorRepresentation = '#e9dcc3';
 /**

@@ -2,13 +2,12 @@ import { Box3, Vector3 } from 'three';
 import type { LevelView, Surface, Vec3, VolumeView } from '../protocol';
 import type { VoxelBox } from '../track/box';
 import { sliceVotes } from '../track/clusters';
-import { crossSection } from '../track/cut';
+import { crossSection } from '../track/cross-section';
 import type { BoundaryVotes } from '../track/protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import type { SlicePlacement } from '../ui/view-options';
 import { invert, sliceOrientations, slicePlane, toWorld } from './anatomy';
 import { PointCloud } from './cloud';
-import { VolumeBox } from './frame';
 import { Lines } from './lines';
 import { AXIS_TOKENS, SlicePanel } from './panel';
 import { SlicePlane } from './planes';
@@ -16,6 +15,7 @@ import { RegionGrips, regionEdges } from './region';
 import { greysOf, pictureSize, projectSegments } from './slicing';
 import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
+import { VolumeBox } from './volume-box';
 import { drawFaces, drawVotes, voteColors, votesNear } from './votes';
 
 /** Content below the 3D view: the slices, or one of the paper's figures. */

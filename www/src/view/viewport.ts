@@ -16,8 +16,8 @@ import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
 import type { Vec3 } from '../protocol';
 import { anatomicalSigns, type Grid } from './anatomy';
-import { WebGlRendering } from './drawing';
-import { applyPinhole, type PinholeCamera } from './eye';
+import { applyPinhole, type PinholeCamera } from './pinhole';
+import { WebGlRendering } from './rendering';
 
 const FIELD_OF_VIEW = 30;
 /** Rotation of the view by an arrow key, radians, and zoom factor of + and -. */

@@ -1,6 +1,6 @@
 /** Opens volumes in the worker, and reduces them to what the page shows. */
 import { VesicleError, Volume } from 'vesicle';
-import { importVolume } from '../foreign';
+import { importVolume } from '../importers';
 import type { LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
 import { quantize } from '../quantize';
 import { shapeVoxels } from '../shapes';
