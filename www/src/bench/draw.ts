@@ -1,4 +1,4 @@
-import { text } from '../texts';
+import { LANGUAGE, text } from '../texts';
 import { h } from '../ui/dom';
 import { scaleOf } from './scale';
 import type { Chart, Section } from './sections';
@@ -122,7 +122,7 @@ function axis({ ticks, at }: ChartLayout): HTMLElement {
   return h('div', { class: 'bench-axis', 'aria-hidden': true }, h('div', {}, ...ticks.map(label)));
 }
 
-const short = (value: number) => new Intl.NumberFormat('en', { maximumSignificantDigits: 3 }).format(value);
+const short = (value: number) => new Intl.NumberFormat(LANGUAGE, { maximumSignificantDigits: 3 }).format(value);
 
 /** Creates the table of a chart: a row per figure if all have the same hosts, else a row per bar. */
 function tableOf(section: string, chart: Chart): HTMLElement {

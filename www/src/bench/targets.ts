@@ -42,7 +42,7 @@ export function verdict(figure: Figure): 'met' | 'not met' | 'not measured' {
 export function withUnit(value: number, unit: string): string {
   if (unit === 's' && value < 0.1) return withUnit(1000 * value, 'ms');
   const digits = Math.abs(value) >= 100 ? { maximumFractionDigits: 0 } : { maximumSignificantDigits: 3 };
-  const number = new Intl.NumberFormat('en', digits).format(value);
+  const number = new Intl.NumberFormat(LANGUAGE, digits).format(value);
   return unit === '×' ? `${number}×` : `${number} ${unit}`;
 }
 

@@ -1,58 +1,11 @@
-import bench from './en/bench.json';
-import controls from './en/controls.json';
-import counts from './en/counts.json';
-import exercises from './en/exercises.json';
-import extract from './en/extract.json';
-import extractPanels from './en/extractPanels.json';
-import extractPresets from './en/extractPresets.json';
-import files from './en/files.json';
-import labs from './en/labs.json';
-import measures from './en/measures.json';
-import panels from './en/panels.json';
-import pointPanels from './en/pointPanels.json';
-import reconstruct from './en/reconstruct.json';
-import reconstructPresets from './en/reconstructPresets.json';
-import sculpt from './en/sculpt.json';
-import sculptPanels from './en/sculptPanels.json';
-import sculptPresets from './en/sculptPresets.json';
-import shapes from './en/shapes.json';
-import shell from './en/shell.json';
-import track from './en/track.json';
-import trackPanels from './en/trackPanels.json';
-import trackPresets from './en/trackPresets.json';
-import view from './en/view.json';
+import catalogue from './en.json';
 
-/** All texts of the interface, by the part of the app that shows them. To translate the app, translate these values and set `LANGUAGE`. */
-const catalogue = {
-  sculptPresets,
-  trackPresets,
-  reconstructPresets,
-  extractPresets,
-  trackPanels,
-  sculptPanels,
-  pointPanels,
-  measures,
-  extractPanels,
-  exercises,
-  controls,
-  bench,
-  counts,
-  extract,
-  files,
-  labs,
-  panels,
-  reconstruct,
-  sculpt,
-  shapes,
-  shell,
-  track,
-  view,
-};
-const LANGUAGE = 'en';
+/** All texts of the interface are in `en.json`, by the part of the app; to translate it, translate that file, and set this to its language. */
+export const LANGUAGE = 'en';
 
 type Catalogue = typeof catalogue;
 type KeyIn<S extends keyof Catalogue> = `${S}.${keyof Catalogue[S] & string}`;
-/** Key of a text, as in `extract.openVolume`. */
+/** Key of a text, as in `extract.noVolume`. */
 export type TextKey = { [S in keyof Catalogue]: KeyIn<S> }[keyof Catalogue];
 /** Key of a text with plural forms, without the suffix of the form. */
 export type PluralKey = TextKey extends infer K ? (K extends `${infer Base}_other` ? Base : never) : never;

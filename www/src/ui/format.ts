@@ -1,6 +1,6 @@
-import { text } from '../texts';
+import { LANGUAGE, text } from '../texts';
 
-const COUNT = new Intl.NumberFormat('en', { maximumFractionDigits: 0 });
+const COUNT = new Intl.NumberFormat(LANGUAGE, { maximumFractionDigits: 0 });
 
 export function count(value: number): string {
   return COUNT.format(value);
@@ -11,7 +11,7 @@ export function figure(value: number): string {
   if (!Number.isFinite(value)) return '–';
   const size = Math.abs(value);
   if (size !== 0 && (size < 1e-3 || size >= 1e7)) return value.toExponential(2);
-  return new Intl.NumberFormat('en', { maximumSignificantDigits: 4 }).format(value);
+  return new Intl.NumberFormat(LANGUAGE, { maximumSignificantDigits: 4 }).format(value);
 }
 
 export function milliseconds(value: number): string {
