@@ -59,11 +59,11 @@ interface ChartLayout {
 
 function drawFigure(figure: Figure, drawn: ChartLayout): HTMLElement {
   const { name, target, bars } = figure;
-  const asked = target ? [verdictMark(figure, formatTarget(target, drawn.unit))] : [];
+  const verdictMarks = target ? [verdictMark(figure, formatTarget(target, drawn.unit))] : [];
   return h(
     'div',
     { class: 'bench-figure' },
-    h('p', { class: 'bench-name' }, h('span', {}, name), ...asked),
+    h('p', { class: 'bench-name' }, h('span', {}, name), ...verdictMarks),
     ...bars.map((bar) => drawBar(figure, bar, drawn)),
   );
 }
@@ -154,17 +154,17 @@ type Table = [head: string[], rows: string[][]];
 
 function byHost({ unit, figures }: Chart): Table {
   const hosts = [...new Set(figures.flatMap(({ bars }) => bars.map(({ label }) => label)))];
-  const asks = figures.some(({ target }) => target);
+  const hasTargets = figures.some(({ target }) => target);
   const row = (figure: Figure) => [figure.name, ...hosts.map((host) => shownAt(figure, host, unit))];
-  const asked = (figure: Figure) =>
+  const targetCells = (figure: Figure) =>
     figure.target ? [formatTarget(figure.target, unit), VERDICTS[verdict(figure)]] : ['–', '–'];
   return [
     [
       text('bench.columnMeasured'),
       ...hosts,
-      ...(asks ? [text('bench.columnTarget'), text('bench.columnVerdict')] : []),
+      ...(hasTargets ? [text('bench.columnTarget'), text('bench.columnVerdict')] : []),
     ],
-    figures.map((figure) => [...row(figure), ...(asks ? asked(figure) : [])]),
+    figures.map((figure) => [...row(figure), ...(hasTargets ? targetCells(figure) : [])]),
   ];
 }
 

@@ -1,3 +1,5 @@
+import { LANGUAGE } from '../texts';
+
 /** The target of a measurement. */
 export interface Target {
   limit: number;
