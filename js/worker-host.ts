@@ -134,10 +134,10 @@ class Host {
     const abort = new AbortController();
     this.#controllers.set(id, abort);
     const listener = (report: Report) => this.#post({ type: 'report', id, report }, []);
-    const heard = reports && { [ABORTABLE[name as keyof typeof ABORTABLE]]: listener };
+    const listeners = reports && { [ABORTABLE[name as keyof typeof ABORTABLE]]: listener };
     try {
       const work = target[name] as (options: object) => Promise<unknown>;
-      return await work.call(target, { ...(options as object), signal: abort.signal, ...heard });
+      return await work.call(target, { ...(options as object), signal: abort.signal, ...listeners });
     } finally {
       this.#controllers.delete(id);
     }

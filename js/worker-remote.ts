@@ -269,14 +269,14 @@ function remoteClass(name: ClassName): Class {
       }
     },
   };
-  const made = named[name] as unknown as Class;
+  const proxy = named[name] as unknown as Class;
   for (const method of Object.keys(STATICS[name])) {
-    define(made, method, { value: async (...args: unknown[]) => post(currentSession(), name, method, args) });
+    define(proxy, method, { value: async (...args: unknown[]) => post(currentSession(), name, method, args) });
   }
-  for (const [member, kind] of Object.entries(MEMBERS[name])) define(made.prototype, member, memberOf(member, kind));
+  for (const [member, kind] of Object.entries(MEMBERS[name])) define(proxy.prototype, member, memberOf(member, kind));
   // Meshes are created by static methods only.
-  if (name !== 'Mesh') define(made, 'create', { value: creator(made, name) });
-  return made;
+  if (name !== 'Mesh') define(proxy, 'create', { value: creator(proxy, name) });
+  return proxy;
 }
 
 const SPECIAL: Record<string, (remote: Remote, ...args: never[]) => Promise<unknown>> = { run, coverage, copyTo };
@@ -309,11 +309,11 @@ function ignoreRejection({ state, created }: ReturnType<typeof make>): RemoteSta
   return state;
 }
 
-function creator(made: Class, name: ClassName): (...args: unknown[]) => Promise<Remote> {
+function creator(proxy: Class, name: ClassName): (...args: unknown[]) => Promise<Remote> {
   return async (...args) => {
-    const asked = make(name, args);
-    const object = new made(asked.state);
-    await asked.created;
+    const request = make(name, args);
+    const object = new proxy(request.state);
+    await request.created;
     return object;
   };
 }

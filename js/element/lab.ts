@@ -94,14 +94,14 @@ export class VesicleLab extends HTMLElement {
       throw invalid('method', `must be one of ${Object.keys(MODELS).join(', ')}, got '${method}'`);
     const src = this.getAttribute('src');
     if (!src) throw invalid('src', 'must be the address of a file');
-    const told = {
+    const settings = {
       start: parseStart(this.getAttribute('start')),
       levels: Number(this.getAttribute('levels') ?? 0),
       params: json<Record<string, unknown>>('params', this.getAttribute('params'), {}),
       ellipsoids: json('ellipsoids', this.getAttribute('ellipsoids'), []),
     };
     const [bytes] = await Promise.all([fetched(new URL(src, document.baseURI).href), init()]);
-    return make({ ...told, bytes });
+    return make({ ...settings, bytes });
   }
 
   /** Runs to the end, or until {@link VesicleLab.pause}. */

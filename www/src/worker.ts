@@ -297,10 +297,10 @@ class Session {
     await stop(this.#coverageRun);
     const iteration = this.#iteration;
     const abort = new AbortController();
-    let toldAt = 0;
+    let reportedAt = 0;
     const onProgress = (share: number) => {
-      if (performance.now() - toldAt < TELL_EVERY) return;
-      toldAt = performance.now();
+      if (performance.now() - reportedAt < TELL_EVERY) return;
+      reportedAt = performance.now();
       send({ event: 'covering', share });
     };
     const work: Task = { abort, ended: this.#current().coverage({ signal: abort.signal, onProgress }) };

@@ -4,7 +4,7 @@ import { text } from '../texts';
 const early = new Map<string, Promise<Uint8Array>>();
 
 /** Starts to download a file that will be needed as soon as the engine has loaded. */
-export function fetchAhead(url: string): void {
+export function preload(url: string): void {
   const bytes = download(url);
   // `fetchBytes` reports the error.
   bytes.catch(() => undefined);

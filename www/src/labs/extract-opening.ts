@@ -6,7 +6,7 @@ import { text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import { count } from '../ui/format';
 import type { StartChoice } from '../ui/start';
-import { fetchAhead, fetchBytes } from './downloads';
+import { fetchBytes, preload } from './downloads';
 import type { ExtractParts } from './extract-parts';
 import type { ExtractResults } from './extract-results';
 import type { ExtractSettings } from './extract-settings';
@@ -55,7 +55,7 @@ export class ExtractOpening extends Opening<Example, Linked, VolumeSource, Opene
   static fetchLinked(): void {
     const linked = fromHash(location.hash);
     const example = linked?.example ? exampleById(linked.example) : EXAMPLES[0];
-    if (example && !linked?.file && 'file' in example.source) fetchAhead(exampleUrl(example.source.file));
+    if (example && !linked?.file && 'file' in example.source) preload(exampleUrl(example.source.file));
   }
 
   /** Opens a volume passed on by another lab. */

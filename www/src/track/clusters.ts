@@ -84,15 +84,15 @@ function voteOf(
 ): void {
   const side = 2 * halfWidth + 1;
   const from = (y - halfWidth) * width + x - halfWidth;
-  let [least, largest] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
+  let [smallest, largest] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
   for (let j = 0; j < side; j++)
     for (let i = 0; i < side; i++) {
       const value = values[from + j * width + i] ?? 0;
-      if (value < least) least = value;
+      if (value < smallest) smallest = value;
       if (value > largest) largest = value;
     }
   // Quick test: most windows end here.
-  if (largest - least <= threshold) return;
+  if (largest - smallest <= threshold) return;
   const inside = Array.from({ length: side * side }, (_, k) => from + Math.floor(k / side) * width + (k % side));
   const found = twoMeans(inside.map((at) => values[at] ?? 0));
   if (!hasBoundary(found, threshold)) return;

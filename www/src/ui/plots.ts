@@ -10,7 +10,7 @@ import { PlotTable } from './plot-table';
 
 const PLOT_HEIGHT = 144;
 /** Space above a plot for the names of the levels. */
-const MARK_ROOM = 16;
+const MARK_HEIGHT = 16;
 /** Height of the tick marks of one kind of event. */
 const MARK_LANE = 6;
 
@@ -173,7 +173,7 @@ function optionsFor(kind: PlotKind, mark: (plot: uPlot) => void): uPlot.Options 
     height: PLOT_HEIGHT,
     legend: { show: false },
     cursor: { y: false, drag: { x: false, y: false } },
-    padding: [MARK_ROOM, 8, 0, 0],
+    padding: [MARK_HEIGHT, 8, 0, 0],
     scales: {
       x: { time: false, range: iterationRange },
       y: kind.log ? { distr: 3, range: logRange } : { range: valueRange },
@@ -203,8 +203,8 @@ function iterationRange(_: uPlot, __: number | null, last: number | null): uPlot
 
 function valueRange(_: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax {
   if (low === null || high === null) return [0, 1];
-  const room = Math.max(1, 0.08 * (high - low));
-  return [low - room, high + room];
+  const margin = Math.max(1, 0.08 * (high - low));
+  return [low - margin, high + margin];
 }
 
 /** Rounds a range outwards to whole powers of ten. */

@@ -8,7 +8,7 @@ const KINDS: { value: Enrichment; label: string }[] = [
   { value: 'flow', label: text('trackPanels.enrichFlow') },
 ];
 /** Largest factor for in-between slices that the library supports. */
-const MOST = 16;
+const MAX_FACTOR = 16;
 
 /** Controls for the preprocessing of the image before tracking: binning and in-between slices. */
 export class PreparationControls {
@@ -42,7 +42,7 @@ export class PreparationControls {
       type: 'number',
       id: factor,
       min: 0,
-      max: MOST,
+      max: MAX_FACTOR,
       step: 1,
       placeholder: text('controls.auto'),
       inputmode: 'numeric',
@@ -50,8 +50,8 @@ export class PreparationControls {
     });
     this.#factor.addEventListener('change', () => {
       const given = this.#factor.value === '' && !this.#factor.validity.badInput ? 0 : this.#factor.valueAsNumber;
-      const valid = Number.isInteger(given) && given >= 0 && given <= MOST;
-      this.#error.textContent = valid ? '' : text('trackPanels.inBetweenFactorError', { most: MOST });
+      const valid = Number.isInteger(given) && given >= 0 && given <= MAX_FACTOR;
+      this.#error.textContent = valid ? '' : text('trackPanels.inBetweenFactorError', { most: MAX_FACTOR });
       if (valid) onChange({ ...this.#value, factor: given }, text('trackPanels.inBetweenFactorChange'));
     });
     this.element = h(

@@ -7,7 +7,7 @@ import { figure } from './format';
 
 const HEIGHT = 190;
 /** Space above the plot for the names of the marks. */
-const MARK_ROOM = 18;
+const MARK_HEIGHT = 18;
 
 export interface VolumeCurves {
   volumes: number[];
@@ -176,7 +176,7 @@ function options(mark: (plot: uPlot) => void): uPlot.Options {
     height: HEIGHT,
     legend: { show: false },
     cursor: { y: false, drag: { x: false, y: false } },
-    padding: [MARK_ROOM, 12, 0, 0],
+    padding: [MARK_HEIGHT, 12, 0, 0],
     scales: {
       x: { time: false, range: (_, low, high) => [(low ?? 1) - 0.5, (high ?? 2) + 0.5] },
       y: { range: (_, low, high) => (low === null || high === null ? [0, 1] : spread(low, high)) },
@@ -191,6 +191,6 @@ function options(mark: (plot: uPlot) => void): uPlot.Options {
 }
 
 function spread(low: number, high: number): [number, number] {
-  const room = 0.1 * (high - low) || Math.max(1e-6, 0.1 * Math.abs(high));
-  return [low - room, high + room];
+  const margin = 0.1 * (high - low) || Math.max(1e-6, 0.1 * Math.abs(high));
+  return [low - margin, high + margin];
 }

@@ -8,7 +8,7 @@ import { type Axis, type SliceOrientation, toWorld } from './anatomy';
 import type { Grip } from './panel';
 
 /** Smallest size of the region along an axis, voxels; a smaller one contains no window with a boundary. */
-const LEAST = 4;
+const MIN_VOXELS = 4;
 
 export class RegionGrips {
   region: VoxelBox | undefined;
@@ -79,8 +79,8 @@ export class RegionGrips {
 
 function moved(box: VoxelBox, axis: Axis, side: 'low' | 'high', to: number, dims: Vec3): VoxelBox {
   const ends: VoxelBox = { low: [...box.low], high: [...box.high] };
-  if (side === 'low') ends.low[axis] = Math.max(0, Math.min(Math.round(to + 0.5), box.high[axis] - LEAST + 1));
-  else ends.high[axis] = Math.min(dims[axis] - 1, Math.max(Math.round(to - 0.5), box.low[axis] + LEAST - 1));
+  if (side === 'low') ends.low[axis] = Math.max(0, Math.min(Math.round(to + 0.5), box.high[axis] - MIN_VOXELS + 1));
+  else ends.high[axis] = Math.min(dims[axis] - 1, Math.max(Math.round(to - 0.5), box.low[axis] + MIN_VOXELS - 1));
   return ends;
 }
 

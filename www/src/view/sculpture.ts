@@ -264,13 +264,13 @@ export class SculptureView {
 
 /** Returns a box for the surface in all poses: with the same margin around the ellipsoids as at the start. */
 function boxOfAllPoses(box: { min: Vec3; max: Vec3 }, start: Pose, poses: Pose[]): Box3 {
-  const room = new Box3(new Vector3(...box.min), new Vector3(...box.max));
+  const all = new Box3(new Vector3(...box.min), new Vector3(...box.max));
   const first = boxOf(start);
   for (const pose of poses) {
     const { min, max } = boxOf(pose);
     const corner = (at: Vec3, from: Vec3, of: Vec3) =>
       new Vector3(...of.map((x, k) => x + (at[k] ?? 0) - (from[k] ?? 0)));
-    room.expandByPoint(corner(min, first.min, box.min)).expandByPoint(corner(max, first.max, box.max));
+    all.expandByPoint(corner(min, first.min, box.min)).expandByPoint(corner(max, first.max, box.max));
   }
-  return room;
+  return all;
 }

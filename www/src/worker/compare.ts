@@ -40,7 +40,7 @@ async function once(
       iterations: 0,
       times: {} as Record<string, number>,
     }));
-    let toldAt = 0;
+    let reportedAt = 0;
     // A step belongs to the level on which it began: the last one of a level includes the change to the next.
     let level = model.level;
     const onStep = (report: StepReport) => {
@@ -50,8 +50,8 @@ async function once(
         entry.iterations += 1;
         for (const [part, time] of Object.entries(report.times)) entry.times[part] = (entry.times[part] ?? 0) + time;
       }
-      if (performance.now() - toldAt < TELL_EVERY && !report.done) return;
-      toldAt = performance.now();
+      if (performance.now() - reportedAt < TELL_EVERY && !report.done) return;
+      reportedAt = performance.now();
       onReport(report);
     };
     const report = await model.run({ signal, onStep, maxIterations: MOST_ITERATIONS });
