@@ -58,7 +58,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     await extension.evaluate((one) => one?.loseContext());
     await expect
       .poll(() => page.locator('.view-note').allTextContents())
-      .toEqual([expect.stringContaining('comes back')]);
+      .toEqual([expect.stringContaining('restored automatically')]);
     await extension.evaluate((one) => one?.restoreContext());
     await expect.poll(() => page.locator('.view-note').count()).toBe(0);
     await expect.poll(async () => before.equals(await view())).toBe(true);
