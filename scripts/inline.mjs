@@ -10,7 +10,7 @@ async function moduleInside() {
   return `
 const TEXT = '${bytes.toString('base64')}';
 
-export function ownModule() {
+export function defaultModule() {
   const bytes = Uint8Array.from(atob(TEXT), (character) => character.charCodeAt(0));
   const unpacked = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'));
   return new Response(unpacked).arrayBuffer();

@@ -130,13 +130,13 @@ describe('with reduced motion', () => {
     const beat = () => app.page.textContent('[data-frame=beat]');
     await open(app, QUICK.track);
     await reach(app.page, 'done');
-    expect(await beat()).toBe('Beat');
+    expect(await beat()).toBe('Loop');
     await app.page.locator('canvas[tabindex]').first().press('b');
-    expect(await beat()).toBe('Hold');
+    expect(await beat()).toBe('Stop');
     await expect.poll(() => drawings(5)).toBeGreaterThan(0);
     await app.page.emulateMedia({ reducedMotion: 'no-preference' });
     await open(app, QUICK.track);
-    await expect.poll(beat).toBe('Hold');
+    await expect.poll(beat).toBe('Stop');
     await app.page.emulateMedia({ reducedMotion: 'reduce' });
   });
 

@@ -2,7 +2,7 @@
 import { describe, expect, test } from 'vitest';
 import { scaleOf } from '../../www/src/bench/scale';
 import { sectionsOf } from '../../www/src/bench/sections';
-import { askedOf, atLeast, atMost, type Figure, shortHost, verdict, withUnit } from '../../www/src/bench/targets';
+import { atLeast, atMost, type Figure, formatTarget, shortHost, verdict, withUnit } from '../../www/src/bench/targets';
 
 describe('scales', () => {
   test.each([0.3, 1, 9.7, 276, 1038])('from 0 to %d: a few round ticks, and everything fits', (most) => {
@@ -60,7 +60,7 @@ describe('bounds', () => {
     expect(withUnit(9.735, 's')).toBe('9.74 s');
     expect(withUnit(0.0353, 's')).toBe('35.3 ms');
     expect(withUnit(275.9, '×')).toBe('276×');
-    expect(askedOf(atMost(5, 'native'), 'µs')).toBe('≤ 5 µs native');
+    expect(formatTarget(atMost(5, 'native'), 'µs')).toBe('≤ 5 µs native');
     expect(shortHost('Chromium 156.0.8078.79')).toBe('Chromium 156');
     expect(shortHost('native')).toBe('native');
   });

@@ -55,10 +55,10 @@ test('missed bounds are marked', async () => {
   const count = (outcome: string) => page.locator(`#summary tr[data-verdict="${outcome}"]`).count();
   const all = await page.locator('#summary tr[data-verdict]').count();
   const title = await page.textContent('#summary h2');
-  expect(title).toBe(`${await count('met')} of ${all} bounds kept`);
+  expect(title).toBe(`${await count('met')} of ${all} targets met`);
   const [model] = await page.locator('#head .verdict').allTextContents();
   const slow = (report.head as { model: { milliseconds: number } }[]).some(({ model }) => model.milliseconds > 2000);
-  expect(model).toBe(`asked: ≤ 2 s; ${slow ? 'not met' : 'met'}`);
+  expect(model).toBe(`target: ≤ 2 s; ${slow ? 'not met' : 'met'}`);
 });
 
 test.each([

@@ -8,14 +8,14 @@ import { at } from '../../scripts/shell.mjs';
 import { exampleById } from '../../www/src/presets';
 import { cloudById } from '../../www/src/reconstruct/presets';
 import { sceneById } from '../../www/src/sculpt/presets';
-import { filmById } from '../../www/src/track/presets';
+import { imageById } from '../../www/src/track/presets';
 
 const DOCS = at('dist/docs');
 const LABS: Record<string, (id: string) => { id: string } | undefined> = {
   extract: exampleById,
   reconstruct: cloudById,
   sculpt: sceneById,
-  track: filmById,
+  track: imageById,
 };
 
 interface Link {

@@ -121,7 +121,7 @@ test('changed attributes restart it', async () => {
 test('the view rotates by keys and is described in words', async () => {
   await open('<vesicle-lab src="ring.mha"></vesicle-lab>');
   await state('done');
-  const view = page.getByRole('img', { name: /^The surface\. Arrow keys turn it/ });
+  const view = page.getByRole('img', { name: /^The surface\. Arrow keys rotate it/ });
   await expect.poll(drawnPixels).toBeGreaterThan(2000);
   const before = await view.screenshot();
   await view.press('ArrowUp');
@@ -129,10 +129,10 @@ test('the view rotates by keys and is described in words', async () => {
 });
 
 test.each([
-  ['<vesicle-lab></vesicle-lab>', 'src: the address of a file is needed'],
+  ['<vesicle-lab></vesicle-lab>', 'src: must be the address of a file'],
   [
     '<vesicle-lab src="ring.mha" method="magic"></vesicle-lab>',
-    /^method: 'magic'; there are deformable, implicit, tracking, multires$/,
+    /^method: must be one of deformable, implicit, tracking, multires, got 'magic'$/,
   ],
   ['<vesicle-lab src="ring.mha" params="iso 3"></vesicle-lab>', /^params: 'iso 3' is not JSON/],
   ['<vesicle-lab src="ring.mha" start="above"></vesicle-lab>', /^start: 'above'; accepted: contour, enclosing/],
@@ -202,7 +202,7 @@ test('without WebGL there are numbers, and a message in place of the view', asyn
   await writeFile(join(folder, 'blind.js'), 'HTMLCanvasElement.prototype.getContext = () => null;');
   await open('<vesicle-lab src="ring.mha"></vesicle-lab>', '<script src="./blind.js"></script>');
   await state('done');
-  expect(await page.locator('vesicle-lab p').textContent()).toMatch(/no WebGL/);
+  expect(await page.locator('vesicle-lab p').textContent()).toMatch(/WebGL is not available/);
   // three.js reports it as well.
   expect(complaints.splice(0).every((complaint) => /WebGL/.test(complaint))).toBe(true);
 });

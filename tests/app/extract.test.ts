@@ -157,7 +157,7 @@ describe('files', () => {
 });
 
 describe('the mean edge', () => {
-  const edge = () => app.page.getByLabel('Mean edge');
+  const edge = () => app.page.getByLabel('Mean edge length');
   const complaint = () => app.page.locator('.start .field-error:not(:empty)');
 
   test('shorter edges give more vertices, also after a reset', async () => {
@@ -172,7 +172,7 @@ describe('the mean edge', () => {
     await app.page.click('text=Reset');
     await reach(app.page, 'paused');
     expect(await edge().inputValue()).toBe('1');
-    await app.page.click('text=Play');
+    await app.page.click('text="Play"');
     await reach(app.page, 'done');
     expect((await measures(app.page)).vertices).toBe(shorter.vertices);
   });
@@ -182,7 +182,7 @@ describe('the mean edge', () => {
     await edge().fill(value);
     await edge().press('Enter');
     await expect.poll(() => edge().inputValue()).toBe('1');
-    expect(await complaint().allTextContents()).toEqual([expect.stringMatching(/accepted|needed/)]);
+    expect(await complaint().allTextContents()).toEqual([expect.stringMatching(/accepted|Must be/)]);
     await reach(app.page, 'done');
     expect(await measures(app.page)).toEqual(before);
   });
@@ -262,7 +262,7 @@ describe('files that cannot be opened', () => {
     await app.page.click('button:has-text("Reset")');
     await expect.poll(state).toMatch(/paused|done/);
     await app.page.keyboard.press('Escape');
-    if ((await state()) === 'paused') await app.page.click('text=Play');
+    if ((await state()) === 'paused') await app.page.click('text="Play"');
     await reach(app.page, 'done');
     await expect.poll(() => measures(app.page)).toEqual(before);
   });

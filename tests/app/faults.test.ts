@@ -58,7 +58,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     await extension.evaluate((one) => one?.loseContext());
     await expect
       .poll(() => page.locator('.view-note').allTextContents())
-      .toEqual([expect.stringContaining('comes back')]);
+      .toEqual([expect.stringContaining('restored automatically')]);
     await extension.evaluate((one) => one?.restoreContext());
     await expect.poll(() => page.locator('.view-note').count()).toBe(0);
     await expect.poll(async () => before.equals(await view())).toBe(true);
@@ -133,7 +133,7 @@ describe.each(LABS)('the %s lab', (lab) => {
         });
     });
     await reach(page, 'done');
-    expect(await page.textContent('.view-note')).toContain('no WebGL 2');
+    expect(await page.textContent('.view-note')).toContain('needs WebGL 2');
     expect(await measures(page)).toMatchObject({ closed: true });
     await page.locator('canvas[tabindex]').first().press('ArrowLeft');
   });
@@ -162,7 +162,7 @@ describe.each(LABS)('the %s lab', (lab) => {
       Object.assign(window, { Worker: Breaking });
     });
     await page.waitForSelector('[data-state=error]');
-    expect(await banner().textContent()).toMatch(/Reset starts the engine again.*out of memory/);
+    expect(await banner().textContent()).toMatch(/Reset restarts the engine.*out of memory/);
     await expect.poll(async () => countColors(page, await view())).toBeGreaterThan(100);
     await page.getByRole('button', { name: 'Reset', exact: true }).click();
     await expect.poll(() => banner().isVisible()).toBe(false);

@@ -2,7 +2,7 @@
 import { readFile } from 'node:fs/promises';
 import init, { Mesh } from 'vesicle';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
-import { describedIn } from '../../www/src/foreign/tiff-description';
+import { describedIn } from '../../www/src/importers/tiff-description';
 import { type App, measures, openApp, reach } from './browser';
 import { dicomSeries, type Given, tiffStack } from './pictures';
 
@@ -122,13 +122,13 @@ describe('TIFF', () => {
     await app.page.setInputFiles('input[type=file]', files);
     await expect
       .poll(() => app.page.textContent('.banner'))
-      .toMatch(/TIFF: page 2 is of another size than the first, 24 by 20/);
+      .toMatch(/TIFF: page 2 differs in size from the first page, 24 × 20/);
   });
 
   test('a single slice is refused', async () => {
     const file = { name: 'slice.tif', mimeType: 'image/tiff', buffer: tiffStack([new Uint8Array(4)], [2, 2], '') };
     await app.page.setInputFiles('input[type=file]', [file]);
-    await expect.poll(() => app.page.textContent('.banner')).toMatch(/TIFF: a single slice; choose or drop all files/);
+    await expect.poll(() => app.page.textContent('.banner')).toMatch(/TIFF: this is a single slice; open all files/);
   });
 
   test('more files than a header and its data are refused', async () => {

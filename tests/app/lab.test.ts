@@ -22,7 +22,7 @@ async function openAt(hash: string): Promise<void> {
 }
 
 /** Number of iterations of the chain of figure 7 until it converges. */
-const CHAIN = PRESETS.find(({ id }) => id === 'figure-7')?.variants[0].outcome.iterations;
+const CHAIN = PRESETS.find(({ id }) => id === 'figure-7')?.variants[0].expected.iterations;
 
 const text = (selector: string) => app.page.locator(selector).textContent();
 /** Takes a screenshot of a canvas. */
@@ -35,7 +35,7 @@ describe('a figure of the paper', () => {
     await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('head phantom'));
     await reach(app.page, 'done');
     expect(await measures(app.page)).toMatchObject({ components: 1, genus: 5, closed: true });
-    expect(await text('.figure')).toMatch(/Paper: On the CT of a head.*Here both end/);
+    expect(await text('.figure')).toMatch(/Paper: On a head CT.*Here both runs end/);
     expect(await app.page.evaluate(() => location.hash)).toBe('#extract?example=figure-15-16&v=2');
   });
 
@@ -50,7 +50,7 @@ describe('a figure of the paper', () => {
     expect(levels.map(({ width }) => width)).toEqual([20, 36, 64, 112]);
     expect(levels.map(({ inUse }) => inUse)).toEqual([false, false, false, true]);
     expect(levels[0]?.label).toBe('I₃: level 3, 20 × 20 × 20 voxels');
-    expect(levels[3]?.label).toContain('the model is here');
+    expect(levels[3]?.label).toContain('present level of the model');
   });
 
   test('a selected level is shown in the slices, and the pictures follow the slice', async () => {
@@ -80,7 +80,7 @@ describe('a figure of the paper', () => {
   });
 
   test('shows the time of each part on each level, as in the paper', async () => {
-    const table = app.page.getByRole('region', { name: 'Time per part and level' });
+    const table = app.page.getByRole('region', { name: 'Time by part and level' });
     const head = await table.locator('thead th').allTextContents();
     expect(head).toEqual(['Part', 'level 3', 'level 2', 'level 1', 'level 0', 'total']);
     const rows = await table.locator('tbody tr, tfoot tr').allTextContents();
@@ -92,7 +92,7 @@ describe('a figure of the paper', () => {
       'embedding',
       'forces',
       'motion',
-      'together',
+      'total',
     ]);
     const numbers = async (row: string) =>
       (await table.locator('tr', { hasText: row }).locator('td').allTextContents()).map(Number);
@@ -117,8 +117,8 @@ describe('a figure of the paper', () => {
     expect(direct).toMatchObject({ levels: 0, done: true, components: 1, genus: 5 });
     expect(coarseToFine).toMatchObject({ levels: 3, done: true, components: 1, genus: 5, vertices: before.vertices });
     expect(direct.milliseconds).toBeGreaterThan(2.75 * coarseToFine.milliseconds);
-    expect(await text('.compare [role=status]')).toMatch(/times less time than direct\. Area differs by 0\.\d\d %/);
-    const table = app.page.getByRole('region', { name: 'Time of both ways' });
+    expect(await text('.compare [role=status]')).toMatch(/times as fast as direct\. Area differs by 0\.\d\d %/);
+    const table = app.page.getByRole('region', { name: 'Times of both runs' });
     expect(await table.locator('thead th').allTextContents()).toEqual(['Part', 'I₃', 'I₂', 'I₁', 'I₀', 'total']);
     const heads = await table.locator('tbody th').allTextContents();
     expect(heads).toEqual(['coarse to fine', 'T', 'N', 'F', '=', 'steps', 'direct', 'T', 'N', 'F', '=', 'steps']);
@@ -229,7 +229,7 @@ describe('colour', () => {
     await app.page.selectOption('[data-view=color]', 'plain');
     const plain = await picture('.view > canvas');
     await app.page.selectOption('[data-view=color]', 'speed');
-    const legend = app.page.getByRole('group', { name: 'Meaning of the colours' });
+    const legend = app.page.getByRole('group', { name: 'Colour scale' });
     await legend.waitFor();
     expect(await legend.textContent()).toMatch(/^Speed along the normal, δ per iteration−([\d.]+)0\1inwardsoutwards$/);
     await expect.poll(async () => (await picture('.view > canvas')).equals(plain)).toBe(false);
@@ -241,9 +241,11 @@ describe('colour', () => {
   test("by curvature has a legend in the volume's unit, and distinguishes convex from concave", async () => {
     await app.page.selectOption('[data-view=color]', 'mean curvature');
     const legend = app.page.locator('.color-legend');
-    await expect.poll(() => legend.textContent()).toMatch(/^Mean curvature, 1\/unit−([\d.]+)0\1hollowbulging$/);
+    await expect.poll(() => legend.textContent()).toMatch(/^Mean curvature, 1\/unit−([\d.]+)0\1concaveconvex$/);
     await app.page.selectOption('[data-view=color]', 'gaussian curvature');
-    await expect.poll(() => legend.textContent()).toMatch(/^Gaussian curvature, 1\/unit²−.*saddledome or cup$/);
+    await expect
+      .poll(() => legend.textContent())
+      .toMatch(/^Gaussian curvature, 1\/unit²−.*hyperbolic \(saddle\)elliptic \(dome or cup\)$/);
   });
 
   test('shows no motion at the start, then inward motion everywhere', async () => {
@@ -357,8 +359,8 @@ describe('a link', () => {
     await reach(app.page, 'running', 'done');
     expect(await app.page.inputValue('.data select')).toBe('linked-rings');
     expect(await app.page.inputValue('.start select')).toBe('bubbles');
-    expect(await app.page.getByLabel('Bubbles along each side').inputValue()).toBe('9');
-    expect(await app.page.getByLabel('Mean edge').inputValue()).toBe('2');
+    expect(await app.page.getByLabel('Bubbles per axis').inputValue()).toBe('9');
+    expect(await app.page.getByLabel('Mean edge length').inputValue()).toBe('2');
     expect(await app.page.inputValue('[data-param=iso] input[type=number]')).toBe('130');
     expect(await app.page.inputValue('[data-param=rigidity] input[type=number]')).toBe('0.15');
     expect(await app.page.locator('.attractors li').count()).toBe(1);
@@ -393,7 +395,7 @@ describe('exercises', () => {
     expect(await exercises.count()).toBe(2);
     await app.page.locator('summary', { hasText: 'Exercises' }).click();
     await app.page.locator('[data-exercise] summary').last().click();
-    for (const words of ['Look for:', 'Hand in:', 'Compare'])
+    for (const words of ['Questions:', 'Hand in:', 'Compare'])
       expect(await exercises.last().textContent()).toContain(words);
     await exercises.last().locator('button').click();
     await expect.poll(() => app.page.inputValue('.data select')).toBe('figure-15-16');

@@ -44,7 +44,7 @@ test.each(LABS)('%s links to its documentation, and from its keyboard shortcuts 
   expect(pages.map((page) => /<title>(.*)<\/title>/.exec(page)?.[1])).toEqual([
     expect.stringMatching(/^A surface .* Vesicle documentation$/),
     'Vesicle documentation',
-    'Vesicle: Measurements',
+    'Vesicle: Benchmarks',
     'Vesicle in other software',
   ]);
 });

@@ -52,14 +52,14 @@ function expectOutcome(found: Outcome, said: Outcome) {
 }
 
 test.each(CASES)('figure %s gives the result that the page states', async (_, preset, variant) => {
-  expectOutcome(await outcomeOf(preset, variant), variant.outcome);
+  expectOutcome(await outcomeOf(preset, variant), variant.expected);
 });
 
 test("every figure has an id of its own, and states the paper's result and its own", () => {
   expect(new Set(PRESETS.map(({ id }) => id)).size).toBe(PRESETS.length);
-  for (const [, { saw }, { came }] of CASES) {
-    for (const text of [saw, came]) expect(text).toMatch(/^[A-Z].{40,}\.$/);
-    expect(came).toMatch(/^Here/);
+  for (const [, { paperResult }, { ourResult }] of CASES) {
+    for (const text of [paperResult, ourResult]) expect(text).toMatch(/^[A-Z].{40,}\.$/);
+    expect(ourResult).toMatch(/^Here/);
   }
 });
 

@@ -94,8 +94,8 @@ describe('the built-in example', () => {
     expect(times).toHaveLength(5);
     for (const time of times) expect(time).toMatch(/^[\d.,]+ m?s$/);
     const captions = await app.page.locator('.plots figcaption, [data-plot=kernel]').allTextContents();
-    expect(captions[0]).toMatch(/^After \d+ steps of the solve the residual is .* below the tolerance of/);
-    expect(captions[1]).toMatch(/^Falls to half at r = 0\.\d+; at 0\.5, [\d.]+ % are left/);
+    expect(captions[0]).toMatch(/^After \d+ iterations of the solver the residual is .* below the tolerance of/);
+    expect(captions[1]).toMatch(/^Decays to half at r = 0\.\d+; at 0\.5, [\d.]+ % remain/);
   });
 
   test.each(['ply', 'stl', 'glb', 'obj'])('exports a closed mesh as %s', async (format) => {
@@ -250,7 +250,7 @@ describe('edits of points', () => {
     await app.page.keyboard.press('Control+z');
     await expect.poll(told).toBe('1 point added.');
     await app.page.keyboard.press('Control+z');
-    await expect.poll(told).toBe('Nothing was changed by hand.');
+    await expect.poll(told).toBe('No edits.');
     await app.page.keyboard.press('Control+Shift+Z');
     await expect.poll(told).toBe('1 point added.');
     // Each of these started a run; the measures tell that the last one has ended.
@@ -294,7 +294,7 @@ describe('edits of points', () => {
   test('where no point is near, none is removed, and the lab says so', async () => {
     await app.page.check('[data-tool=remove]');
     await app.page.locator('.scene > canvas').click({ position: { x: 12, y: 12 } });
-    await expect.poll(() => text('.status')).toBe('No point is so near to that place.');
+    await expect.poll(() => text('.status')).toBe('There are no points within this distance.');
     expect(await text('.edit-tools [role=status]')).toBe('1 point added.');
   });
 
@@ -442,7 +442,7 @@ describe('the timing curve', () => {
   test('is measured point by point, can be cancelled, and keeps the surface', async () => {
     await openAt('#reconstruct?example=two-balls', 'done');
     const before = await measured();
-    await app.page.click('summary:has-text("Time against number of constraints")');
+    await app.page.click('summary:has-text("Solve time versus number of constraints")');
     await app.page.click('[data-timing=start]');
     const timings = async () => JSON.parse((await app.page.getAttribute('[data-timings]', 'data-timings')) ?? '[]');
     await expect.poll(async () => (await timings()).length).toBeGreaterThanOrEqual(2);
@@ -470,7 +470,9 @@ describe('a link', () => {
 
   test("to a figure shows the paper's result; selecting another of its pictures solves again", async () => {
     await openAt('#reconstruct?example=figure-7', 'done');
-    expect(await text('.figure')).toMatch(/Paper: 477 of 3,173 points.*Here all 6,930 points/);
+    expect(await text('.figure')).toMatch(
+      /Paper: A surface from 477 of 3,173 points.*Here the mean distance of all 6,930 points/,
+    );
     await afterRun(() => app.page.click('.figure button:has-text("a subset")'));
     expect(await text('[data-figure=came]')).toContain('812');
     expect(await measured()).toMatchObject({ surfaceConstraints: 812, components: 1, genus: 0 });
@@ -480,14 +482,14 @@ describe('a link', () => {
     await openAt('#reconstruct?example=figure-8&p.lambdaSurface=0.001', 'done');
     const pressed = () => text('.figure button[aria-pressed=true]');
     expect([await pressed(), (await measured()).genus]).toEqual(['λ = 0.001', 1]);
-    expect(await text('[data-figure=came]')).toContain('a handle too many');
+    expect(await text('[data-figure=came]')).toContain('a spurious handle');
     await afterRun(() => app.page.click('.figure button:has-text("2,168 points")'));
     expect([await pressed(), (await measured()).genus]).toEqual(['2,168 points', 0]);
     expect(await text('[data-figure=came]')).toContain('genus 0');
     expect(await app.page.evaluate(() => document.activeElement?.textContent)).toBe('2,168 points');
     await afterRun(() => setParam('tau', '0.02'));
     expect(await app.page.locator('.figure button[aria-pressed=true]').count()).toBe(0);
-    expect(await text('[data-figure=came]')).toBe('Here the settings are others than those of the figure.');
+    expect(await text('[data-figure=came]')).toBe('The settings differ from those of the figure.');
   });
 
   test('that is invalid shows a message, and the first example opens', async () => {

@@ -1,10 +1,10 @@
 /** Parts of the Sculpt lab that need no browser. */
 import { beforeAll, describe, expect, test } from 'vitest';
 import init, { type ControlEllipsoid, Mesh, MultiresolutionModel } from '../../pkg/index.js';
-import { Answers } from '../../www/src/labs/answers';
-import { Ahead } from '../../www/src/labs/sculpt-ahead';
+import { DragLatency } from '../../www/src/labs/drag-latency';
+import { SurfaceCarrier } from '../../www/src/labs/sculpt-carrier';
 import { filmOf, fromHash, linkOf, toHash } from '../../www/src/labs/sculpt-link';
-import { carried } from '../../www/src/sculpt/carry';
+import { deformPoints } from '../../www/src/sculpt/deform';
 import {
   ball,
   between,
@@ -144,13 +144,13 @@ describe('links', () => {
 
 describe('drag latency', () => {
   test('is measured from the oldest pose that a frame follows', () => {
-    const answers = new Answers();
-    answers.sent(1, 100);
-    answers.sent(2, 110);
-    expect(answers.drawn(0, 120)).toBe(false);
-    expect(answers.drawn(2, 150)).toBe(true);
+    const answers = new DragLatency();
+    answers.poseSent(1, 100);
+    answers.poseSent(2, 110);
+    expect(answers.frameDrawn(0, 120)).toBe(false);
+    expect(answers.frameDrawn(2, 150)).toBe(true);
     expect(answers.last).toEqual({ milliseconds: 50, frames: 2 });
-    expect(answers.drawn(2, 160)).toBe(false);
+    expect(answers.frameDrawn(2, 160)).toBe(false);
   });
 });
 
@@ -161,16 +161,16 @@ describe('extrapolated display of a surface', () => {
   test('moves rigidly with ellipsoids that move alike', () => {
     const after = pair.map((one) => moved(turnedAbout(one, [0, 0, 0], [0, 0, 1], Math.PI / 2), [1, 2, 3]));
     const expected = [1, 4.5, 3, -0.5, 2, 3.5, 2, 1, 7, -2, 42, 5];
-    for (const [i, x] of carried(points, pair, after).entries()) expect(x).toBeCloseTo(expected[i] ?? 0, 4);
+    for (const [i, x] of deformPoints(points, pair, after).entries()) expect(x).toBeCloseTo(expected[i] ?? 0, 4);
   });
 
   test('moves with the nearest ellipsoid, and stays with one that does not move', () => {
     const on = Float32Array.of(4, 2, 3, -6, 1, 0);
-    const out = carried(on, pair, [moved(LONG, [0, 0, 1]), ball(-6, 0, 0, 1)]);
+    const out = deformPoints(on, pair, [moved(LONG, [0, 0, 1]), ball(-6, 0, 0, 1)]);
     expect(out[2]).toBeGreaterThan(3.95);
     expect(out[2]).toBeLessThanOrEqual(4);
     expect(Math.abs(out[5] ?? 1)).toBeLessThan(0.05);
-    expect(carried(on, [LONG], [scaled(LONG, [2, 2, 2])]).slice(0, 3)).toEqual(Float32Array.of(7, 2, 3));
+    expect(deformPoints(on, [LONG], [scaled(LONG, [2, 2, 2])]).slice(0, 3)).toEqual(Float32Array.of(7, 2, 3));
   });
 
   test('equals a first step of the model', () => {
@@ -181,7 +181,7 @@ describe('extrapolated display of a surface', () => {
     model.setEllipsoids([end]);
     const [now] = model.ellipsoids;
     model.step(1);
-    const after = carried(before, [now ?? start], model.ellipsoids);
+    const after = deformPoints(before, [now ?? start], model.ellipsoids);
     const size = (list: Float32Array) => Math.max(...list.filter((_, i) => i % 3 === 0));
     expect(size(after)).toBeCloseTo(size(model.mesh.arrays().positions), 1);
     model.free();
@@ -191,40 +191,40 @@ describe('extrapolated display of a surface', () => {
   function ahead() {
     const drawn: (number | undefined)[] = [];
     const view = { move: (_: string, positions: Float32Array) => drawn.push(positions[0]) };
-    return { drawn, ahead: new Ahead(view as unknown as ConstructorParameters<typeof Ahead>[0]) };
+    return { drawn, ahead: new SurfaceCarrier(view as unknown as ConstructorParameters<typeof SurfaceCarrier>[0]) };
   }
 
   /** Returns a frame with one point on a ball at x that moves to `goal`. */
   function frame(x: number, goal: number, turn: number) {
     const one = { positions: Float32Array.of(x + 1, 0, 0) };
     const event = { result: one, ellipsoids: [ball(x, 0, 0, 1)], pose: [ball(goal, 0, 0, 1)], turn };
-    return event as unknown as Parameters<Ahead['shown']>[0];
+    return event as unknown as Parameters<SurfaceCarrier['frameShown']>[0];
   }
 
   test('follows the pointer while the model lags behind, and equals the model once it has caught up', () => {
     const { drawn, ahead: one } = ahead();
-    expect(one.follow([ball(1, 0, 0, 1)], 1)).toBe(false);
-    one.shown(frame(0, 0, 0));
-    expect(one.follow([ball(2, 0, 0, 1)], 2)).toBe(true);
-    one.shown(frame(0.5, 1, 1));
-    one.shown(frame(1, 2, 2));
+    expect(one.dragTo([ball(1, 0, 0, 1)], 1)).toBe(false);
+    one.frameShown(frame(0, 0, 0));
+    expect(one.dragTo([ball(2, 0, 0, 1)], 2)).toBe(true);
+    one.frameShown(frame(0.5, 1, 1));
+    one.frameShown(frame(1, 2, 2));
     expect(drawn.map((x) => Math.fround(x ?? Number.NaN))).toEqual([2, 3, 3, 3]);
-    one.shown(frame(2, 2, 2));
-    one.shown(frame(2.5, 3, 2));
+    one.frameShown(frame(2, 2, 2));
+    one.frameShown(frame(2.5, 3, 2));
     expect(drawn).toHaveLength(4);
   });
 
   test('ends when other input moves the ellipsoids, when ellipsoids are added or removed, and at rest', () => {
     const { drawn, ahead: one } = ahead();
-    one.shown(frame(0, 0, 0));
-    one.follow([ball(2, 0, 0, 1)], 1);
-    one.shown(frame(0.5, -7, 1));
-    one.shown(frame(1, -7, 1));
+    one.frameShown(frame(0, 0, 0));
+    one.dragTo([ball(2, 0, 0, 1)], 1);
+    one.frameShown(frame(0.5, -7, 1));
+    one.frameShown(frame(1, -7, 1));
     expect(drawn).toEqual([3]);
-    expect(one.follow([ball(2, 0, 0, 1), ball(5, 0, 0, 1)], 2)).toBe(false);
-    one.follow([ball(4, 0, 0, 1)], 3);
-    one.rest();
-    one.rest();
+    expect(one.dragTo([ball(2, 0, 0, 1), ball(5, 0, 0, 1)], 2)).toBe(false);
+    one.dragTo([ball(4, 0, 0, 1)], 3);
+    one.stop();
+    one.stop();
     expect(drawn).toEqual([3, 5, 2]);
   });
 });
@@ -234,15 +234,15 @@ describe('the preview', () => {
     const set = { edgeMin: 0.1, edgeMax: 0.25, supersample: 2 };
     const model = new MultiresolutionModel({ ellipsoids: [ball(0, 0, 0, 1)], params: set });
     const preview = new Preview();
-    preview.prepare(model, 'course', 200);
+    preview.prepare(model, 'path', 200);
     expect(model.params).toMatchObject({ ...set, supersample: 0 });
     preview.prepare(model, 'none', 10);
     expect(preview.on).toBe(false);
     expect(model.params).toMatchObject(set);
-    preview.prepare(model, 'hand', 10);
+    preview.prepare(model, 'drag', 10);
     expect(model.params).toMatchObject({ ...set, supersample: 0 });
-    preview.prepare(model, 'hand', 200);
-    preview.prepare(model, 'hand', 200);
+    preview.prepare(model, 'drag', 200);
+    preview.prepare(model, 'drag', 200);
     expect(model.params).toMatchObject({ edgeMin: 0.2, edgeMax: 0.5, supersample: 0 });
     preview.prepare(model, 'none', 10);
     expect(model.params).toMatchObject(set);

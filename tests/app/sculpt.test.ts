@@ -115,7 +115,7 @@ describe('the built-in example', () => {
 
   test('describes the plots in words', async () => {
     const captions = await app.page.locator('.plots figcaption').allTextContents();
-    expect(captions[0]).toMatch(/^After \d+ frames one more iteration would move the skin by /);
+    expect(captions[0]).toMatch(/^After \d+ frames, one more iteration would move the membrane by /);
     expect(captions[2]).toMatch(/^Half of the frames took less than /);
   });
 
@@ -178,12 +178,12 @@ describe('dragging', () => {
     const before = await app.page.inputValue('[aria-label="Centre, x"]');
     const news = await recordNews(app.page);
     await view().press('ArrowRight');
-    const moved = /^Ellipsoid 2, small: moved; its centre is /;
+    const moved = /^Ellipsoid 2, small: moved, centre /;
     await expect.poll(news).toContainEqual(expect.stringMatching(moved));
     expect(await app.page.inputValue('[aria-label="Centre, x"]')).not.toBe(before);
     await view().press('t');
     await view().press('ArrowLeft');
-    await expect.poll(news).toContainEqual(expect.stringMatching(/small: turned/));
+    await expect.poll(news).toContainEqual(expect.stringMatching(/small: rotated/));
     await view().press('Escape');
     expect(await app.page.locator('.numbers').isVisible()).toBe(false);
     await atRest();
@@ -193,7 +193,7 @@ describe('dragging', () => {
     await app.page.click('[data-ellipsoid="1"]');
     await app.page.fill('[aria-label="Semi-axis 1"]', '-1');
     await app.page.keyboard.press('Enter');
-    expect(await text('.ellipsoids .field-error')).toBe('A length above 0 is needed.');
+    expect(await text('.ellipsoids .field-error')).toBe('The length must be > 0.');
     await app.page.fill('[aria-label="Semi-axis 1"]', '0.95');
     await app.page.keyboard.press('Enter');
     await atRest();
@@ -281,7 +281,7 @@ describe('a file', () => {
     const bytes = new Uint8Array(await readFile(at('www/public/data/nefertiti.ply')));
     await openAt(SMALL, 'done');
     await drop(app.page, [{ name: 'bust.ply', bytes }]);
-    await expect.poll(() => text('.status')).toMatch(/^Making the base of bust\.ply/);
+    await expect.poll(() => text('.status')).toMatch(/^Computing the base of bust\.ply/);
     await app.page.click('[data-action=cancel]');
     await reach(app.page, 'done');
     expect(await text('.facts dd')).toMatch(/^Globe/);

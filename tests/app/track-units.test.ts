@@ -6,16 +6,16 @@ import { at } from '../../scripts/shell.mjs';
 import { fromHash, linkOf, setupOf, toHash } from '../../www/src/labs/track-link';
 import { framesCsv } from '../../www/src/labs/track-measures';
 import type { Surface } from '../../www/src/protocol';
-import { betweenSlices } from '../../www/src/track/between';
 import { boxOf, voxelsOf } from '../../www/src/track/box';
 import { canny } from '../../www/src/track/canny';
 import { cineVoxels, contraction, trueVolume, wallDistances } from '../../www/src/track/cine';
-import { boundaryPicture, isSplit, sliceVotes, twoMeans, windowAt } from '../../www/src/track/clusters';
+import { boundaryImage, hasBoundary, sliceVotes, twoMeans, windowAt } from '../../www/src/track/clusters';
+import { crossSection, intersectionsWithRow } from '../../www/src/track/cross-section';
 import { beatOf, warningsOf } from '../../www/src/track/curve';
-import { crossings, cutBy } from '../../www/src/track/cut';
-import { FILMS } from '../../www/src/track/examples';
+import { IMAGES } from '../../www/src/track/examples';
+import { interpolateSlice } from '../../www/src/track/interpolate-slice';
 import { TRACK_PRESETS, viewOf } from '../../www/src/track/presets';
-import { filmFrom, framesOf, prepared } from '../../www/src/track/source';
+import { framesOf, openImage, prepare } from '../../www/src/track/source';
 import { invert } from '../../www/src/view/anatomy';
 import { votesNear } from '../../www/src/view/votes';
 
@@ -140,9 +140,9 @@ describe('windows', () => {
     expect(found.means[0]).toBeCloseTo(11);
     expect(found.means[1]).toBeCloseTo(102);
     expect([...found.bright]).toEqual([0, 0, 0, 1, 1]);
-    expect(isSplit(found, 50)).toBe(true);
-    expect(isSplit(found, 95)).toBe(false);
-    expect(isSplit(twoMeans([...new Array(24).fill(10), 100]), 50)).toBe(false);
+    expect(hasBoundary(found, 50)).toBe(true);
+    expect(hasBoundary(found, 95)).toBe(false);
+    expect(hasBoundary(twoMeans([...new Array(24).fill(10), 100]), 50)).toBe(false);
     expect(twoMeans([7, 7, 7]).means).toEqual([7, 7]);
   });
 
@@ -167,21 +167,21 @@ describe('windows', () => {
       { x: 0.25, y: 0.75, weight: 1 },
       { x: 9, y: 9, weight: 1 },
     ];
-    expect([...boundaryPicture({ width: 2, height: 1 }, faces)]).toEqual([1.5, 0]);
+    expect([...boundaryImage({ width: 2, height: 1 }, faces)]).toEqual([1.5, 0]);
   });
 });
 
 describe('cross-sections', () => {
   test('of a ball are a circle with a plane, and two points with a line', () => {
     const ball = Mesh.icosphere([0, 0, 0], 10, 1);
-    const cut = cutBy(surfaceOf(ball), { origin: [0, 0, 3], normal: [0, 0, 1] });
+    const cut = crossSection(surfaceOf(ball), { origin: [0, 0, 3], normal: [0, 0, 1] });
     expect(cut.length).toBeGreaterThan(6 * 20);
     for (let i = 0; i < cut.length; i += 3) {
       expect(cut[i + 2]).toBeCloseTo(3, 4);
       expect(Math.hypot(cut[i] ?? 0, cut[i + 1] ?? 0)).toBeCloseTo(Math.sqrt(91), 0);
     }
     const flat = Float32Array.from({ length: (cut.length / 3) * 2 }, (_, i) => cut[3 * (i >> 1) + (i % 2)] ?? 0);
-    const [left, right, ...more] = crossings(flat, 0.1);
+    const [left, right, ...more] = intersectionsWithRow(flat, 0.1);
     expect(more).toEqual([]);
     expect(left).toBeCloseTo(-Math.sqrt(91), 0);
     expect(right).toBeCloseTo(Math.sqrt(91), 0);
@@ -213,17 +213,17 @@ describe('boxes', () => {
 });
 
 describe('links', () => {
-  const view = viewOf(FILMS[0]);
+  const view = viewOf(IMAGES[0]);
 
   test('omit default settings', () => {
-    const setup = setupOf(FILMS[0]);
-    expect(toHash(linkOf({ example: FILMS[0], file: '', setup, view }))).toBe('#track');
+    const setup = setupOf(IMAGES[0]);
+    expect(toHash(linkOf({ example: IMAGES[0], file: '', setup, view }))).toBe('#track');
     expect(fromHash('#track')).toBeUndefined();
     expect(fromHash('#sculpt?example=globe')).toBeUndefined();
   });
 
   test('restore all settings', () => {
-    const example = FILMS[1];
+    const example = IMAGES[1];
     const setup = {
       ...setupOf(example),
       preparation: { binning: 2 as const, enrichment: 'linear' as const, factor: 3 },
@@ -267,7 +267,7 @@ describe('images', () => {
       return bytes;
     };
     const files = [9, 7, 8].map((value) => ({ name: `frame-${value}.nii`, bytes: frame(value) }));
-    const film = await filmFrom({ files });
+    const film = await openImage({ files });
     expect(film.frames).toBe(3);
     expect([0, 1, 2].map((index) => film.sample([1, 1, 1], index))).toEqual([7, 8, 9]);
     film.free();
@@ -277,10 +277,10 @@ describe('images', () => {
     const film = Volume.parse(new Uint8Array(await readFile(at('www/public/data/heart.nii.gz'))));
     expect([...film.dims, film.frames]).toEqual([64, 64, 20, 20]);
     const told: string[] = [];
-    const volume = prepared(film, { binning: 2, enrichment: 'linear', factor: 2 }, (what) => told.push(what));
+    const volume = prepare(film, { binning: 2, enrichment: 'linear', factor: 2 }, (what) => told.push(what));
     expect(volume.dims).toEqual([32, 32, 39]);
     expect(told).toHaveLength(2);
-    expect(prepared(film, { binning: 1, enrichment: 'none', factor: 0 }, () => undefined)).toBe(film);
+    expect(prepare(film, { binning: 1, enrichment: 'none', factor: 0 }, () => undefined)).toBe(film);
     volume.free();
     film.free();
   });
@@ -290,21 +290,21 @@ describe('images', () => {
     const disc = (x: number, y: number, z: number) => (Math.hypot(x - 13 - 3 * z, y - 16) < 7 ? 200 : 40);
     const data = Float32Array.from({ length: 32 * 32 * 3 }, (_, i) => disc(i % 32, Math.floor(i / 32) % 32, i >> 10));
     const volume = new Volume({ data, dims: [32, 32, 3] });
-    const { linear, flow, before, off } = betweenSlices(volume, 0, 1, [0, 255]);
+    const { linear, flow, before, rmsError } = interpolateSlice(volume, 0, 1, [0, 255]);
     const half = (values: Uint8Array) => values.reduce((sum, v) => sum + (v > 80 && v < 160 ? 1 : 0), 0);
     expect(before[16 * 32 + 13]).toBe(200);
     expect(half(flow)).toBeLessThan(0.7 * half(linear));
-    expect(off.flow).toBeLessThan(0.9 * off.linear);
-    expect(() => betweenSlices(volume, 0, 2, [0, 255])).toThrow(/neighbours/);
+    expect(rmsError.flow).toBeLessThan(0.9 * rmsError.linear);
+    expect(() => interpolateSlice(volume, 0, 2, [0, 255])).toThrow(/neighbours/);
     volume.free();
   });
 });
 
 test("every figure has an id of its own, and states the paper's result and its own", () => {
-  expect(new Set([...FILMS, ...TRACK_PRESETS].map(({ id }) => id)).size).toBe(FILMS.length + TRACK_PRESETS.length);
-  for (const { saw, variants } of TRACK_PRESETS)
-    for (const { came } of variants) {
-      for (const text of [saw, came]) expect(text).toMatch(/^\S.{40,}\.$/);
-      expect(came).toMatch(/^Here/);
+  expect(new Set([...IMAGES, ...TRACK_PRESETS].map(({ id }) => id)).size).toBe(IMAGES.length + TRACK_PRESETS.length);
+  for (const { paperResult, variants } of TRACK_PRESETS)
+    for (const { ourResult } of variants) {
+      for (const text of [paperResult, ourResult]) expect(text).toMatch(/^\S.{40,}\.$/);
+      expect(ourResult).toMatch(/^Here/);
     }
 });

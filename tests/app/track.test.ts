@@ -92,9 +92,9 @@ describe('the computed ventricle', () => {
 
   test('describes the curve in words, together with the truth', async () => {
     // The text is updated when the curve is drawn, in the next animation frame.
-    const words = /^End-diastole \(ED\) in frame \d+: [\d.]+ ml; end-systole .* In truth /;
+    const words = /^End-diastole \(ED\) in frame \d+: [\d.]+ ml; end-systole .* Ground truth: /;
     await expect.poll(() => text('[data-beat]')).toMatch(words);
-    expect(await text('.status')).toMatch(/^Done: all 12 frames have their surface\. Ejection fraction [\d.]+ %\.$/);
+    expect(await text('.status')).toMatch(/^Done: all 12 frames tracked\. Ejection fraction [\d.]+ %\.$/);
     expect(await app.page.locator('.results table').first().locator('tbody tr').count()).toBe(12);
   });
 
@@ -113,7 +113,7 @@ describe('the computed ventricle', () => {
     await app.page.click('[data-frame=beat]');
     await expect.poll(shown).not.toBe(5);
     await app.page.click('[data-frame=beat]');
-    await expect.poll(() => text('[data-frame=beat]')).toBe('Beat');
+    await expect.poll(() => text('[data-frame=beat]')).toBe('Loop');
   });
 
   test('has votes on its surface and pictures below', async () => {
@@ -130,7 +130,7 @@ describe('the computed ventricle', () => {
   });
 
   test('is compared with the run without prediction', async () => {
-    await app.page.click('summary:has-text("With and without")');
+    await app.page.click('summary:has-text("Compare settings")');
     await app.page.selectOption('[data-compare=with]', 'prediction');
     await app.page.click('[data-compare=start]');
     const runs = async () =>
@@ -141,7 +141,7 @@ describe('the computed ventricle', () => {
       }[];
     await expect.poll(async () => (await runs()).length).toBe(2);
     const [present, other] = await runs();
-    expect([present?.name, other?.name]).toEqual(['predicted', 'not predicted']);
+    expect([present?.name, other?.name]).toEqual(['with prediction', 'without prediction']);
     expect(other?.steps).toBeGreaterThanOrEqual(present?.steps ?? 0);
     expect(other?.error).toBeLessThan(1);
     await expect.poll(() => text('[data-beat]')).toContain('not predicted:');
@@ -221,7 +221,7 @@ describe('changes', () => {
     const threshold = app.page.locator('[data-param=threshold] input[type=number]');
     await threshold.fill('250');
     await threshold.press('Enter');
-    await expect.poll(() => text('.banner')).toMatch(/The run has stopped\..*largest step/);
+    await expect.poll(() => text('.banner')).toMatch(/The run failed\..*largest step/);
     await app.page.click('.banner button');
     await expect.poll(() => enabled('[data-transport=undo]')).toBe(true);
     await app.page.click('[data-transport=undo]');
@@ -339,7 +339,7 @@ describe('links', () => {
 
   test('with invalid settings are followed without them', async () => {
     await openAt('#track?example=ventricle&p.threshold=-1', 'running', 'done');
-    await expect.poll(() => text('.banner')).toContain('The link’s settings are left out.');
+    await expect.poll(() => text('.banner')).toContain('The link’s settings were ignored.');
   });
 });
 
@@ -363,7 +363,7 @@ test('can be cancelled while an image is being opened, which restores the previo
   await expect.poll(news).toContainEqual('Cancelled.');
   await expect.poll(state).toMatch(/running|done/);
   expect(await text('.facts')).toBe(
-    before.replace(/Prepared in.*$/, (await text('.facts')).match(/Prepared in.*$/)?.[0] ?? ''),
+    before.replace(/Opening time.*$/, (await text('.facts')).match(/Opening time.*$/)?.[0] ?? ''),
   );
   expect(await app.page.locator('.banner').isVisible()).toBe(false);
 });

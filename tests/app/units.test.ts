@@ -8,10 +8,10 @@ import type { StepReport } from '../../www/src/protocol';
 import { quantize } from '../../www/src/quantize';
 import { otsu, quantiles } from '../../www/src/threshold';
 import { History } from '../../www/src/ui/history';
-import { anatomyOf, type Grid, invert, sliceFrames, slicePlane, toWorld } from '../../www/src/view/anatomy';
+import { anatomyOf, type Grid, invert, sliceOrientations, slicePlane, toWorld } from '../../www/src/view/anatomy';
 import { componentRoots } from '../../www/src/view/components';
-import { diverging, robustRange, shadeColors, shadeTitle } from '../../www/src/view/shading';
-import { discOf, levelIndex, paintSlice, projectSegments } from '../../www/src/view/slicing';
+import { diverging, quantityTitle, robustRange, shadeColors } from '../../www/src/view/shading';
+import { ballSection, levelIndex, paintSlice, projectSegments } from '../../www/src/view/slicing';
 
 /** Returns a grid with the given columns as voxel axes. */
 function grid(columns: [number, number, number][], space: 'RAS' | 'LPS' = 'RAS'): Grid {
@@ -39,7 +39,7 @@ test('in RAS the first voxel axis runs to the right, in LPS to the left', () => 
 test('slices are oriented by radiological convention, whatever the order of the voxel axes', () => {
   for (const columns of [STRAIGHT, TILTED]) {
     for (const space of ['RAS', 'LPS'] as const) {
-      const frames = sliceFrames(grid(columns, space));
+      const frames = sliceOrientations(grid(columns, space));
       const axial = frames.find((frame) => frame.name === 'Axial');
       const sagittal = frames.find((frame) => frame.name === 'Sagittal');
       expect(axial?.labels).toEqual({ left: 'R', right: 'L', top: 'A', bottom: 'P' });
@@ -51,7 +51,7 @@ test('slices are oriented by radiological convention, whatever the order of the 
 test('a picture shows each voxel on the side that its labels say', () => {
   const voxels = Uint8Array.from({ length: 4 * 5 * 6 }, (_, i) => i);
   const volume = { ...grid(STRAIGHT), voxels };
-  const axial = sliceFrames(volume)[2];
+  const axial = sliceOrientations(volume)[2];
   if (!axial) throw new Error('no axial slice');
   const out = new Uint8ClampedArray(4 * 4 * 5);
   paintSlice(volume, axial, 1, out);
@@ -79,7 +79,7 @@ test('the plane of a slice contains its voxels', () => {
 
 test('an outline lies over the voxels it passes through', () => {
   const volume = grid(STRAIGHT);
-  const axial = sliceFrames(volume)[2];
+  const axial = sliceOrientations(volume)[2];
   if (!axial) throw new Error('no axial slice');
   const segment = new Float32Array([...toWorld(volume.affine, [3, 4, 0]), ...toWorld(volume.affine, [0, 0, 0])]);
   const [x1, y1, x2, y2] = projectSegments(segment, invert(volume.affine), volume, axial);
@@ -251,8 +251,8 @@ describe('numbers as colours', () => {
   });
 
   test('have a title with the reciprocal unit', () => {
-    expect(shadeTitle('mean curvature', 'mm')).toBe('Mean curvature, 1/mm');
-    expect(shadeTitle('gaussian curvature', '')).toBe('Gaussian curvature, 1/unit²');
+    expect(quantityTitle('mean curvature', 'mm')).toBe('Mean curvature, 1/mm');
+    expect(quantityTitle('gaussian curvature', '')).toBe('Gaussian curvature, 1/unit²');
   });
 
   test('reach the GPU as linear light, and NaN as zero', () => {
@@ -267,7 +267,7 @@ describe('numbers as colours', () => {
 test("a slice of a coarser level is at the position of the volume's slice", () => {
   const fine = { dims: [9, 9, 9] as [number, number, number], voxels: new Uint8Array() };
   const coarse = { dims: [3, 3, 3] as [number, number, number], voxels: new Uint8Array() };
-  const [frame] = sliceFrames({ ...grid(STRAIGHT), dims: [9, 9, 9] });
+  const [frame] = sliceOrientations({ ...grid(STRAIGHT), dims: [9, 9, 9] });
   if (!frame) throw new Error('no slice');
   expect([0, 2, 3, 8].map((index) => levelIndex(fine, coarse, frame, index))).toEqual([0, 0, 1, 2]);
 });
@@ -275,10 +275,10 @@ test("a slice of a coarser level is at the position of the volume's slice", () =
 test('the radius of an attractor is a disc in the slices it intersects', () => {
   const { dims, ...rest } = grid(STRAIGHT);
   const volume = { ...rest, dims };
-  const axial = sliceFrames(volume)[2];
+  const axial = sliceOrientations(volume)[2];
   if (!axial) throw new Error('no axial slice');
   const attractor = { point: toWorld(rest.affine, [1, 2, 3]), strength: 1, radius: 5 };
-  const disc = (slice: number) => discOf(attractor, slice, invert(rest.affine), volume, axial);
+  const disc = (slice: number) => ballSection(attractor, slice, invert(rest.affine), volume, axial);
   // Slices are 3 apart, rows 2: in the next slice the disc has a radius of 4.
   expect(disc(3)).toMatchObject({ radiusX: 5, radiusY: 2.5, near: true });
   expect(disc(4)?.radiusX).toBeCloseTo(4, 5);

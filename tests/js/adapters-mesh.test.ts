@@ -209,7 +209,7 @@ test('three: invalid arguments are refused', () => {
   expect(failure(() => new ThreeSurface(THREE, wrong(new THREE.Group()))).message).toMatch(/THREE\.Mesh/);
   const { surface } = scene();
   for (const nothing of [undefined, {}, { arrays: () => source.arrays() }]) {
-    expect(failure(() => surface.update(wrong(nothing))).message).toMatch(/a Mesh is needed/);
+    expect(failure(() => surface.update(wrong(nothing))).message).toMatch(/must be a Mesh/);
   }
   const spaces = { space: wrong('LAS') };
   expect(failure(() => new ThreeSurface(THREE, new THREE.Mesh(), spaces)).message).toMatch(/'RAS', 'LPS'/);
@@ -280,7 +280,7 @@ test('vtk.js: dispose, and invalid arguments', () => {
   surface.dispose();
   expect(wrong(surface.polyData).isDeleted()).toBe(true);
   expect(failure(() => new VtkSurface(wrong({ vtkPolyData }))).message).toMatch(/vtkDataArray/);
-  expect(failure(() => new VtkSurface(vtk).update(wrong(null))).message).toMatch(/a Mesh is needed/);
+  expect(failure(() => new VtkSurface(vtk).update(wrong(null))).message).toMatch(/must be a Mesh/);
 });
 
 // ── NiiVue 0.69
@@ -496,8 +496,8 @@ test('NiiVue 1.0: a surface can be removed', async () => {
 });
 
 test('NiiVue: invalid arguments are refused', async () => {
-  expect(failure(() => new NiivueSurface(wrong(undefined))).message).toMatch(/a Niivue is needed/);
-  expect(failure(() => new NiivueSurface(wrong({ ...niivue().nv, gl: null }))).message).toMatch(/attach it first/);
+  expect(failure(() => new NiivueSurface(wrong(undefined))).message).toMatch(/must be a Niivue/);
+  expect(failure(() => new NiivueSurface(wrong({ ...niivue().nv, gl: null }))).message).toMatch(/attach one first/);
   expect(failure(() => new NiivueSurface(wrong(niivue().nv))).message).toMatch(/import \{ Niivue, NVMesh \}/);
-  expect((await rejection(niivue().surface.update(wrong({})))).message).toMatch(/a Mesh is needed/);
+  expect((await rejection(niivue().surface.update(wrong({})))).message).toMatch(/must be a Mesh/);
 });

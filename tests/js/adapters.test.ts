@@ -175,7 +175,7 @@ test('three: frames', () => {
   expect(volume.frames).toBe(2);
   expect([...volume.intensities(1)]).toEqual([...voxels(2).subarray(COUNT)]);
   const colours = loaded(nrrd(fields('RGB-color domain domain domain'), new Uint8Array(voxels(2).buffer)));
-  expect(failure(() => volumeFromThree(colours)).message).toMatch(/one number a voxel/);
+  expect(failure(() => volumeFromThree(colours)).message).toMatch(/one number per voxel/);
 });
 
 test('three: invalid arguments are refused', () => {
@@ -185,7 +185,7 @@ test('three: invalid arguments are refused', () => {
   expect(failure(() => volumeFromThree(big)).message).toMatch(/Volume\.parse/);
   expect(failure(() => volumeFromThree(big, wrong({ world: 'somewhere' }))).code).toBe('invalid-argument');
   const few = Object.assign(loaded(scan('RAS', OBLIQUE)), { xLength: 4 });
-  expect(failure(() => volumeFromThree(few)).message).toMatch(/4 x 6 x 5/);
+  expect(failure(() => volumeFromThree(few)).message).toMatch(/4 × 6 × 5/);
 });
 
 // ── NiiVue
@@ -270,8 +270,8 @@ test('NiiVue: invalid arguments are refused', () => {
     expect(failure(() => volumeFromNiivue(wrong(nothing))).message).toMatch(/a loaded volume of NiiVue/);
   }
   const colours = niivue({ datatypeCode: 128 }, new Uint8Array(3 * COUNT));
-  expect(failure(() => volumeFromNiivue(colours)).message).toMatch(/RGB; one number a voxel/);
-  expect(failure(() => volumeFromNiivue(niivue({}, new Uint8Array(COUNT + 1)))).message).toMatch(/7 x 6 x 5/);
+  expect(failure(() => volumeFromNiivue(colours)).message).toMatch(/RGB; only one number per voxel/);
+  expect(failure(() => volumeFromNiivue(niivue({}, new Uint8Array(COUNT + 1)))).message).toMatch(/7 × 6 × 5/);
   expect(failure(() => volumeFromNiivue(niivue({}, [...voxels()]))).message).toMatch(/Uint8Array/);
 });
 
@@ -305,7 +305,7 @@ test('vtk.js: invalid arguments are refused', () => {
   expect(failure(() => volumeFromVtk(wrong({}))).message).toMatch(/a vtkImageData/);
   expect(failure(() => volumeFromVtk(wrong(vtkImageData.newInstance()))).message).toMatch(/no scalars/);
   const colours = vtkImage(OBLIQUE, Int16Array.from({ length: 3 * COUNT }), 3);
-  expect(failure(() => volumeFromVtk(colours)).message).toMatch(/3 numbers a voxel; one/);
+  expect(failure(() => volumeFromVtk(colours)).message).toMatch(/3 numbers per voxel; only one/);
   expect(failure(() => volumeFromVtk(vtkImage(OBLIQUE), wrong({ space: 'LAS' }))).message).toMatch(/RAS/);
 });
 
@@ -342,10 +342,12 @@ test('itk-wasm: 4D has frames', () => {
 
 test('itk-wasm: invalid arguments are refused', () => {
   expect(failure(() => volumeFromItk(wrong(null))).message).toMatch(/an Image of itk-wasm/);
-  expect(failure(() => volumeFromItk(new Image())).message).toMatch(/2D; a 3D or 4D/);
+  expect(failure(() => volumeFromItk(new Image())).message).toMatch(/3D or 4D image, got 2D/);
   const colours = new Image(new ImageType(3, 'uint8', 'RGB', 3));
-  expect(failure(() => volumeFromItk(colours)).message).toMatch(/3 numbers a voxel, RGB/);
-  expect(failure(() => volumeFromItk(Object.assign(itkImage(OBLIQUE), { data: null }))).message).toMatch(/no voxels/);
+  expect(failure(() => volumeFromItk(colours)).message).toMatch(/3 numbers per voxel, RGB/);
+  expect(failure(() => volumeFromItk(Object.assign(itkImage(OBLIQUE), { data: null }))).message).toMatch(
+    /unsupported voxel type/,
+  );
   const wide = Object.assign(itkImage(OBLIQUE), { data: new BigInt64Array(COUNT) });
-  expect(failure(() => volumeFromItk(wide)).message).toMatch(/no voxels of a kind/);
+  expect(failure(() => volumeFromItk(wide)).message).toMatch(/unsupported voxel type/);
 });

@@ -198,8 +198,8 @@ test('a second run is refused, but parameters can change during a run', async ()
   const fitted = model();
   const first = fitted.run({ maxIterations: 10, budgetMs: 0.01 });
   expect((await rejection(fitted.run())).code).toBe('invalid-argument');
-  expect(failure(() => fitted.step()).message).toContain('under way');
-  expect(failure(() => fitted.restore(fitted.save())).message).toContain('under way');
+  expect(failure(() => fitted.step()).message).toContain('during a run');
+  expect(failure(() => fitted.restore(fitted.save())).message).toContain('during a run');
   fitted.setParams({ rigidity: 0.1 });
   expect((await first).iteration).toBe(10);
   expect(fitted.step().iteration).toBe(11);
@@ -328,7 +328,7 @@ test('coverage is measured during a run, for the surface at its beginning', asyn
   const fitted = model();
   const before = await fitted.coverage();
   const running = fitted.run({ maxIterations: 30, budgetMs: 0.01 });
-  expect(failure(() => fitted.seed()).message).toContain('under way');
+  expect(failure(() => fitted.seed()).message).toContain('during a run');
   const [meanwhile] = await Promise.all([fitted.coverage(), running]);
   expect(meanwhile.recall).toBeLessThanOrEqual(1);
   expect(await model().coverage()).toEqual(before);

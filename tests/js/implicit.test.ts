@@ -288,8 +288,8 @@ test('a second run is refused, and freeing a surface ends its run', async () => 
   const found = surface();
   const running = found.run({ budgetMs: 0.01 });
   expect((await rejection(found.run())).code).toBe('invalid-argument');
-  expect(failure(() => found.step()).message).toContain('under way');
-  expect(failure(() => found.restore(found.save())).message).toContain('under way');
+  expect(failure(() => found.step()).message).toContain('during a run');
+  expect(failure(() => found.restore(found.save())).message).toContain('during a run');
   found.free();
   expect((await rejection(running)).code).toBe('freed');
 });

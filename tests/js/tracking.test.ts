@@ -314,8 +314,8 @@ test('a second run is refused, but parameters can change during a run', async ()
   const one = tracker({ volume: short });
   const first = one.run({ maxIterations: 5, budgetMs: 0.01 });
   expect((await rejection(one.run())).code).toBe('invalid-argument');
-  expect(failure(() => one.step()).message).toContain('under way');
-  expect(failure(() => one.restore(one.save())).message).toContain('under way');
+  expect(failure(() => one.step()).message).toContain('during a run');
+  expect(failure(() => one.restore(one.save())).message).toContain('during a run');
   one.setParams({ damping: 0.8 });
   expect((await first).iteration).toBe(5);
   expect(one.step().iteration).toBe(6);

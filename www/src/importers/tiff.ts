@@ -2,6 +2,7 @@
 import { fromArrayBuffer, type GeoTIFFImage } from 'geotiff';
 import type { VolumeInit, VoxelArray } from 'vesicle';
 import type { NamedBytes } from '../protocol';
+import { text } from '../texts';
 import { Refusal } from '../worker/refusal';
 import { describedIn, type Stack } from './tiff-description';
 
@@ -12,7 +13,7 @@ export async function readStack(files: NamedBytes[]): Promise<VolumeInit> {
   const byName = [...files].sort((a, b) => a.name.localeCompare(b.name, 'en', { numeric: true }));
   const pages = (await Promise.all(byName.map(pagesOf))).flat();
   const [first] = pages;
-  if (!first) throw new Refusal('bad-file', 'TIFF: there is no page in it');
+  if (!first) throw new Refusal('bad-file', text('files.tiffEmpty'));
   const stack = describedIn(String((await tagOf(first, 'ImageDescription')) ?? ''), pages.length);
   const planes = stack.pages.map((page) => pages[page]).filter((page) => page !== undefined);
   return joined(planes, stack, await pixelSize(first, stack));
@@ -24,7 +25,10 @@ async function pagesOf({ name, bytes }: NamedBytes): Promise<GeoTIFFImage[]> {
     const count = await file.getImageCount();
     return await Promise.all(Array.from({ length: count }, (_, k) => file.getImage(k)));
   } catch (error) {
-    throw new Refusal('bad-file', `TIFF: ${name}: ${error instanceof Error ? error.message : String(error)}`);
+    throw new Refusal(
+      'bad-file',
+      text('files.tiffError', { name, reason: error instanceof Error ? error.message : String(error) }),
+    );
   }
 }
 
@@ -34,22 +38,21 @@ async function joined(planes: GeoTIFFImage[], stack: Stack, spacing: [number, nu
   let data: VoxelArray | undefined;
   for (const [k, plane] of planes.entries()) {
     if (plane.getWidth() !== wide || plane.getHeight() !== high)
-      throw new Refusal('bad-file', `TIFF: page ${k + 1} is of another size than the first, ${wide} by ${high} pixels`);
+      throw new Refusal('bad-file', text('files.tiffSizes', { page: k + 1, width: wide, height: high }));
     const values = await valuesOf(plane, k);
     data ??= new (values.constructor as new (length: number) => VoxelArray)(wide * high * planes.length);
     data.set(values, k * wide * high);
   }
-  if (!data) throw new Refusal('bad-file', 'TIFF: there is no page in it');
+  if (!data) throw new Refusal('bad-file', text('files.tiffEmpty'));
   const slices = planes.length / stack.frames;
   return { data, dims: [wide, high, slices, stack.frames], spacing };
 }
 
 async function valuesOf(plane: GeoTIFFImage, k: number): Promise<VoxelArray> {
-  if (plane.getSamplesPerPixel() !== 1)
-    throw new Refusal('bad-file', `TIFF: page ${k + 1} is in colour; one intensity a pixel is needed`);
+  if (plane.getSamplesPerPixel() !== 1) throw new Refusal('bad-file', text('files.tiffColour', { page: k + 1 }));
   const values = await plane.readRasters({ interleave: true });
   const kind = KINDS.find((Kind) => values instanceof Kind);
-  if (!kind) throw new Refusal('bad-file', `TIFF: page ${k + 1} has numbers that are not read here`);
+  if (!kind) throw new Refusal('bad-file', text('files.tiffFormat', { page: k + 1 }));
   return values as VoxelArray;
 }
 

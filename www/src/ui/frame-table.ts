@@ -1,7 +1,8 @@
+import { plural, text } from '../texts';
 import { warningsOf } from '../track/curve';
 import type { FrameFacts, SurfaceError } from '../track/protocol';
 import { h } from './dom';
-import { count, figure, plural } from './format';
+import { count, figure } from './format';
 
 /** A column of the table of frames. */
 interface Column {
@@ -11,20 +12,40 @@ interface Column {
 }
 
 const COLUMNS: Column[] = [
-  { head: 'volume', help: 'Enclosed', text: ({ volume }) => figure(volume) },
-  { head: 'area', help: 'Of the surface', text: ({ area }) => figure(area) },
-  { head: 'folded', help: 'Triangles that face away from their three neighbours', text: ({ folded }) => count(folded) },
   {
-    head: 'rest',
-    help: 'How far the last projection still moved the vertices, in the mean',
+    head: text('trackPanels.columnVolume'),
+    help: text('trackPanels.columnVolumeHelp'),
+    text: ({ volume }) => figure(volume),
+  },
+  { head: text('trackPanels.columnArea'), help: text('trackPanels.columnAreaHelp'), text: ({ area }) => figure(area) },
+  {
+    head: text('trackPanels.columnFolded'),
+    help: text('trackPanels.columnFoldedHelp'),
+    text: ({ folded }) => count(folded),
+  },
+  {
+    head: text('trackPanels.columnCorrection'),
+    help: text('trackPanels.columnCorrectionHelp'),
     text: ({ correction }) => figure(round(correction)),
   },
-  { head: 'steps', help: 'Of the projections, in the mean', text: ({ steps }) => figure(round(steps)) },
-  { head: 'held', help: 'Moves held back, so that nothing crosses', text: ({ held }) => count(held) },
-  { head: 'rejected', help: 'Projections that led nowhere or too far', text: ({ rejected }) => count(rejected) },
   {
-    head: 'retracted',
-    help: 'Vertices without a boundary: drawn together where a crevice closed, grown where one opened',
+    head: text('trackPanels.columnSteps'),
+    help: text('trackPanels.columnStepsHelp'),
+    text: ({ steps }) => figure(round(steps)),
+  },
+  {
+    head: text('trackPanels.columnHeld'),
+    help: text('trackPanels.columnHeldHelp'),
+    text: ({ held }) => count(held),
+  },
+  {
+    head: text('trackPanels.columnRejected'),
+    help: text('trackPanels.columnRejectedHelp'),
+    text: ({ rejected }) => count(rejected),
+  },
+  {
+    head: text('trackPanels.columnRetracted'),
+    help: text('trackPanels.columnRetractedHelp'),
     text: ({ retracted }) => count(retracted),
   },
 ];
@@ -34,7 +55,7 @@ const round = (value: number) => Number(value.toPrecision(3));
 /**
  * Table of the Track lab with the statistics of each frame, and warnings about folded triangles and jumps of the area.
  */
-export class BeatTable {
+export class FrameTable {
   readonly warnings = h('p', { class: 'warning', role: 'status', 'data-warnings': '0' });
   readonly element: HTMLElement;
   readonly #table = h('table', { class: 'times' });
@@ -42,16 +63,12 @@ export class BeatTable {
   #rows: HTMLElement[] = [];
 
   constructor() {
-    const label = 'What happened in each frame';
+    const label = text('trackPanels.framesTable');
     this.element = h(
       'div',
       {},
       h('div', { class: 'scroll tall', tabindex: 0, role: 'region', 'aria-label': label }, this.#table),
-      h(
-        'p',
-        { class: 'help' },
-        'Volume and area in world units. Steps: of the projections. Rest: how far the last of them still moved the vertices. Held, rejected and retracted: moves that were not made, and why.',
-      ),
+      h('p', { class: 'help' }, text('trackPanels.framesTableHelp')),
     );
   }
 
@@ -68,7 +85,11 @@ export class BeatTable {
   #fill(facts: readonly FrameFacts[], errors: readonly (SurfaceError | undefined)[]): void {
     this.#warn(facts);
     const known = errors.some((error) => error);
-    const heads = ['frame', ...COLUMNS.map(({ head }) => head), ...(known ? ['error'] : [])];
+    const heads = [
+      text('trackPanels.columnFrame'),
+      ...COLUMNS.map(({ head }) => head),
+      ...(known ? [text('trackPanels.columnError')] : []),
+    ];
     const head = heads.map((title, i) => h('th', { scope: 'col', title: COLUMNS[i - 1]?.help }, title));
     this.#rows = facts.map((one, i) => {
       const cells = COLUMNS.map(({ text }) => h('td', {}, text(one)));
@@ -83,21 +104,18 @@ export class BeatTable {
     const found = warningsOf(facts);
     const frames = (kind: 'folded' | 'area') => found.filter((one) => one.kind === kind);
     const [folded, jumped] = [frames('folded'), frames('area')];
-    const percent = (shares: number[]) => `${(100 * Math.max(...shares.map(Math.abs))).toFixed(1)} %`;
+    const percent = (shares: number[]) =>
+      text('controls.percent', { value: (100 * Math.max(...shares.map(Math.abs))).toFixed(1) });
     const texts = [
       ...(folded.length > 0
-        ? [
-            `In ${plural(folded.length, 'frame')} more than 1 % of the triangles are folded over, at most ${percent(folded.map(({ share }) => share))}: there the surface is crumpled, however well its volume looks.`,
-          ]
+        ? [plural('trackPanels.foldedWarning', folded.length, { most: percent(folded.map(({ share }) => share)) })]
         : []),
       ...(jumped.length > 0
-        ? [
-            `In ${plural(jumped.length, 'frame')} the area is more than 15 % off what it was before and the change of volume explains, at most ${percent(jumped.map(({ share }) => share))}: parts may have been lost or joined.`,
-          ]
+        ? [plural('trackPanels.areaWarning', jumped.length, { most: percent(jumped.map(({ share }) => share)) })]
         : []),
     ];
     this.warnings.dataset.warnings = String(found.length);
-    const text = texts.join(' ');
-    if (this.warnings.textContent !== text) this.warnings.textContent = text;
+    const warnings = texts.join(' ');
+    if (this.warnings.textContent !== warnings) this.warnings.textContent = warnings;
   }
 }

@@ -2,7 +2,10 @@
 import type { Plane, Surface } from '../protocol';
 
 /** Returns the cross-section of a surface with a plane, as segments: pairs of points, packed xyz. */
-export function cutBy({ positions, indices, vertices, triangles }: Surface, { origin, normal }: Plane): Float32Array {
+export function crossSection(
+  { positions, indices, vertices, triangles }: Surface,
+  { origin, normal }: Plane,
+): Float32Array {
   const heights = new Float32Array(vertices);
   const offset = normal[0] * origin[0] + normal[1] * origin[1] + normal[2] * origin[2];
   for (let i = 0; i < vertices; i++) {
@@ -31,7 +34,7 @@ export function cutBy({ positions, indices, vertices, triangles }: Surface, { or
 }
 
 /** Returns the x coordinates, sorted, at which segments in a picture (x y x y each) cross the row at a height. */
-export function crossings(segments: Float32Array, height: number): number[] {
+export function intersectionsWithRow(segments: Float32Array, height: number): number[] {
   const out: number[] = [];
   for (let i = 0; i + 3 < segments.length; i += 4) {
     const [x1 = 0, y1 = 0, x2 = 0, y2 = 0] = segments.subarray(i, i + 4);

@@ -2,37 +2,44 @@
  * Interpolates a measured slice from its two neighbours, linearly and along the optical flow, for comparison (figure
  * 5).
  */
+
 import { Volume } from 'vesicle';
 import { quantize } from '../quantize';
+import { text } from '../texts';
 import { Refusal } from '../worker/refusal';
-import type { Between } from './protocol';
+import type { InterpolatedSlice } from './protocol';
 
 /**
  * Interpolates slice number `slice` across the last voxel axis as if it had not been measured, and returns it with its
  * neighbours and the errors.
  */
-export function betweenSlices(volume: Volume, frame: number, slice: number, window: [number, number]): Between {
+export function interpolateSlice(
+  volume: Volume,
+  frame: number,
+  slice: number,
+  window: [number, number],
+): InterpolatedSlice {
   const [width, height, slices] = volume.dims;
   if (slice < 1 || slice + 1 >= slices)
-    throw new Refusal('invalid-argument', `slice ${slice} has no two neighbours: there are ${slices} slices`);
+    throw new Refusal('invalid-argument', text('track.noNeighbours', { slice, slices }));
   const [before, measured, after] = [-1, 0, 1].map((off) => volume.slice(2, slice + off, frame)) as Three;
-  const middle = (method: 'flow' | 'linear') => between(before, after, width, height, method);
-  const [linear, flow] = [middle('linear'), middle('flow')];
+  const interpolated = (method: 'flow' | 'linear') => interpolate(before, after, width, height, method);
+  const [linear, flow] = [interpolated('linear'), interpolated('flow')];
   const greys = (values: Float32Array) => {
     const out = new Uint8Array(width * height);
     quantize(values, window, out, 0);
     return out;
   };
-  const off = { linear: rms(linear, measured), flow: rms(flow, measured) };
+  const rmsError = { linear: rms(linear, measured), flow: rms(flow, measured) };
   return {
-    ...{ width, height, off, before: greys(before), flow: greys(flow), measured: greys(measured) },
+    ...{ width, height, rmsError, before: greys(before), flow: greys(flow), measured: greys(measured) },
     ...{ linear: greys(linear), after: greys(after) },
   };
 }
 
 type Three = [Float32Array, Float32Array, Float32Array];
 
-function between(
+function interpolate(
   one: Float32Array,
   other: Float32Array,
   width: number,

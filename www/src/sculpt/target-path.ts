@@ -3,14 +3,14 @@ import { type Film, glide, lastFrame, poseAt } from './film';
 import type { Pose } from './protocol';
 
 /** Sets the ellipsoids' target of each frame: along a film while it plays, else along a glide to the last pose sent. */
-export class Course {
+export class TargetPath {
   /** The film that is loaded. */
   #film: Film | undefined;
   /** Frame of the film that the ellipsoids were sent to last. */
   #frame = 0;
   #playing = false;
   /** Remaining poses of the glide to the last pose sent. */
-  #way: Pose[] = [];
+  #glide: Pose[] = [];
 
   get film(): Film | undefined {
     return this.#film;
@@ -22,12 +22,12 @@ export class Course {
 
   /** Whether poses of a film or a glide remain. */
   get isUnderWay(): boolean {
-    return this.#playing || this.#way.length > 0;
+    return this.#playing || this.#glide.length > 0;
   }
 
   /** Returns the final pose of the glide, or else the model's present target. */
-  goalOf(model: MultiresolutionModel): Pose {
-    return this.#way.at(-1) ?? model.goals;
+  finalTarget(model: MultiresolutionModel): Pose {
+    return this.#glide.at(-1) ?? model.goals;
   }
 
   /** Loads a film at a frame, without playing it. */
@@ -42,14 +42,14 @@ export class Course {
     if (!this.#film) return;
     if (this.#frame >= lastFrame(this.#film)) this.#frame = 0;
     this.#playing = true;
-    this.#way = [];
+    this.#glide = [];
   }
 
   /** Arranges for one more frame of the film, if there is one, when the user steps through it. */
   playOne(): void {
     const film = this.#film;
     this.#playing = film !== undefined && (film.loop || this.#frame < lastFrame(film));
-    if (this.#playing) this.#way = [];
+    if (this.#playing) this.#glide = [];
   }
 
   stop(): void {
@@ -59,14 +59,14 @@ export class Course {
   /** Sets the film to another frame, and ends playing and gliding. */
   rewind(frame: number): void {
     this.#frame = frame;
-    this.#way = [];
+    this.#glide = [];
     this.#playing = false;
   }
 
   /** Sets the target pose at once, as during a drag. */
-  goTo(model: MultiresolutionModel, pose: Pose): void {
+  jumpTo(model: MultiresolutionModel, pose: Pose): void {
     model.setEllipsoids(pose);
-    this.#way = [];
+    this.#glide = [];
     this.#playing = false;
   }
 
@@ -75,13 +75,13 @@ export class Course {
     const from = model.goals;
     model.setEllipsoids(pose);
     model.setEllipsoids(from);
-    this.#way = glide(from, pose);
+    this.#glide = glide(from, pose);
     this.#playing = false;
   }
 
   /** Sets the model's target to the pose of the next frame, if there is one. */
   next(model: MultiresolutionModel): void {
-    const next = this.#playing ? this.#nextOfFilm() : this.#way.shift();
+    const next = this.#playing ? this.#nextOfFilm() : this.#glide.shift();
     if (next) model.setEllipsoids(next);
   }
 

@@ -1,4 +1,5 @@
 import uPlot from 'uplot';
+import { text } from '../texts';
 import 'uplot/dist/uPlot.min.css';
 import { type Beat, beatOf } from '../track/curve';
 import { h, onSchemeChange, token } from './dom';
@@ -6,9 +7,9 @@ import { figure } from './format';
 
 const HEIGHT = 190;
 /** Space above the plot for the names of the marks. */
-const MARK_ROOM = 18;
+const MARK_HEIGHT = 18;
 
-export interface BeatCurves {
+export interface VolumeCurves {
   volumes: number[];
   /** True volumes, if the image is computed. */
   truth: number[] | undefined;
@@ -20,13 +21,13 @@ export interface BeatCurves {
   unit: string;
 }
 
-const EMPTY: BeatCurves = { volumes: [], truth: undefined, other: undefined, frame: 0, frames: 2, unit: 'mm' };
+const EMPTY: VolumeCurves = { volumes: [], truth: undefined, other: undefined, frame: 0, frames: 2, unit: 'mm' };
 
 /**
  * Plot of the enclosed volume over the frames, with end-diastole, end-systole and the ejection fraction. A click shows
  * the frame.
  */
-export class BeatCurve {
+export class VolumeCurve {
   readonly element: HTMLElement;
   readonly #plot: uPlot;
   readonly #caption = h('figcaption', { 'data-beat': '{}' });
@@ -54,7 +55,7 @@ export class BeatCurve {
     this.show(EMPTY);
   }
 
-  show(curves: BeatCurves): void {
+  show(curves: VolumeCurves): void {
     this.#curves = curves;
     this.#pending ||= requestAnimationFrame(() => {
       this.#pending = 0;
@@ -70,18 +71,20 @@ export class BeatCurve {
       Array.from({ length: all }, (_, i) => (values?.[i] === undefined ? null : scale * (values[i] ?? 0)));
     const x = Array.from({ length: all }, (_, i) => i + 1);
     this.#plot.setData([x, column(volumes), column(truth), column(other?.volumes)] as uPlot.AlignedData);
-    this.#title.textContent = `Volume by frame, ${unit === 'mm' ? 'ml' : `${unit || 'unit'}³`}`;
+    this.#title.textContent = text('trackPanels.volumeByFrame', {
+      unit: unit === 'mm' ? 'ml' : `${unit || text('view.unknownUnit')}³`,
+    });
     const key = (name: string, text: string) =>
       h('span', {}, h('span', { class: `mark ${name}`, 'aria-hidden': 'true' }), text);
     this.#legend.replaceChildren(
-      key('tracked', 'tracked'),
-      ...(truth ? [key('truth', 'true')] : []),
+      key('tracked', text('trackPanels.curveTracked')),
+      ...(truth ? [key('truth', text('trackPanels.curveTruth'))] : []),
       ...(other ? [key('annular', other.name)] : []),
     );
     const beat = beatOf(volumes);
     this.#caption.dataset.beat = JSON.stringify(beat ?? {});
     this.#caption.textContent =
-      beat && volumes.length === frames ? told(beat, this.#curves) : 'Not all frames are done.';
+      beat && volumes.length === frames ? describeBeat(beat, this.#curves) : text('trackPanels.curveUnfinished');
   }
 
   /** Draws vertical lines at the current frame, and at the largest and smallest volume. */
@@ -89,7 +92,12 @@ export class BeatCurve {
     const { ctx, bbox } = plot;
     const { volumes, frames, frame } = this.#curves;
     const beat = volumes.length === frames ? beatOf(volumes) : undefined;
-    const marks = beat ? [['ED', beat.diastole] as const, ['ES', beat.systole] as const] : [];
+    const marks = beat
+      ? [
+          [text('trackPanels.endDiastoleMark'), beat.diastole] as const,
+          [text('trackPanels.endSystoleMark'), beat.systole] as const,
+        ]
+      : [];
     ctx.save();
     ctx.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
     ctx.textAlign = 'center';
@@ -114,16 +122,38 @@ export class BeatCurve {
 }
 
 /** Describes the curve in words, for screen readers. */
-function told(beat: Beat, { truth, other, unit }: BeatCurves): string {
-  const size = (volume: number) => (unit === 'mm' ? `${(volume / 1000).toFixed(1)} ml` : figure(volume));
-  const percent = (share: number) => `${(100 * share).toFixed(1)} %`;
+function describeBeat(beat: Beat, { truth, other, unit }: VolumeCurves): string {
+  const size = (volume: number) =>
+    unit === 'mm' ? text('controls.millilitres', { value: (volume / 1000).toFixed(1) }) : figure(volume);
+  const percent = (share: number) => text('controls.percent', { value: (100 * share).toFixed(1) });
   const known = truth && beatOf(truth);
   const second = other && beatOf(other.volumes);
   return [
-    `End-diastole (ED) in frame ${beat.diastole + 1}: ${size(beat.largest)}; end-systole (ES) in frame ${beat.systole + 1}: ${size(beat.smallest)}; ejection fraction ${percent(beat.ejection)}.`,
-    ...(known ? [`In truth ${size(known.largest)}, ${size(known.smallest)} and ${percent(known.ejection)}.`] : []),
+    text('trackPanels.beatTold', {
+      diastoleFrame: beat.diastole + 1,
+      largest: size(beat.largest),
+      systoleFrame: beat.systole + 1,
+      smallest: size(beat.smallest),
+      ejection: percent(beat.ejection),
+    }),
+    ...(known
+      ? [
+          text('trackPanels.beatTruth', {
+            largest: size(known.largest),
+            smallest: size(known.smallest),
+            ejection: percent(known.ejection),
+          }),
+        ]
+      : []),
     ...(other && second
-      ? [`${other.name}: ${size(second.largest)}, ${size(second.smallest)} and ${percent(second.ejection)}.`]
+      ? [
+          text('trackPanels.beatOther', {
+            name: other.name,
+            largest: size(second.largest),
+            smallest: size(second.smallest),
+            ejection: percent(second.ejection),
+          }),
+        ]
       : []),
   ].join(' ');
 }
@@ -146,7 +176,7 @@ function options(mark: (plot: uPlot) => void): uPlot.Options {
     height: HEIGHT,
     legend: { show: false },
     cursor: { y: false, drag: { x: false, y: false } },
-    padding: [MARK_ROOM, 12, 0, 0],
+    padding: [MARK_HEIGHT, 12, 0, 0],
     scales: {
       x: { time: false, range: (_, low, high) => [(low ?? 1) - 0.5, (high ?? 2) + 0.5] },
       y: { range: (_, low, high) => (low === null || high === null ? [0, 1] : spread(low, high)) },
@@ -161,6 +191,6 @@ function options(mark: (plot: uPlot) => void): uPlot.Options {
 }
 
 function spread(low: number, high: number): [number, number] {
-  const room = 0.1 * (high - low) || Math.max(1e-6, 0.1 * Math.abs(high));
-  return [low - room, high + room];
+  const margin = 0.1 * (high - low) || Math.max(1e-6, 0.1 * Math.abs(high));
+  return [low - margin, high + margin];
 }

@@ -3,10 +3,10 @@ import { UndoStack } from './undo';
 /** Limits of the undo history. */
 const LIMITS = { entries: 60, bytes: 96e6 };
 /** Milliseconds within which repeated changes of the same setting count as one, as when a slider is dragged. */
-const TOGETHER = 1500;
+const MERGE_MS = 1500;
 
 /** A state to go back to: of the model, and of the page. */
-export interface Moment<Page, Saved> {
+export interface SavedMoment<Page, Saved> {
   saved: Saved;
   page: Page;
 }
@@ -19,15 +19,15 @@ export interface SavingWorker<Saved> {
 }
 
 /** Undo and redo of all changes to the model: keeps the worker's saved states, and the page's state with each. */
-export class Rewinder<Page, Saved extends { state: Uint8Array }> {
+export class UndoHistory<Page, Saved extends { state: Uint8Array }> {
   readonly #client: SavingWorker<Saved>;
   readonly #page: () => Page;
   readonly #onChange: (undoable: string | undefined, redoable: string | undefined) => void;
-  readonly #stack = new UndoStack<Moment<Page, Saved>>(LIMITS);
+  readonly #stack = new UndoStack<SavedMoment<Page, Saved>>(LIMITS);
   /** Resolves when all saves for the undo history are complete. */
   #ready: Promise<void> = Promise.resolve();
-  #last = { together: '', at: 0 };
-  #newest: Moment<Page, Saved> | undefined;
+  #lastChange = { mergeKey: '', at: 0 };
+  #newest: SavedMoment<Page, Saved> | undefined;
   #saving: Promise<unknown> = Promise.resolve();
   /** Counts volumes, so that saves of a previous one are discarded. */
   #volume = 0;
@@ -43,26 +43,26 @@ export class Rewinder<Page, Saved extends { state: Uint8Array }> {
   }
 
   /** The newest saved state, even if no change followed it: to resume from after a failure of the engine. */
-  get newest(): Moment<Page, Saved> | undefined {
+  get newest(): SavedMoment<Page, Saved> | undefined {
     return this.#newest;
   }
 
   /** Settles when the worker has answered the last save request. */
-  get kept(): Promise<unknown> {
+  get saved(): Promise<unknown> {
     return this.#saving;
   }
 
   /** Forgets all states: none fits another volume. */
   clear(): void {
     this.#volume += 1;
-    this.#last = { together: '', at: 0 };
+    this.#lastChange = { mergeKey: '', at: 0 };
     this.#stack.clear();
     this.#newest = undefined;
-    this.#tell();
+    this.#notify();
   }
 
   /** Saves the present state as {@link newest} only. Undefined if the engine is broken. */
-  async keep(): Promise<Moment<Page, Saved> | undefined> {
+  async save(): Promise<SavedMoment<Page, Saved> | undefined> {
     const page = this.#page();
     const volume = this.#volume;
     const saving = this.#client.request('save', undefined);
@@ -79,16 +79,16 @@ export class Rewinder<Page, Saved extends { state: Uint8Array }> {
 
   /**
    * Saves the present state for undo, before a change. Requests are answered in order, so the state is that before any
-   * request made after this call. Changes with the same `together` in short succession count as one. Returns a function
+   * request made after this call. Changes with the same `mergeKey` in short succession count as one. Returns a function
    * that forgets the state, to call if the change fails.
    */
-  remember(label: string, together = ''): () => void {
+  checkpoint(label: string, mergeKey = ''): () => void {
     const now = performance.now();
-    const isOne = together !== '' && together === this.#last.together && now - this.#last.at < TOGETHER;
-    this.#last = { together, at: now };
+    const isOne = mergeKey !== '' && mergeKey === this.#lastChange.mergeKey && now - this.#lastChange.at < MERGE_MS;
+    this.#lastChange = { mergeKey, at: now };
     if (isOne) return () => undefined;
     const volume = this.#volume;
-    const keeping = this.keep();
+    const keeping = this.save();
     const kept = this.#ready
       .then(() => keeping)
       .then((state) => {
@@ -96,12 +96,12 @@ export class Rewinder<Page, Saved extends { state: Uint8Array }> {
         if (checkpoint && volume === this.#volume) this.#stack.push(checkpoint);
         return checkpoint;
       });
-    this.#ready = kept.then(() => this.#tell());
+    this.#ready = kept.then(() => this.#notify());
     return () => {
-      this.#last.together = '';
+      this.#lastChange.mergeKey = '';
       this.#ready = kept.then((checkpoint) => {
         if (checkpoint) this.#stack.drop(checkpoint);
-        this.#tell();
+        this.#notify();
       });
     };
   }
@@ -110,23 +110,23 @@ export class Rewinder<Page, Saved extends { state: Uint8Array }> {
    * Undoes or redoes a change; returns the state that the model is in then, or undefined if there is nothing to undo or
    * redo.
    */
-  async travel(way: 'undo' | 'redo'): Promise<Moment<Page, Saved> | undefined> {
+  async step(direction: 'undo' | 'redo'): Promise<SavedMoment<Page, Saved> | undefined> {
     await this.#ready;
-    if ((way === 'undo' ? this.#stack.undoable : this.#stack.redoable) === undefined) return undefined;
-    this.#last.together = '';
+    if ((direction === 'undo' ? this.#stack.undoable : this.#stack.redoable) === undefined) return undefined;
+    this.#lastChange.mergeKey = '';
     await this.#client.request('pause', undefined);
     const page = this.#page();
     const saved = await this.#client.request('save', undefined);
-    const moment = this.#stack[way]({ bytes: saved.state.byteLength, state: { saved, page } });
+    const moment = this.#stack[direction]({ bytes: saved.state.byteLength, state: { saved, page } });
     if (moment) {
       await this.#client.request('restore', moment.saved);
       this.#newest = moment;
     }
-    this.#tell();
+    this.#notify();
     return moment;
   }
 
-  #tell(): void {
+  #notify(): void {
     this.#onChange(this.#stack.undoable, this.#stack.redoable);
   }
 }

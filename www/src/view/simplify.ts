@@ -6,11 +6,11 @@
 /** Number of edges sampled for the mean edge length. */
 const SAMPLES = 1000;
 /** Number of triangles that remain per cell area, so that their total is close to the target. */
-const FILL = 1.5;
+const TRIANGLES_PER_CELL = 1.5;
 /** Ratio of triangles to the target above which larger cells are tried. */
 const MOST_EXCESS = 1.5;
 
-export interface Fine {
+export interface FineMesh {
   positions: Float32Array;
   normals: Float32Array;
   indices: Uint32Array;
@@ -23,23 +23,23 @@ export interface Fine {
  * Returns the corners of about `triangles` triangles. The vertices in a grid cell are merged into one of them; the two
  * sides of a thin sheet stay separate, by the directions of their normals.
  */
-export function coarseCorners(fine: Fine, triangles: number): Uint32Array {
-  const cell = meanEdge(fine) * Math.sqrt((FILL * fine.corners) / 3 / triangles);
-  const list = clusteredCorners(fine, cell);
+export function simplifiedIndices(fine: FineMesh, triangles: number): Uint32Array {
+  const cell = meanEdge(fine) * Math.sqrt((TRIANGLES_PER_CELL * fine.corners) / 3 / triangles);
+  const list = clusteredIndices(fine, cell);
   // Thin sheets and small components keep more triangles, because each has cells of its own.
   const excess = list.length / 3 / triangles;
-  return excess > MOST_EXCESS ? clusteredCorners(fine, cell * Math.sqrt(excess)) : list;
+  return excess > MOST_EXCESS ? clusteredIndices(fine, cell * Math.sqrt(excess)) : list;
 }
 
-function clusteredCorners(fine: Fine, cell: number): Uint32Array {
+function clusteredIndices(fine: FineMesh, cell: number): Uint32Array {
   const { indices, corners } = fine;
-  const leaders = leadersOf(fine, cell);
+  const representatives = clusterRepresentatives(fine, cell);
   const out = new Uint32Array(corners);
   let length = 0;
   for (let i = 0; i < corners; i += 3) {
-    const a = leaders[indices[i] ?? 0] ?? 0;
-    const b = leaders[indices[i + 1] ?? 0] ?? 0;
-    const c = leaders[indices[i + 2] ?? 0] ?? 0;
+    const a = representatives[indices[i] ?? 0] ?? 0;
+    const b = representatives[indices[i + 1] ?? 0] ?? 0;
+    const c = representatives[indices[i + 2] ?? 0] ?? 0;
     if (a === b || b === c || c === a) continue;
     out[length++] = a;
     out[length++] = b;
@@ -48,7 +48,7 @@ function clusteredCorners(fine: Fine, cell: number): Uint32Array {
   return out.slice(0, length);
 }
 
-function meanEdge({ positions, indices, corners }: Fine): number {
+function meanEdge({ positions, indices, corners }: FineMesh): number {
   const stride = 3 * Math.max(1, Math.floor(corners / 3 / SAMPLES));
   let [sum, count] = [0, 0];
   for (let i = 0; i + 1 < corners; i += stride) {
@@ -61,20 +61,20 @@ function meanEdge({ positions, indices, corners }: Fine): number {
 }
 
 /** Returns for each vertex the first one in its cell. */
-function leadersOf({ positions, normals, vertices }: Fine, cell: number): Uint32Array {
+function clusterRepresentatives({ positions, normals, vertices }: FineMesh, cell: number): Uint32Array {
   const [low, wide] = extent(positions, vertices);
   const side = Math.floor(wide / cell) + 1;
   const at = (i: number, axis: number) => Math.floor(((positions[i + axis] ?? 0) - (low[axis] ?? 0)) / cell);
   const first = new Map<number, number>();
-  const leaders = new Uint32Array(vertices);
+  const representatives = new Uint32Array(vertices);
   for (let vertex = 0; vertex < vertices; vertex++) {
     const i = 3 * vertex;
-    const key = 6 * ((at(i, 0) * side + at(i, 1)) * side + at(i, 2)) + facing(normals, i);
-    const leader = first.get(key);
-    if (leader === undefined) first.set(key, vertex);
-    leaders[vertex] = leader ?? vertex;
+    const key = 6 * ((at(i, 0) * side + at(i, 1)) * side + at(i, 2)) + dominantFace(normals, i);
+    const representative = first.get(key);
+    if (representative === undefined) first.set(key, vertex);
+    representatives[vertex] = representative ?? vertex;
   }
-  return leaders;
+  return representatives;
 }
 
 /** Returns the lowest corner of the bounding box of the points, and its longest side. */
@@ -89,7 +89,7 @@ function extent(positions: Float32Array, vertices: number): [number[], number] {
 }
 
 /** Returns the face of a cube that the normal intersects, 0 to 5. */
-function facing(normals: Float32Array, i: number): number {
+function dominantFace(normals: Float32Array, i: number): number {
   const [x, y, z] = [normals[i] ?? 0, normals[i + 1] ?? 0, normals[i + 2] ?? 0];
   const [ax, ay, az] = [Math.abs(x), Math.abs(y), Math.abs(z)];
   if (ax >= ay && ax >= az) return x < 0 ? 0 : 1;

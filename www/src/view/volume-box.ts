@@ -20,12 +20,12 @@ const LETTERS = [
   ['S', 'I'],
 ] as const;
 /** Distance of the letters from the box, as a fraction of the box. */
-const STAND_OFF = 0.06;
+const LETTER_DISTANCE = 0.06;
 /** Height of a letter as a fraction of the view's height. */
 const LETTER_SIZE = 0.045;
 
 /** The bounding box of a volume in the 3D view, with anatomical directions at its six faces. */
-export class VolumeFrame {
+export class VolumeBox {
   readonly object = new Group();
   readonly #box: LineSegments<EdgesGeometry, LineBasicMaterial>;
   readonly #sprites: Sprite[] = [];
@@ -35,8 +35,8 @@ export class VolumeFrame {
     this.object.add(this.#box);
     for (const [axis, { anatomical, positive }] of anatomyOf(grid).entries()) {
       const [high, low] = positive ? LETTERS[anatomical] : [LETTERS[anatomical][1], LETTERS[anatomical][0]];
-      this.#addLetter(high, sideCentre(grid, axis, 1 + STAND_OFF));
-      this.#addLetter(low, sideCentre(grid, axis, -STAND_OFF));
+      this.#addLetter(high, sideCentre(grid, axis, 1 + LETTER_DISTANCE));
+      this.#addLetter(low, sideCentre(grid, axis, -LETTER_DISTANCE));
     }
   }
 

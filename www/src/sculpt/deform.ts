@@ -9,16 +9,16 @@ import type { ControlEllipsoid, Pose, Vec3 } from './protocol';
  * Bounds the weight of an ellipsoid near its surface: there it is eleven times the weight at a distance of its shortest
  * semi-axis.
  */
-const SOFTNESS = 0.1;
+const WEIGHT_SOFTENING = 0.1;
 
 /**
  * Moves points, packed xyz, as the ellipsoids move from `before` to `after`: by the mean of the ellipsoids' affine
  * maps, weighted by proximity. Moves only the first `count` points; the returned array is as long as `points`.
  */
-export function carried(points: Float32Array, before: Pose, after: Pose, count = points.length / 3): Float32Array {
+export function deformPoints(points: Float32Array, before: Pose, after: Pose, count = points.length / 3): Float32Array {
   const maps = before.map((one, k) => mapBetween(one, after[k] ?? one));
   const out = new Float32Array(points.length);
-  for (let i = 0; i < 3 * count; i += 3) carry(points, i, maps, out);
+  for (let i = 0; i < 3 * count; i += 3) deformPoint(points, i, maps, out);
   return out;
 }
 
@@ -49,17 +49,17 @@ function mapBetween(one: ControlEllipsoid, other: ControlEllipsoid): EllipsoidMa
   };
 }
 
-function carry(points: Float32Array, i: number, maps: EllipsoidMap[], out: Float32Array): void {
+function deformPoint(points: Float32Array, i: number, maps: EllipsoidMap[], out: Float32Array): void {
   const [x, y, z] = [points[i] ?? 0, points[i + 1] ?? 0, points[i + 2] ?? 0];
   let [sumX, sumY, sumZ, total] = [0, 0, 0, 0];
   for (const { center, toUnit, newCenter, axes, thinnest } of maps) {
-    const seen: Vec3 = [x - center[0], y - center[1], z - center[2]];
-    const u = dot(toUnit[0], seen);
-    const v = dot(toUnit[1], seen);
-    const w = dot(toUnit[2], seen);
+    const offset: Vec3 = [x - center[0], y - center[1], z - center[2]];
+    const u = dot(toUnit[0], offset);
+    const v = dot(toUnit[1], offset);
+    const w = dot(toUnit[2], offset);
     const size = Math.sqrt(u * u + v * v + w * w);
-    const clearance = size > 1 ? (Math.sqrt(dot(seen, seen)) * (1 - 1 / size)) / thinnest : 0;
-    const weight = 1 / (SOFTNESS + clearance * clearance);
+    const clearance = size > 1 ? (Math.sqrt(dot(offset, offset)) * (1 - 1 / size)) / thinnest : 0;
+    const weight = 1 / (WEIGHT_SOFTENING + clearance * clearance);
     sumX += weight * (newCenter[0] + u * axes[0][0] + v * axes[1][0] + w * axes[2][0]);
     sumY += weight * (newCenter[1] + u * axes[0][1] + v * axes[1][1] + w * axes[2][1]);
     sumZ += weight * (newCenter[2] + u * axes[0][2] + v * axes[1][2] + w * axes[2][2]);

@@ -1,12 +1,13 @@
 import type { ParamSpec } from '../protocol';
+import { text } from '../texts';
 import { h, symbol, uniqueId } from './dom';
 import { figure } from './format';
 
 /** Multiple of the noise below which noise alone is detected as boundary. */
-const SAFE = 2.5;
+const NOISE_FACTOR = 2.5;
 
 /** Control for the edge threshold τ, with the noise level it must exceed. */
-export class StepHeight {
+export class EdgeThreshold {
   readonly element: HTMLElement;
   readonly #number: HTMLInputElement;
   readonly #slider: HTMLInputElement;
@@ -31,7 +32,13 @@ export class StepHeight {
       inputmode: 'decimal',
       'aria-describedby': `${id}-help`,
     });
-    this.#slider = h('input', { type: 'range', min: 0, max: 1, step: 'any', 'aria-label': `${label}, slider` });
+    this.#slider = h('input', {
+      type: 'range',
+      min: 0,
+      max: 1,
+      step: 'any',
+      'aria-label': text('controls.sliderOf', { label }),
+    });
     this.#number.addEventListener('change', () => onChange(this.#number.valueAsNumber));
     // A change restarts the tracker, so it is applied only when the slider is released.
     this.#slider.addEventListener('input', () => {
@@ -61,24 +68,27 @@ export class StepHeight {
     );
   }
 
-  /** `most`: the largest possible difference of intensities. */
-  show(threshold: number, noise: number, suggested: number, most: number): void {
+  /** `largest`: the largest possible difference of intensities. */
+  show(threshold: number, noise: number, suggested: number, largest: number): void {
     this.#suggested = suggested;
-    const top = rounded(Math.max(most / 2, threshold));
+    const top = rounded(Math.max(largest / 2, threshold));
     Object.assign(this.#slider, { max: String(top), step: String(top / 500) });
     this.#slider.valueAsNumber = threshold;
     this.#slider.setAttribute('aria-valuetext', figure(threshold));
     this.#number.value = String(Number(threshold.toPrecision(6)));
-    this.#noise.textContent = `Noise measured in the box: σ = ${figure(rounded(noise))}. Suggested: ${figure(rounded(suggested))}.`;
-    this.#suggest.textContent = `Take ${figure(rounded(suggested))}`;
+    this.#noise.textContent = text('trackPanels.noiseEstimate', {
+      noise: figure(rounded(noise)),
+      suggested: figure(rounded(suggested)),
+    });
+    this.#suggest.textContent = text('trackPanels.useSuggested', { suggested: figure(rounded(suggested)) });
     this.#suggest.disabled = Object.is(threshold, suggested);
-    const low = threshold < SAFE * noise;
-    const text = low ? `Below 2.5 σ = ${figure(rounded(SAFE * noise))}: noise alone will make boundaries.` : '';
-    if (this.#warning.textContent !== text) this.#warning.textContent = text;
+    const low = threshold < NOISE_FACTOR * noise;
+    const warning = low ? text('trackPanels.noiseWarning', { limit: figure(rounded(NOISE_FACTOR * noise)) }) : '';
+    if (this.#warning.textContent !== warning) this.#warning.textContent = warning;
     this.#error.textContent = '';
   }
 
-  complain(message: string): void {
+  showError(message: string): void {
     this.#error.textContent = message;
   }
 }

@@ -18,7 +18,7 @@ export interface Pose {
   forward: Vector3;
   /** Focal lengths along x and y, and the principal point, pixels. */
   focal: [number, number];
-  middle: [number, number];
+  principalPoint: [number, number];
 }
 
 /** Decomposes a projection matrix: its left 3 × 3 part is an upper triangular matrix times a rotation. */
@@ -36,7 +36,14 @@ export function poseOf({ projection }: PinholeCamera): Pose {
   const right = across.addScaledVector(down, -across.dot(down));
   const focalX = right.length() / scale;
   right.normalize();
-  return { centre: centreOf(projection), right, down, forward, focal: [focalX, focalY], middle: [middleX, middleY] };
+  return {
+    centre: centreOf(projection),
+    right,
+    down,
+    forward,
+    focal: [focalX, focalY],
+    principalPoint: [middleX, middleY],
+  };
 }
 
 /** Returns the camera centre: the point whose projection is 0. */
@@ -51,25 +58,25 @@ function centreOf(p: ArrayLike<number>): Vector3 {
  * Gives `eye` the pose and projection of `camera`. If the view has another aspect ratio than the image, it shows more
  * on both sides.
  */
-export function placeEye(
-  eye: PerspectiveCamera,
+export function applyPinhole(
+  target: PerspectiveCamera,
   camera: PinholeCamera,
   world: Matrix4,
   aspect: number,
   [near, far]: [number, number],
 ): void {
-  const { centre, right, down, forward, focal, middle } = poseOf(camera);
-  eye.matrix.makeBasis(right, down.clone().negate(), forward.clone().negate()).setPosition(centre);
-  eye.matrix.premultiply(world);
-  eye.matrixWorldNeedsUpdate = true;
+  const { centre, right, down, forward, focal, principalPoint } = poseOf(camera);
+  target.matrix.makeBasis(right, down.clone().negate(), forward.clone().negate()).setPosition(centre);
+  target.matrix.premultiply(world);
+  target.matrixWorldNeedsUpdate = true;
   const [width, height] = [camera.width, camera.height];
-  let [x0, x1] = [(-0.5 - middle[0]) / focal[0], (width - 0.5 - middle[0]) / focal[0]];
-  let [y0, y1] = [(-0.5 - middle[1]) / focal[1], (height - 0.5 - middle[1]) / focal[1]];
+  let [x0, x1] = [(-0.5 - principalPoint[0]) / focal[0], (width - 0.5 - principalPoint[0]) / focal[0]];
+  let [y0, y1] = [(-0.5 - principalPoint[1]) / focal[1], (height - 0.5 - principalPoint[1]) / focal[1]];
   const wider = aspect / ((x1 - x0) / (y1 - y0));
   if (wider > 1) [x0, x1] = stretched(x0, x1, wider);
   else [y0, y1] = stretched(y0, y1, 1 / wider);
-  eye.projectionMatrix.makePerspective(near * x0, near * x1, -near * y0, -near * y1, near, far);
-  eye.projectionMatrixInverse.copy(eye.projectionMatrix).invert();
+  target.projectionMatrix.makePerspective(near * x0, near * x1, -near * y0, -near * y1, near, far);
+  target.projectionMatrixInverse.copy(target.projectionMatrix).invert();
 }
 
 function stretched(low: number, high: number, factor: number): [number, number] {

@@ -6,19 +6,19 @@ import { buffersOf } from './serving';
 /**
  * Ratio of consecutive capacities. A smaller one needs new buffers more often, a larger one leaves more of them unused.
  */
-const STEP = 1.25;
+const CAPACITY_RATIO = 1.25;
 
 /**
  * Rounds a count up to the next capacity of a geometric sequence, so that the buffers of a growing surface fit for a
  * while, here and on the GPU.
  */
-export function roomFor(count: number): number {
-  return Math.ceil(STEP ** Math.ceil(Math.log(Math.max(1, count)) / Math.log(STEP)));
+export function capacityFor(count: number): number {
+  return Math.ceil(CAPACITY_RATIO ** Math.ceil(Math.log(Math.max(1, count)) / Math.log(CAPACITY_RATIO)));
 }
 
 export type Arrays = Pick<Surface, 'positions' | 'normals' | 'indices' | 'uvs' | 'colors'>;
 
-export function noArrays(): Arrays {
+export function emptyArrays(): Arrays {
   return { positions: new Float32Array(0), normals: new Float32Array(0), indices: new Uint32Array(0) };
 }
 
@@ -26,8 +26,8 @@ export function noArrays(): Arrays {
  * Copies a mesh into arrays with spare capacity, which are transferred to the page and uploaded to the GPU unchanged.
  * The given arrays are reused if their lengths match.
  */
-export function surfaceIn({ positions, normals, indices }: Arrays, mesh: Mesh): Surface {
-  const [numbers, corners] = [3 * roomFor(mesh.vertexCount), 3 * roomFor(mesh.triangleCount)];
+export function copySurface({ positions, normals, indices }: Arrays, mesh: Mesh): Surface {
+  const [numbers, corners] = [3 * capacityFor(mesh.vertexCount), 3 * capacityFor(mesh.triangleCount)];
   const arrays: Arrays = {
     positions: positions.length === numbers ? positions : new Float32Array(numbers),
     normals: normals.length === numbers ? normals : new Float32Array(numbers),
@@ -39,10 +39,10 @@ export function surfaceIn({ positions, normals, indices }: Arrays, mesh: Mesh): 
 
 /** Copies a mesh with its texture coordinates into arrays with the same spare capacity. */
 export function texturedSurface(mesh: Mesh): Surface {
-  const room = roomFor(mesh.vertexCount);
-  const surface = surfaceIn(noArrays(), mesh);
+  const capacity = capacityFor(mesh.vertexCount);
+  const surface = copySurface(emptyArrays(), mesh);
   if (!surface.uvs) return surface;
-  const uvs = new Float32Array(2 * room);
+  const uvs = new Float32Array(2 * capacity);
   uvs.set(surface.uvs);
   return { ...surface, uvs };
 }

@@ -19,7 +19,7 @@ const STARTS = ['contour', 'enclosing'] as const;
 type StartName = (typeof STARTS)[number];
 
 /** The parsed attributes of the element and the bytes of its file. */
-export interface Told {
+export interface Settings {
   bytes: Uint8Array;
   start: StartName;
   levels: number;
@@ -28,7 +28,7 @@ export interface Told {
 }
 
 /** A model, and the direction from which the camera views it initially. */
-export interface Made {
+export interface ModelWithView {
   model: Stepper;
   from: Vec3;
 }
@@ -38,30 +38,33 @@ const FRONT: Vec3 = [-0.5, -1, 0.35];
 
 /** Factory of the model for each method; intermediate objects are freed. */
 export const MODELS = {
-  deformable: ({ bytes, start, levels, params }: Told): Promise<Made> =>
+  deformable: ({ bytes, start, levels, params }: Settings): Promise<ModelWithView> =>
     ofVolume(bytes, (volume) => DeformableModel.create({ volume, start, levels, params })),
-  implicit: async ({ bytes, params }: Told): Promise<Made> => {
+  implicit: async ({ bytes, params }: Settings): Promise<ModelWithView> => {
     const { points, normals } = await parsePoints(bytes);
     return { model: await ImplicitSurface.create({ points, ...(normals && { normals }), params }), from: FRONT };
   },
-  tracking: ({ bytes, params }: Told): Promise<Made> =>
+  tracking: ({ bytes, params }: Settings): Promise<ModelWithView> =>
     ofVolume(bytes, (volume) => SurfaceTracker.create({ volume, params })),
-  multires: async ({ bytes, ellipsoids, params }: Told): Promise<Made> => {
+  multires: async ({ bytes, ellipsoids, params }: Settings): Promise<ModelWithView> => {
     const make = (detail: Mesh) => MultiresolutionModel.create({ detail, ellipsoids, params });
-    return { model: await using(await Mesh.parse(bytes), make), from: FRONT };
+    return { model: await withResource(await Mesh.parse(bytes), make), from: FRONT };
   },
 };
 
 /** Creates a model from a volume, with the camera in front of a patient, a little to their left. */
-function ofVolume(bytes: Uint8Array, make: (volume: Volume) => Promise<Stepper>): Promise<Made> {
-  const made = async (volume: Volume): Promise<Made> => {
+function ofVolume(bytes: Uint8Array, make: (volume: Volume) => Promise<Stepper>): Promise<ModelWithView> {
+  const made = async (volume: Volume): Promise<ModelWithView> => {
     const [model, space] = await Promise.all([make(volume), volume.space]);
     return { model, from: space === 'RAS' ? [-0.6, 1, 0.35] : [0.6, -1, 0.35] };
   };
-  return Volume.parse(bytes).then((volume) => using(volume, made));
+  return Volume.parse(bytes).then((volume) => withResource(volume, made));
 }
 
-async function using<T extends { free(): void }, Made>(thing: T, make: (thing: T) => Promise<Made>): Promise<Made> {
+async function withResource<T extends { free(): void }, Made>(
+  thing: T,
+  make: (thing: T) => Promise<Made>,
+): Promise<Made> {
   try {
     return await make(thing);
   } finally {
@@ -77,7 +80,7 @@ export async function fetched(address: string): Promise<Uint8Array> {
 }
 
 /** Returns the initial surface that an attribute names; `'contour'` by default. */
-export function startNamed(name: string | null): StartName {
+export function parseStart(name: string | null): StartName {
   const start = STARTS.find((one) => one === (name ?? 'contour'));
   if (!start) throw invalid('start', `'${name}'; accepted: ${STARTS.join(', ')}`);
   return start;

@@ -1,20 +1,20 @@
 /** The paper's figures of one slice, or of one line through time, side by side under the view of the Track lab. */
 import type { Vec3, VolumeView } from '../protocol';
 import { type CannySettings, canny } from '../track/canny';
-import { boundaryPicture, isSplit, twoMeans, windowAt } from '../track/clusters';
-import { crossings } from '../track/cut';
-import type { Between, Votes } from '../track/protocol';
-import { h, pen, token } from '../ui/dom';
-import { invert, sliceFrames } from './anatomy';
-import { voxelsOfFrame } from './beating';
+import { boundaryImage, hasBoundary, twoMeans, windowAt } from '../track/clusters';
+import { intersectionsWithRow } from '../track/cross-section';
+import type { BoundaryVotes, InterpolatedSlice } from '../track/protocol';
+import { context2d, h, token } from '../ui/dom';
+import { invert, sliceOrientations } from './anatomy';
 import { greysOf, slicePicture } from './slicing';
+import { voxelsOfFrame } from './track';
 import { votesIn } from './votes';
 
 /** Size of an image's longer side in pixels; sharp on high-resolution screens, too. */
-const FINE = 560;
+const IMAGE_SIZE = 560;
 
 /** An image with a caption. */
-export class Picture {
+export class FigureImage {
   readonly element: HTMLElement;
   readonly canvas: HTMLCanvasElement;
   readonly #caption = h('figcaption');
@@ -32,12 +32,12 @@ export class Picture {
    * Returns the position of a mouse event as fractions of the image's width and height, 0 to 1; the image may not fill
    * its canvas.
    */
-  partsAt({ offsetX, offsetY }: MouseEvent): [number, number] {
+  fractionsAt({ offsetX, offsetY }: MouseEvent): [number, number] {
     const { width, height, clientWidth, clientHeight } = this.canvas;
     const fit = Math.min(clientWidth / width, clientHeight / height);
-    const part = (at: number, room: number, size: number) =>
-      Math.min(1 - 1e-6, Math.max(0, (at - (room - fit * size) / 2) / (fit * size)));
-    return [part(offsetX, clientWidth, width), part(offsetY, clientHeight, height)];
+    const fraction = (at: number, available: number, size: number) =>
+      Math.min(1 - 1e-6, Math.max(0, (at - (available - fit * size) / 2) / (fit * size)));
+    return [fraction(offsetX, clientWidth, width), fraction(offsetY, clientHeight, height)];
   }
 
   /**
@@ -49,10 +49,10 @@ export class Picture {
     [wide, high]: [number, number],
     over: (context: CanvasRenderingContext2D, scaleX: number, scaleY: number) => void = () => undefined,
   ): void {
-    const fit = FINE / Math.max(small.width * wide, small.height * high);
+    const fit = IMAGE_SIZE / Math.max(small.width * wide, small.height * high);
     this.canvas.width = Math.round(small.width * wide * fit);
     this.canvas.height = Math.round(small.height * high * fit);
-    const context = pen(this.canvas);
+    const context = context2d(this.canvas);
     if (!context) return;
     context.imageSmoothingEnabled = false;
     context.drawImage(small, 0, 0, this.canvas.width, this.canvas.height);
@@ -70,16 +70,16 @@ export interface Subject {
 /** The voxel axis across the slices, in the scanner's order. */
 const ACROSS = 2;
 /** Width and height of the section of a slice that shows a window, pixels. */
-const CUT = 28;
+const SECTION_SIZE = 28;
 
 /**
  * Paints the section of the slice around the crosshair, with the voxels of the window there classified as bright and
  * dark: green and red, as in figure 4 a. Returns whether the two clusters differ by the threshold.
  */
 export function paintWindow(
-  picture: Picture,
+  picture: FigureImage,
   { volume, frame, voxel }: Subject,
-  reach: number,
+  halfWidth: number,
   threshold: number,
 ): boolean {
   const side = sliceSide(volume);
@@ -88,15 +88,15 @@ export function paintWindow(
   const { width, height } = small;
   const values = greysOf(shown, side, voxel[ACROSS]);
   const [x, y] = [placeIn(side.horizontal, voxel, volume.dims), placeIn(side.vertical, voxel, volume.dims)];
-  const window = windowAt({ width, height, values }, x, y, reach);
+  const window = windowAt({ width, height, values }, x, y, halfWidth);
   const found = twoMeans(window.map((i) => values[i] ?? 0));
   const [low, high] = volume.window;
-  const split = isSplit(found, (threshold * 255) / (high - low || 1));
+  const split = hasBoundary(found, (threshold * 255) / (high - low || 1));
   const [left, top] = cornerOf(volume, side, voxel);
-  const cut = document.createElement('canvas');
-  [cut.width, cut.height] = [Math.min(CUT, width), Math.min(CUT, height)];
-  pen(cut)?.drawImage(small, -left, -top);
-  picture.paint(cut, pixelOfSide(volume, side), (context, scaleX, scaleY) => {
+  const section = document.createElement('canvas');
+  [section.width, section.height] = [Math.min(SECTION_SIZE, width), Math.min(SECTION_SIZE, height)];
+  context2d(section)?.drawImage(small, -left, -top);
+  picture.paint(section, pixelOfSide(volume, side), (context, scaleX, scaleY) => {
     context.lineWidth = 3;
     for (const bright of [0, 1]) {
       context.strokeStyle = bright ? '#2ecc5a' : '#ff5a4d';
@@ -111,14 +111,14 @@ export function paintWindow(
 }
 
 /** Paints the accumulated votes of all windows: figure 4 b. */
-export function paintBoundary(picture: Picture, { volume, voxel }: Subject, votes: Votes): void {
+export function paintBoundary(picture: FigureImage, { volume, voxel }: Subject, votes: BoundaryVotes): void {
   const side = sliceSide(volume);
   const [width, height] = [volume.dims[side.horizontal.axis], volume.dims[side.vertical.axis]];
   const inverse = invert(volume.affine);
-  const faces = votesIn(votes, { volume, inverse, frame: side, slice: voxel[ACROSS] });
+  const faces = votesIn(votes, { volume, inverse, orientation: side, slice: voxel[ACROSS] });
   // Votes lie on pixel faces: x is an integer for a face to the right, and y a half. Subtracting less than a pixel
   // assigns both kinds to their pixel.
-  const sum = boundaryPicture(
+  const sum = boundaryImage(
     { width, height },
     faces.map(({ x, y, weight }) => ({ x: x - 0.25, y: y - 0.25, weight })),
   );
@@ -129,7 +129,7 @@ export function paintBoundary(picture: Picture, { volume, voxel }: Subject, vote
 }
 
 /** Paints Canny's edges of the same slice: figure 4 c. */
-export function paintCanny(picture: Picture, { volume, frame, voxel }: Subject, settings: CannySettings): void {
+export function paintCanny(picture: FigureImage, { volume, frame, voxel }: Subject, settings: CannySettings): void {
   const side = sliceSide(volume);
   const shown = { dims: volume.dims, voxels: voxelsOfFrame(volume, frame) };
   const [width, height] = [volume.dims[side.horizontal.axis], volume.dims[side.vertical.axis]];
@@ -145,7 +145,7 @@ export function paintCanny(picture: Picture, { volume, frame, voxel }: Subject, 
  * frame. Returns their number.
  */
 export function paintTime(
-  picture: Picture,
+  picture: FigureImage,
   { volume, frame, voxel }: Subject,
   outlines: readonly (Float32Array | undefined)[],
 ): number {
@@ -162,7 +162,7 @@ export function paintTime(
   picture.paint(small, [(3.6 * length) / frames, 1], (context, scaleX, scaleY) => {
     context.fillStyle = token('--outline');
     for (const [t, outline] of outlines.entries())
-      for (const x of outline ? crossings(outline, row + 0.5) : []) {
+      for (const x of outline ? intersectionsWithRow(outline, row + 0.5) : []) {
         count += 1;
         context.beginPath();
         context.arc((t + 0.5) * scaleX, x * scaleY, 3.4, 0, 2 * Math.PI);
@@ -177,9 +177,9 @@ export function paintTime(
 
 /** Paints figure 5: a slice, its neighbours, and the interpolations in its place. */
 export function paintBetween(
-  pictures: readonly Picture[],
+  pictures: readonly FigureImage[],
   volume: VolumeView,
-  { width, height, before, flow, measured, linear, after }: Between,
+  { width, height, before, flow, measured, linear, after }: InterpolatedSlice,
 ): void {
   const side = sliceSide(volume);
   const pixel = pixelOfSide(volume, side);
@@ -197,7 +197,7 @@ export function voxelIn(volume: VolumeView, voxel: Vec3, across: number, down: n
     [side.vertical, top, down],
   ] as const) {
     const last = volume.dims[axis] - 1;
-    const at = Math.max(0, Math.min(last, from + Math.floor(part * Math.min(CUT, last + 1))));
+    const at = Math.max(0, Math.min(last, from + Math.floor(part * Math.min(SECTION_SIZE, last + 1))));
     out[axis] = flip ? last - at : at;
   }
   return out;
@@ -206,12 +206,12 @@ export function voxelIn(volume: VolumeView, voxel: Vec3, across: number, down: n
 /** Returns the upper left corner of the section of the slice centred on the crosshair. */
 function cornerOf({ dims }: VolumeView, { horizontal, vertical }: Side, voxel: Vec3): [number, number] {
   const from = (side: Side['horizontal']) =>
-    Math.max(0, Math.min(dims[side.axis] - CUT, placeIn(side, voxel, dims) - (CUT >> 1)));
+    Math.max(0, Math.min(dims[side.axis] - SECTION_SIZE, placeIn(side, voxel, dims) - (SECTION_SIZE >> 1)));
   return [from(horizontal), from(vertical)];
 }
 
 function sliceSide(volume: VolumeView) {
-  const side = sliceFrames(volume)[ACROSS];
+  const side = sliceOrientations(volume)[ACROSS];
   if (!side) throw new Error('a volume has three axes');
   return side;
 }
@@ -235,6 +235,6 @@ function inGrey(width: number, height: number, grey: (i: number) => number): HTM
     const value = grey(i);
     pixels.data.set([value, value, value, 255], 4 * i);
   }
-  pen(canvas)?.putImageData(pixels, 0, 0);
+  context2d(canvas)?.putImageData(pixels, 0, 0);
   return canvas;
 }

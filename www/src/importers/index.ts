@@ -1,6 +1,7 @@
 /** Formats read by other libraries, which are loaded only when such a file is opened. */
 import type { VolumeInit } from 'vesicle';
 import type { NamedBytes } from '../protocol';
+import { text } from '../texts';
 import { Refusal } from '../worker/refusal';
 
 /** Number of bytes before the letters DICM at the start of a DICOM file. */
@@ -24,16 +25,17 @@ export function isTiff({ bytes }: NamedBytes): boolean {
  * Reads the volume from a series of DICOM files, or from TIFF files with one slice each or all in one; undefined if
  * they are neither.
  */
-export async function readForeign(files: NamedBytes[]): Promise<VolumeInit | undefined> {
+export async function importVolume(files: NamedBytes[]): Promise<VolumeInit | undefined> {
   // DICOM folders contain other files as well, and DICOM files without that extension.
   const series = files.filter(isDicom);
-  if (series.length > 0) return solid('DICOM', await (await import('./dicom')).readSeries(series));
-  if (files.length > 0 && files.every(isTiff)) return solid('TIFF', await (await import('./tiff')).readStack(files));
+  if (series.length > 0) return rejectSingleSlice('DICOM', await (await import('./dicom')).readSeries(series));
+  if (files.length > 0 && files.every(isTiff))
+    return rejectSingleSlice('TIFF', await (await import('./tiff')).readStack(files));
   return undefined;
 }
 
 /** Rejects a single slice, which has no surface. */
-function solid(format: string, init: VolumeInit): VolumeInit {
+function rejectSingleSlice(format: string, init: VolumeInit): VolumeInit {
   if (init.dims[2] > 1) return init;
-  throw new Refusal('bad-file', `${format}: a single slice; choose or drop all files of the series together`);
+  throw new Refusal('bad-file', text('files.singleSlice', { format }));
 }

@@ -4,6 +4,7 @@
 import { type Image, InterfaceTypes, runPipeline } from 'itk-wasm';
 import type { VolumeInit, VoxelArray } from 'vesicle';
 import type { NamedBytes } from '../protocol';
+import { text } from '../texts';
 import { Refusal } from '../worker/refusal';
 
 const PIPELINE = 'read-image-dicom-file-series';
@@ -37,15 +38,15 @@ export async function readSeries(files: NamedBytes[]): Promise<VolumeInit> {
 }
 
 function unreadable(files: NamedBytes[], reason: string): Refusal {
-  const what = files.length === 1 ? 'this file' : `these ${files.length} files`;
-  return new Refusal('bad-file', `DICOM: ${what} could not be read as one series of slices. ${firstLine(reason)}`);
+  const what = files.length === 1 ? text('files.thisFile') : text('files.theseFiles', { count: files.length });
+  return new Refusal('bad-file', text('files.dicomUnreadable', { files: what, reason: firstLine(reason) }));
 }
 
 const firstLine = (text: string) => text.trim().split('\n').at(-1)?.slice(0, 200) ?? '';
 
 function volumeOf({ imageType, data, size, spacing, origin, direction }: Image): VolumeInit {
   if (imageType.components !== 1)
-    throw new Refusal('bad-file', `DICOM: voxels of ${imageType.components} colours; one intensity a voxel is needed`);
+    throw new Refusal('bad-file', text('files.dicomComponents', { components: imageType.components }));
   const dims = [0, 1, 2].map((axis) => Number(size[axis] ?? 1)) as [number, number, number];
   return {
     data: data as VoxelArray,

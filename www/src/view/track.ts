@@ -2,13 +2,12 @@ import { Box3, Vector3 } from 'three';
 import type { LevelView, Surface, Vec3, VolumeView } from '../protocol';
 import type { VoxelBox } from '../track/box';
 import { sliceVotes } from '../track/clusters';
-import { cutBy } from '../track/cut';
-import type { Votes } from '../track/protocol';
+import { crossSection } from '../track/cross-section';
+import type { BoundaryVotes } from '../track/protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import type { SlicePlacement } from '../ui/view-options';
-import { invert, sliceFrames, slicePlane, toWorld } from './anatomy';
+import { invert, sliceOrientations, slicePlane, toWorld } from './anatomy';
 import { PointCloud } from './cloud';
-import { VolumeFrame } from './frame';
 import { Lines } from './lines';
 import { AXIS_TOKENS, SlicePanel } from './panel';
 import { SlicePlane } from './planes';
@@ -16,21 +15,22 @@ import { RegionGrips, regionEdges } from './region';
 import { greysOf, pictureSize, projectSegments } from './slicing';
 import { SurfaceObject } from './surface';
 import { Viewport } from './viewport';
+import { VolumeBox } from './volume-box';
 import { drawFaces, drawVotes, voteColors, votesNear } from './votes';
 
 /** Content below the 3D view: the slices, or one of the paper's figures. */
-export type Below = 'slices' | 'boundary' | 'time' | 'between';
+export type ContentBelow = 'slices' | 'boundary' | 'time' | 'between';
 
 /** Boundary votes that are shown: those near the surface, or all in the box. */
-export type ShownVotes = 'none' | 'near' | 'all';
+export type VisibleVotes = 'none' | 'near' | 'all';
 
 export interface TrackViewOptions {
   surface: boolean;
   edges: boolean;
-  votes: ShownVotes;
+  votes: VisibleVotes;
   region: boolean;
   slices: SlicePlacement;
-  below: Below;
+  below: ContentBelow;
 }
 
 interface Scene {
@@ -38,18 +38,18 @@ interface Scene {
   inverse: Float64Array;
   panels: SlicePanel[];
   planes: SlicePlane[];
-  frame: VolumeFrame;
+  box: VolumeBox;
 }
 
 /** Diameter of a boundary vote, as a fraction of the voxel's shortest side. */
 const DISC = 1.1;
 /** Distance from a vertex within which votes are near the surface, in shortest voxel sides. */
-const NEAR = 2;
+const NEAR_DISTANCE = 2;
 /** Scale of the box to which the view is fitted, because the object leaves a margin in it. */
-const CLOSER = 0.44;
+const FIT_SCALE = 0.44;
 
 /** The 3D view and the slices of the Track lab for one frame at a time, synchronised by a common crosshair. */
-export class BeatingView {
+export class TrackView {
   /** Called when the region of interest was dragged to other voxels. */
   onRegion: (region: VoxelBox) => void = () => undefined;
   /** Called whenever the slices have moved. */
@@ -66,7 +66,7 @@ export class BeatingView {
   #options: TrackViewOptions;
   #scene: Scene | undefined;
   #shown: Surface | undefined;
-  #votes: Votes | undefined;
+  #votes: BoundaryVotes | undefined;
   #frame = 0;
   /** Previewed votes by voxel axis. */
   #preview: ReturnType<typeof sliceVotes>[] = [];
@@ -90,40 +90,43 @@ export class BeatingView {
     const at = keep && this.#scene ? toWorld(this.#scene.volume.affine, this.#crosshair) : undefined;
     this.#clear();
     const inverse = invert(volume.affine);
-    const panels = sliceFrames(volume).map((frame) => {
-      const panel: SlicePanel = new SlicePanel(volume, frame, inverse, {
-        onIndex: (index) => this.#moveSlice(frame.axis, index),
+    const panels = sliceOrientations(volume).map((orientation) => {
+      const panel: SlicePanel = new SlicePanel(volume, orientation, inverse, {
+        onIndex: (index) => this.#moveSlice(orientation.axis, index),
         onPoint: (index) => this.#moveTo(index),
         grab: (place, slack) =>
-          this.#options.region ? this.#grips.grab(place, slack, frame.axis, volume.dims) : undefined,
+          this.#options.region ? this.#grips.grab(place, slack, orientation.axis, volume.dims) : undefined,
       });
       panel.overlay = (context, scaleX, scaleY) => this.#drawOver(panel, context, scaleX, scaleY);
       return panel;
     });
     const planes = panels.map(
-      ({ frame, picture }) =>
-        new SlicePlane(volume, frame, picture, { frame: token(AXIS_TOKENS[frame.axis]), section: token('--outline') }),
+      ({ orientation, picture }) =>
+        new SlicePlane(volume, orientation, picture, {
+          frame: token(AXIS_TOKENS[orientation.axis]),
+          section: token('--outline'),
+        }),
     );
-    const frame = new VolumeFrame(volume, token('--muted'));
-    this.#scene = { volume, inverse, panels, planes, frame };
-    for (const { object } of [...planes, frame]) this.#viewport.add(object);
+    const box = new VolumeBox(volume, token('--muted'));
+    this.#scene = { volume, inverse, panels, planes, box };
+    for (const { object } of [...planes, box]) this.#viewport.add(object);
     this.#slices.append(
-      ...[...panels].sort((a, b) => a.frame.name.localeCompare(b.frame.name)).map((panel) => panel.element),
+      ...[...panels].sort((a, b) => a.orientation.name.localeCompare(b.orientation.name)).map((panel) => panel.element),
     );
     this.#cloud.size = DISC * Math.min(...volume.spacing);
-    if (!keep) this.#viewport.frame(volume);
+    if (!keep) this.#viewport.fitVolume(volume);
     this.#moveTo(volume.dims.map((n) => (n - 1) >> 1) as Vec3);
     this.showFrame(0, undefined);
     if (at) this.goTo(at);
   }
 
   /** Fits a box of voxels closely into the view. */
-  look(region: VoxelBox): void {
+  fitRegion(region: VoxelBox): void {
     if (!this.#scene) return;
     const { space, affine } = this.#scene.volume;
     const all = new Box3().setFromArray(regionEdges(region, affine));
-    const [middle, size] = [all.getCenter(new Vector3()), all.getSize(new Vector3()).multiplyScalar(2 * CLOSER)];
-    this.#viewport.frameBox(new Box3().setFromCenterAndSize(middle, size), space === 'LPS' ? 1 : -1, 0.5);
+    const [middle, size] = [all.getCenter(new Vector3()), all.getSize(new Vector3()).multiplyScalar(2 * FIT_SCALE)];
+    this.#viewport.fitBox(new Box3().setFromCenterAndSize(middle, size), space === 'LPS' ? 1 : -1, 0.5);
   }
 
   /** Shows the slices of a frame, and its surface if it has one. */
@@ -134,12 +137,12 @@ export class BeatingView {
     const level = this.#level;
     for (const panel of this.#scene?.panels ?? []) panel.setLevel(level);
     this.#placePlanes();
-    this.#cut();
+    this.#updateSections();
     this.#apply();
   }
 
   /** Shows the boundary votes of a frame, or none. */
-  showVotes(votes: Votes | undefined): void {
+  showVotes(votes: BoundaryVotes | undefined): void {
     this.#votes = votes;
     this.#showCloud();
     this.#apply();
@@ -149,24 +152,24 @@ export class BeatingView {
   #showCloud(): void {
     const { votes } = this.#options;
     if (!this.#votes || votes === 'none') return;
-    const reach = NEAR * Math.min(...(this.#scene?.volume.spacing ?? [1]));
+    const reach = NEAR_DISTANCE * Math.min(...(this.#scene?.volume.spacing ?? [1]));
     const near = votes === 'near' && this.#shown ? votesNear(this.#votes, this.#shown, reach) : this.#votes;
     this.#cloud.show(near.points, voteColors(near.weights));
   }
 
   /**
-   * Previews the boundary for an edge threshold, found in each slice separately with windows that reach `reach` pixels
+   * Previews the boundary for an edge threshold, found in each slice separately with windows of half width `halfWidth`, in pixels
    * to each side; undefined removes the preview.
    */
-  preview(threshold: number | undefined, reach: number): void {
+  preview(threshold: number | undefined, halfWidth: number): void {
     const level = this.#level;
     this.#preview = [];
-    for (const { frame } of threshold !== undefined && level ? (this.#scene?.panels ?? []) : []) {
+    for (const { orientation } of threshold !== undefined && level ? (this.#scene?.panels ?? []) : []) {
       const [low, high] = this.#scene?.volume.window ?? [0, 1];
-      const values = greysOf(level as LevelView, frame, this.#crosshair[frame.axis]);
-      const { width, height } = pictureSize(level as LevelView, frame);
-      const least = ((threshold ?? 0) * 255) / (high - low || 1);
-      this.#preview[frame.axis] = sliceVotes({ width, height, values }, reach, least);
+      const values = greysOf(level as LevelView, orientation, this.#crosshair[orientation.axis]);
+      const { width, height } = pictureSize(level as LevelView, orientation);
+      const leastDifference = ((threshold ?? 0) * 255) / (high - low || 1);
+      this.#preview[orientation.axis] = sliceVotes({ width, height, values }, halfWidth, leastDifference);
     }
     this.#redraw();
   }
@@ -214,7 +217,7 @@ export class BeatingView {
     const panel = scene?.panels[axis];
     if (!scene || !panel) return new Float32Array(0);
     const plane = slicePlane(scene.volume.affine, scene.inverse, axis, this.#crosshair[axis]);
-    return projectSegments(cutBy(surface, plane), scene.inverse, scene.volume, panel.frame);
+    return projectSegments(crossSection(surface, plane), scene.inverse, scene.volume, panel.orientation);
   }
 
   dispose(): void {
@@ -239,7 +242,7 @@ export class BeatingView {
     this.#crosshair = index;
     for (const panel of this.#scene?.panels ?? []) panel.setCrosshair(index);
     this.#placePlanes();
-    this.#cut();
+    this.#updateSections();
     this.onMoved();
   }
 
@@ -249,12 +252,12 @@ export class BeatingView {
   }
 
   /** Updates the surface's outlines on the slices. */
-  #cut(): void {
+  #updateSections(): void {
     const scene = this.#scene;
     if (!scene) return;
     for (const axis of [0, 1, 2] as const) {
       const plane = slicePlane(scene.volume.affine, scene.inverse, axis, this.#crosshair[axis]);
-      const section = this.#shown ? cutBy(this.#shown, plane) : new Float32Array(0);
+      const section = this.#shown ? crossSection(this.#shown, plane) : new Float32Array(0);
       scene.panels[axis]?.setOutline(section);
       scene.planes[axis]?.showSection(section);
     }
@@ -282,12 +285,12 @@ export class BeatingView {
     const scene = this.#scene;
     if (!scene) return;
     const { volume, inverse } = scene;
-    const slice = this.#crosshair[panel.frame.axis];
-    const preview = this.#preview[panel.frame.axis];
+    const slice = this.#crosshair[panel.orientation.axis];
+    const preview = this.#preview[panel.orientation.axis];
     if (preview) drawFaces(context, preview, scaleX, scaleY);
     else if (this.#options.votes !== 'none' && this.#votes)
-      drawVotes(context, this.#votes, { volume, inverse, frame: panel.frame, slice, scaleX, scaleY });
-    if (this.#options.region) this.#grips.draw(context, panel.frame, volume.dims, scaleX, scaleY);
+      drawVotes(context, this.#votes, { volume, inverse, orientation: panel.orientation, slice, scaleX, scaleY });
+    if (this.#options.region) this.#grips.draw(context, panel.orientation, volume.dims, scaleX, scaleY);
   }
 
   #placeSlices(viewer: Vector3): void {
@@ -307,7 +310,7 @@ export class BeatingView {
   #clear(): void {
     const scene = this.#scene;
     if (!scene) return;
-    for (const item of [...scene.planes, scene.frame]) {
+    for (const item of [...scene.planes, scene.box]) {
       this.#viewport.remove(item.object);
       item.dispose();
     }

@@ -1,13 +1,12 @@
 import { type PerspectiveCamera, type Scene, WebGLRenderer } from 'three';
+import { text } from '../texts';
 import { h } from '../ui/dom';
 
-const NONE =
-  'There is no 3D view: this browser offers no WebGL 2, or it is switched off. All else works: the model runs, with its plots and measures.';
-const LOST =
-  'The graphics card has taken the 3D view away. It comes back by itself as soon as it can; the model is not touched by it, and runs on.';
+const NONE = text('view.noWebGl');
+const LOST = text('view.contextLost');
 
 /** WebGL 2 rendering on a canvas; handles a missing context, and one that is lost and restored. */
-export class Drawing {
+export class WebGlRendering {
   readonly #canvas: HTMLCanvasElement;
   readonly #renderer: WebGLRenderer | undefined;
   /** Message shown in place of the rendering. */
@@ -19,7 +18,7 @@ export class Drawing {
   constructor(canvas: HTMLCanvasElement, onBack: () => void) {
     this.#canvas = canvas;
     this.#renderer = rendererFor(canvas);
-    canvas.addEventListener('webglcontextlost', () => this.#say(LOST));
+    canvas.addEventListener('webglcontextlost', () => this.#showNote(LOST));
     canvas.addEventListener('webglcontextrestored', () => {
       this.#note.remove();
       onBack();
@@ -33,7 +32,7 @@ export class Drawing {
 
   render(scene: Scene, camera: PerspectiveCamera): void {
     if (this.#renderer) this.#renderer.render(scene, camera);
-    else this.#say(NONE);
+    else this.#showNote(NONE);
   }
 
   /** Whether rendering is done by the processor. Queried on first use only, because it blocks the page. */
@@ -50,7 +49,7 @@ export class Drawing {
     this.#renderer?.forceContextLoss();
   }
 
-  #say(text: string): void {
+  #showNote(text: string): void {
     if (this.#disposed || this.#note.isConnected) return;
     this.#note.textContent = text;
     this.#canvas.after(this.#note);
