@@ -8,7 +8,7 @@ use common::shapes;
 use std::time::Instant;
 use vesicle::io::{MeshFormat, parse_mesh, write_mesh};
 use vesicle::math::Vec3;
-use vesicle::mesh::{Mesh, TriangleMesh, count_crossings, measure};
+use vesicle::mesh::{Mesh, TriangleMesh, count_self_intersections, measure};
 use vesicle::remesh::{EdgeBounds, remesh};
 use vesicle::spatial::surface_distance;
 
@@ -80,7 +80,7 @@ fn main() {
                 continue;
             }
         };
-        let was = count_crossings(&input);
+        let was = count_self_intersections(&input);
         let before = measure(&input);
         if let Ok(folder) = std::env::var("INPUTS") {
             std::fs::write(format!("{folder}/{name}.ply"), write_mesh(&input, MeshFormat::Ply).unwrap())
@@ -102,7 +102,7 @@ fn main() {
             let ok = mesh.check();
             let out = mesh.to_triangles();
             let after = measure(&out);
-            let crossings = count_crossings(&out);
+            let crossings = count_self_intersections(&out);
             let distance = surface_distance(&out, &input).unwrap().hausdorff;
             let dense = surface_distance(&finer(&out, 2), &finer(&input, 1)).unwrap().hausdorff;
             let sharp = out.corners().filter(|&c| smallest(c) < 30.0).count();

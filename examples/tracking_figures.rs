@@ -18,7 +18,7 @@ use common::cine::Cine;
 use std::time::Instant;
 use vesicle::io::parse_volume;
 use vesicle::math::{DAffine3, DVec3};
-use vesicle::mesh::{count_crossings, measure};
+use vesicle::mesh::{count_self_intersections, measure};
 use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
 use vesicle::spatial::surface_distance;
 use vesicle::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
@@ -112,7 +112,7 @@ fn track(cine: &Cine) {
         let truth = cine.truth(frame as f64, 0.8);
         let (a, b) = (measure(mesh), measure(&truth));
         let off = surface_distance(mesh, &truth).unwrap();
-        let crossings = count_crossings(mesh);
+        let crossings = count_self_intersections(mesh);
         let folds = 100.0 * facts.folded as f64 / facts.triangles as f64;
         println!(
             "{frame} {:.0} ms {:?}\n   volume {:.2} of {:.2} ({:+.1} %), area {:+.1} %, mean {:.2}, p95 {:.2}, max {:.1}, folds {:.2} %, chi {}, crossings {}",
@@ -227,7 +227,7 @@ fn follow_file(volume: &Volume, voxel: DVec3, reach: f64) {
             m.volume / 1000.0,
             m.area / 100.0,
             m.euler,
-            count_crossings(mesh),
+            count_self_intersections(mesh),
             100.0 * facts.folded as f64 / facts.triangles as f64,
             facts
         );

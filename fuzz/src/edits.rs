@@ -3,7 +3,7 @@
 use super::bytes::Bytes;
 use super::steppers::shape;
 use vesicle::math::Vec3;
-use vesicle::mesh::{EditError, Mesh, TriangleMesh, count_crossings, curvature, geodesic, measure};
+use vesicle::mesh::{EditError, Mesh, TriangleMesh, count_self_intersections, curvature, geodesic_distances, measure};
 use vesicle::remesh::{EdgeBounds, Unchecked, decimate, remesh, restructure};
 use vesicle::spatial::{cross_section, surface_distance};
 
@@ -63,13 +63,13 @@ pub fn remeshing(data: &[u8]) {
     let given = shape(bytes);
     let Ok(mut mesh) = Mesh::from_triangles(&given) else { return };
     let edge = mesh.longest_edge();
-    let (crossings, euler) = (count_crossings(&given), mesh.euler());
+    let (crossings, euler) = (count_self_intersections(&given), mesh.euler());
     for _ in 0..1 + bytes.below(3) {
         pass(&mut mesh, edge, bytes);
         assert_eq!(mesh.check(), Ok(()));
         assert_eq!(mesh.euler(), euler);
         let now = mesh.to_triangles();
-        assert!(crossings > 0 || count_crossings(&now) == 0, "triangles cross");
+        assert!(crossings > 0 || count_self_intersections(&now) == 0, "triangles cross");
         measured(&now);
     }
 }
@@ -97,7 +97,7 @@ pub fn measured(mesh: &TriangleMesh) {
     let found = measure(mesh);
     assert!(found.volume.is_finite() && found.area.is_finite());
     assert_eq!(curvature(mesh).mean.len(), mesh.positions.len());
-    assert_eq!(geodesic(mesh, 0).map_or(0, |all| all.len()), mesh.positions.len());
+    assert_eq!(geodesic_distances(mesh, 0).map_or(0, |all| all.len()), mesh.positions.len());
     let at = mesh.positions[0];
     let section = cross_section(mesh, at, Vec3::new(0.6, -0.5, 0.7));
     assert!(section.iter().flatten().all(|p| p.is_finite()), "a section at {at}");

@@ -3,7 +3,7 @@
 use super::edits::measured;
 use std::sync::Arc;
 use vesicle::io::{MeshFormat, parse_mesh, parse_points, parse_textured_mesh, write_animation, write_mesh};
-use vesicle::mesh::{Mesh, Texture, TriangleMesh, count_crossings, measure, report};
+use vesicle::mesh::{Mesh, Texture, TriangleMesh, count_self_intersections, measure, report};
 use vesicle::remesh::decimate;
 
 /// Largest number of triangles for which a mesh is checked in full.
@@ -106,7 +106,7 @@ fn check(mesh: &TriangleMesh, choice: usize) {
         assert_eq!(dynamic.check(), Ok(()));
         assert!(found.closed && found.oriented);
     }
-    assert_eq!(count_crossings(mesh) > 0, found.self_intersections > 0);
+    assert_eq!(count_self_intersections(mesh) > 0, found.self_intersections > 0);
     measured(mesh);
     write(mesh, choice);
 }

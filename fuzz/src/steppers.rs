@@ -3,7 +3,7 @@
 
 use super::bytes::Bytes;
 use vesicle::math::{DAffine3, DVec3, Vec3};
-use vesicle::mesh::{Mesh, TriangleMesh, count_crossings, measure, report};
+use vesicle::mesh::{Mesh, TriangleMesh, count_self_intersections, measure, report};
 use vesicle::methods::deformable::{
     Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Seeding, Start,
 };
@@ -21,7 +21,7 @@ use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
 /// self-intersections.
 fn assert_sound(mesh: &Mesh) {
     assert_eq!(mesh.check(), Ok(()));
-    assert_eq!(count_crossings(&mesh.to_triangles()), 0, "triangles cross");
+    assert_eq!(count_self_intersections(&mesh.to_triangles()), 0, "triangles cross");
 }
 
 /// Returns a volume of blobs in noise, on a rotated grid with anisotropic voxels; some voxels may be NaN.
@@ -101,7 +101,7 @@ pub fn deformable(data: &[u8]) {
             Err(error) => panic!("{error}"),
         }
         assert_sound(model.mesh());
-        assert_eq!(count_crossings(&model.surface()), 0, "triangles cross in world space");
+        assert_eq!(count_self_intersections(&model.surface()), 0, "triangles cross in world space");
         match bytes.below(16) {
             3 => assert_covers(&model),
             4 => _ = model.seed(),
@@ -372,7 +372,7 @@ pub fn tracking(data: &[u8]) {
         assert_eq!(tracker.mesh().check(), Ok(()));
         if let Some(mesh) = tracker.meshes().last() {
             let found = measure(mesh);
-            assert_eq!((found.components, count_crossings(mesh)), (parts, 0));
+            assert_eq!((found.components, count_self_intersections(mesh)), (parts, 0));
         }
         if bytes.chance(8) {
             let saved = tracker.save();

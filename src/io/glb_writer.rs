@@ -16,7 +16,7 @@ const INDICES: Option<u32> = Some(34963);
 /// # Errors
 /// [`MeshError::TooLarge`] if there is not enough memory for it.
 pub(super) fn write(mesh: &TriangleMesh) -> Result<Vec<u8>, MeshError> {
-    let mut parts = Parts::default();
+    let mut parts = DocumentBuilder::default();
     let node = if mesh.triangles.is_empty() {
         String::from("{}")
     } else {
@@ -28,7 +28,7 @@ pub(super) fn write(mesh: &TriangleMesh) -> Result<Vec<u8>, MeshError> {
 
 /// A glTF document under construction: its buffer and the entries of its JSON arrays.
 #[derive(Default)]
-pub(super) struct Parts {
+pub(super) struct DocumentBuilder {
     bytes: Vec<u8>,
     views: Vec<String>,
     accessors: Vec<String>,
@@ -38,7 +38,7 @@ pub(super) struct Parts {
     images: Vec<String>,
 }
 
-impl Parts {
+impl DocumentBuilder {
     /// Adds a mesh with its texture and returns its index in the document.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl Parts {
 
     /// Adds the vertex attributes of a mesh and returns the members of the primitive's `attributes` object.
     fn attributes(&mut self, mesh: &TriangleMesh) -> String {
-        let bounds = Bounds::of(&mesh.positions);
+        let bounds = Bounds::from_points(&mesh.positions);
         let [min, max] = [bounds.min, bounds.max].map(|p| format!("[{:?},{:?},{:?}]", p.x, p.y, p.z));
         let position =
             self.vectors(mesh.positions.iter().copied(), VERTICES, &format!(r#","min":{min},"max":{max}"#));
@@ -173,7 +173,7 @@ impl Parts {
         let nodes: Vec<String> = (0..self.nodes.len()).map(|node| node.to_string()).collect();
         json += &format!(r#","scenes":[{{"nodes":[{}]}}]"#, nodes.join(","));
         json += more;
-        json += &self.looks();
+        json += &self.materials_json();
         let buffers = [format!(r#"{{"byteLength":{}}}"#, self.bytes.len())];
         let buffers = if self.bytes.is_empty() { &[][..] } else { &buffers };
         for (name, entries) in [
@@ -183,13 +183,13 @@ impl Parts {
             ("bufferViews", &self.views),
             ("buffers", buffers),
         ] {
-            json += &table(name, entries);
+            json += &json_array_member(name, entries);
         }
         container(json + "}", std::mem::take(&mut self.bytes))
     }
 
     /// Returns the JSON of materials, textures and images. WebP is an extension of glTF, declared as required.
-    fn looks(&self) -> String {
+    fn materials_json(&self) -> String {
         let is_webp = |texture: &Arc<Texture>| texture.kind() == ImageKind::Webp;
         let (mut materials, mut textures) = (Vec::new(), Vec::new());
         for (number, texture) in self.textures.iter().enumerate() {
@@ -207,18 +207,18 @@ impl Parts {
         let names = [String::from(r#""EXT_texture_webp""#)];
         let extensions = if self.textures.iter().any(is_webp) { &names[..] } else { &[] };
         [
-            table("extensionsUsed", extensions),
-            table("extensionsRequired", extensions),
-            table("materials", &materials),
-            table("textures", &textures),
-            table("samplers", samplers),
-            table("images", &self.images),
+            json_array_member("extensionsUsed", extensions),
+            json_array_member("extensionsRequired", extensions),
+            json_array_member("materials", &materials),
+            json_array_member("textures", &textures),
+            json_array_member("samplers", samplers),
+            json_array_member("images", &self.images),
         ]
         .concat()
     }
 }
 
 /// Returns an array as a member of a JSON object, preceded by a comma; nothing for an empty array, which glTF forbids.
-pub(super) fn table(name: &str, entries: &[String]) -> String {
+pub(super) fn json_array_member(name: &str, entries: &[String]) -> String {
     if entries.is_empty() { String::new() } else { format!(r#","{name}":[{}]"#, entries.join(",")) }
 }

@@ -24,7 +24,7 @@ const UNCOMPRESSED: &str = "files without compression (save the mesh without it)
 const PRIMITIVE_COST: u64 = 64;
 
 /// Returns whether a file may require the extension: it does not affect positions and triangles, or is supported.
-fn is_harmless(extension: &str) -> bool {
+fn is_supported_extension(extension: &str) -> bool {
     extension.starts_with("KHR_materials_")
         || ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_texture_basisu", "EXT_texture_webp"]
             .contains(&extension)
@@ -40,7 +40,7 @@ pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, For
     for part in &parts {
         let read = part.primitive.read()?.transformed(&part.to_world);
         mesh = Some(match mesh {
-            Some(before) => joined(before, read),
+            Some(before) => merged(before, read),
             None => read,
         });
     }
@@ -55,18 +55,18 @@ pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, For
 }
 
 /// Returns both meshes as one, with the attributes that both have.
-fn joined(mut mesh: TriangleMesh, part: TriangleMesh) -> TriangleMesh {
+fn merged(mut mesh: TriangleMesh, part: TriangleMesh) -> TriangleMesh {
     let first = mesh.positions.len() as u32;
     mesh.positions.extend(part.positions);
     mesh.triangles.extend(part.triangles.into_iter().map(|t| t.map(|v| v + first)));
-    mesh.normals = both(mesh.normals, part.normals);
-    mesh.uvs = both(mesh.uvs, part.uvs);
-    mesh.colors = both(mesh.colors, part.colors);
+    mesh.normals = concatenated(mesh.normals, part.normals);
+    mesh.uvs = concatenated(mesh.uvs, part.uvs);
+    mesh.colors = concatenated(mesh.colors, part.colors);
     mesh
 }
 
 /// Concatenates two attribute arrays; `None` if either is missing.
-fn both<T>(a: Option<Vec<T>>, b: Option<Vec<T>>) -> Option<Vec<T>> {
+fn concatenated<T>(a: Option<Vec<T>>, b: Option<Vec<T>>) -> Option<Vec<T>> {
     let mut a = a?;
     a.extend(b?);
     Some(a)
@@ -89,7 +89,7 @@ impl<'a> Document<'a> {
     /// Returns an error if the file requires an extension that is not supported.
     fn check_extensions(&self) -> Result<(), FormatError> {
         let required = self.root["extensionsRequired"].as_array().map_or(&[][..], Vec::as_slice);
-        match required.iter().filter_map(Value::as_str).find(|name| !is_harmless(name)) {
+        match required.iter().filter_map(Value::as_str).find(|name| !is_supported_extension(name)) {
             None => Ok(()),
             Some(name) => Err(FormatError::unsupported(FORMAT, "extensionsRequired", name, UNCOMPRESSED)),
         }
@@ -195,7 +195,7 @@ impl<'a> Document<'a> {
         let field = format!("bufferViews[{index}]");
         let buffer = required(value, "buffer", &field)?;
         let outside = buffer != 0 || !self.entry("buffers", buffer)?["uri"].is_null();
-        if let Some(name) = compression(value).filter(|name| outside || self.is_stand_in(buffer, name)) {
+        if let Some(name) = compression(value).filter(|name| outside || self.is_fallback_buffer(buffer, name)) {
             return Err(FormatError::unsupported(FORMAT, field, name, UNCOMPRESSED));
         }
         if outside {
@@ -216,13 +216,13 @@ impl<'a> Document<'a> {
     }
 
     /// Returns whether a buffer is only a placeholder for data compressed elsewhere by `extension`.
-    fn is_stand_in(&self, buffer: u64, extension: &str) -> bool {
+    fn is_fallback_buffer(&self, buffer: u64, extension: &str) -> bool {
         let buffer = self.entry("buffers", buffer);
         buffer.is_ok_and(|buffer| buffer["extensions"][extension]["fallback"] == true)
     }
 
     /// Returns whether an accessor has no buffer view, because its elements are compressed elsewhere.
-    fn is_hollow(&self, accessor: u64) -> bool {
+    fn lacks_buffer_view(&self, accessor: u64) -> bool {
         self.entry("accessors", accessor).is_ok_and(|accessor| accessor["bufferView"].is_null())
     }
 }
@@ -303,7 +303,7 @@ impl<'a> Primitive<'a> {
         let Some(a) = self.attribute(&format!("TEXCOORD_{set}"), &[2])? else { return Ok(None) };
         let uvs = (0..a.count).map(|i| Vec2::new(a.number(i, 0) as f32, a.number(i, 1) as f32));
         Ok(Some(match &self.base_color {
-            Some(base) => uvs.map(|uv| base.place(uv)).collect(),
+            Some(base) => uvs.map(|uv| base.transform_uv(uv)).collect(),
             None => uvs.collect(),
         }))
     }
@@ -345,7 +345,7 @@ fn check_compression(document: &Document, primitive: &Value) -> Result<(), Forma
     let Some(name) = compression(primitive) else { return Ok(()) };
     let attributes = &primitive["attributes"];
     let used = [unsigned(attributes, "POSITION")?, unsigned(primitive, "indices")?];
-    if used[0].is_none() || used.into_iter().flatten().any(|accessor| document.is_hollow(accessor)) {
+    if used[0].is_none() || used.into_iter().flatten().any(|accessor| document.lacks_buffer_view(accessor)) {
         return Err(FormatError::unsupported(FORMAT, "primitives", name, UNCOMPRESSED));
     }
     Ok(())
@@ -392,7 +392,7 @@ impl Component {
     }
 
     /// Returns the value that represents 1 in normalised data.
-    fn full(self) -> f64 {
+    fn normalization_scale(self) -> f64 {
         match self {
             Self::I8 => 127.0,
             Self::U8 => 255.0,
@@ -428,7 +428,7 @@ impl Accessor<'_> {
             Component::U32 => f64::from(u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])),
             Component::F32 => f64::from(f32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])),
         };
-        if self.normalized { (value / self.component.full()).max(-1.0) } else { value }
+        if self.normalized { (value / self.component.normalization_scale()).max(-1.0) } else { value }
     }
 
     fn vector(&self, i: usize) -> Vec3 {

@@ -44,7 +44,7 @@ impl MeshFormat {
 
     /// Returns whether texture coordinate v is measured from the lower edge of the image, not from the upper one as in
     /// glTF.
-    fn counts_v_from_below(self) -> bool {
+    fn has_v_upwards(self) -> bool {
         matches!(self, Self::Ply | Self::Obj | Self::Vtp)
     }
 }
@@ -75,7 +75,7 @@ pub fn parse_textured_mesh(bytes: &[u8], texture: Arc<Texture>) -> Result<Triang
         return Err(FormatError::invalid(format, "texture coordinates", problem));
     }
     if format != glb::FORMAT {
-        mesh.turn_v_over();
+        mesh.flip_v();
     }
     mesh.texture = Some(texture);
     Ok(mesh)
@@ -116,7 +116,7 @@ fn parse(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
     if obj::is_obj(bytes) {
         return Ok(("OBJ", obj::parse(bytes)?));
     }
-    Err(unknown(bytes))
+    Err(unsupported_format(bytes))
 }
 
 /// Returns whether the first bytes contain no control characters other than those of text.
@@ -125,7 +125,7 @@ pub(super) fn is_text(bytes: &[u8]) -> bool {
 }
 
 /// Returns the error for bytes in no accepted format, which names the format if it is recognised.
-fn unknown(bytes: &[u8]) -> FormatError {
+fn unsupported_format(bytes: &[u8]) -> FormatError {
     const ACCEPTED: &str = "GLB, PLY, STL and OBJ";
     let unsupported = |found: &str| FormatError::unsupported("mesh file", "format", found, ACCEPTED);
     let text = is_text(bytes);
@@ -154,9 +154,9 @@ fn unknown(bytes: &[u8]) -> FormatError {
 pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, MeshError> {
     mesh.validate()?;
     check_size(mesh)?;
-    let turned = (mesh.texture.is_some() && format.counts_v_from_below()).then(|| {
+    let turned = (mesh.texture.is_some() && format.has_v_upwards()).then(|| {
         let mut mesh = mesh.clone();
-        mesh.turn_v_over();
+        mesh.flip_v();
         mesh
     });
     let mesh = turned.as_ref().unwrap_or(mesh);

@@ -8,12 +8,12 @@
 
 use super::FormatError;
 use super::gzip::{gunzip, gunzip_start, is_gzip};
-use super::raw::{Place, SLACK, Scalar, decode, exact, payload_size, refused};
+use super::raw::{FieldName, MAX_PADDING, Scalar, decode, payload, payload_size, volume_error};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::volume::{LengthUnit, Space, Volume, VolumeInit, Voxels};
 
 const FORMAT: &str = "NIfTI";
-const DATA: Place = Place { format: FORMAT, field: "voxel data" };
+const DATA: FieldName = FieldName { format: FORMAT, field: "voxel data" };
 /// Header sizes of the two versions in bytes, which are also the first number in the file.
 const SIZE_1: usize = 348;
 const SIZE_2: usize = 540;
@@ -63,7 +63,7 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
     let end =
         offset.checked_add(size).ok_or_else(|| FormatError::too_large(FORMAT, "vox_offset", u64::MAX))?;
     if is_gzip(source) {
-        let whole = gunzip(FORMAT, source, end.saturating_add(SLACK))?;
+        let whole = gunzip(FORMAT, source, end.saturating_add(MAX_PADDING))?;
         return header.volume(&whole, offset, size);
     }
     header.volume(source, offset, size)
@@ -456,7 +456,7 @@ impl Header {
                 source.len(),
             ));
         };
-        let payload = exact(DATA, rest, size)?;
+        let payload = payload(DATA, rest, size)?;
         let volume = Volume::new(VolumeInit {
             voxels: decode(DATA, payload, self.scalar, self.big)?,
             dims: self.dims,
@@ -466,7 +466,7 @@ impl Header {
             frame_seconds: self.frame_seconds,
             space: Space::Ras,
         });
-        Ok(volume.map_err(|error| refused(FORMAT, error))?.with_unit(self.unit))
+        Ok(volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit))
     }
 }
 

@@ -185,12 +185,12 @@ fn index(digits: &[u8], table: &str, count: usize, line: usize) -> Result<u32, F
 fn numbers<'a>(
     words: impl Iterator<Item = &'a [u8]>,
     line: usize,
-    least: usize,
+    min_count: usize,
 ) -> Result<Vec<f32>, FormatError> {
     let number = |word: &[u8]| std::str::from_utf8(word).ok()?.parse::<f32>().ok();
     let found: Option<Vec<f32>> = words.take_while(|word| !word.starts_with(b"#")).map(number).collect();
-    found.filter(|numbers| numbers.len() >= least).ok_or_else(|| {
-        FormatError::invalid(FORMAT, format!("line {line}"), format!("{least} or more numbers are accepted"))
+    found.filter(|numbers| numbers.len() >= min_count).ok_or_else(|| {
+        FormatError::invalid(FORMAT, format!("line {line}"), format!("{min_count} or more numbers are accepted"))
     })
 }
 

@@ -9,7 +9,7 @@ use std::iter::Peekable;
 
 pub(super) const FORMAT: &str = "point text";
 /// Name of the format of the data sets of Hoppe's surface reconstruction, in error messages.
-pub(super) const KEYED: &str = "PTS";
+pub(super) const KEYWORD_FORMAT: &str = "PTS";
 
 /// Maximum number of columns; real files have some dozens. Without a limit, a file of nothing but commas would take
 /// forty times its size in memory.
@@ -33,7 +33,7 @@ impl Line<'_> {
 
     /// Returns whether all cells of the line are numbers.
     fn is_row(&self) -> bool {
-        cells(&self.text, mark(&self.text)).iter().all(|cell| cell.parse::<f32>().is_ok())
+        cells(&self.text, separator(&self.text)).iter().all(|cell| cell.parse::<f32>().is_ok())
     }
 
     /// Parses a cell of the line as a finite number.
@@ -61,23 +61,23 @@ fn lines(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
 
 /// Returns the text of a comment; `None` if the line is not one.
 fn comment(line: &str) -> Option<&str> {
-    ["#", "//", "%"].iter().find_map(|mark| line.strip_prefix(mark))
+    ["#", "//", "%"].iter().find_map(|separator| line.strip_prefix(separator))
 }
 
 /// Returns the separator of the line's cells; `None` for whitespace.
-fn mark(line: &str) -> Option<char> {
-    [';', ','].into_iter().find(|&mark| line.contains(mark))
+fn separator(line: &str) -> Option<char> {
+    [';', ','].into_iter().find(|&separator| line.contains(separator))
 }
 
 /// Returns the cells of a line without surrounding whitespace and quotes, at most [`MAX_COLUMNS`] + 1 of them.
-fn cells(line: &str, mark: Option<char>) -> Vec<&str> {
+fn cells(line: &str, separator: Option<char>) -> Vec<&str> {
     let mut quoted = false;
     let ends = |c: char| {
         quoted ^= c == '"';
-        !quoted && mark.map_or(c.is_whitespace(), |mark| c == mark)
+        !quoted && separator.map_or(c.is_whitespace(), |separator| c == separator)
     };
     // A run of whitespace is one separator.
-    let cells = line.split(ends).filter(|cell| mark.is_some() || !cell.is_empty());
+    let cells = line.split(ends).filter(|cell| separator.is_some() || !cell.is_empty());
     cells.take(MAX_COLUMNS + 1).map(unquoted).collect()
 }
 
@@ -90,15 +90,15 @@ fn unquoted(cell: &str) -> &str {
 pub(super) fn parse(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     let mut lines = content(bytes).peekable();
     let count_line = lines.next_if(|line| announced(line).is_some());
-    let named = take_names(&mut lines, count_line.is_some())?;
+    let named = take_column_names(&mut lines, count_line.is_some())?;
     let Some(first) = lines.peek() else { return Ok(PointCloud::default()) };
-    let mark = mark(&first.text);
-    let count = cells(&first.text, mark).len();
+    let separator = separator(&first.text);
+    let count = cells(&first.text, separator).len();
     let columns = match named.or_else(|| named_in_comment(bytes, count)) {
         Some(columns) => columns,
         None => Columns::unnamed(count, first)?,
     };
-    let table = Table::read(columns, mark, lines)?;
+    let table = Table::read(columns, separator, lines)?;
     if let Some(line) = count_line {
         check_count(&line, table.rows().len())?;
     }
@@ -122,7 +122,7 @@ fn check_count(line: &Line, rows: usize) -> Result<(), FormatError> {
 
 /// Takes a line of column names, unless the next line consists of numbers. After an announced count, a line that names
 /// no columns is skipped.
-fn take_names<'a>(
+fn take_column_names<'a>(
     lines: &mut Peekable<impl Iterator<Item = Line<'a>>>,
     counted: bool,
 ) -> Result<Option<Columns>, FormatError> {
@@ -161,14 +161,14 @@ struct Extras {
 impl Columns {
     /// Returns the columns that a line names; `None` if x, y and z are not all named, or there are too many columns.
     fn named(line: &str) -> Option<Self> {
-        let names: Vec<String> = cells(line, mark(line)).into_iter().map(str::to_ascii_lowercase).collect();
+        let names: Vec<String> = cells(line, separator(line)).into_iter().map(str::to_ascii_lowercase).collect();
         let set = |set: [&str; 3]| -> Option<Vec<usize>> {
             set.into_iter().map(|name| names.iter().position(|found| found == name)).collect()
         };
         if names.len() > MAX_COLUMNS {
             return None;
         }
-        let points = set(["x", "y", "z"]).or_else(|| axes(&names))?;
+        let points = set(["x", "y", "z"]).or_else(|| napari_axes(&names))?;
         let normals = set(["nx", "ny", "nz"]);
         let colors = set(["red", "green", "blue"]).or_else(|| set(["r", "g", "b"]));
         let extras = Extras {
@@ -190,7 +190,7 @@ impl Columns {
 }
 
 /// Returns the columns of x, y and z under the names that napari gives, whose axes are ordered from slowest to fastest.
-fn axes(names: &[String]) -> Option<Vec<usize>> {
+fn napari_axes(names: &[String]) -> Option<Vec<usize>> {
     let place = |axis: usize| names.iter().position(|name| *name == format!("axis-{axis}"));
     let all: Vec<usize> = (0..5).map_while(place).collect();
     match all.as_slice() {
@@ -212,17 +212,17 @@ struct Table {
 impl Table {
     fn read<'a>(
         columns: Columns,
-        mark: Option<char>,
+        separator: Option<char>,
         mut lines: impl Iterator<Item = Line<'a>>,
     ) -> Result<Self, FormatError> {
         let mut table = Self { columns, numbers: Vec::new() };
-        lines.try_for_each(|line| table.push(&line, mark))?;
+        lines.try_for_each(|line| table.push(&line, separator))?;
         Ok(table)
     }
 
     /// Adds the numbers of a line.
-    fn push(&mut self, line: &Line, mark: Option<char>) -> Result<(), FormatError> {
-        let cells = cells(&line.text, mark);
+    fn push(&mut self, line: &Line, separator: Option<char>) -> Result<(), FormatError> {
+        let cells = cells(&line.text, separator);
         if cells.len() != self.columns.count {
             let (found, accepted) = (columns(cells.len()), columns(self.columns.count));
             let problem =
@@ -283,7 +283,7 @@ impl Table {
 }
 
 /// Returns whether at least one line is a point with a keyword: `p x y z`.
-pub(super) fn is_keyed(bytes: &[u8]) -> bool {
+pub(super) fn has_keywords(bytes: &[u8]) -> bool {
     content(bytes).any(|line| {
         let mut words = line.text.split_whitespace();
         words.next() == Some("p") && words.next().is_some_and(|word| word.parse::<f32>().is_ok())
@@ -291,18 +291,18 @@ pub(super) fn is_keyed(bytes: &[u8]) -> bool {
 }
 
 /// Reads points with a keyword (`p`). Colours (`d`, `s`) and gloss (`g`), which apply to all that follows, are ignored.
-pub(super) fn parse_keyed(bytes: &[u8]) -> Result<PointCloud, FormatError> {
+pub(super) fn parse_keyword_lines(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     let mut points = Vec::new();
     for line in content(bytes) {
         // One word more than a point has is enough to detect too many.
         let words: Vec<&str> = line.text.split_whitespace().take(5).collect();
         match words.as_slice() {
             ["p", x, y, z] => {
-                let number = |word| line.number(KEYED, word);
+                let number = |word| line.number(KEYWORD_FORMAT, word);
                 points.push(Vec3::new(number(x)?, number(y)?, number(z)?));
             }
             ["d" | "s" | "g", ..] => {}
-            _ => return Err(line.invalid(KEYED, "p and three numbers, or d, s or g, are accepted")),
+            _ => return Err(line.invalid(KEYWORD_FORMAT, "p and three numbers, or d, s or g, are accepted")),
         }
     }
     Ok(PointCloud { points, ..PointCloud::default() })

@@ -51,7 +51,7 @@ pub fn parse_points(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     // Some programs start UTF-8 text with a byte order mark.
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let (format, cloud) = parse(bytes)?;
-    checked(format, cloud)
+    validated(format, cloud)
 }
 
 /// Reads points in the format that the bytes indicate, with the name of the format.
@@ -59,7 +59,7 @@ fn parse(bytes: &[u8]) -> Result<(&'static str, PointCloud), FormatError> {
     if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
         return Ok((ply::FORMAT, vertices(ply::parse_vertices(bytes)?)));
     }
-    if let Some(found) = foreign(bytes) {
+    if let Some(found) = unsupported_format(bytes) {
         const ACCEPTED: &str = "PLY, OBJ and text in columns (XYZ, PTS, CSV, TXT)";
         return Err(FormatError::unsupported("point file", "format", found, ACCEPTED));
     }
@@ -69,14 +69,14 @@ fn parse(bytes: &[u8]) -> Result<(&'static str, PointCloud), FormatError> {
     if obj::is_obj(bytes) {
         return Ok((obj::FORMAT, obj::parse_points(bytes)?));
     }
-    if point_text::is_keyed(bytes) {
-        return Ok((point_text::KEYED, point_text::parse_keyed(bytes)?));
+    if point_text::has_keywords(bytes) {
+        return Ok((point_text::KEYWORD_FORMAT, point_text::parse_keyword_lines(bytes)?));
     }
     Ok((point_text::FORMAT, point_text::parse(bytes)?))
 }
 
 /// Returns the name of an unsupported format that the first bytes indicate; `None` for text that may hold points.
-fn foreign(bytes: &[u8]) -> Option<&'static str> {
+fn unsupported_format(bytes: &[u8]) -> Option<&'static str> {
     let start = |mark: &[u8]| bytes.starts_with(mark);
     Some(match bytes {
         _ if start(b"glTF") => "GLB",
@@ -99,7 +99,7 @@ fn vertices(mesh: TriangleMesh) -> PointCloud {
 }
 
 /// Returns the cloud with colours in 0..1, after checking it.
-fn checked(format: &'static str, cloud: PointCloud) -> Result<PointCloud, FormatError> {
+fn validated(format: &'static str, cloud: PointCloud) -> Result<PointCloud, FormatError> {
     let count = cloud.points.len();
     if count == 0 {
         return Err(FormatError::invalid(format, "points", "there are none; at least one is needed"));
@@ -156,7 +156,7 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     /// Three points, two of them with equal positions.
-    fn made() -> PointCloud {
+    fn sample_cloud() -> PointCloud {
         let p = Vec3::new(0.1, -2.5, 1e10);
         PointCloud {
             points: vec![p, Vec3::new(4.0, 5.0, 6.0), p],
@@ -193,7 +193,7 @@ mod tests {
 
     fn ply_text(color: &str, full: f32) -> Vec<u8> {
         let header = ply_header("ascii", "float", color, ["red", "green", "blue"]);
-        format!("{header}2 7 8\n{}0 2 9 9\n", text(&rows(&made(), full), "77 ", " ")).into_bytes()
+        format!("{header}2 7 8\n{}0 2 9 9\n", text(&rows(&sample_cloud(), full), "77 ", " ")).into_bytes()
     }
 
     /// A binary PLY with doubles and 16-bit colours.
@@ -207,7 +207,7 @@ mod tests {
             out.extend(bytes);
         };
         [vec![2], vec![0, 7], vec![0, 8]].into_iter().for_each(&mut put);
-        for row in rows(&made(), 65535.0) {
+        for row in rows(&sample_cloud(), 65535.0) {
             put(vec![77]);
             row[..6].iter().for_each(|&x| put(f64::from(x).to_be_bytes().into()));
             row[6..].iter().for_each(|&x| put((x.round() as u16).to_be_bytes().into()));
@@ -217,7 +217,7 @@ mod tests {
     }
 
     fn obj(faces: &str) -> Vec<u8> {
-        let (mut vertices, mut normals) = (rows(&made(), 1.0), Vec::new());
+        let (mut vertices, mut normals) = (rows(&sample_cloud(), 1.0), Vec::new());
         for row in &mut vertices {
             normals.push(row.drain(3..6).collect());
         }
@@ -225,7 +225,7 @@ mod tests {
     }
 
     fn columns(head: &str, between: &str, full: f32) -> Vec<u8> {
-        format!("{head}{}", text(&rows(&made(), full), "", between)).into_bytes()
+        format!("{head}{}", text(&rows(&sample_cloud(), full), "", between)).into_bytes()
     }
 
     /// One file of each kind, all with the same points.
@@ -246,7 +246,7 @@ mod tests {
     }
 
     fn keyed() -> Vec<u8> {
-        let rows: Vec<Vec<f32>> = made().points.iter().map(|p| p.to_array().into()).collect();
+        let rows: Vec<Vec<f32>> = sample_cloud().points.iter().map(|p| p.to_array().into()).collect();
         format!("# made\nd 1 1 1\ns 1 1 1\ng 1 0 0\n{}", text(&rows, "p ", " ")).into_bytes()
     }
 
@@ -254,12 +254,12 @@ mod tests {
     fn every_format_gives_the_same_points() {
         for (name, bytes) in files() {
             let cloud = parse_points(&bytes).unwrap_or_else(|error| panic!("{name}: {error}"));
-            assert_eq!((&cloud.points, &cloud.normals), (&made().points, &made().normals), "{name}");
-            for (found, expected) in cloud.colors.unwrap().iter().zip(made().colors.unwrap()) {
+            assert_eq!((&cloud.points, &cloud.normals), (&sample_cloud().points, &sample_cloud().normals), "{name}");
+            for (found, expected) in cloud.colors.unwrap().iter().zip(sample_cloud().colors.unwrap()) {
                 assert!((*found - expected).abs().max_element() < 1e-6, "{name}: {found} {expected}");
             }
         }
-        let expected = PointCloud { points: made().points, ..PointCloud::default() };
+        let expected = PointCloud { points: sample_cloud().points, ..PointCloud::default() };
         assert_eq!(parse_points(&keyed()).unwrap(), expected);
     }
 

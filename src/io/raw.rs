@@ -19,14 +19,14 @@ pub(super) enum Scalar {
 }
 
 /// Number of bytes that a payload may have beyond the size given by the header: writers pad the end of files.
-pub(super) const SLACK: usize = 512;
+pub(super) const MAX_PADDING: usize = 512;
 
 /// Largest integer up to which `f64` represents every integer.
 const MAX_EXACT: u64 = 1 << 53;
 
 /// Format and field of the numbers, for error messages.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct FieldName {
     pub(super) format: &'static str,
     pub(super) field: &'static str,
 }
@@ -47,7 +47,7 @@ impl Scalar {
 ///
 /// # Errors
 /// A dimension of 0, or a size that cannot be addressed.
-pub(super) fn payload_size(place: Place, dims: [usize; 4], scalar: Scalar) -> Result<usize, FormatError> {
+pub(super) fn payload_size(place: FieldName, dims: [usize; 4], scalar: Scalar) -> Result<usize, FormatError> {
     if dims.contains(&0) {
         return Err(FormatError::invalid(
             place.format,
@@ -67,11 +67,11 @@ pub(super) fn payload_size(place: Place, dims: [usize; 4], scalar: Scalar) -> Re
 ///
 /// # Errors
 /// Fewer bytes than `needed`, or more than [`SLACK`] beyond it: header and payload then do not match.
-pub(super) fn exact(place: Place, bytes: &[u8], needed: usize) -> Result<&[u8], FormatError> {
+pub(super) fn payload(place: FieldName, bytes: &[u8], needed: usize) -> Result<&[u8], FormatError> {
     let Some(payload) = bytes.get(..needed) else {
         return Err(FormatError::truncated(place.format, place.field, needed, bytes.len()));
     };
-    if bytes.len() - needed > SLACK {
+    if bytes.len() - needed > MAX_PADDING {
         let problem = format!("{} bytes of voxels, the header accounts for {needed}", bytes.len());
         return Err(FormatError::invalid(place.format, place.field, problem));
     }
@@ -82,7 +82,7 @@ pub(super) fn exact(place: Place, bytes: &[u8], needed: usize) -> Result<&[u8], 
 ///
 /// # Errors
 /// A 64-bit integer beyond ±2⁵³, which `f64` may not represent exactly; not enough memory.
-pub(super) fn decode(place: Place, bytes: &[u8], scalar: Scalar, big: bool) -> Result<Voxels, FormatError> {
+pub(super) fn decode(place: FieldName, bytes: &[u8], scalar: Scalar, big: bool) -> Result<Voxels, FormatError> {
     Ok(match scalar {
         Scalar::U8 => Voxels::U8(numbers(place, bytes, |[b]| b)?),
         Scalar::I8 => Voxels::I8(numbers(place, bytes, i8::from_ne_bytes)?),
@@ -119,7 +119,7 @@ pub(super) fn decode(place: Place, bytes: &[u8], scalar: Scalar, big: bool) -> R
 
 /// Decodes all numbers with `read`.
 fn numbers<const N: usize, T>(
-    place: Place,
+    place: FieldName,
     bytes: &[u8],
     read: impl Fn([u8; N]) -> T,
 ) -> Result<Vec<T>, FormatError> {
@@ -132,7 +132,7 @@ fn numbers<const N: usize, T>(
 }
 
 /// Returns an error if the absolute value of an integer exceeds [`MAX_EXACT`].
-fn check_exact(place: Place, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> Result<(), FormatError> {
+fn check_exact(place: FieldName, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> Result<(), FormatError> {
     match bytes.as_chunks().0.iter().map(|&b| size(b)).find(|&v| v > MAX_EXACT) {
         None => Ok(()),
         Some(v) => {
@@ -148,7 +148,7 @@ fn check_exact(place: Place, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> Res
 /// # Errors
 /// Too few or too many numbers, a word that is not a number, or a number out of the range of its type.
 pub(super) fn decode_text(
-    place: Place,
+    place: FieldName,
     bytes: &[u8],
     scalar: Scalar,
     count: usize,
@@ -181,9 +181,9 @@ pub(super) fn decode_text(
     ))
 }
 
-fn text_number(place: Place, word: &[u8], scalar: Scalar) -> Result<f64, FormatError> {
+fn text_number(place: FieldName, word: &[u8], scalar: Scalar) -> Result<f64, FormatError> {
     let text = String::from_utf8_lossy(word);
-    let value = text.parse::<f64>().ok().filter(|&v| holds(scalar, v));
+    let value = text.parse::<f64>().ok().filter(|&v| can_represent(scalar, v));
     value.ok_or_else(|| {
         let shown: String = text.chars().take(20).collect();
         FormatError::invalid(
@@ -195,7 +195,7 @@ fn text_number(place: Place, word: &[u8], scalar: Scalar) -> Result<f64, FormatE
 }
 
 /// Returns whether a number type can represent a value.
-fn holds(scalar: Scalar, v: f64) -> bool {
+fn can_represent(scalar: Scalar, v: f64) -> bool {
     let within = |low: f64, high: f64| v >= low && v <= high && v == libm::trunc(v);
     match scalar {
         Scalar::U8 => within(0.0, 255.0),
@@ -211,7 +211,7 @@ fn holds(scalar: Scalar, v: f64) -> bool {
 }
 
 /// Converts an error of [`crate::volume::Volume`] to one of the file being read.
-pub(super) fn refused(format: &'static str, error: VolumeError) -> FormatError {
+pub(super) fn volume_error(format: &'static str, error: VolumeError) -> FormatError {
     match error {
         VolumeError::InvalidArgument { parameter, problem } => {
             FormatError::invalid(format, parameter, problem)

@@ -48,7 +48,7 @@ pub enum EditError {
     /// The ends of the edge have this common neighbour besides the two opposite vertices, so that a collapse would
     /// pinch a neck (link condition).
     #[error("{0:?} closes a ring of three edges that is no triangle")]
-    NeckInTheWay(VertexId),
+    LinkCondition(VertexId),
     /// The three edges to cut bound a triangle of the surface.
     #[error("the ring of three edges is a triangle of the surface")]
     IsTriangle,
@@ -57,7 +57,7 @@ pub enum EditError {
     NotATetrahedron(VertexId),
     /// The edit would make the mesh intersect itself.
     #[error("triangles would cross")]
-    WouldCross,
+    WouldSelfIntersect,
     /// No vertex ids are left.
     #[error("the mesh holds as many vertices as it can name")]
     Full,

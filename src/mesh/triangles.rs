@@ -1,7 +1,7 @@
 //! Indexed triangle lists, as in files and GPU buffers.
 
-use super::edge_table::edge_uses;
-use super::groups::Groups;
+use super::edge_table::sorted_half_edges;
+use super::disjoint_sets::DisjointSets;
 use super::{MeshError, Texture};
 use crate::math::{DAffine3, DVec3, Vec2, Vec3, triangle};
 use std::sync::Arc;
@@ -74,7 +74,7 @@ impl TriangleMesh {
 
     /// Replaces each texture coordinate v by 1 − v, rounded to single precision: converts between file formats whose
     /// images start at the lower edge and those whose images start at the upper edge.
-    pub(crate) fn turn_v_over(&mut self) {
+    pub(crate) fn flip_v(&mut self) {
         let turn = |uv: &mut Vec2| uv.y = 1.0 - uv.y;
         self.uvs.iter_mut().flatten().for_each(turn);
         self.corner_uvs.iter_mut().flatten().flatten().for_each(turn);
@@ -110,17 +110,17 @@ impl TriangleMesh {
     /// Components are connected through edges; a vertex where two of them touch is copied to both. Unused vertices are
     /// dropped.
     pub fn components(&self) -> Vec<Self> {
-        let mut groups = Groups::new(self.triangles.len());
-        groups.join_across_edges(&edge_uses(&self.triangles));
+        let mut groups = DisjointSets::new(self.triangles.len());
+        groups.join_across_edges(&sorted_half_edges(&self.triangles));
         let mut members: Vec<Vec<usize>> = vec![Vec::new(); self.triangles.len()];
         (0..self.triangles.len()).for_each(|t| members[groups.find(t)].push(t));
         let mut slots = vec![u32::MAX; self.positions.len()];
-        members.iter().filter(|part| !part.is_empty()).map(|part| self.part(part, &mut slots)).collect()
+        members.iter().filter(|part| !part.is_empty()).map(|part| self.triangle_subset(part, &mut slots)).collect()
     }
 
     /// Returns the given triangles as a mesh, its vertices numbered in order of first use. `slots` is scratch space,
     /// all `u32::MAX` before and after.
-    fn part(&self, triangles: &[usize], slots: &mut [u32]) -> Self {
+    fn triangle_subset(&self, triangles: &[usize], slots: &mut [u32]) -> Self {
         let mut used = Vec::new();
         let renumbered = |t: &usize| {
             self.triangles[*t].map(|v| {
@@ -134,13 +134,13 @@ impl TriangleMesh {
         };
         let renumbered = triangles.iter().map(renumbered).collect();
         used.iter().for_each(|&v| slots[v] = u32::MAX);
-        let part = self.gathered(&used);
+        let part = self.vertex_subset(&used);
         let corner_uvs = self.corner_uvs.as_ref().map(|uvs| triangles.iter().map(|&t| uvs[t]).collect());
         Self { triangles: renumbered, corner_uvs, ..part }
     }
 
     /// Returns a mesh of the given vertices with their normals, texture coordinates and colours, without triangles.
-    pub(super) fn gathered(&self, vertices: &[usize]) -> Self {
+    pub(super) fn vertex_subset(&self, vertices: &[usize]) -> Self {
         Self {
             positions: gather(&self.positions, vertices),
             triangles: Vec::new(),
@@ -166,7 +166,7 @@ impl TriangleMesh {
     /// Returns texture coordinates per vertex, for formats without seams: at a seam those of one side are used, which
     /// distorts the texture on the triangles of the other sides. [`Self::split_at_seams`] avoids this with more
     /// vertices.
-    pub fn uvs_of_one_side(&self) -> Option<Vec<Vec2>> {
+    pub fn uvs_ignoring_seams(&self) -> Option<Vec<Vec2>> {
         let Some(corner_uvs) = &self.corner_uvs else { return self.uvs.clone() };
         let mut uvs = vec![Vec2::ZERO; self.positions.len()];
         for (&v, &uv) in self.triangles.as_flattened().iter().zip(corner_uvs.as_flattened()) {
@@ -193,7 +193,7 @@ impl TriangleMesh {
             vertices.push(v as usize);
             uvs.push(Vec2::new(f32::from_bits(x), f32::from_bits(y)));
         }
-        Self { triangles, uvs: Some(uvs), ..self.gathered(&vertices) }
+        Self { triangles, uvs: Some(uvs), ..self.vertex_subset(&vertices) }
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::math::triangle::area_vector;
 use crate::math::{IVec3, Vec3};
-use crate::mesh::{Groups, TriangleMesh};
+use crate::mesh::{DisjointSets, TriangleMesh};
 
 /// The cosine of the largest angle by which a triangle may turn when vertices are merged, 60°.
 const LARGEST_TURN: f64 = 0.5;
@@ -18,11 +18,11 @@ const LEAST_VALENCE: u32 = 3;
 pub fn clustered(mesh: &TriangleMesh, furthest: f32, cell: impl Fn(Vec3) -> IVec3) -> TriangleMesh {
     let mut clusters = Clusters::new(mesh, cell);
     clusters.keep_contractible(mesh);
-    clusters.keep_flat(mesh, furthest);
+    clusters.dissolve_bent(mesh, furthest);
     loop {
         let merged = clusters.merge(mesh);
-        if !clusters.dissolve_where_wrong(mesh, &merged) {
-            return merged.parts_where(|_| true);
+        if !clusters.dissolve_invalid(mesh, &merged) {
+            return merged.components_where(|_| true);
         }
     }
 }
@@ -36,17 +36,17 @@ struct Clusters {
 impl Clusters {
     fn new(mesh: &TriangleMesh, cell: impl Fn(Vec3) -> IVec3) -> Self {
         let cells: Vec<IVec3> = mesh.positions.iter().map(|&p| cell(p)).collect();
-        let mut groups = Groups::new(cells.len());
+        let mut groups = DisjointSets::new(cells.len());
         for [u, v] in edges(mesh) {
             if cells[u] == cells[v] {
-                groups.join(u, v);
+                groups.union(u, v);
             }
         }
         Self { first: (0..cells.len()).map(|v| groups.find(v) as u32).collect() }
     }
 
     /// Dissolves clusters with a vertex further than `furthest` from the mean along its normal.
-    fn keep_flat(&mut self, mesh: &TriangleMesh, furthest: f32) {
+    fn dissolve_bent(&mut self, mesh: &TriangleMesh, furthest: f32) {
         let means = self.means(mesh);
         let normals = mesh.vertex_normals();
         let mut is_bent = vec![false; self.first.len()];
@@ -76,9 +76,9 @@ impl Clusters {
 
     /// Dissolves the clusters for which `goes` is true, identified by their lowest vertex; returns whether one of them
     /// had more than one vertex.
-    fn dissolve(&mut self, goes: impl Fn(u32) -> bool) -> bool {
+    fn dissolve(&mut self, dissolves: impl Fn(u32) -> bool) -> bool {
         let mut any = false;
-        for (v, c) in (0u32..).zip(&mut self.first).filter(|(v, c)| v != *c && goes(**c)) {
+        for (v, c) in (0u32..).zip(&mut self.first).filter(|(v, c)| v != *c && dissolves(**c)) {
             *c = v;
             any = true;
         }
@@ -104,7 +104,7 @@ impl Clusters {
 
     /// Dissolves the clusters at edges of more than two triangles, at vertices of fewer than three, and at triangles
     /// that turn by more than 60°; returns whether there were any.
-    fn dissolve_where_wrong(&mut self, mesh: &TriangleMesh, merged: &TriangleMesh) -> bool {
+    fn dissolve_invalid(&mut self, mesh: &TriangleMesh, merged: &TriangleMesh) -> bool {
         let mut is_wrong = vec![false; self.first.len()];
         let valences = valences(merged);
         for (v, &valence) in valences.iter().enumerate() {

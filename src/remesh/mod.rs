@@ -21,14 +21,14 @@ mod obstacles;
 mod resolve;
 mod restructure;
 mod sampling;
-mod specks;
+mod small_components;
 
 pub use changes::Changes;
 pub use clustering::clustered;
 pub use decimate::decimate;
 pub use embedding::Embedding;
 pub use isotropic::remesh;
-pub use resolve::{Contact, Resolver, TopologyGuide, Unguided, Waiting};
+pub use resolve::{ContactPolicy, Resolver, TopologyGuide, Unguided, Pending};
 pub use restructure::{
     EdgeBounds, EditPolicy, Unchecked, collapse_short, flip_for_valence, restructure, split_long,
 };

@@ -6,9 +6,9 @@
 //! guaranteed: that all edges are brought within bounds, and, with [`Unchecked`] edits, that no triangles intersect.
 
 use super::{Changes, Embedding};
-use crate::math::order::{by_both, rank, sort_by_rank};
+use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::math::{Vec3, triangle};
-use crate::mesh::{EditError, Mesh, MeshError, Opposite, VertexId};
+use crate::mesh::{EditError, Mesh, MeshError, OppositeVertices, VertexId};
 
 /// The shortest and the longest edge allowed (ε_min and ε_max of the paper), in units of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -193,7 +193,7 @@ pub(super) fn may_collapse(mesh: &Mesh, bounds: EdgeBounds, kept: VertexId, gone
     if !may_move(mesh, bounds, kept, gone) {
         return false;
     }
-    let Ok(Opposite { left, right }) = mesh.can_collapse(kept, gone) else { return false };
+    let Ok(OppositeVertices { left, right }) = mesh.can_collapse(kept, gone) else { return false };
     let valences = mesh.ring(kept).valence() + mesh.ring(gone).valence() - 4;
     (LEAST_VALENCE..=MOST_VALENCE).contains(&valences)
         && [left, right].iter().all(|&w| mesh.ring(w).valence() > LEAST_VALENCE)
@@ -231,8 +231,8 @@ pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut 
         let square = |(u, v): (VertexId, VertexId)| mesh.position(u).distance_squared(mesh.position(v));
         let all = mesh.edges().map(|edge| (square(edge), edge));
         let mut long: Vec<_> = all.filter(|&(square, _)| square > longest).collect();
-        sort_by_rank(&mut long, |&(_, (u, v))| by_both(u.0, v.0));
-        sort_by_rank(&mut long, |&(square, _)| (!rank(square)).into());
+        sort_by_rank(&mut long, |&(_, (u, v))| combined_rank(u.0, v.0));
+        sort_by_rank(&mut long, |&(square, _)| (!rank_f32(square)).into());
         for (_, (u, v)) in long {
             if mesh.vertex_count() >= most {
                 return changes;
@@ -286,7 +286,7 @@ fn flip_if_wanted(
     edits: &mut impl EditPolicy,
     stale: &mut [bool],
 ) -> bool {
-    let Ok(Opposite { left, right }) = mesh.opposite(u, v) else { return false };
+    let Ok(OppositeVertices { left, right }) = mesh.opposite_vertices(u, v) else { return false };
     if !wants_flip(mesh, bounds, [u, v], [left, right], edits)
         || edits.attempt(mesh, |mesh| mesh.flip(u, v)).is_err()
     {

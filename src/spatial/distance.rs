@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn loose_vertices_have_a_distance_and_do_not_count() {
+    fn unused_vertices_have_a_distance_but_no_weight() {
         let mut mesh = square(0.0);
         mesh.positions.push(Vec3::new(0.0, 0.0, 50.0));
         let found = surface_distance(&mesh, &square(0.0)).unwrap();

@@ -92,7 +92,7 @@ fn faces() -> [[usize; 4]; 6] {
 
 /// Returns the closed loops of cut edges of a case, oriented so that their triangles face outwards.
 fn loops(case: usize) -> Vec<Vec<usize>> {
-    let mut next = follow_faces(case);
+    let mut next = next_on_loop(case);
     let mut out = Vec::new();
     for start in 0..EDGES.len() {
         let mut contour = Vec::new();
@@ -109,7 +109,7 @@ fn loops(case: usize) -> Vec<Vec<usize>> {
 }
 
 /// Returns, for each cut edge, the next cut edge on its loop.
-fn follow_faces(case: usize) -> [Option<usize>; 12] {
+fn next_on_loop(case: usize) -> [Option<usize>; 12] {
     let inside = |corner: usize| case >> corner & 1 == 1;
     let between = edges_between();
     let mut next = [None; 12];

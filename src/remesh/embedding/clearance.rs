@@ -27,13 +27,13 @@ pub(super) fn triangle_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f3
     };
     let others: SmallVec<[([VertexId; 3], Triangle, Bounds); ORDINARY_RING]> = triangles_at(v, u)
         .map(|names| (names, names.map(at)))
-        .map(|(names, points)| (names, points, Bounds::of(&points)))
+        .map(|(names, points)| (names, points, Bounds::from_points(&points)))
         .collect();
     let mut clearance = f32::INFINITY;
     let mut axis = Vec3::ZERO;
     for names in triangles_at(u, v) {
         let triangle = names.map(at);
-        let bounds = Bounds::of(&triangle);
+        let bounds = Bounds::from_points(&triangle);
         for (other_names, other, other_bounds) in &others {
             // `u` and `v` themselves are corners of one of the two only.
             if names[1..].iter().any(|w| other_names[1..].contains(w)) {
@@ -173,13 +173,13 @@ fn higher_of(a: f32x4, b: f32x4) -> f32x4 {
 /// Returns whether two triangles are known to be further apart than `margin`, by axes in the plane of either and normal
 /// to one of its edges. Most triangles near each other lie on one sheet, where exact predicates are slowest. `reach` is
 /// the longest distance between two of their corners.
-pub(super) fn are_beside(s: &Triangle, t: &Triangle, reach: f32, margin: f32) -> bool {
+pub(super) fn are_apart_in_plane(s: &Triangle, t: &Triangle, reach: f32, margin: f32) -> bool {
     let gap = margin + ROUNDING * reach;
-    is_beside_edge(s, t, gap) || is_beside_edge(t, s, gap)
+    is_beyond_edge(s, t, gap) || is_beyond_edge(t, s, gap)
 }
 
 /// Returns whether `t` is beyond an edge of `s` by more than `gap`.
-fn is_beside_edge(s: &Triangle, t: &Triangle, gap: f32) -> bool {
+fn is_beyond_edge(s: &Triangle, t: &Triangle, gap: f32) -> bool {
     let normal = (s[1] - s[0]).cross(s[2] - s[0]);
     [[0, 1, 2], [1, 2, 0], [2, 0, 1]].into_iter().any(|[from, to, tip]| {
         let outwards = unit((s[to] - s[from]).cross(normal));
@@ -229,7 +229,7 @@ mod tests {
     use super::super::one_ring::{intersections_around, intersections_between, longest_edge};
     use super::*;
     use crate::math::Random;
-    use crate::math::predicates::triangles_cross;
+    use crate::math::predicates::triangles_intersect;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -267,12 +267,12 @@ mod tests {
         random: &mut Random,
         mut intersections: impl FnMut(&Mesh, &mut Vec<VertexId>),
     ) {
-        let mut crossing = Vec::new();
-        intersections(mesh, &mut crossing);
+        let mut intersecting = Vec::new();
+        intersections(mesh, &mut intersecting);
         for _ in 0..3 {
-            intersections(&shaken(mesh, clearance, random), &mut crossing);
+            intersections(&shaken(mesh, clearance, random), &mut intersecting);
         }
-        assert!(crossing.is_empty(), "with clearance for {clearance}");
+        assert!(intersecting.is_empty(), "with clearance for {clearance}");
     }
 
     /// Returns two triangles beside each other or overlapping, sometimes exactly in one plane.
@@ -290,13 +290,13 @@ mod tests {
             let random = &mut Random::new(seed);
             let [s, t] = two_triangles(random);
             let margins = (1..=100).map(|k| 0.01 * k as f32);
-            let largest = margins.take_while(|&margin| are_beside(&s, &t, 4.0, margin)).last();
+            let largest = margins.take_while(|&margin| are_apart_in_plane(&s, &t, 4.0, margin)).last();
             found[usize::from(largest.is_some())] += 1;
             let Some(margin) = largest else { continue };
             for _ in 0..60 {
                 let towards = any(random).normalize_or_zero() * (0.499 * margin);
                 let [s, t] = [s.map(|p| p + towards), t.map(|p| p - towards)];
-                assert!(!triangles_cross(s, t), "seed {seed}");
+                assert!(!triangles_intersect(s, t), "seed {seed}");
             }
         }
         assert!(found.iter().all(|&count| count > 400), "{found:?}");

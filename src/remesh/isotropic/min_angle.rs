@@ -3,7 +3,7 @@
 use super::one_ring::{Move, OneRing, angle_quality, has_better_angle, least_quality, moved};
 use super::session::Session;
 use crate::math::Vec3;
-use crate::mesh::{Mesh, Opposite, VertexId};
+use crate::mesh::{Mesh, OppositeVertices, VertexId};
 use crate::remesh::restructure::{LEAST_VALENCE, may_collapse, may_flip};
 use crate::remesh::{Changes, EdgeBounds, EditPolicy};
 
@@ -85,7 +85,7 @@ fn flip<E: EditPolicy>(
     [u, v]: [VertexId; 2],
     session: &mut Session<E>,
 ) -> bool {
-    let Ok(Opposite { left, right }) = mesh.opposite(u, v) else { return false };
+    let Ok(OppositeVertices { left, right }) = mesh.opposite_vertices(u, v) else { return false };
     let [p, q, a, b] = [u, v, left, right].map(|w| mesh.position(w));
     let lesser = |s: f32, t: f32| if s < t { s } else { t };
     let now = lesser(angle_quality([p, q, a]), angle_quality([q, p, b]));
@@ -127,10 +127,10 @@ fn collapse<E: EditPolicy>(
 fn shift<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, v: VertexId, session: &mut Session<E>) {
     let mut step = 0;
     for _ in 0..MOVES {
-        let Some(star) = OneRing::of(mesh, v) else { return };
+        let Some(one_ring) = OneRing::of(mesh, v) else { return };
         while step < STEPS.len() {
             let reach = STEPS[step] * session.target_edge();
-            if best_step(mesh, bounds, v, &star, reach, session) {
+            if best_step(mesh, bounds, v, &one_ring, reach, session) {
                 break;
             }
             step += 1;
@@ -143,7 +143,7 @@ fn best_step<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
     v: VertexId,
-    star: &OneRing,
+    one_ring: &OneRing,
     reach: f32,
     session: &mut Session<E>,
 ) -> bool {
@@ -153,7 +153,7 @@ fn best_step<E: EditPolicy>(
     let ring = mesh.ring(v).as_slice();
     let towards = ring.iter().map(|&w| mesh.position(w) - p).flat_map(|direction| [direction, -direction]);
     for direction in towards {
-        let position = p + star.along(direction.normalize_or(Vec3::ZERO) * reach);
+        let position = p + one_ring.along(direction.normalize_or(Vec3::ZERO) * reach);
         // The closest point is near `position`, so most steps can be rejected without computing it.
         if !all_better(mesh, mesh.ring(v).pairs(), position, most) {
             continue;

@@ -21,8 +21,8 @@ pub(super) fn relax<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session:
         if !mesh.is_live(v) || !session.is_free(v) {
             continue;
         }
-        let Some(star) = OneRing::of(mesh, v) else { continue };
-        let step = star.along(star.to_centroid);
+        let Some(one_ring) = OneRing::of(mesh, v) else { continue };
+        let step = one_ring.along(one_ring.to_centroid);
         if step.length_squared() < shortest * shortest {
             continue;
         }

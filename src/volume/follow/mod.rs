@@ -135,14 +135,14 @@ enum Task {
 /// assert!(follower.mesh()?.positions.iter().all(|p| (p.length() - 1.0).abs() < 4e-4));
 /// # Ok::<(), vesicle::volume::VolumeError>(())
 /// ```
-pub struct Follower {
+pub struct SurfaceExtractor {
     lattice: Lattice,
     blocks: Blocks,
     flood: Flood,
     scan: Option<Scan>,
     /// Refinement steps requested per vertex; `taken` is the number performed.
-    steps: usize,
-    taken: usize,
+    refine_steps: usize,
+    refine_steps_done: usize,
     /// The surface during and after refinement.
     surface: Option<Surface>,
     batch: Batch,
@@ -151,7 +151,7 @@ pub struct Follower {
     evaluations: usize,
 }
 
-impl Follower {
+impl SurfaceExtractor {
     /// Creates an extractor without seeds.
     ///
     /// # Errors
@@ -164,8 +164,8 @@ impl Follower {
             blocks: Blocks::new(lattice.dims)?,
             flood: Flood::default(),
             scan: None,
-            steps: 0,
-            taken: 0,
+            refine_steps: 0,
+            refine_steps_done: 0,
             surface: None,
             batch: Batch::default(),
             task: Task::Nothing,
@@ -195,9 +195,9 @@ impl Follower {
             return Err(VolumeError::invalid("stride", "0 given; at least 1 is needed"));
         }
         let mut scan = Scan::new(stride, &self.blocks)?;
-        scan.found = self.found_by_scan();
+        scan.components_found = self.components_found_by_scan();
         self.scan = Some(scan);
-        self.drop_batch_of(Task::Scan);
+        self.discard_batch_of(Task::Scan);
         Ok(())
     }
 
@@ -209,7 +209,7 @@ impl Follower {
     /// `f32`, and to 4e-12 by two. A vertex takes no more steps once they would not move it, and stays 1/256 of an edge
     /// away from nodes.
     pub fn refine(&mut self, steps: usize) {
-        self.steps = steps;
+        self.refine_steps = steps;
     }
 
     /// Continues with at most `budget` evaluations, but at least one; returns true when the extraction is complete.
@@ -229,11 +229,11 @@ impl Follower {
             let count = self.batch.evaluate(left, f);
             left -= count;
             self.evaluations += count;
-            if !self.take()? {
+            if !self.store_values()? {
                 return Ok(false);
             }
-            self.drop_batch_of(self.task);
-            self.task = self.ask()?;
+            self.discard_batch_of(self.task);
+            self.task = self.next_task()?;
             if self.task == Task::Nothing {
                 return Ok(true);
             }
@@ -241,46 +241,46 @@ impl Follower {
     }
 
     /// Passes the values of the batch to the stage that requested them; returns false if some are missing.
-    fn take(&mut self) -> Result<bool, VolumeError> {
+    fn store_values(&mut self) -> Result<bool, VolumeError> {
         let Some(values) = self.batch.values() else { return Ok(false) };
         match self.task {
             Task::Nothing => {}
             Task::Wave => {
-                (self.surface, self.taken, self.waves) = (None, 0, self.waves + 1);
-                self.flood.take(values, &mut self.blocks)?;
+                (self.surface, self.refine_steps_done, self.waves) = (None, 0, self.waves + 1);
+                self.flood.store_values(values, &mut self.blocks)?;
             }
-            Task::Scan => self.scan.iter_mut().for_each(|scan| scan.take(values, &self.blocks)),
+            Task::Scan => self.scan.iter_mut().for_each(|scan| scan.store_values(values, &self.blocks)),
             Task::Refine => {
-                self.surface.iter_mut().for_each(|surface| surface.take(values));
-                self.taken += 1;
+                self.surface.iter_mut().for_each(|surface| surface.store_values(values));
+                self.refine_steps_done += 1;
             }
         }
         Ok(true)
     }
 
     /// Selects the next stage and fills the batch for it: first the flood, then the scan, then refinement.
-    fn ask(&mut self) -> Result<Task, VolumeError> {
+    fn next_task(&mut self) -> Result<Task, VolumeError> {
         let Self { lattice, blocks, flood, batch, .. } = self;
-        if flood.ask(blocks, lattice, batch)? {
+        if flood.request(blocks, lattice, batch)? {
             return Ok(Task::Wave);
         }
         if let Some(scan) = &mut self.scan
-            && scan.ask(blocks, flood, lattice, batch)?
+            && scan.request(blocks, flood, lattice, batch)?
         {
             return Ok(Task::Scan);
         }
-        if self.taken >= self.steps {
+        if self.refine_steps_done >= self.refine_steps {
             return Ok(Task::Nothing);
         }
         let surface = match &mut self.surface {
             Some(surface) => surface,
-            none => none.insert(Surface::new(&flood.cut, blocks)?),
+            none => none.insert(Surface::new(&flood.crossed, blocks)?),
         };
-        Ok(if surface.ask(blocks, lattice, batch) { Task::Refine } else { Task::Nothing })
+        Ok(if surface.request(blocks, lattice, batch) { Task::Refine } else { Task::Nothing })
     }
 
     /// Discards the current batch if `task` requested it.
-    fn drop_batch_of(&mut self, task: Task) {
+    fn discard_batch_of(&mut self, task: Task) {
         if self.task == task {
             self.batch.clear();
             self.task = Task::Nothing;
@@ -314,7 +314,7 @@ impl Follower {
     fn with_surface<T>(&self, read: impl Fn(&Surface) -> Result<T, VolumeError>) -> Result<T, VolumeError> {
         match &self.surface {
             Some(surface) => read(surface),
-            None => read(&Surface::new(&self.flood.cut, &self.blocks)?),
+            None => read(&Surface::new(&self.flood.crossed, &self.blocks)?),
         }
     }
 
@@ -327,19 +327,19 @@ impl Follower {
             Task::Nothing => 0.0,
             Task::Wave => 0.6 * waves / (waves + 2.0),
             Task::Scan => 0.6,
-            Task::Refine => 0.6 + 0.4 * (self.taken as f64 + share) / self.steps as f64,
+            Task::Refine => 0.6 + 0.4 * (self.refine_steps_done as f64 + share) / self.refine_steps as f64,
         }
     }
 
     /// Returns the number of components of the surface without a seed that the scan found; components that share a cell
     /// count as one.
-    pub fn found_by_scan(&self) -> usize {
-        self.scan.as_ref().map_or(0, |scan| scan.found)
+    pub fn components_found_by_scan(&self) -> usize {
+        self.scan.as_ref().map_or(0, |scan| scan.components_found)
     }
 
     /// Returns the number of cells that the surface crosses, as found so far.
     pub fn crossed_cells(&self) -> usize {
-        self.flood.cut.len()
+        self.flood.crossed.len()
     }
 
     /// Returns the number of function evaluations so far.

@@ -15,14 +15,14 @@ fn batched(f: impl Fn(DVec3) -> f64) -> impl FnMut(&[DVec3], &mut [f64]) {
     move |points, values| values.iter_mut().zip(points).for_each(|(value, &p)| *value = f(p))
 }
 
-fn run(follower: &mut Follower, budget: usize, f: impl Fn(DVec3) -> f64) {
+fn run(follower: &mut SurfaceExtractor, budget: usize, f: impl Fn(DVec3) -> f64) {
     let mut f = batched(f);
     while !follower.advance(budget, &mut f).unwrap() {}
 }
 
 /// Extracts a surface from `seeds` and, if `stride` is above 0, by a scan.
-fn followed(lattice: Lattice, seeds: &[DVec3], stride: usize, f: impl Fn(DVec3) -> f64) -> Follower {
-    let mut follower = Follower::new(lattice).unwrap();
+fn followed(lattice: Lattice, seeds: &[DVec3], stride: usize, f: impl Fn(DVec3) -> f64) -> SurfaceExtractor {
+    let mut follower = SurfaceExtractor::new(lattice).unwrap();
     seeds.iter().for_each(|&p| assert!(follower.seed(p)));
     if stride > 0 {
         follower.scan(stride).unwrap();
@@ -131,7 +131,7 @@ fn refined_vertices_lie_on_the_sphere() {
     let square = |p: DVec3| 25.0 * 25.0 - p.distance_squared(centre);
     for f in [&ball(centre, 25.0) as &dyn Fn(DVec3) -> f64, &square] {
         let mut follower = followed(unit(64), &[centre + DVec3::X * 25.0], 0, f);
-        let largest = |follower: &Follower| {
+        let largest = |follower: &SurfaceExtractor| {
             let at_margin = |p: &DVec3| {
                 let off = (*p - p.round()).abs().max_element();
                 (off - 1.0 / 256.0).abs() < 1e-9
@@ -165,7 +165,7 @@ fn a_torus_has_a_hole() {
     follower.refine(3);
     run(&mut follower, 1000, torus);
     let measures = healthy(&follower.mesh().unwrap());
-    assert_eq!((measures.components, measures.genus, follower.found_by_scan()), (1, 1, 0));
+    assert_eq!((measures.components, measures.genus, follower.components_found_by_scan()), (1, 1, 0));
     let exact = 2.0 * std::f64::consts::PI * std::f64::consts::PI * 0.09;
     assert!((measures.volume / exact - 1.0).abs() < 0.01, "{}", measures.volume);
 }
@@ -179,11 +179,11 @@ fn the_scan_finds_and_counts_what_no_seed_led_to() {
     assert_eq!(healthy(&one.mesh().unwrap()).components, 1);
     for stride in [1, 3, 8] {
         let two = followed(unit(32), &seeds, stride, both);
-        assert_eq!(two.found_by_scan(), 1, "stride {stride}");
+        assert_eq!(two.components_found_by_scan(), 1, "stride {stride}");
         let measures = healthy(&two.mesh().unwrap());
         assert_eq!((measures.components, measures.genus), (2, 0));
         let none = followed(unit(32), &[], stride, both);
-        assert_eq!((none.found_by_scan(), none.mesh().unwrap()), (2, two.mesh().unwrap()));
+        assert_eq!((none.components_found_by_scan(), none.mesh().unwrap()), (2, two.mesh().unwrap()));
     }
 }
 
@@ -196,7 +196,7 @@ fn the_scan_finds_the_inner_side_of_a_shell_between_its_nodes() {
     let mut nodes = (0..27).map(|i| DVec3::new((i % 3) as f64, (i / 3 % 3) as f64, (i / 9) as f64) * 16.0);
     assert!(nodes.all(|p| shell(p) < 0.0));
     let two = followed(unit(33), &outer, 16, shell);
-    assert_eq!((two.found_by_scan(), healthy(&two.mesh().unwrap()).components), (1, 2));
+    assert_eq!((two.components_found_by_scan(), healthy(&two.mesh().unwrap()).components), (1, 2));
 }
 
 #[test]
@@ -207,7 +207,7 @@ fn metaballs_grow_together() {
     follower.refine(3);
     run(&mut follower, usize::MAX, f);
     let measures = healthy(&follower.mesh().unwrap());
-    assert_eq!((measures.components, measures.genus, follower.found_by_scan()), (1, 0, 0));
+    assert_eq!((measures.components, measures.genus, follower.components_found_by_scan()), (1, 0, 0));
 }
 
 #[test]
@@ -227,7 +227,7 @@ fn a_gyroid_is_closed_at_the_border_as_by_marching_cubes() {
 fn a_full_lattice_is_its_box_and_an_empty_one_nothing() {
     let full = followed(unit(5), &[], 1, |_| 1.0);
     assert_eq!(triangle_set(&full.mesh().unwrap()), triangle_set(&dense(5, |_| 1.0)));
-    assert_eq!(full.found_by_scan(), 1);
+    assert_eq!(full.components_found_by_scan(), 1);
     let empty = followed(unit(5), &[DVec3::splat(2.5)], 1, |_| -1.0);
     assert_eq!((empty.mesh().unwrap(), empty.evaluations()), (TriangleMesh::default(), 64 + 61));
     let one = Lattice { dims: [1; 3], ..unit(1) };
@@ -243,7 +243,7 @@ fn flood_and_finest_scan_find_all_of_marching_cubes() {
         let found = followed(unit(n), &[], 1, f);
         healthy(&found.mesh().unwrap());
         assert_eq!(triangle_set(&found.mesh().unwrap()), expected, "noise {seed}");
-        assert!(found.found_by_scan() <= found.mesh().unwrap().components().len());
+        assert!(found.components_found_by_scan() <= found.mesh().unwrap().components().len());
     }
 }
 
@@ -293,12 +293,12 @@ fn slices_make_no_difference() {
     let f = move |p: DVec3| a(p).max(b(p));
     for f in [&f as &dyn Fn(DVec3) -> f64, &gyroid, &noise(3, 6)] {
         let results = [usize::MAX, 1, 100, 7].map(|budget| {
-            let mut follower = Follower::new(unit(20)).unwrap();
+            let mut follower = SurfaceExtractor::new(unit(20)).unwrap();
             follower.seed(DVec3::new(10.3, 6.3, 6.3));
             follower.scan(3).unwrap();
             follower.refine(2);
             run(&mut follower, budget, f);
-            (follower.mesh().unwrap(), follower.evaluations(), follower.found_by_scan())
+            (follower.mesh().unwrap(), follower.evaluations(), follower.components_found_by_scan())
         });
         assert!(!results[0].0.triangles.is_empty());
         assert!(results.iter().all(|result| *result == results[0]));
@@ -308,7 +308,7 @@ fn slices_make_no_difference() {
 #[test]
 fn a_slice_keeps_to_its_budget() {
     let f = ball(DVec3::splat(10.3), 8.0);
-    let mut follower = Follower::new(unit(21)).unwrap();
+    let mut follower = SurfaceExtractor::new(unit(21)).unwrap();
     follower.scan(5).unwrap();
     follower.refine(2);
     for budget in [0, 1, 30, 1000, 0, 17].into_iter().cycle() {
@@ -357,7 +357,7 @@ fn seeds_beside_what_was_followed_cost_nothing() {
 
 #[test]
 fn seeds_outside_the_lattice_are_passed_over() {
-    let mut follower = Follower::new(unit(8)).unwrap();
+    let mut follower = SurfaceExtractor::new(unit(8)).unwrap();
     for p in [DVec3::splat(-1.1), DVec3::new(3.0, 8.0, 3.0), DVec3::NAN, DVec3::INFINITY] {
         assert!(!follower.seed(p), "{p}");
     }
@@ -375,7 +375,7 @@ fn more_seeds_may_come_when_all_was_done() {
     let both = |p: DVec3| a(p).max(b(p));
     let seeds = [DVec3::new(15.3, 9.3, 9.3), DVec3::new(27.4, 22.4, 22.4)];
     let followed = |together: bool| {
-        let mut follower = Follower::new(unit(32)).unwrap();
+        let mut follower = SurfaceExtractor::new(unit(32)).unwrap();
         follower.refine(3);
         for p in seeds {
             follower.seed(p);
@@ -395,7 +395,7 @@ fn what_there_is_so_far_is_a_part_of_the_whole() {
     let f = ball(DVec3::splat(12.3), 9.0);
     let mut follower = followed(unit(25), &[DVec3::new(12.3, 12.3, 21.3)], 0, f);
     let whole = triangle_set(&follower.mesh().unwrap());
-    follower = Follower::new(unit(25)).unwrap();
+    follower = SurfaceExtractor::new(unit(25)).unwrap();
     follower.seed(DVec3::new(12.3, 12.3, 21.3));
     let mut sizes = vec![0];
     while !follower.advance(200, &mut batched(f)).unwrap() {
@@ -419,7 +419,7 @@ fn what_is_not_a_number_is_outside() {
     assert!((measures.bounds[1].x - 10.3).abs() < 0.01, "{}", measures.bounds[1].x);
     assert_eq!(followed(unit(6), &[DVec3::splat(2.5)], 1, |_| f64::NAN).crossed_cells(), 0);
     // A value that the function does not write is outside, too.
-    let mut silent = Follower::new(unit(6)).unwrap();
+    let mut silent = SurfaceExtractor::new(unit(6)).unwrap();
     silent.scan(1).unwrap();
     assert!(silent.advance(usize::MAX, &mut |_, _| {}).unwrap());
     assert_eq!(silent.crossed_cells(), 0);
@@ -443,7 +443,7 @@ fn infinite_and_huge_values_leave_a_healthy_mesh() {
 fn a_function_that_changes_its_mind_comes_to_an_end() {
     for stride in [1, 3] {
         let mut state = 5_u64;
-        let mut follower = Follower::new(unit(12)).unwrap();
+        let mut follower = SurfaceExtractor::new(unit(12)).unwrap();
         follower.scan(stride).unwrap();
         follower.refine(3);
         let mut slices = 0;
@@ -489,7 +489,7 @@ fn a_lattice_as_far_away_as_may_be_crosses_nothing() {
 
 #[test]
 fn bad_arguments_are_named() {
-    let named = |lattice: Lattice| match Follower::new(lattice) {
+    let named = |lattice: Lattice| match SurfaceExtractor::new(lattice) {
         Err(VolumeError::InvalidArgument { parameter, .. }) => parameter,
         other => panic!("{:?}", other.map(|f| f.lattice)),
     };
@@ -503,6 +503,6 @@ fn bad_arguments_are_named() {
         assert_eq!(named(Lattice { origin, ..good }), "origin");
     }
     assert_eq!(named(Lattice { edge: 1e38, ..good }), "origin");
-    let refused = Follower::new(good).unwrap().scan(0).unwrap_err();
+    let refused = SurfaceExtractor::new(good).unwrap().scan(0).unwrap_err();
     assert!(matches!(refused, VolumeError::InvalidArgument { parameter: "stride", .. }));
 }

@@ -1,7 +1,7 @@
 //! Connected components of a triangle list, connected through vertices, and the volumes they enclose.
 
 use super::TriangleMesh;
-use super::groups::Groups;
+use super::disjoint_sets::DisjointSets;
 use crate::math::DVec3;
 
 impl TriangleMesh {
@@ -9,10 +9,10 @@ impl TriangleMesh {
     ///
     /// Components are connected through vertices. Cavities are not subtracted from the surface around them, so a small
     /// shell is removed together with its cavity. Only positions and triangles are kept.
-    pub fn without_parts_below(&self, volume: f64) -> Self {
-        let part_of = self.part_of_each_vertex();
+    pub fn without_components_below(&self, volume: f64) -> Self {
+        let part_of = self.component_of_each_vertex();
         let enclosed = self.enclosed_volumes(&part_of);
-        self.parts_where(|v| enclosed[part_of[v as usize] as usize].abs() >= volume)
+        self.components_where(|v| enclosed[part_of[v as usize] as usize].abs() >= volume)
     }
 
     /// Appends the positions and triangles of another mesh; other data of it is ignored.
@@ -24,7 +24,7 @@ impl TriangleMesh {
 
     /// Returns the triangles whose first vertex satisfies `keeps`, with the vertices they use. Only positions and
     /// triangles are kept.
-    pub(crate) fn parts_where(&self, mut keeps: impl FnMut(u32) -> bool) -> Self {
+    pub(crate) fn components_where(&self, mut keeps: impl FnMut(u32) -> bool) -> Self {
         let mut slots = vec![u32::MAX; self.positions.len()];
         let mut kept = Self::default();
         // As large as what they come from, without growing past it.
@@ -44,11 +44,11 @@ impl TriangleMesh {
     }
 
     /// Returns for each vertex the lowest vertex index of its connected component.
-    pub(crate) fn part_of_each_vertex(&self) -> Vec<u32> {
-        let mut groups = Groups::new(self.positions.len());
+    pub(crate) fn component_of_each_vertex(&self) -> Vec<u32> {
+        let mut groups = DisjointSets::new(self.positions.len());
         for [a, b, c] in &self.triangles {
-            groups.join(*a as usize, *b as usize);
-            groups.join(*b as usize, *c as usize);
+            groups.union(*a as usize, *b as usize);
+            groups.union(*b as usize, *c as usize);
         }
         (0..self.positions.len()).map(|v| groups.find(v) as u32).collect()
     }
@@ -81,10 +81,10 @@ mod tests {
         let mut hollow = ball(Vec3::ZERO, 0.9);
         hollow.triangles.iter_mut().for_each(|t| t.swap(1, 2));
         let all = joined(&[ball(Vec3::ZERO, 3.0), hollow, ball(Vec3::X * 9.0, 1.1)]);
-        assert_eq!(all.without_parts_below(1.0).components().len(), 3);
-        let kept = all.without_parts_below(3.5);
+        assert_eq!(all.without_components_below(1.0).components().len(), 3);
+        let kept = all.without_components_below(3.5);
         assert_eq!(kept.components().len(), 2);
         assert!(kept.positions.iter().all(|p| p.length() > 2.9 || p.x > 5.0));
-        assert!(all.without_parts_below(1000.0).triangles.is_empty());
+        assert!(all.without_components_below(1000.0).triangles.is_empty());
     }
 }
