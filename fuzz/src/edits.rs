@@ -3,7 +3,9 @@
 use super::bytes::Bytes;
 use super::steppers::shape;
 use vesicle::math::Vec3;
-use vesicle::mesh::{EditError, Mesh, TriangleMesh, count_self_intersections, curvature, geodesic_distances, measure};
+use vesicle::mesh::{
+    EditError, Mesh, TriangleMesh, count_self_intersections, curvature, geodesic_distances, measure,
+};
 use vesicle::remesh::{EdgeBounds, Unchecked, decimate, remesh, restructure};
 use vesicle::spatial::{cross_section, surface_distance};
 

@@ -71,7 +71,8 @@ impl AnimationWriter {
             return Err(invalid_argument("frames", "there are none; at least one is needed".into()));
         }
         if !(MIN_FRAME_SECONDS..=MAX_FRAME_SECONDS).contains(&frame_seconds) {
-            let problem = format!("{frame_seconds}; {MIN_FRAME_SECONDS} to {MAX_FRAME_SECONDS} seconds are accepted");
+            let problem =
+                format!("{frame_seconds}; {MIN_FRAME_SECONDS} to {MAX_FRAME_SECONDS} seconds are accepted");
             return Err(invalid_argument("frameSeconds", problem));
         }
         let (mut samplers, mut channels) = (Vec::new(), Vec::new());
@@ -83,7 +84,8 @@ impl AnimationWriter {
             channels.push(format!(r#"{{"sampler":{mesh},"target":{{"node":{mesh},"path":"scale"}}}}"#));
             self.parts.nodes.push(node(mesh));
         }
-        let tracks = [json_array_member("samplers", &samplers), json_array_member("channels", &channels)].concat();
+        let tracks =
+            [json_array_member("samplers", &samplers), json_array_member("channels", &channels)].concat();
         let animation = [format!("{{{}}}", tracks.trim_start_matches(','))];
         self.parts.finish(&json_array_member("animations", &animation))
     }

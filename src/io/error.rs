@@ -88,7 +88,7 @@ impl FormatError {
 /// Maximum number of characters of a file's content that an error message quotes.
 const MAX_QUOTED: usize = 200;
 
-/// Truncates text quoted in an error message to [`MOST_SHOWN`] characters: a malformed file may have a field of any
+/// Truncates text quoted in an error message to [`MAX_QUOTED`] characters: a malformed file may have a field of any
 /// length.
 fn clipped(text: impl Into<String>) -> String {
     let mut text = text.into();

@@ -195,7 +195,8 @@ impl<'a> Document<'a> {
         let field = format!("bufferViews[{index}]");
         let buffer = required(value, "buffer", &field)?;
         let outside = buffer != 0 || !self.entry("buffers", buffer)?["uri"].is_null();
-        if let Some(name) = compression(value).filter(|name| outside || self.is_fallback_buffer(buffer, name)) {
+        if let Some(name) = compression(value).filter(|name| outside || self.is_fallback_buffer(buffer, name))
+        {
             return Err(FormatError::unsupported(FORMAT, field, name, UNCOMPRESSED));
         }
         if outside {

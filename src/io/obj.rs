@@ -181,7 +181,7 @@ fn index(digits: &[u8], table: &str, count: usize, line: usize) -> Result<u32, F
     })
 }
 
-/// Parses the numbers up to a comment; an error if there are fewer than `least`.
+/// Parses the numbers up to a comment; an error if there are fewer than `min_count`.
 fn numbers<'a>(
     words: impl Iterator<Item = &'a [u8]>,
     line: usize,
@@ -190,7 +190,11 @@ fn numbers<'a>(
     let number = |word: &[u8]| std::str::from_utf8(word).ok()?.parse::<f32>().ok();
     let found: Option<Vec<f32>> = words.take_while(|word| !word.starts_with(b"#")).map(number).collect();
     found.filter(|numbers| numbers.len() >= min_count).ok_or_else(|| {
-        FormatError::invalid(FORMAT, format!("line {line}"), format!("{min_count} or more numbers are accepted"))
+        FormatError::invalid(
+            FORMAT,
+            format!("line {line}"),
+            format!("{min_count} or more numbers are accepted"),
+        )
     })
 }
 

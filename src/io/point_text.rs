@@ -161,7 +161,8 @@ struct Extras {
 impl Columns {
     /// Returns the columns that a line names; `None` if x, y and z are not all named, or there are too many columns.
     fn named(line: &str) -> Option<Self> {
-        let names: Vec<String> = cells(line, separator(line)).into_iter().map(str::to_ascii_lowercase).collect();
+        let names: Vec<String> =
+            cells(line, separator(line)).into_iter().map(str::to_ascii_lowercase).collect();
         let set = |set: [&str; 3]| -> Option<Vec<usize>> {
             set.into_iter().map(|name| names.iter().position(|found| found == name)).collect()
         };

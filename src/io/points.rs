@@ -254,7 +254,11 @@ mod tests {
     fn every_format_gives_the_same_points() {
         for (name, bytes) in files() {
             let cloud = parse_points(&bytes).unwrap_or_else(|error| panic!("{name}: {error}"));
-            assert_eq!((&cloud.points, &cloud.normals), (&sample_cloud().points, &sample_cloud().normals), "{name}");
+            assert_eq!(
+                (&cloud.points, &cloud.normals),
+                (&sample_cloud().points, &sample_cloud().normals),
+                "{name}"
+            );
             for (found, expected) in cloud.colors.unwrap().iter().zip(sample_cloud().colors.unwrap()) {
                 assert!((*found - expected).abs().max_element() < 1e-6, "{name}: {found} {expected}");
             }

@@ -66,7 +66,7 @@ pub(super) fn payload_size(place: FieldName, dims: [usize; 4], scalar: Scalar) -
 /// Returns the first `needed` bytes, which hold the voxels.
 ///
 /// # Errors
-/// Fewer bytes than `needed`, or more than [`SLACK`] beyond it: header and payload then do not match.
+/// Fewer bytes than `needed`, or more than [`MAX_PADDING`] beyond it: header and payload then do not match.
 pub(super) fn payload(place: FieldName, bytes: &[u8], needed: usize) -> Result<&[u8], FormatError> {
     let Some(payload) = bytes.get(..needed) else {
         return Err(FormatError::truncated(place.format, place.field, needed, bytes.len()));
@@ -82,7 +82,12 @@ pub(super) fn payload(place: FieldName, bytes: &[u8], needed: usize) -> Result<&
 ///
 /// # Errors
 /// A 64-bit integer beyond ±2⁵³, which `f64` may not represent exactly; not enough memory.
-pub(super) fn decode(place: FieldName, bytes: &[u8], scalar: Scalar, big: bool) -> Result<Voxels, FormatError> {
+pub(super) fn decode(
+    place: FieldName,
+    bytes: &[u8],
+    scalar: Scalar,
+    big: bool,
+) -> Result<Voxels, FormatError> {
     Ok(match scalar {
         Scalar::U8 => Voxels::U8(numbers(place, bytes, |[b]| b)?),
         Scalar::I8 => Voxels::I8(numbers(place, bytes, i8::from_ne_bytes)?),

@@ -223,8 +223,8 @@ impl BoxTree {
         self.descend(f64::INFINITY, |bounds| bounds.ray_entry(ray), visit);
     }
 
-    /// Visits items as [`Self::along_ray`] does, but along the whole line, ahead and behind, with `most` as initial
-    /// bound.
+    /// Visits items as [`Self::along_ray`] does, but along the whole line, ahead and behind, with `max_distance` as
+    /// initial bound.
     pub fn along_line(&self, ray: &Ray, max_distance: f64, visit: impl FnMut(u32) -> f64) {
         self.descend(max_distance, |bounds| bounds.line_entry(ray), visit);
     }

@@ -44,9 +44,15 @@ mod tests {
         let all = [&NUMBERS[..], &[f64::NAN, -f64::NAN]].concat();
         for (&a, &b) in all.iter().flat_map(|a| all.iter().map(move |b| (a, b))) {
             assert_eq!(rank_f64(a).cmp(&rank_f64(b)), a.total_cmp(&b), "{a} {b}");
-            assert_eq!(rank_f32(a as f32).cmp(&rank_f32(b as f32)), (a as f32).total_cmp(&(b as f32)), "{a} {b}");
+            assert_eq!(
+                rank_f32(a as f32).cmp(&rank_f32(b as f32)),
+                (a as f32).total_cmp(&(b as f32)),
+                "{a} {b}"
+            );
         }
-        assert!(combined_rank(1, u32::MAX) < combined_rank(2, 0) && combined_rank(2, 0) < combined_rank(2, 1));
+        assert!(
+            combined_rank(1, u32::MAX) < combined_rank(2, 0) && combined_rank(2, 0) < combined_rank(2, 1)
+        );
     }
 
     #[test]

@@ -72,7 +72,8 @@ pub fn triangles_intersect_sharing_vertex(shared: Vec3, a: [Vec3; 2], b: [Vec3; 
     }
     // Both triangles are star-shaped about the shared corner: if they share another point, the opposite edge of one
     // meets the other triangle.
-    segment_intersects_triangle(a, sides_of_a, triangle_b) || segment_intersects_triangle(b, sides_of_b, triangle_a)
+    segment_intersects_triangle(a, sides_of_a, triangle_b)
+        || segment_intersects_triangle(b, sides_of_b, triangle_a)
 }
 
 /// Returns whether the triangles `u v a` and `v u b` overlap beyond their common edge: they are coplanar and on the

@@ -106,7 +106,7 @@ impl Mesh {
     /// Collapses the edge `uv`: deletes `v` and moves `u` to `position` (the paper's deletion).
     ///
     /// # Errors
-    /// [`EditError::NotAnEdge`]; [`EditError::NeckInTheWay`] if `u` and `v` have more than two common neighbours;
+    /// [`EditError::NotAnEdge`]; [`EditError::LinkCondition`] if `u` and `v` have more than two common neighbours;
     /// [`EditError::ValenceTooLow`] if a vertex opposite the edge has three neighbours only, as on a tetrahedron.
     pub fn collapse(&mut self, u: VertexId, v: VertexId, position: Vec3) -> Result<(), EditError> {
         let OppositeVertices { left: a, right: b } = self.can_collapse(u, v)?;

@@ -1,8 +1,8 @@
 //! Geometric and topological measures of a triangle list, summed in `f64` in the order of the triangles.
 
 use super::TriangleMesh;
-use super::edge_table::{HalfEdge, by_edge, sorted_half_edges};
 use super::disjoint_sets::DisjointSets;
+use super::edge_table::{HalfEdge, by_edge, sorted_half_edges};
 use crate::math::{DMat3, DVec3};
 
 /// Geometric and topological measures of a mesh, in the length unit of its positions.

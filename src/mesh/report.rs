@@ -1,8 +1,8 @@
 //! Validation of a triangle list from its arrays alone, independent of the dynamic mesh; one function per invariant.
 
-use super::self_intersections::count_self_intersections;
-use super::edge_table::{HalfEdge, by_edge, sorted_half_edges};
 use super::disjoint_sets::DisjointSets;
+use super::edge_table::{HalfEdge, by_edge, sorted_half_edges};
+use super::self_intersections::count_self_intersections;
 use super::{MeshError, TriangleMesh};
 use crate::math::order::{combined_rank, sort_by_rank};
 use crate::math::predicates::collinear;
@@ -23,7 +23,7 @@ pub struct MeshReport {
     /// The number of triangles with two equal corners or collinear corners, tested exactly.
     pub degenerate_triangles: usize,
     /// The number of pairs of triangles that intersect beyond their common corners and edges, tested exactly; see
-    /// [`crossing_pairs`](super::crossing_pairs).
+    /// [`intersecting_pairs`](super::intersecting_pairs).
     pub self_intersections: usize,
 }
 

@@ -11,7 +11,8 @@ use crate::math::{Bounds, BoxTree, Vec3};
 ///
 /// The test is exact and includes touching. Coplanar triangles folded onto each other at a common edge count, and so do
 /// two triangles with the same three corners. Triangles with two equal corners, an invalid index or a position that is
-/// not finite are ignored. The list may be quadratic in the number of triangles; [`count_crossings`] only counts.
+/// not finite are ignored. The list may be quadratic in the number of triangles; [`count_self_intersections`] only
+/// counts.
 pub fn intersecting_pairs(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     let mut pairs = Vec::new();
     for_each_intersecting_pair(mesh, |s, t| pairs.push([s, t]));
@@ -19,7 +20,7 @@ pub fn intersecting_pairs(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     pairs
 }
 
-/// Returns the number of self-intersections: the length of [`crossing_pairs`], without storing the pairs.
+/// Returns the number of self-intersections: the length of [`intersecting_pairs`], without storing the pairs.
 ///
 /// Memory is linear in the number of triangles. So is time if few bounding boxes of triangles overlap; it is quadratic
 /// if all do.
@@ -32,7 +33,9 @@ pub fn count_self_intersections(mesh: &TriangleMesh) -> usize {
 fn for_each_intersecting_pair(mesh: &TriangleMesh, mut visit: impl FnMut(u32, u32)) {
     let (valid, boxes): (Vec<u32>, Vec<Bounds>) = (0..)
         .zip(&mesh.triangles)
-        .filter_map(|(t, triangle)| valid_corners(mesh, triangle).map(|corners| (t, Bounds::from_points(&corners))))
+        .filter_map(|(t, triangle)| {
+            valid_corners(mesh, triangle).map(|corners| (t, Bounds::from_points(&corners)))
+        })
         .unzip();
     BoxTree::new(&boxes).for_each_pair(|i, j| {
         let (s, t) = (valid[i as usize], valid[j as usize]);

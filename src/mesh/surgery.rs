@@ -139,8 +139,8 @@ impl Mesh {
         let at = |rim: &[VertexId]| rim.iter().map(|&w| self.position(w)).collect::<Vec<_>>();
         let tube = shortest_tube(&at(first), &at(second));
         for i in 0..first.len() {
-            // met_by_first yields decreasing j; each is inserted right after `next`, which reverses them into ring
-            // order.
+            // `connected_to_first` yields decreasing j; each is inserted right after `next`, which reverses them into
+            // ring order.
             let met: Vec<VertexId> = tube.connected_to_first(i).map(|j| second[j]).collect();
             for &s in &met {
                 let next = first[(i + 1) % first.len()];

@@ -1,7 +1,7 @@
 //! Indexed triangle lists, as in files and GPU buffers.
 
-use super::edge_table::sorted_half_edges;
 use super::disjoint_sets::DisjointSets;
+use super::edge_table::sorted_half_edges;
 use super::{MeshError, Texture};
 use crate::math::{DAffine3, DVec3, Vec2, Vec3, triangle};
 use std::sync::Arc;
@@ -115,7 +115,11 @@ impl TriangleMesh {
         let mut members: Vec<Vec<usize>> = vec![Vec::new(); self.triangles.len()];
         (0..self.triangles.len()).for_each(|t| members[groups.find(t)].push(t));
         let mut slots = vec![u32::MAX; self.positions.len()];
-        members.iter().filter(|part| !part.is_empty()).map(|part| self.triangle_subset(part, &mut slots)).collect()
+        members
+            .iter()
+            .filter(|part| !part.is_empty())
+            .map(|part| self.triangle_subset(part, &mut slots))
+            .collect()
     }
 
     /// Returns the given triangles as a mesh, its vertices numbered in order of first use. `slots` is scratch space,

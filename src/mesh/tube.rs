@@ -39,9 +39,9 @@ impl Tube {
 const MIN_SWITCHES: usize = 4;
 
 /// The largest coordinate for which squared distances, and sums of them, are sure to fit into `f32`. Polygons beyond it
-/// are scaled by [`SHRINK`] first.
+/// are scaled by [`OVERFLOW_SCALE`] first.
 const MAX_COORDINATE: f32 = (1u64 << 55) as f32;
-/// The scale of polygons beyond [`FAR`]; a power of two, so that scaling is exact.
+/// The scale of polygons beyond [`MAX_COORDINATE`]; a power of two, so that scaling is exact.
 const OVERFLOW_SCALE: f32 = 1.0 / (1u128 << 80) as f32;
 
 /// Returns the tube with the least sum of squared edge lengths, over all offsets between the polygons.
@@ -137,17 +137,21 @@ impl WalkTable {
         }
     }
 
-    /// Returns the final step and number of switches of the cheapest closed walk with at least [`TURNS`] switches.
+    /// Returns the final step and number of switches of the cheapest closed walk with at least [`MIN_SWITCHES`]
+    /// switches.
     fn best_end(&self) -> Option<(usize, usize)> {
         let other = 1 - self.first_step as usize;
-        let ends = [(self.first_step as usize, MIN_SWITCHES), (other, MIN_SWITCHES - 1), (other, MIN_SWITCHES)];
-        let total =
-            |&(step, switches): &(usize, usize)| self.states[self.index(self.rows, self.columns, step, switches)].0;
+        let ends =
+            [(self.first_step as usize, MIN_SWITCHES), (other, MIN_SWITCHES - 1), (other, MIN_SWITCHES)];
+        let total = |&(step, switches): &(usize, usize)| {
+            self.states[self.index(self.rows, self.columns, step, switches)].0
+        };
         ends.into_iter().filter(|end| total(end) < f32::INFINITY).min_by(|a, b| total(a).total_cmp(&total(b)))
     }
 
     fn best_total(&self) -> Option<f32> {
-        self.best_end().map(|(step, switches)| self.states[self.index(self.rows, self.columns, step, switches)].0)
+        self.best_end()
+            .map(|(step, switches)| self.states[self.index(self.rows, self.columns, step, switches)].0)
     }
 
     /// Returns the pairs of the cheapest walk in order, without the closing pair, which equals the first.

@@ -74,8 +74,8 @@ impl Clusters {
         self.dissolve(|c| euler[c as usize] != 1);
     }
 
-    /// Dissolves the clusters for which `goes` is true, identified by their lowest vertex; returns whether one of them
-    /// had more than one vertex.
+    /// Dissolves the clusters for which `dissolves` is true, identified by their lowest vertex; returns whether one of
+    /// them had more than one vertex.
     fn dissolve(&mut self, dissolves: impl Fn(u32) -> bool) -> bool {
         let mut any = false;
         for (v, c) in (0u32..).zip(&mut self.first).filter(|(v, c)| v != *c && dissolves(**c)) {

@@ -181,7 +181,8 @@ impl<'a> Decimation<'a> {
         for (kept, gone) in [(u, v), (v, u)] {
             for (a, b) in self.mesh.ring(kept).pairs().filter(|&(a, b)| a != gone && b != gone) {
                 let old = self.mesh.facet([kept, a, b]);
-                let new = Facet { corners: [u.0, a.0, b.0], points: [position, old.points[1], old.points[2]] };
+                let new =
+                    Facet { corners: [u.0, a.0, b.0], points: [position, old.points[1], old.points[2]] };
                 if !may_replace(&old, &new) {
                     return false;
                 }

@@ -52,7 +52,13 @@ impl Resolver {
     }
 
     /// Brings the first edge around `u` that is out of bounds and can be edited within bounds.
-    fn restore_vertex(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide, u: VertexId) {
+    fn restore_vertex(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        guide: &dyn TopologyGuide,
+        u: VertexId,
+    ) {
         let from = mesh.position(u);
         for k in 0..mesh.ring(u).valence() {
             let v = mesh.ring(u).as_slice()[k];

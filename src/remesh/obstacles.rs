@@ -172,7 +172,8 @@ fn components(mesh: &Mesh) -> Vec<u32> {
 }
 
 fn cross_each_other(fresh: &[Facet], boxes: &[Bounds]) -> bool {
-    (0..fresh.len()).any(|i| (0..i).any(|j| boxes[i].overlaps(&boxes[j]) && facets_intersect(&fresh[i], &fresh[j])))
+    (0..fresh.len())
+        .any(|i| (0..i).any(|j| boxes[i].overlaps(&boxes[j]) && facets_intersect(&fresh[i], &fresh[j])))
 }
 
 /// Returns the bounding box of the one-ring of `v`.

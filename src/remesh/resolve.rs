@@ -106,7 +106,7 @@ pub struct Pending {
 }
 
 impl Pending {
-    /// Returns the pending vertices after renumbering, without deleted ones; `names` maps old ids to new ones.
+    /// Returns the pending vertices after renumbering, without deleted ones; `new_ids` maps old ids to new ones.
     pub fn renumbered(&self, new_ids: &[Option<VertexId>]) -> Self {
         let rename = |list: &[VertexId]| list.iter().filter_map(|v| *new_ids.get(v.index())?).collect();
         Self { queue: rename(&self.queue), dirty: rename(&self.dirty) }
@@ -114,7 +114,7 @@ impl Pending {
 }
 
 impl Resolver {
-    /// Creates a resolver that stops splitting edges once the mesh has `most_vertices`.
+    /// Creates a resolver that stops splitting edges once the mesh has `max_vertices`.
     pub fn with_max_vertices(max_vertices: usize) -> Self {
         Self {
             max_vertices,
@@ -163,7 +163,7 @@ impl Resolver {
         self.max_vertices
     }
 
-    /// Returns [`Self::most_vertices`] if the last call left an edge too long because of this limit; reported once.
+    /// Returns [`Self::max_vertices`] if the last call left an edge too long because of this limit; reported once.
     pub fn take_overflow(&mut self) -> Option<usize> {
         std::mem::take(&mut self.overflowed).then_some(self.max_vertices)
     }
@@ -219,14 +219,19 @@ impl Resolver {
         self.changes
     }
 
-    /// Moves all vertices by the displacements `ways`, scaled down to prevent self-intersections, as
-    /// [`Embedding::carry`] does.
-    pub fn move_all(&mut self, mesh: &mut Mesh, sampling: Sampling, displacements: &mut [Vec3]) -> Vec<(VertexId, f32)> {
+    /// Moves all vertices by `displacements`, scaled down to prevent self-intersections, as
+    /// [`Embedding::move_all`] does.
+    pub fn move_all(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        displacements: &mut [Vec3],
+    ) -> Vec<(VertexId, f32)> {
         let all: Vec<VertexId> = mesh.vertices().collect();
         self.move_some(mesh, sampling, &all, displacements)
     }
 
-    /// Moves the vertices `moving` by the displacements `ways`, as [`Embedding::carry_some`] does, and records those
+    /// Moves the vertices `moving` by `displacements`, as [`Embedding::move_some`] does, and records those
     /// that could not move.
     pub fn move_some(
         &mut self,

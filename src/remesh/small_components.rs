@@ -166,7 +166,12 @@ impl Resolver {
     }
 
     /// Removes all negligibly small components, and returns their number.
-    pub fn remove_negligible(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide) -> u32 {
+    pub fn remove_negligible(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        guide: &dyn TopologyGuide,
+    ) -> u32 {
         let before = self.changes.vanished;
         for members in mesh.component_members() {
             self.remove_if_negligible(mesh, sampling, guide, members[0]);

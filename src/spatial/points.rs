@@ -101,7 +101,8 @@ impl PointGrid {
             }
             reach *= 1.5;
         }
-        let mut ranked: Vec<u64> = found.iter().map(|&(squared, i)| combined_rank(squared.to_bits(), i)).collect();
+        let mut ranked: Vec<u64> =
+            found.iter().map(|&(squared, i)| combined_rank(squared.to_bits(), i)).collect();
         if ranked.len() > count {
             ranked.select_nth_unstable(count);
             ranked.truncate(count);

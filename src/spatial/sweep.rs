@@ -31,7 +31,7 @@ const MAX_COLUMNS_PER_BALL: usize = 8;
 /// The number of bits of the [`Filter`] per column near a large ball; with fewer, more small balls pass it needlessly.
 const FILTER_BITS: usize = 8;
 
-/// Calls `found` once with every pair of `balls` whose distance is at most [`Proximity::between`]. The order is
+/// Calls `found` once with every pair of `balls` whose distance is at most [`Proximity::distance_for`]. The order is
 /// unspecified but deterministic.
 pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut(&VertexBall, &VertexBall)) {
     let mut bound = FIRST_CLASS_BOUND * median_radius(&balls);
@@ -107,7 +107,7 @@ fn floor(x: f64) -> i32 {
     whole - i32::from(f64::from(whole) > x)
 }
 
-/// Returns the indices that sort `places`, columns of balls. A counting sort, several times as fast, is used if the
+/// Returns the indices that sort `columns`, columns of balls. A counting sort, several times as fast, is used if the
 /// columns are as densely occupied as those of a mesh.
 fn column_order(columns: &[[i32; 2]]) -> Vec<u32> {
     let extent = |axis: usize| {
@@ -156,7 +156,8 @@ impl Columns {
         let mut by_height = Vec::new();
         for column in order.chunk_by_mut(|&a, &b| column_of[a as usize] == column_of[b as usize]) {
             by_height.clear();
-            by_height.extend(column.iter().map(|&i| combined_rank(rank_f32(balls[i as usize].position.z), i)));
+            by_height
+                .extend(column.iter().map(|&i| combined_rank(rank_f32(balls[i as usize].position.z), i)));
             by_height.sort_unstable();
             column.iter_mut().zip(&by_height).for_each(|(i, &ranked)| *i = ranked as u32);
         }

@@ -108,7 +108,7 @@ impl TriangleTree {
     }
 
     /// Returns the intersection with the line through `origin` along `direction` that is nearest to `origin`, at most
-    /// `most` away. Its `distance` is negative behind `origin`. Otherwise as [`Self::ray_hit`].
+    /// `max_distance` away. Its `distance` is negative behind `origin`. Otherwise as [`Self::ray_hit`].
     pub fn line_hit(&self, origin: Vec3, direction: Vec3, max_distance: f64) -> Option<SurfacePoint> {
         let (origin, direction) = normalized_ray(origin, direction)?;
         let (line, mut nearest) = (Line::new(origin, direction), NearestHit::within(max_distance));
@@ -144,7 +144,7 @@ pub struct NearestHit {
 }
 
 impl NearestHit {
-    /// Starts a query for hits at most `most` away.
+    /// Starts a query for hits at most `max_distance` away.
     pub fn within(max_distance: f64) -> Self {
         Self { max_distance, found: None }
     }
@@ -155,7 +155,9 @@ impl NearestHit {
     pub fn add(&mut self, item: u32, hit: Option<LineHit>) -> f64 {
         let Some(hit) = hit else { return self.max_distance };
         let distance = hit.distance.abs();
-        if distance < self.max_distance || distance == self.max_distance && self.found.is_none_or(|(nearest, _)| item < nearest) {
+        if distance < self.max_distance
+            || distance == self.max_distance && self.found.is_none_or(|(nearest, _)| item < nearest)
+        {
             (self.max_distance, self.found) = (distance, Some((item, hit)));
         }
         self.max_distance
@@ -198,7 +200,9 @@ mod tests {
         let tree = TriangleTree::new(&mesh).unwrap();
         for p in points {
             let found = tree.closest(p).unwrap();
-            let distance = |c: [Vec3; 3]| triangle::point_at(c, triangle::closest_barycentric(c, p)).distance(p.as_dvec3());
+            let distance = |c: [Vec3; 3]| {
+                triangle::point_at(c, triangle::closest_barycentric(c, p)).distance(p.as_dvec3())
+            };
             let expected = mesh.corners().map(distance).fold(f64::INFINITY, f64::min);
             assert_eq!(found.distance, expected);
             assert!((found.point.distance(p) - expected as f32).abs() < 1e-5);
@@ -257,7 +261,8 @@ mod tests {
             let mut found = Vec::new();
             tree.for_each_overlapping(&bounds, |t| found.push(t));
             found.sort_unstable();
-            let meets = |t: &u32| Bounds::from_points(&mesh.corners().nth(*t as usize).unwrap()).overlaps(&bounds);
+            let meets =
+                |t: &u32| Bounds::from_points(&mesh.corners().nth(*t as usize).unwrap()).overlaps(&bounds);
             assert_eq!(found, (0..mesh.triangles.len() as u32).filter(meets).collect::<Vec<_>>());
         }
     }

@@ -28,11 +28,11 @@ const NONE: u32 = u32::MAX;
 /// A hierarchical hashed grid of vertices; the longest edge at a vertex determines its level.
 ///
 /// Vertices are inserted, moved and removed one by one, so that the grid can follow a mesh with few changes. Queries
-/// find all vertices as long as none has moved further than `blur` from the position last set. The order of results
-/// depends on earlier changes and must not be relied upon.
+/// find all vertices as long as none has moved further than `max_displacement` from the position last set. The order of
+/// results depends on earlier changes and must not be relied upon.
 ///
-/// If most of the mesh changes, first unlink the cells by [`Self::empty_cells`], and relink them by
-/// [`Self::fill_cells`] before the next queries.
+/// If most of the mesh changes, first unlink the cells by [`Self::unlink_cells`], and relink them by
+/// [`Self::link_cells`] before the next queries.
 #[derive(Clone, Debug, Default)]
 pub struct VertexGrid {
     /// The distance that a vertex may have moved since its position was set.
@@ -102,8 +102,8 @@ impl Proximity {
 const ABSENT_ENTRY: Entry = Entry { level: ABSENT, key: 0, position: Vec3::ZERO, longest: 0.0, next: NONE };
 
 impl VertexGrid {
-    /// Creates an empty grid for about `vertices` vertices that may move by `blur` after insertion. It is fastest if
-    /// most longest edges are slightly shorter than `edge`, which must be positive.
+    /// Creates an empty grid for about `vertices` vertices that may move by `max_displacement` after insertion. It is
+    /// fastest if most longest edges are slightly shorter than `edge`, which must be positive.
     pub fn new(edge: f32, max_displacement: f32, vertices: usize) -> Self {
         let mut grid = Self { max_displacement, ..Self::default() };
         let mut bound = edge;
@@ -120,7 +120,7 @@ impl VertexGrid {
     pub fn set(&mut self, v: VertexId, position: Vec3, longest: f32) {
         if v.index() >= self.entries.len() {
             self.entries.resize(v.index() + 1, ABSENT_ENTRY);
-            // The lists are too long: cells are unlinked, so that the next `fill_cells` builds more buckets.
+            // The lists are too long: cells are unlinked, so that the next `link_cells` builds more buckets.
             self.linked &= self.entries.len() <= 2 * LOAD * self.heads.len();
         }
         let level = self.level_of(longest);
@@ -141,7 +141,7 @@ impl VertexGrid {
         self.entries[v.index()] = entry;
     }
 
-    /// Unlinks all vertices from their cells until [`Self::fill_cells`] is called. Meanwhile updates are cheap, and
+    /// Unlinks all vertices from their cells until [`Self::link_cells`] is called. Meanwhile updates are cheap, and
     /// queries visit all vertices.
     pub fn unlink_cells(&mut self) {
         self.linked = false;
@@ -248,10 +248,12 @@ impl VertexGrid {
     }
 
     /// Collects into `found` the balls near a box of query vertices whose longest edges are at most `longest`: all
-    /// whose distance from the box, in each axis, is at most [`Proximity::between`], and some further away.
+    /// whose distance from the box, in each axis, is at most [`Proximity::distance_for`], and some further away.
     pub fn near_balls(&self, bounds: &Bounds, longest: f32, near: Proximity, found: &mut Vec<VertexBall>) {
         found.clear();
-        let radius = |other: f32| near.distance_for(longest, other + 2.0 * self.max_displacement) + self.max_displacement;
+        let radius = |other: f32| {
+            near.distance_for(longest, other + 2.0 * self.max_displacement) + self.max_displacement
+        };
         self.search(bounds, radius, &mut |ball: &VertexBall| found.push(*ball));
     }
 
@@ -435,8 +437,9 @@ mod tests {
                 let near = Proximity { least: 0.7, margin: 0.1, share: 0.8 };
                 let mut found = Vec::new();
                 grid.near_balls(&bounds, 1.1, near, &mut found);
-                let in_reach =
-                    |q, longest| bounds.distance_squared(q).sqrt() < f64::from(near.distance_for(1.1, longest));
+                let in_reach = |q, longest| {
+                    bounds.distance_squared(q).sqrt() < f64::from(near.distance_for(1.1, longest))
+                };
                 let found = found.into_iter().map(|ball| ball.vertex.index()).collect();
                 assert_complete(found, &expected(&known, in_reach));
             }

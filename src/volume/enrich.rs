@@ -108,7 +108,9 @@ impl Volume {
             }
             let after = slices.image(slice + 1, &intensities)?;
             let flow = match method {
-                Enrichment::Flow => Some(weighted_by_confidence(&before, &after, symmetric_flow(&before, &after)?)?),
+                Enrichment::Flow => {
+                    Some(weighted_by_confidence(&before, &after, symmetric_flow(&before, &after)?)?)
+                }
                 Enrichment::Linear => None,
             };
             for step in 1..factor {
@@ -183,12 +185,7 @@ fn squared_differences(one: &Image, other: &Image) -> Result<Image, VolumeError>
 }
 
 /// Returns the image interpolated at fraction `share` from `before` to `after`, along the flow if there is one.
-fn in_between(
-    before: &Image,
-    after: &Image,
-    flow: Option<&Flow>,
-    share: f32,
-) -> Result<Image, VolumeError> {
+fn in_between(before: &Image, after: &Image, flow: Option<&Flow>, share: f32) -> Result<Image, VolumeError> {
     let mix = |left: &Image, right: &Image| {
         let mut values = reserve(left.values.len())?;
         values.extend(left.values.iter().zip(&right.values).map(|(a, b)| a + (b - a) * share));

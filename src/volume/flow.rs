@@ -77,7 +77,8 @@ impl Image {
         let mut values = reserve(self.values.len())?;
         for (y, (us, vs)) in flow.x.rows().zip(flow.y.rows()).enumerate() {
             let displacements = us.iter().zip(vs).enumerate();
-            values.extend(displacements.map(|(x, (u, v))| self.at(x as f32 + share * u, y as f32 + share * v)));
+            values
+                .extend(displacements.map(|(x, (u, v))| self.at(x as f32 + share * u, y as f32 + share * v)));
         }
         Ok(Self { values, ..*self })
     }
@@ -122,7 +123,9 @@ impl Image {
         let mut along = Self::flat(width, height, 0.0)?;
         let whole = height / ROWS_AT_ONCE * ROWS_AT_ONCE * width;
         let ((rows, last), (to, last_to)) = (self.values.split_at(whole), along.values.split_at_mut(whole));
-        for (rows, to) in rows.chunks_exact(ROWS_AT_ONCE * width).zip(to.chunks_exact_mut(ROWS_AT_ONCE * width)) {
+        for (rows, to) in
+            rows.chunks_exact(ROWS_AT_ONCE * width).zip(to.chunks_exact_mut(ROWS_AT_ONCE * width))
+        {
             running_sums::<ROWS_AT_ONCE>(rows, to);
         }
         for (row, to) in last.chunks_exact(width).zip(last_to.chunks_exact_mut(width)) {
@@ -264,7 +267,7 @@ impl NormalEquations {
         Ok(Self { xx, xy, yy, xd: xd.window_sums()?, yd: yd.window_sums()?, regularisation })
     }
 
-    /// Returns the change of the flow at a pixel: the solution of the normal equations, limited to [`LONGEST`].
+    /// Returns the change of the flow at a pixel: the solution of the normal equations, limited to [`MAX_STEP`].
     #[inline]
     fn step(&self, i: usize) -> (f32, f32) {
         let (xx, yy) = (self.xx.values[i] + self.regularisation, self.yy.values[i] + self.regularisation);

@@ -70,9 +70,9 @@ impl Grid {
         cell.blend(&cell.corners(|index| self.values[index]))
     }
 
-    /// Returns the trilinearly interpolated value at `p` in the grid padded with voxels of value `beyond` on all sides.
-    /// Faster if `p` is in the same cell as in the previous call with this `known`, which must only be used with one
-    /// grid.
+    /// Returns the trilinearly interpolated value at `p` in the grid padded with voxels of value `padding` on all
+    /// sides. Faster if `p` is in the same cell as in the previous call with this `cache`, which must only be used with
+    /// one grid.
     ///
     /// The padded field is continuous, so a surface that moves towards an iso value converges at the border, too.
     #[inline]

@@ -27,7 +27,12 @@ pub fn voxels_inside(surface: &TriangleMesh, dims: [usize; 3]) -> FixedBitSet {
 }
 
 /// Toggles, for each row of voxels along x that the triangle crosses, the first voxel beyond the triangle.
-fn cross_triangle(positions: &[Vec3], corners: [u32; 3], dims: [usize; 3], crossings_parity: &mut FixedBitSet) {
+fn cross_triangle(
+    positions: &[Vec3],
+    corners: [u32; 3],
+    dims: [usize; 3],
+    crossings_parity: &mut FixedBitSet,
+) {
     let [a, b, c] = corners.map(|v| positions[v as usize].as_dvec3());
     let normal = (b - a).cross(c - a);
     let span = |axis: usize| {

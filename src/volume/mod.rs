@@ -28,22 +28,22 @@ mod cube_cases;
 mod enrich;
 mod error;
 mod flow;
-mod follow;
 mod grid;
 mod inside;
 mod pyramid;
 mod sampling;
 mod sequence;
 mod slices;
+mod surface_extractor;
 mod voxels;
 
 pub use contour::{marching_cubes, marching_cubes_world};
 pub use enrich::Enrichment;
 pub use error::VolumeError;
-pub use follow::{SurfaceExtractor, Lattice};
-pub use grid::{Grid, CellCache, VectorGrid};
+pub use grid::{CellCache, Grid, VectorGrid};
 pub use inside::voxels_inside;
 pub(crate) use sampling::trilinear;
+pub use surface_extractor::{Lattice, SurfaceExtractor};
 pub use voxels::Voxels;
 
 use crate::math::{DAffine3, DVec3};

@@ -113,7 +113,8 @@ impl Grid {
             return Err(VolumeError::invalid("spacing", "spacing and unit must be positive and finite"));
         }
         let dims = reduced_dims(self.dims, factor);
-        let taps = [0, 1, 2].map(|axis| ResamplingWeights::new(self.dims[axis], dims[axis], unit / spacing[axis]));
+        let taps =
+            [0, 1, 2].map(|axis| ResamplingWeights::new(self.dims[axis], dims[axis], unit / spacing[axis]));
         let along_x = self.resample_x(&taps[0], dims[0])?;
         let along_xy = along_x.resample_rows(&taps[1], dims[1], 1)?;
         let coarse = along_xy.resample_rows(&taps[2], dims[2], 2)?;
@@ -133,7 +134,12 @@ impl Grid {
     }
 
     /// Resamples along y (`axis` 1) or z (`axis` 2), blending whole runs of contiguous values at once.
-    fn resample_rows(&self, taps: &ResamplingWeights, count: usize, axis: usize) -> Result<Grid, VolumeError> {
+    fn resample_rows(
+        &self,
+        taps: &ResamplingWeights,
+        count: usize,
+        axis: usize,
+    ) -> Result<Grid, VolumeError> {
         let run = if axis == 1 { self.dims[0] } else { self.dims[0] * self.dims[1] };
         let mut dims = self.dims;
         dims[axis] = count;

@@ -175,7 +175,11 @@ fn the_box_closes_what_goes_on_beyond_it_also_in_mirrored_volumes() {
             let ends = if bounds.is_some() { [5.5, 25.5] } else { [-0.5, 29.5] };
             for (frame, mesh) in tracker.meshes().iter().enumerate() {
                 let found = measure(mesh);
-                assert_eq!((found.euler, found.components, count_self_intersections(mesh)), (2, 1, 0), "{frame}");
+                assert_eq!(
+                    (found.euler, found.components, count_self_intersections(mesh)),
+                    (2, 1, 0),
+                    "{frame}"
+                );
                 let radius = 7.0 + libm::cos(frame as f64 * std::f64::consts::TAU / 6.0);
                 let truth = std::f64::consts::PI * radius * radius * (ends[1] - ends[0]) * 3.375;
                 assert!((found.volume / truth - 1.0).abs() < 0.06, "{frame} {} {truth}", found.volume);

@@ -6,7 +6,7 @@
 //! last.
 
 use super::FORMAT;
-use super::axis::{Axis, KINDS, AxisKind, axes, words};
+use super::axis::{Axis, AxisKind, KINDS, axes, words};
 use super::fields::Fields;
 use super::world::World;
 use crate::io::FormatError;

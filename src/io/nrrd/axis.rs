@@ -103,7 +103,11 @@ fn kind(axis: usize, word: &str, size: usize) -> Result<AxisKind, FormatError> {
 }
 
 /// Returns the direction of each axis, `None` for an axis without one; an empty list if the file has no directions.
-fn directions(fields: &Fields, world: &World, kinds: &[AxisKind]) -> Result<Vec<Option<Vector>>, FormatError> {
+fn directions(
+    fields: &Fields,
+    world: &World,
+    kinds: &[AxisKind],
+) -> Result<Vec<Option<Vector>>, FormatError> {
     let Some(field) = fields.get("spacedirections") else { return Ok(Vec::new()) };
     let vectors = vectors(&field, world)?;
     if vectors.len() != kinds.len() {

@@ -221,7 +221,7 @@ fn byte_skip(fields: &Fields, encoding: Encoding) -> Result<Option<usize>, Forma
 }
 
 /// Decodes pairs of hexadecimal digits to bytes, ignoring whitespace; an error if there are more than `size` plus
-/// [`SLACK`].
+/// [`MAX_PADDING`].
 fn unhex(text: &[u8], size: usize) -> Result<Vec<u8>, FormatError> {
     let digits = text.iter().filter(|b| !b.is_ascii_whitespace());
     let mut out = Vec::new();

@@ -115,7 +115,8 @@ mod tests {
 
     #[test]
     fn names_in_all_their_spellings() {
-        let facts = |text| parse_space(&field("space", text)).map(|w| (w.space, w.flip_x, w.has_time)).unwrap();
+        let facts =
+            |text| parse_space(&field("space", text)).map(|w| (w.space, w.flip_x, w.has_time)).unwrap();
         for text in ["right-anterior-superior", "Right Anterior Superior", "rightanteriorsuperior", "RAS"] {
             assert_eq!(facts(text), (Space::Ras, false, false), "{text}");
         }

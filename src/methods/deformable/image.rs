@@ -5,7 +5,7 @@
 
 use crate::math::Vec3;
 use crate::methods::MethodError;
-use crate::volume::{Grid, CellCache, VectorGrid, Volume};
+use crate::volume::{CellCache, Grid, VectorGrid, Volume};
 
 /// The reduction factor ρ of the pyramid, which belongs to √3 refinement (15).
 pub(super) const REDUCTION: f64 = 1.732_050_807_568_877_2;

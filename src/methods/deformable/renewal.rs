@@ -74,7 +74,8 @@ impl DeformableModel {
             has_contour[group] = true;
             is_renewed[group] |= is_left_out[part as usize];
         }
-        let fresh = contour.components_where(|v| is_renewed[groups.find(part_of_contour[v as usize] as usize)]);
+        let fresh =
+            contour.components_where(|v| is_renewed[groups.find(part_of_contour[v as usize] as usize)]);
         // A component near no contour would be inside of a new component, or around it.
         let mut is_stale = |v: usize| {
             let group = groups.find(first + v);

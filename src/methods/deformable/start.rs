@@ -8,7 +8,7 @@ use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections};
 use crate::methods::MethodError;
 use crate::methods::given::surface;
-use crate::remesh::{Resolver, Sampling, TopologyGuide, Unguided, Pending};
+use crate::remesh::{Pending, Resolver, Sampling, TopologyGuide, Unguided};
 use crate::spatial::CellSet;
 use crate::volume::marching_cubes;
 
@@ -117,7 +117,10 @@ impl Start {
         };
         let mut resolver = resolve_all(&mut mesh, frame.most_vertices(), frame.sampling, guide)?;
         if !resolver.is_embedded(&mesh) {
-            return Err(MeshError::SelfIntersecting { pairs: count_self_intersections(&mesh.to_triangles()) }.into());
+            return Err(MeshError::SelfIntersecting {
+                pairs: count_self_intersections(&mesh.to_triangles()),
+            }
+            .into());
         }
         Ok(mesh)
     }

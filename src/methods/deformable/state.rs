@@ -7,7 +7,7 @@ use super::{Attractor, DeformableModel, DeformableParams, delta_at};
 use crate::mesh::{Mesh, VertexId};
 use crate::methods::MethodError;
 use crate::methods::saved::{Hash, MOST_NEIGHBOURS, Mark, can_be_checked, opened, sealed};
-use crate::remesh::{Resolver, Pending};
+use crate::remesh::{Pending, Resolver};
 use crate::volume::Volume;
 use serde::{Deserialize, Serialize};
 
@@ -108,7 +108,8 @@ impl DeformableModel {
         next.domain = self.domain_for(state.finest_delta);
         next.mesh = state.mesh;
         next.mesh.advance_versions_past(&self.mesh);
-        next.resolver = Resolver::with_max_vertices(next.domain.most_vertices(delta_at(state.finest_delta, 0)));
+        next.resolver =
+            Resolver::with_max_vertices(next.domain.most_vertices(delta_at(state.finest_delta, 0)));
         next.watch_output();
         next.resolver.set_pending(state.waiting);
         next.iteration = state.iteration;

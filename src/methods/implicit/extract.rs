@@ -8,7 +8,7 @@ use super::field::Field;
 use crate::math::{Bounds, DVec3, Vec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
-use crate::volume::{SurfaceExtractor, Lattice};
+use crate::volume::{Lattice, SurfaceExtractor};
 
 /// Minimum and maximum default number of cells along the longest side of the points' bounding box.
 const CELLS: [f64; 2] = [64.0, 160.0];

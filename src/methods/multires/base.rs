@@ -12,7 +12,7 @@ use crate::mesh::{Mesh, MeshError, TriangleMesh};
 use crate::methods::MethodError;
 use crate::remesh::{Embedding, Unchecked, restructure};
 use crate::spatial::SurfacePoint;
-use crate::volume::{SurfaceExtractor, Lattice};
+use crate::volume::{Lattice, SurfaceExtractor};
 use std::rc::Rc;
 
 /// Maximum number of smoothing rounds of a decomposition; a bust settles in twelve.

@@ -43,7 +43,7 @@ const NEAREST_CORNER: f32 = 0.577_351;
 const PIERCING: f32 = 0.763_763;
 
 /// The skin of the broad phase: the displacement of a one-ring after which its vertex is searched for neighbours again,
-/// relative to the ordinary edge (that of [`Embedding::follow_with`]). A wider skin gives more pairs, a narrower one
+/// relative to the ordinary edge (that of [`Embedding::sync_with_edge`]). A wider skin gives more pairs, a narrower one
 /// more searches. Few vertices of an ordinary mesh have any pair.
 const SEARCH_SKIN: f32 = 0.04;
 
@@ -115,7 +115,7 @@ impl Embedding {
         output::exact_below(self.output.as_ref())
     }
 
-    /// Synchronises with `mesh` as [`Self::follow`] does, and sets the ordinary edge: a length that most edges do not
+    /// Synchronises with `mesh` as [`Self::sync`] does, and sets the ordinary edge: a length that most edges do not
     /// exceed. It affects speed and the largest distance of [`Self::for_each_contact`], not which intersections are
     /// found.
     pub fn sync_with_edge(&mut self, mesh: &Mesh, edge: f32) {
@@ -157,7 +157,7 @@ impl Embedding {
     /// Performs one or more edits as a transaction, and rolls it back if triangles would intersect.
     ///
     /// # Errors
-    /// That of the edit; [`EditError::WouldCross`]. The mesh is unchanged on error.
+    /// That of the edit; [`EditError::WouldSelfIntersect`]. The mesh is unchanged on error.
     pub fn attempt<T>(
         &mut self,
         mesh: &mut Mesh,
@@ -167,7 +167,7 @@ impl Embedding {
     }
 
     /// Performs edits as [`Self::attempt`] does, but tests only pairs of triangles that share a corner.
-    /// [`Self::crossing`] finds the other intersections.
+    /// [`Self::intersecting_vertices`] finds the other intersections.
     ///
     /// # Errors
     /// As [`Self::attempt`].

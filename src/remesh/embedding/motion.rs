@@ -16,7 +16,7 @@ impl Embedding {
         self.stuck && !self.is_embedded(mesh)
     }
 
-    /// Moves all vertices, as [`Self::carry_some`] does.
+    /// Moves all vertices, as [`Self::move_some`] does.
     pub fn move_all(&mut self, mesh: &mut Mesh, displacements: &mut [Vec3]) -> Vec<(VertexId, f32)> {
         let all: Vec<VertexId> = mesh.vertices().collect();
         self.move_some(mesh, &all, displacements)

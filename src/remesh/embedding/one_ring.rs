@@ -28,7 +28,7 @@ const SMALL: f32 = 0.125;
 const LEFT_BY_TURN: f32 = 0.94;
 const TURN: f32 = 1.0 / 6.0;
 
-/// Returns the length of the longest edge at `v`; not less than [`FINEST`].
+/// Returns the length of the longest edge at `v`; not less than [`MIN_LENGTH`].
 pub(super) fn longest_edge(mesh: &Mesh, v: VertexId) -> f32 {
     let p = mesh.position(v);
     let square = mesh.ring(v).as_slice().iter().fold(0.0f32, |longest, &w| {
@@ -212,7 +212,7 @@ fn gap(mesh: &Mesh, [u, v]: [VertexId; 2], in_plane: [VertexId; 2], origin: Vec3
     least
 }
 
-/// Appends to `crossing` the corners of all pairs of triangles at `v` that intersect beyond their common corners;
+/// Appends to `intersecting` the corners of all pairs of triangles at `v` that intersect beyond their common corners;
 /// exact.
 pub(super) fn intersections_around(
     mesh: &Mesh,
@@ -259,8 +259,8 @@ fn are_apart_at_corner(corner: Vec3, s: &Facet, t: &Facet, margin: f32) -> bool 
     gap_between_corners(tips(s), tips(t)) > margin
 }
 
-/// Appends to `crossing` the corners of all pairs of intersecting triangles without a common corner, one at `u` and one
-/// at `v`; exact.
+/// Appends to `intersecting` the corners of all pairs of intersecting triangles without a common corner, one at `u` and
+/// one at `v`; exact.
 pub(super) fn intersections_between(
     mesh: &Mesh,
     [u, v]: [VertexId; 2],

@@ -103,11 +103,7 @@ fn intersect_apart(s: &Changed, t: &Changed, output: Option<&OutputSpace>) -> bo
 }
 
 /// Returns whether two triangles are known to be disjoint, including in the output space.
-fn are_apart(
-    (s, around_s): &Changed,
-    (t, around_t): &Changed,
-    output: Option<&OutputSpace>,
-) -> bool {
+fn are_apart((s, around_s): &Changed, (t, around_t): &Changed, output: Option<&OutputSpace>) -> bool {
     let whole = around_s.union(around_t);
     let reach = (whole.max - whole.min).max_element();
     are_apart_in_plane(&s.points, &t.points, reach, 2.0 * exact_below(output))

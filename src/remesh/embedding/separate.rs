@@ -24,10 +24,13 @@ impl Embedding {
     /// at the start from a contour. Returns whether none intersect afterwards; if some do, other clusters may have been
     /// changed.
     ///
-    /// `crossing` must contain all corners of intersecting triangles, as returned by [`Self::crossing`].
+    /// `intersecting` must contain all corners of intersecting triangles, as returned by
+    /// [`Self::intersecting_vertices`].
     pub fn separate(&mut self, mesh: &mut Mesh, intersecting: &[VertexId]) -> bool {
         intersecting.len() <= MOST
-            && clusters(mesh, intersecting, CLUSTER_DISTANCE * self.ordinary_edge).iter().all(|cluster| self.separate_cluster(mesh, cluster))
+            && clusters(mesh, intersecting, CLUSTER_DISTANCE * self.ordinary_edge)
+                .iter()
+                .all(|cluster| self.separate_cluster(mesh, cluster))
     }
 
     /// Separates one cluster: tries to move all its vertices along their normals, then those of one sheet, then
@@ -54,7 +57,9 @@ impl Embedding {
     fn separates(&mut self, mesh: &mut Mesh, cluster: &[VertexId], moves: &Moves, share: f32) -> bool {
         let triangles = mesh.triangles_at(cluster);
         let edit = |mesh: &mut Mesh| {
-            moves.iter().for_each(|&(v, displacement)| mesh.set_position(v, mesh.position(v) + displacement * share));
+            moves
+                .iter()
+                .for_each(|&(v, displacement)| mesh.set_position(v, mesh.position(v) + displacement * share));
             Ok(())
         };
         self.attempt_with(mesh, edit, |guard, mesh, _| guard.changes_intersect(mesh, &triangles)).is_ok()

@@ -34,7 +34,7 @@ const ROUNDS: usize = 5;
 const SWEEPS: usize = 2;
 
 /// The ratio of the bounds used in rounds, by Botsch & Kobbelt: triangles with such edges have no angle below 33°. With
-/// a smaller ratio, halves of long edges are too short. `MOST_INSIDE` is the largest factor by which wider bounds are
+/// a smaller ratio, halves of long edges are too short. `MAX_NARROWING` is the largest factor by which wider bounds are
 /// narrowed.
 const INNER_RATIO: f32 = 5.0 / 3.0;
 const MAX_NARROWING: f32 = 1.2;

@@ -58,7 +58,8 @@ impl ClusterTree {
     }
 
     fn split(&mut self, points: &[Vec3], order: &mut [u32], start: usize) -> usize {
-        let bounds = order.iter().fold(Bounds::EMPTY, |b, &i| b.union(&Bounds::from_points(&[points[i as usize]])));
+        let bounds =
+            order.iter().fold(Bounds::EMPTY, |b, &i| b.union(&Bounds::from_points(&[points[i as usize]])));
         let at = self.clusters.len();
         self.clusters.push(Cluster { start, end: start + order.len(), bounds, halves: None });
         if order.len() > LEAF {

@@ -1,10 +1,10 @@
 //! Surface-following marching cubes: extracts the zero set of an implicit function, evaluated only near the surface.
 //!
-//! For functions that are expensive and best evaluated for many points at a time. A [`Follower`] starts in the cells of
-//! its seeds and continues from cell to cell through the faces that the surface crosses (`flood`); a coarse scan of the
-//! rest of the lattice finds components without a seed (`scan`); a few root-finding iterations along its lattice edge
-//! move each vertex onto the surface (`root`). Work is done in slices of a given number of evaluations, and the mesh
-//! found so far is available after each.
+//! For functions that are expensive and best evaluated for many points at a time. A [`SurfaceExtractor`] starts in the
+//! cells of its seeds and continues from cell to cell through the faces that the surface crosses (`flood`); a coarse
+//! scan of the rest of the lattice finds components without a seed (`scan`); a few root-finding iterations along its
+//! lattice edge move each vertex onto the surface (`root`). Work is done in slices of a given number of evaluations,
+//! and the mesh found so far is available after each.
 //!
 //! Guarantees: cubes are triangulated as by [`marching_cubes`](super::marching_cubes), values of 0 and above are
 //! inside, NaN and everything beyond the lattice are outside. So the mesh is closed, oriented, 2-manifold and free of
@@ -41,8 +41,8 @@ const MAX_EDGES_AWAY: f64 = 8192.0;
 /// Smallest accepted edge length, in world units: far below it, `f32` cannot distinguish vertices.
 const MIN_EDGE: f64 = 1e-30;
 
-/// A regular lattice of cubes in world space on which [`Follower`] extracts a surface. Node (i, j, k) is at origin +
-/// edge × (i, j, k).
+/// A regular lattice of cubes in world space on which [`SurfaceExtractor`] extracts a surface. Node (i, j, k) is at
+/// origin + edge × (i, j, k).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
     /// World position of node (0, 0, 0).
@@ -120,19 +120,19 @@ enum Task {
 ///
 /// ```
 /// use vesicle::math::DVec3;
-/// use vesicle::volume::{Follower, Lattice};
+/// use vesicle::volume::{Lattice, SurfaceExtractor};
 ///
 /// let mut ball = |points: &[DVec3], values: &mut [f64]| {
 ///     values.iter_mut().zip(points).for_each(|(value, p)| *value = 1.0 - p.length());
 /// };
 /// let lattice = Lattice { origin: DVec3::splat(-1.5), edge: 0.1, dims: [31; 3] };
-/// let mut follower = Follower::new(lattice)?;
-/// follower.seed(DVec3::X);
-/// follower.scan(4)?;
-/// follower.refine(3);
-/// while !follower.advance(1000, &mut ball)? {}
-/// assert_eq!(follower.found_by_scan(), 0);
-/// assert!(follower.mesh()?.positions.iter().all(|p| (p.length() - 1.0).abs() < 4e-4));
+/// let mut extractor = SurfaceExtractor::new(lattice)?;
+/// extractor.seed(DVec3::X);
+/// extractor.scan(4)?;
+/// extractor.refine(3);
+/// while !extractor.advance(1000, &mut ball)? {}
+/// assert_eq!(extractor.components_found_by_scan(), 0);
+/// assert!(extractor.mesh()?.positions.iter().all(|p| (p.length() - 1.0).abs() < 4e-4));
 /// # Ok::<(), vesicle::volume::VolumeError>(())
 /// ```
 pub struct SurfaceExtractor {
@@ -140,7 +140,7 @@ pub struct SurfaceExtractor {
     blocks: Blocks,
     flood: Flood,
     scan: Option<Scan>,
-    /// Refinement steps requested per vertex; `taken` is the number performed.
+    /// Refinement steps requested per vertex; `refine_steps_done` is the number performed.
     refine_steps: usize,
     refine_steps_done: usize,
     /// The surface during and after refinement.

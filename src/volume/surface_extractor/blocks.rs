@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_counts_only_what_was_followed() {
+    fn a_line_counts_only_visited_cells() {
         let mut blocks = Blocks::new([30; 3]).unwrap();
         for x in 9..16 {
             let slot = blocks.open([x, 1, 1]).unwrap();

@@ -84,7 +84,16 @@ impl Scan {
         let mut inside = reserve(count)?;
         inside.resize(count, false);
         let requested = Vec::new();
-        Ok(Self { axes, inside, known: 0, requested, next_line: 0, line: None, found_in_pass: false, components_found: 0 })
+        Ok(Self {
+            axes,
+            inside,
+            known: 0,
+            requested,
+            next_line: 0,
+            line: None,
+            found_in_pass: false,
+            components_found: 0,
+        })
     }
 
     /// Fills `batch` with the points the scan needs next, or queues a cell in the flood; returns false when the scan is

@@ -127,7 +127,8 @@ impl Flood {
     fn queue_seed_neighbours(&mut self, blocks: &mut Blocks) -> Result<(), VolumeError> {
         self.unresolved_seeds.sort_unstable();
         self.unresolved_seeds.dedup();
-        self.unresolved_seeds.retain(|&cell| !around(cell, blocks).iter().any(|&near| is_crossed(near, blocks)));
+        self.unresolved_seeds
+            .retain(|&cell| !around(cell, blocks).iter().any(|&near| is_crossed(near, blocks)));
         while let Some(&cell) = self.unresolved_seeds.last() {
             around(cell, blocks).into_iter().try_for_each(|near| self.visit(near, blocks).map(drop))?;
             self.unresolved_seeds.pop();
