@@ -68,11 +68,11 @@ impl AnimationWriter {
     /// As [`write_animation`].
     pub fn finish(mut self, frame_seconds: f64) -> Result<Vec<u8>, MeshError> {
         if self.frames == 0 {
-            return Err(invalid_argument("frames", "there are none; at least one is needed".into()));
+            return Err(invalid_argument("frames", "must contain at least one frame".into()));
         }
         if !(MIN_FRAME_SECONDS..=MAX_FRAME_SECONDS).contains(&frame_seconds) {
             let problem =
-                format!("{frame_seconds}; {MIN_FRAME_SECONDS} to {MAX_FRAME_SECONDS} seconds are accepted");
+                format!("must be {MIN_FRAME_SECONDS} to {MAX_FRAME_SECONDS} seconds, got {frame_seconds}");
             return Err(invalid_argument("frameSeconds", problem));
         }
         let (mut samplers, mut channels) = (Vec::new(), Vec::new());

@@ -65,7 +65,7 @@ fn signature(bytes: &[u8]) -> &'static str {
         () if at(0, b"BZh") => "bzip2",
         () if line(b"<?xml") || line(b"<VTKFile") => "XML",
         () if at(0, b"# vtk") => "VTK legacy",
-        () if at(0, b"\x89PNG") || at(0, &[0xFF, 0xD8, 0xFF]) => "a flat picture",
-        () => "a file of no known signature",
+        () if at(0, b"\x89PNG") || at(0, &[0xFF, 0xD8, 0xFF]) => "an image file (PNG or JPEG)",
+        () => "an unknown signature",
     }
 }

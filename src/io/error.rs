@@ -38,7 +38,7 @@ pub enum FormatError {
         found: u64,
     },
     /// The content does not fit in memory.
-    #[error("{format}: {field}: needs {needed} bytes, more than can be had")]
+    #[error("{format}: {field}: needs {needed} bytes, more than is available")]
     TooLarge {
         /// Name of the file format.
         format: &'static str,

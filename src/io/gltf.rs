@@ -44,9 +44,8 @@ pub(super) fn triangles(root: &Value, binary: &[u8]) -> Result<TriangleMesh, For
             None => read,
         });
     }
-    let mut mesh = mesh.ok_or_else(|| {
-        FormatError::invalid(FORMAT, "meshes", "the scene has no triangles; at least one is needed")
-    })?;
+    let mut mesh =
+        mesh.ok_or_else(|| FormatError::invalid(FORMAT, "meshes", "the scene has no triangles"))?;
     let base_color = parts.iter().find_map(|part| part.primitive.base_color.as_ref());
     if let Some(base_color) = base_color.filter(|_| mesh.has_uvs()) {
         mesh.texture = base_color.texture(&document)?.map(Arc::new);
@@ -99,7 +98,7 @@ impl<'a> Document<'a> {
     pub(super) fn entry(&self, table: &'static str, index: u64) -> Result<&'a Value, FormatError> {
         let entries = self.root[table].as_array().map_or(&[][..], Vec::as_slice);
         let found = usize::try_from(index).ok().and_then(|i| entries.get(i));
-        let problem = || format!("number {index} is named; there are {}", entries.len());
+        let problem = || format!("index {index} is out of range; there are {} entries", entries.len());
         found.ok_or_else(|| FormatError::invalid(FORMAT, table, problem()))
     }
 
@@ -114,7 +113,7 @@ impl<'a> Document<'a> {
         while let Some((index, parent)) = stack.pop() {
             let node = self.entry("nodes", index)?;
             if std::mem::replace(&mut seen[index as usize], true) {
-                let problem = "is reached twice; a tree of nodes is accepted";
+                let problem = "is reached twice; nodes must form a tree";
                 return Err(FormatError::invalid(FORMAT, format!("nodes[{index}]"), problem));
             }
             let to_world = parent * transform(node, index)?;
@@ -328,7 +327,7 @@ impl<'a> Primitive<'a> {
             None => (0..vertices as u32).collect(),
         };
         if let Some(bad) = order.iter().find(|&&v| v as usize >= vertices) {
-            let problem = format!("vertex {bad} is named; {vertices} are there");
+            let problem = format!("vertex index {bad} is out of range; there are {vertices} vertices");
             return Err(FormatError::invalid(FORMAT, "indices", problem));
         }
         Ok(match self.mode {
@@ -451,7 +450,7 @@ fn element_width(accessor: &Value, widths: &[usize], field: &str) -> Result<usiz
         return Ok(width);
     }
     let found: String = name.chars().take(20).collect();
-    let problem = format!("is {found}; elements of {widths:?} components are accepted");
+    let problem = format!("must have elements of {widths:?} components, got {found}");
     Err(FormatError::invalid(FORMAT, format!("{field}.type"), problem))
 }
 
@@ -467,11 +466,7 @@ fn transform(node: &Value, index: u64) -> Result<DAffine3, FormatError> {
     let translation = numbers(&node["translation"], || field("translation"))?.unwrap_or([0.0; 3]);
     let rotation = DQuat::from_array(rotation);
     if rotation.length_squared() <= 0.0 {
-        return Err(FormatError::invalid(
-            FORMAT,
-            field("rotation"),
-            "is zero; a unit quaternion is accepted",
-        ));
+        return Err(FormatError::invalid(FORMAT, field("rotation"), "must be a unit quaternion, got 0"));
     }
     Ok(DAffine3::from_scale_rotation_translation(
         DVec3::from_array(scale),
@@ -490,7 +485,9 @@ pub(super) fn numbers<const N: usize>(
     }
     let list = value.as_array().map(|all| all.iter().filter_map(Value::as_f64).collect::<Vec<_>>());
     let found = list.and_then(|all| <[f64; N]>::try_from(all).ok());
-    found.map(Some).ok_or_else(|| FormatError::invalid(FORMAT, field(), format!("is no list of {N} numbers")))
+    found
+        .map(Some)
+        .ok_or_else(|| FormatError::invalid(FORMAT, field(), format!("must be an array of {N} numbers")))
 }
 
 /// Reads a member that is a non-negative integer; `None` if it is missing.
@@ -499,7 +496,10 @@ pub(super) fn unsigned(object: &Value, key: &str) -> Result<Option<u64>, FormatE
     if value.is_null() {
         return Ok(None);
     }
-    value.as_u64().map(Some).ok_or_else(|| FormatError::invalid(FORMAT, key, "is no whole number from 0"))
+    value
+        .as_u64()
+        .map(Some)
+        .ok_or_else(|| FormatError::invalid(FORMAT, key, "must be a non-negative integer"))
 }
 
 /// Reads a member that is a non-negative integer; an error if it is missing.
@@ -510,5 +510,5 @@ pub(super) fn required(object: &Value, key: &str, field: &str) -> Result<u64, Fo
 fn unsigned_list(value: &Value, field: &str) -> Result<Vec<u64>, FormatError> {
     let Some(list) = value.as_array() else { return Ok(Vec::new()) };
     let found: Option<Vec<u64>> = list.iter().map(Value::as_u64).collect();
-    found.ok_or_else(|| FormatError::invalid(FORMAT, field, "is no list of whole numbers"))
+    found.ok_or_else(|| FormatError::invalid(FORMAT, field, "must be an array of non-negative integers"))
 }

@@ -92,10 +92,6 @@ impl TextureTransform {
 fn decode_data_uri(address: &str, image: u64) -> Result<Vec<u8>, FormatError> {
     let coded = address.split_once(',').filter(|(head, _)| head.ends_with(";base64"));
     coded.and_then(|(_, text)| base64::decode(text)).ok_or_else(|| {
-        FormatError::invalid(
-            FORMAT,
-            format!("images[{image}].uri"),
-            "is no base64; data of that kind is accepted",
-        )
+        FormatError::invalid(FORMAT, format!("images[{image}].uri"), "must be a base64 data URI")
     })
 }

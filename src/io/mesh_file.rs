@@ -71,7 +71,7 @@ pub fn parse_mesh(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
 pub fn parse_textured_mesh(bytes: &[u8], texture: Arc<Texture>) -> Result<TriangleMesh, FormatError> {
     let (format, mut mesh) = parse_welded(bytes)?;
     if !mesh.has_uvs() {
-        let problem = "there are none for every triangle; a texture needs them";
+        let problem = "missing; a texture needs them for every triangle";
         return Err(FormatError::invalid(format, "texture coordinates", problem));
     }
     if format != glb::FORMAT {
@@ -93,7 +93,7 @@ fn parse_welded(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatErro
         return Err(FormatError::invalid(
             format,
             "faces",
-            "there are none that span a triangle; at least one is needed",
+            "the file has no triangles with three distinct corners",
         ));
     }
     Ok((format, welded))
@@ -138,7 +138,7 @@ fn unsupported_format(bytes: &[u8]) -> FormatError {
         // STL has no signature: other bytes long enough for its header can only be a broken STL.
         _ if !text && bytes.len() >= stl::HEADER => stl::wrong_length(bytes),
         _ if text => unsupported("text without vertices or facets"),
-        _ => unsupported("bytes without a known mark"),
+        _ => unsupported("an unknown binary format"),
     }
 }
 

@@ -36,7 +36,7 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
         (true, _) => lines.rest(),
         (false, Some(payload)) => payload,
         (false, None) => {
-            return Err(file.invalid("voxels are in another file; give its bytes as the detached payload"));
+            return Err(file.invalid("the voxels are in another file; pass its bytes as `data`"));
         }
     };
     header.volume(source)
@@ -60,7 +60,7 @@ impl Fields {
                 return Err(FormatError::invalid(
                     FORMAT,
                     "header",
-                    format!("'{shown}' is no 'key = value' line"),
+                    format!("'{shown}' is not a 'key = value' line"),
                 ));
             };
             pairs.push((key.trim().to_owned(), value.trim().to_owned()));
@@ -93,7 +93,7 @@ impl Fields {
         match field.text.to_ascii_lowercase().as_str() {
             "true" | "1" => Ok(true),
             "false" | "0" => Ok(false),
-            _ => Err(field.invalid("True or False is needed")),
+            _ => Err(field.invalid("must be True or False")),
         }
     }
 
@@ -214,7 +214,7 @@ fn scalar(field: &Field<'_>) -> Result<Scalar, FormatError> {
         "MET_DOUBLE" => Scalar::F64,
         other => {
             let accepted =
-                "MET_CHAR, SHORT, INT, LONG, LONG_LONG and their unsigned kin, MET_FLOAT, MET_DOUBLE";
+                "MET_CHAR, SHORT, INT, LONG, LONG_LONG and their unsigned variants, MET_FLOAT, MET_DOUBLE";
             return Err(FormatError::unsupported(FORMAT, "ElementType", format!("'{other}'"), accepted));
         }
     })

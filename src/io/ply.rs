@@ -172,7 +172,7 @@ impl Header {
                 ["element", name, count] => elements.push(parse_element(name, count)?),
                 ["property", property @ ..] => {
                     let element: Option<&mut Element> = elements.last_mut();
-                    let missing = || FormatError::invalid(FORMAT, "property", "comes before any element");
+                    let missing = || FormatError::invalid(FORMAT, "property", "must follow an element");
                     element.ok_or_else(missing)?.properties.push(parse_property(property)?);
                 }
                 [] | ["ply"] | ["comment" | "obj_info", ..] => {}
@@ -180,7 +180,7 @@ impl Header {
                     return Err(FormatError::invalid(
                         FORMAT,
                         "header",
-                        format!("\"{}\" is no line of it", clipped(line)),
+                        format!("\"{}\" is not a header line", clipped(line)),
                     ));
                 }
             }
@@ -224,7 +224,7 @@ fn parse_element(name: &str, count: &str) -> Result<Element, FormatError> {
         FormatError::invalid(
             FORMAT,
             format!("element {}", clipped(name)),
-            format!("count {}; 0 to {} are accepted", clipped(count), u32::MAX),
+            format!("count must be 0 to {}, got {}", u32::MAX, clipped(count)),
         )
     })?;
     Ok(Element { name: name.into(), count: parsed as usize, properties: Vec::new() })
@@ -247,7 +247,7 @@ fn parse_property(words: &[&str]) -> Result<Property, FormatError> {
         _ => Err(FormatError::invalid(
             FORMAT,
             "property",
-            format!("\"{}\" is no type and name", clipped(&words.join(" "))),
+            format!("\"{}\" must be a type and a name", clipped(&words.join(" "))),
         )),
     }
 }
@@ -292,7 +292,7 @@ impl Body<'_> {
         }
         std::str::from_utf8(word).ok().and_then(|word| word.parse().ok()).ok_or_else(|| {
             let found = clipped(&String::from_utf8_lossy(word));
-            FormatError::invalid(FORMAT, field, format!("\"{found}\" is no number"))
+            FormatError::invalid(FORMAT, field, format!("\"{found}\" is not a number"))
         })
     }
 
@@ -392,12 +392,10 @@ impl Reader {
         let invalid = |problem| Err(FormatError::invalid(FORMAT, format!("face {face}"), problem));
         let limit = self.mesh.positions.len() as f64;
         if let Some(bad) = indices.iter().find(|&&i| !(i >= 0.0 && i < limit && i.fract() == 0.0)) {
-            return invalid(format!(
-                "names vertex {bad}; whole numbers from 0 to below {limit} are accepted"
-            ));
+            return invalid(format!("vertex index {bad} is out of range; must be an integer in 0..{limit}"));
         }
         if indices.len() < 3 {
-            return invalid(format!("has {} corners; three or more are accepted", indices.len()));
+            return invalid(format!("must have at least three corners, got {}", indices.len()));
         }
         for k in 1..indices.len() - 1 {
             self.mesh.triangles.push([0, k, k + 1].map(|i| indices[i] as u32));

@@ -41,8 +41,8 @@ impl Line<'_> {
         let invalid = |problem| Err(Field { format, name: &self.field(), text: cell }.invalid(problem));
         match cell.parse::<f32>() {
             Ok(number) if number.is_finite() => Ok(number),
-            Ok(_) => invalid("finite numbers below 3.4e38 in size are accepted"),
-            Err(_) => invalid("a number is needed, with a point before its decimals"),
+            Ok(_) => invalid("must be finite and within ±3.4e38"),
+            Err(_) => invalid("must be a number with a decimal point, not a comma"),
         }
     }
 }
@@ -116,7 +116,7 @@ fn check_count(line: &Line, rows: usize) -> Result<(), FormatError> {
     if announced(line) == Some(rows as u64) {
         return Ok(());
     }
-    let problem = format!("points are announced, {rows} follow; the same number is accepted");
+    let problem = format!("announced number of points, but {rows} follow");
     Err(line.invalid(FORMAT, &problem))
 }
 
@@ -129,7 +129,7 @@ fn take_column_names<'a>(
     let Some(line) = lines.next_if(|line| !line.is_row()) else { return Ok(None) };
     let named = Columns::named(&line.text);
     if named.is_none() && !counted {
-        let problem = "numbers in columns, or names of columns with x, y and z among them, are accepted";
+        let problem = "must be columns of numbers, or column names that include x, y and z";
         return Err(line.invalid(FORMAT, problem));
     }
     Ok(named)
@@ -183,7 +183,7 @@ impl Columns {
     /// Returns the columns of a file that does not name them.
     fn unnamed(count: usize, first: &Line) -> Result<Self, FormatError> {
         if ![3, 4, 6, 7, 9].contains(&count) {
-            let accepted = "3, 4, 6, 7 or 9, or a first line that names them";
+            let accepted = "3, 4, 6, 7 or 9 columns, or a first line with column names";
             return Err(FormatError::unsupported(FORMAT, first.field(), columns(count), accepted));
         }
         Ok(Self { count, read: (0..count).collect(), extras: None })
@@ -227,7 +227,7 @@ impl Table {
         if cells.len() != self.columns.count {
             let (found, accepted) = (columns(cells.len()), columns(self.columns.count));
             let problem =
-                format!("{found}; {accepted}, as named or in the first line of numbers, are accepted");
+                format!("must have {accepted}, as named or as in the first line of numbers, got {found}");
             return Err(line.invalid(FORMAT, &problem));
         }
         for &column in &self.columns.read {
@@ -267,8 +267,8 @@ impl Table {
         if normals.is_none_or(|at| self.are_normals(at)) && colors.is_none_or(|at| self.are_colors(at)) {
             return Ok(Extras { normals, colors });
         }
-        let problem = "in columns without names, normals (lengths within 1 % of 1) and colours (all 0 to 1, or whole \
-             numbers of 0 to 255) are accepted";
+        let problem = "without column names, these must be normals (lengths within 1 % of 1) or colours (all in 0..1, or \
+             integers in 0..255)";
         Err(FormatError::invalid(FORMAT, format!("columns 4 to {}", self.columns.count), problem))
     }
 
@@ -303,7 +303,7 @@ pub(super) fn parse_keyword_lines(bytes: &[u8]) -> Result<PointCloud, FormatErro
                 points.push(Vec3::new(number(x)?, number(y)?, number(z)?));
             }
             ["d" | "s" | "g", ..] => {}
-            _ => return Err(line.invalid(KEYWORD_FORMAT, "p and three numbers, or d, s or g, are accepted")),
+            _ => return Err(line.invalid(KEYWORD_FORMAT, "must be p and three numbers, or d, s or g")),
         }
     }
     Ok(PointCloud { points, ..PointCloud::default() })
@@ -419,8 +419,8 @@ mod tests {
         for (text, said) in [
             ("p 1 2 3\np 1 2\n", "PTS: line 2: 'p 1 2'"),
             ("p 1 2 3\nq 1 2 3\n", "PTS: line 2: 'q 1 2 3'"),
-            ("# a\r\np 1 2 x\r\n", "PTS: line 2: 'x': a number"),
-            ("p 1 2 inf\n", "PTS: line 1: 'inf': finite"),
+            ("# a\r\np 1 2 x\r\n", "PTS: line 2: 'x': must be a number"),
+            ("p 1 2 inf\n", "PTS: line 1: 'inf': must be finite"),
         ] {
             assert!(refusal(text).starts_with(said), "{}", refusal(text));
         }
@@ -431,32 +431,32 @@ mod tests {
     #[test]
     fn what_is_wrong_is_said_with_its_line() {
         for (text, said) in [
-            ("1 2 3\r\n4 5\r\n", "point text: line 2: '4 5': 2 columns; 3 columns"),
-            ("1,2,3\n4,5,6,\n", "point text: line 2: '4,5,6,': 4 columns; 3 columns"),
-            ("x,y,z\n1,2,3,4\n", "point text: line 2: '1,2,3,4': 4 columns; 3 columns"),
-            ("1 2 3\n4 five 6\n", "point text: line 2: 'five': a number"),
-            ("1;2;3\n1,5;2;3\n", "point text: line 2: '1,5': a number"),
-            ("x,y,z\n1,,3\n", "point text: line 2: '': a number"),
-            ("1 2 3\n\n4 nan 6\n", "point text: line 3: 'nan': finite"),
-            ("1 2 -inf\n", "point text: line 1: '-inf': finite"),
-            ("1 2 3\n1e39 2 3\n", "point text: line 2: '1e39': finite"),
-            ("3\n1 2 3\n4 5 6\n", "point text: line 1: '3': points are announced, 2 follow"),
-            ("1\n1 2 3\n4 5 6\n", "point text: line 1: '1': points are announced, 2 follow"),
+            ("1 2 3\r\n4 5\r\n", "point text: line 2: '4 5': must have 3 columns"),
+            ("1,2,3\n4,5,6,\n", "point text: line 2: '4,5,6,': must have 3 columns"),
+            ("x,y,z\n1,2,3,4\n", "point text: line 2: '1,2,3,4': must have 3 columns"),
+            ("1 2 3\n4 five 6\n", "point text: line 2: 'five': must be a number"),
+            ("1;2;3\n1,5;2;3\n", "point text: line 2: '1,5': must be a number"),
+            ("x,y,z\n1,,3\n", "point text: line 2: '': must be a number"),
+            ("1 2 3\n\n4 nan 6\n", "point text: line 3: 'nan': must be finite"),
+            ("1 2 -inf\n", "point text: line 1: '-inf': must be finite"),
+            ("1 2 3\n1e39 2 3\n", "point text: line 2: '1e39': must be finite"),
+            ("3\n1 2 3\n4 5 6\n", "point text: line 1: '3': announced number of points, but 2 follow"),
+            ("1\n1 2 3\n4 5 6\n", "point text: line 1: '1': announced number of points, but 2 follow"),
             ("99999999999999999999\n1 2 3\n", "point text: line 1: 1 column"),
             ("1 2\n3 4\n", "point text: line 1: 2 columns is not supported; accepted: 3, 4"),
             ("1 2 3 4 5\n", "point text: line 1: 5 columns"),
-            ("1 2 3 4 5 -6\n", "point text: columns 4 to 6: in columns without names"),
+            ("1 2 3 4 5 -6\n", "point text: columns 4 to 6: without column names"),
             ("1 2 3 0.5 0.5 200\n", "point text: columns 4 to 6"),
             ("1 2 3 9 256 0 0\n", "point text: columns 4 to 7"),
             ("1 2 3 0 0 1 -1 0 0.5\n", "point text: columns 4 to 9"),
-            ("x,y,z,r,g,b\n1,2,3,300,0,0\n", "point text: colours: some are out of range"),
-            ("a,b,c\n1,2,3\n", "point text: line 1: 'a,b,c': numbers in columns, or names"),
+            ("x,y,z,r,g,b\n1,2,3,300,0,0\n", "point text: colours: out of range"),
+            ("a,b,c\n1,2,3\n", "point text: line 1: 'a,b,c': must be columns of numbers, or column names"),
             ("axis-0,axis-1\n1,2\n", "point text: line 1: 'axis-0,axis-1'"),
             ("p 1 2 3\np 1 2 3 4 5 6\n", "PTS: line 2: 'p 1 2 3 4 5 6'"),
             ("Dear all,\n", "point text: line 1: 'Dear all,'"),
-            ("x,y,z\n", "point text: points: there are none"),
-            ("0\n", "point text: points: there are none"),
-            ("# nothing\n\n", "point text: points: there are none"),
+            ("x,y,z\n", "point text: points: the file has no points"),
+            ("0\n", "point text: points: the file has no points"),
+            ("# nothing\n\n", "point text: points: the file has no points"),
         ] {
             assert!(refusal(text).starts_with(said), "{text:?}: {}", refusal(text));
         }

@@ -89,7 +89,7 @@ fn unsupported_format(bytes: &[u8]) -> Option<&'static str> {
         [b'{', ..] => "JSON",
         [0x1f, 0x8b, ..] => "gzip",
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "text in UTF-16 (it must be UTF-8)",
-        _ if !is_text(bytes) => "a binary file without a known mark",
+        _ if !is_text(bytes) => "an unknown binary format",
         _ => return None,
     })
 }
@@ -102,7 +102,7 @@ fn vertices(mesh: TriangleMesh) -> PointCloud {
 fn validated(format: &'static str, cloud: PointCloud) -> Result<PointCloud, FormatError> {
     let count = cloud.points.len();
     if count == 0 {
-        return Err(FormatError::invalid(format, "points", "there are none; at least one is needed"));
+        return Err(FormatError::invalid(format, "points", "the file has no points"));
     }
     check_finite(format, "points", &cloud.points)?;
     if let Some(normals) = &cloud.normals {
@@ -118,7 +118,7 @@ fn validated(format: &'static str, cloud: PointCloud) -> Result<PointCloud, Form
 /// Returns an error if a vector is not finite.
 fn check_finite(format: &'static str, field: &str, vectors: &[Vec3]) -> Result<(), FormatError> {
     let Some(i) = vectors.iter().position(|v| !v.is_finite()) else { return Ok(()) };
-    let problem = format!("that of point {i}, from 0, is {}; finite numbers are accepted", vectors[i]);
+    let problem = format!("point {i} (zero-based) has {}; numbers must be finite", vectors[i]);
     Err(FormatError::invalid(format, field, problem))
 }
 
@@ -127,14 +127,14 @@ fn check_count(format: &'static str, field: &str, found: &[Vec3], count: usize) 
     if found.len() == count {
         return Ok(());
     }
-    let problem = format!("there are {} for {count} points; one each is accepted", found.len());
+    let problem = format!("there are {} for {count} points; one per point is needed", found.len());
     Err(FormatError::invalid(format, field, problem))
 }
 
 /// Returns the colours scaled to 0..1.
 fn unit_colors(format: &'static str, colors: Vec<Vec3>) -> Result<Vec<Vec3>, FormatError> {
     let full = full_channel(colors.iter().copied()).ok_or_else(|| {
-        let problem = "some are out of range; all 0 to 1, or whole numbers of 0 to 255, are accepted";
+        let problem = "out of range; all must be in 0..1, or integers in 0..255";
         FormatError::invalid(format, "colours", problem)
     })?;
     Ok(colors.into_iter().map(|color| color / full).collect())
@@ -294,20 +294,20 @@ mod tests {
         for (bytes, said) in [
             (
                 ply("1 2 3 0 0 0\n4 nan 6 0 0 0\n", "uchar"),
-                "PLY: points: that of point 1, from 0, is [4, NaN, 6]",
+                "PLY: points: point 1 (zero-based) has [4, NaN, 6]",
             ),
             (
                 ply("1 2 3 0 0 0\n4 5 1e39 0 0 0\n", "uchar"),
-                "PLY: points: that of point 1, from 0, is [4, 5, inf]",
+                "PLY: points: point 1 (zero-based) has [4, 5, inf]",
             ),
-            (ply("1 2 3 0 0 0\n4 5 6 0 0 256\n", "uchar"), "PLY: colours: some are out of range"),
-            (ply("1 2 3 0 0 0\n4 5 6 0 0 1.5\n", "float"), "PLY: colours: some are out of range"),
+            (ply("1 2 3 0 0 0\n4 5 6 0 0 256\n", "uchar"), "PLY: colours: out of range"),
+            (ply("1 2 3 0 0 0\n4 5 6 0 0 1.5\n", "float"), "PLY: colours: out of range"),
             (ply("1 2 3 0 0 0\n4 5 6 0\n", "float"), "PLY: green: needs 1 bytes"),
-            (ply("1 2 3 0 0 0\n4 5 six 0 0 0\n", "float"), "PLY: z: \"six\" is no number"),
+            (ply("1 2 3 0 0 0\n4 5 six 0 0 0\n", "float"), "PLY: z: \"six\" is not a number"),
             (ply("", "float").replace("vertex 2", "vertex 4000000000"), "PLY: element vertex: needs"),
-            (ply("", "float").replace("vertex 2", "vertex 0"), "PLY: points: there are none"),
-            ("v 1 2 3\nvn nan 0 0\n".into(), "OBJ: normals: that of point 0"),
-            ("v 1 2 3\r\nv 1 2\r\n".into(), "OBJ: line 2: 3 or more numbers"),
+            (ply("", "float").replace("vertex 2", "vertex 0"), "PLY: points: the file has no points"),
+            ("v 1 2 3\nvn nan 0 0\n".into(), "OBJ: normals: point 0"),
+            ("v 1 2 3\r\nv 1 2\r\n".into(), "OBJ: line 2: at least 3 numbers"),
             (String::new(), "point file: content: needs 1 bytes"),
             (
                 "solid made\nendsolid\n".into(),
@@ -318,7 +318,7 @@ mod tests {
             ("# .PCD v0.7\nVERSION 0.7\n".into(), "point file: format: PCD"),
             ("OFF\n1 0 0\n1 2 3\n".into(), "point file: format: OFF"),
             ("glTF\u{2}\0\0\0".into(), "point file: format: GLB"),
-            ("1 2 3\n\0\u{1}".into(), "point file: format: a binary file"),
+            ("1 2 3\n\0\u{1}".into(), "point file: format: an unknown binary format"),
         ] {
             let error = parse_points(bytes.as_bytes()).unwrap_err().to_string();
             assert!(error.starts_with(said), "{bytes:?}: {error}");

@@ -52,7 +52,7 @@ pub(super) fn payload_size(place: FieldName, dims: [usize; 4], scalar: Scalar) -
         return Err(FormatError::invalid(
             place.format,
             place.field,
-            format!("{dims:?} has a 0; every size must be at least 1"),
+            format!("must all be at least 1, got {dims:?}"),
         ));
     }
     let bytes = dims.iter().fold(scalar.size() as u128, |product, &n| product.saturating_mul(n as u128));
@@ -141,7 +141,7 @@ fn check_exact(place: FieldName, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) ->
     match bytes.as_chunks().0.iter().map(|&b| size(b)).find(|&v| v > MAX_EXACT) {
         None => Ok(()),
         Some(v) => {
-            let problem = format!("a 64-bit voxel of size {v}; up to {MAX_EXACT} (2^53) is accepted");
+            let problem = format!("64-bit voxels must be at most {MAX_EXACT} (2^53) in size, got {v}");
             Err(FormatError::invalid(place.format, place.field, problem))
         }
     }

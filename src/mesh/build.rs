@@ -62,7 +62,7 @@ impl Mesh {
         positive("radius", radius)?;
         positive("maxEdge", max_edge)?;
         if !center.is_finite() {
-            let problem = format!("({}, {}, {}) is not a finite point", center.x, center.y, center.z);
+            let problem = format!("must be finite, got ({}, {}, {})", center.x, center.y, center.z);
             return Err(MeshError::InvalidArgument { parameter: "center", problem });
         }
         let mut mesh = Self::icosahedron(Vec3::ZERO, 1.0);
@@ -133,20 +133,23 @@ fn positive(parameter: &'static str, value: f32) -> Result<(), MeshError> {
     if value.is_finite() && value > 0.0 {
         return Ok(());
     }
-    Err(MeshError::InvalidArgument { parameter, problem: format!("{value} is not a positive finite number") })
+    Err(MeshError::InvalidArgument {
+        parameter,
+        problem: format!("must be positive and finite, got {value}"),
+    })
 }
 
 fn check_indices(mesh: &TriangleMesh) -> Result<(), MeshError> {
     let fail = |parameter, problem| Err(MeshError::InvalidArgument { parameter, problem });
     if mesh.triangles.is_empty() {
-        return fail("indices", "there is no triangle; at least four are needed to close a surface".into());
+        return fail("indices", "no triangles; a closed surface needs at least four".into());
     }
     let count = mesh.positions.len();
     if let Some(&bad) = mesh.triangles.iter().flatten().find(|&&i| i as usize >= count) {
-        return fail("indices", format!("index {bad} has no position; there are {count}"));
+        return fail("indices", format!("index {bad} is out of range; there are {count} positions"));
     }
     if let Some(bad) = mesh.positions.iter().position(|p| !p.is_finite()) {
-        return fail("positions", format!("position {bad} is not finite"));
+        return fail("positions", format!("position {bad} must be finite"));
     }
     Ok(())
 }
@@ -186,26 +189,26 @@ impl Links {
 fn ring_from_links(v: usize, links: &[(u32, u32)]) -> Result<Ring, MeshError> {
     let fail = |what: &str| Err(MeshError::NotClosed { problem: format!("{what} at vertex {v}") });
     if links.len() > LARGEST_VALENCE {
-        return fail("more triangles than can be handled meet");
+        return fail(&format!("more than {LARGEST_VALENCE} triangles meet"));
     }
     if links.iter().any(|&(a, b)| a == b || a as usize == v || b as usize == v) {
-        return fail("a triangle has the same corner twice");
+        return fail("a triangle has two equal corners");
     }
     let mut ring = Vec::with_capacity(links.len());
     let (first, mut here) = links[0];
     ring.push(VertexId(first));
     while here != first {
         if ring.contains(&VertexId(here)) {
-            return fail("an edge of more than two triangles, or triangles of opposite orientation,");
+            return fail("an edge with more than two triangles, or inconsistent orientation,");
         }
         ring.push(VertexId(here));
         match links.iter().find(|&&(a, _)| a == here) {
             Some(&(_, next)) => here = next,
-            None => return fail("a boundary, or triangles of opposite orientation,"),
+            None => return fail("a boundary, or inconsistent orientation,"),
         }
     }
     if ring.len() != links.len() {
-        return fail("two parts of the surface touch, or triangles are doubled,");
+        return fail("non-manifold vertex or duplicate triangles");
     }
     if ring.len() < 3 {
         return fail("fewer than three triangles meet");

@@ -12,13 +12,13 @@ pub enum InvariantViolation {
     #[error("the edge from {0:?} to {1:?} is doubled")]
     DoubledEdge(VertexId, VertexId),
     /// A neighbour is not live, is the vertex itself, or does not have the vertex as its neighbour.
-    #[error("{0:?} names {1:?} as a neighbour, which does not name it back")]
+    #[error("{1:?} is in the ring of {0:?}, but not {0:?} in the ring of {1:?}")]
     OneSidedEdge(VertexId, VertexId),
     /// The rings of the three corners of a triangle are inconsistent: the surface is open or not oriented there.
-    #[error("the corners of ({0:?}, {1:?}, {2:?}) do not agree on this triangle")]
+    #[error("the rings of the corners of triangle ({0:?}, {1:?}, {2:?}) are inconsistent")]
     BrokenTriangle(VertexId, VertexId, VertexId),
     /// The Euler characteristic or the number of half-edges maintained by the edits differs from the counted one.
-    #[error("the edits predict χ = {predicted}, but {counted} is counted")]
+    #[error("χ = {predicted} according to the edits, but {counted} according to a count")]
     EulerMismatch {
         /// The Euler characteristic maintained by the edits.
         predicted: i64,
@@ -26,7 +26,7 @@ pub enum InvariantViolation {
         counted: i64,
     },
     /// Per-vertex arrays, rings and the free list are inconsistent.
-    #[error("the arrays of the mesh are out of step")]
+    #[error("the arrays of the mesh are inconsistent")]
     InconsistentArrays,
     /// A position or attribute of a vertex is NaN or infinite.
     #[error("{0:?} has a position or attribute that is not finite")]

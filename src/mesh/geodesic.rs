@@ -35,7 +35,7 @@ const MIN_RELATIVE_DECREASE: f64 = 1e-12;
 pub fn geodesic_distances(mesh: &TriangleMesh, from: u32) -> Result<Vec<f64>, MeshError> {
     let vertices = mesh.positions.len();
     if from as usize >= vertices {
-        let problem = format!("{from}; there are {vertices} vertices, from 0 on");
+        let problem = format!("must be below the number of vertices ({vertices}), got {from}");
         return Err(MeshError::InvalidArgument { parameter: "fromVertex", problem });
     }
     let mut front = Front::new(mesh, from as usize);

@@ -38,17 +38,14 @@ impl TriangleMesh {
         let invalid = |parameter, problem| Err(MeshError::InvalidArgument { parameter, problem });
         let (vertices, triangles) = (self.positions.len(), self.triangles.len());
         if let Some(v) = self.positions.iter().position(|p| !p.is_finite()) {
-            return invalid(
-                "positions",
-                format!("vertex {v} is {}; finite numbers are accepted", self.positions[v]),
-            );
+            return invalid("positions", format!("vertex {v} must be finite, got {}", self.positions[v]));
         }
         let outside = |t: &[u32; 3]| t.iter().any(|&v| v as usize >= vertices);
         if let Some(t) = self.triangles.iter().position(outside) {
             let named = self.triangles[t];
             return invalid(
                 "indices",
-                format!("triangle {t} is {named:?}; indices below {vertices} are accepted"),
+                format!("triangle {t} has an index that is not below {vertices}: {named:?}"),
             );
         }
         for (name, found, expected) in [
@@ -58,11 +55,11 @@ impl TriangleMesh {
             ("colors", self.colors.as_ref().map(Vec::len), vertices),
         ] {
             if let Some(found) = found.filter(|&found| found != expected) {
-                return invalid(name, format!("has {found} entries; {expected} are accepted"));
+                return invalid(name, format!("must have {expected} entries, got {found}"));
             }
         }
         if self.texture.is_some() && !self.has_uvs() {
-            return invalid("texture", "there are no texture coordinates; a texture needs uvs".into());
+            return invalid("texture", "a texture needs texture coordinates (uvs)".into());
         }
         Ok(())
     }
@@ -255,6 +252,6 @@ mod tests {
         let MeshError::InvalidArgument { parameter, problem } = mesh.validate().unwrap_err() else {
             panic!()
         };
-        assert_eq!((parameter, problem.as_str()), ("uvs", "has 3 entries; 12 are accepted"));
+        assert_eq!((parameter, problem.as_str()), ("uvs", "must have 12 entries, got 3"));
     }
 }

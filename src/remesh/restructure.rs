@@ -44,9 +44,7 @@ impl EdgeBounds {
         let Self { min, max } = self;
         // Also rejects NaN.
         if !(min > 0.0 && max > 2.0 * min && max.is_finite()) {
-            let problem = format!(
-                "min {min} and max {max}; a min above 0 and a finite max of more than twice as much are needed"
-            );
+            let problem = format!("min must be > 0 and max finite and > 2 min, got min {min}, max {max}");
             return Err(MeshError::InvalidArgument { parameter: "edge", problem });
         }
         let area: f64 = mesh.triangles().map(|corners| triangle::area(mesh.facet(corners).points)).sum();

@@ -52,7 +52,7 @@ fn not_empty(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MeshErr
     if !mesh.triangles.is_empty() {
         return Ok(());
     }
-    Err(MeshError::InvalidArgument { parameter, problem: "there is no triangle to measure to".into() })
+    Err(MeshError::InvalidArgument { parameter, problem: "the mesh has no triangles".into() })
 }
 
 fn one_way(mesh: &TriangleMesh, surface: &TriangleTree) -> Vec<f64> {

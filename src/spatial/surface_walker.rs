@@ -152,7 +152,7 @@ fn neighbours(mesh: &TriangleMesh) -> Result<Vec<[u32; 3]>, MeshError> {
     let all = mesh.triangles.iter().map(|&[a, b, c]| {
         let beyond = [across(c, b), across(a, c), across(b, a)];
         let [Some(x), Some(y), Some(z)] = beyond else {
-            let problem = format!("an edge of the triangle {:?} has no other side", [a, b, c]);
+            let problem = format!("triangle {:?} has a boundary edge", [a, b, c]);
             return Err(MeshError::NotClosed { problem });
         };
         Ok([x, y, z])

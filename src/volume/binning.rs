@@ -20,7 +20,7 @@ impl Volume {
         let dims = self.dims();
         if (0..3).any(|axis| !(1..=MAX_FACTOR).contains(&factors[axis]) || factors[axis] > dims[axis]) {
             let problem = format!(
-                "{factors:?} given; 1 to {MAX_FACTOR}, and no more than there are voxels ({dims:?}), is accepted"
+                "must be 1 to {MAX_FACTOR} and at most the number of voxels ({dims:?}) on each axis, got {factors:?}"
             );
             return Err(VolumeError::invalid("factors", problem));
         }

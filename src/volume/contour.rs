@@ -39,7 +39,7 @@ pub fn marching_cubes_world(volume: &Volume, iso: f64, frame: usize) -> Result<T
 /// `iso` not finite, a grid whose values do not match its dimensions, [`VolumeError::TooLarge`].
 pub fn marching_cubes(grid: &Grid, iso: f32) -> Result<TriangleMesh, VolumeError> {
     if !iso.is_finite() {
-        return Err(VolumeError::invalid("iso", format!("{iso} given; a finite number is needed")));
+        return Err(VolumeError::invalid("iso", format!("must be finite, got {iso}")));
     }
     grid.check()?;
     let mut march = MarchingCubes::new(grid, iso)?;

@@ -33,7 +33,7 @@ impl Volume {
         let axis = self.thick_axis();
         let factor = factor.unwrap_or_else(|| self.isotropic_factor(axis));
         if !(1..=MAX_FACTOR).contains(&factor) {
-            let problem = format!("{factor} given; 1 to {MAX_FACTOR} is accepted");
+            let problem = format!("must be 1 to {MAX_FACTOR}, got {factor}");
             return Err(VolumeError::invalid("factor", problem));
         }
         if factor == 1 {
@@ -41,8 +41,7 @@ impl Volume {
         }
         let count = self.dims[axis];
         if count < 2 {
-            let problem =
-                "the volume has one slice along its largest spacing; between two or more there is room";
+            let problem = "must be 1 for a single slice along the axis of the largest spacing";
             return Err(VolumeError::invalid("factor", problem));
         }
         let mut dims = self.dims;

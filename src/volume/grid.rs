@@ -55,11 +55,7 @@ impl Grid {
         if count == Some(self.values.len()) && !self.values.is_empty() {
             return Ok(());
         }
-        let problem = format!(
-            "{} values given for dims {:?}; their product, not 0, is needed",
-            self.values.len(),
-            self.dims
-        );
+        let problem = format!("must have one value per voxel ({:?}), got {}", self.dims, self.values.len());
         Err(VolumeError::invalid("values", problem))
     }
 

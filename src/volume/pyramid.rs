@@ -68,7 +68,7 @@ impl Volume {
             return Ok(());
         }
         let problem = format!(
-            "{levels} given; 1 to {possible} are possible with dims {:?} and factor {factor} (every axis keeps 2 voxels)",
+            "must be 1 to {possible} for dims {:?} and factor {factor} (at least 2 voxels per axis), got {levels}",
             self.dims()
         );
         Err(VolumeError::invalid("levels", problem))
@@ -213,7 +213,7 @@ fn check_factor(factor: f64) -> Result<(), VolumeError> {
     if factor > 1.0 && factor <= 2.0 {
         return Ok(());
     }
-    Err(VolumeError::invalid("factor", format!("{factor} given; more than 1 and at most 2 is accepted")))
+    Err(VolumeError::invalid("factor", format!("must be > 1 and <= 2, got {factor}")))
 }
 
 /// Returns ⌊n/factor⌋ for each dimension, at least 1.
@@ -345,7 +345,7 @@ mod tests {
         assert!(v.pyramid(0, 2.0).is_err());
         assert_eq!(v.pyramid(3, 2.0).unwrap()[2].dims(), [5, 4, 2]);
         let message = v.pyramid(4, 2.0).unwrap_err().to_string();
-        assert!(message.contains("1 to 3 are possible"), "{message}");
+        assert!(message.contains("must be 1 to 3"), "{message}");
         assert!(v.pyramid(usize::MAX, 1.000_001).is_err());
         let flat = volume([20, 16, 1], DAffine3::IDENTITY, |p| p.x);
         assert_eq!(flat.pyramid(1, 2.0).unwrap().len(), 1);

@@ -199,7 +199,7 @@ fn open_and_broken_triangle_lists_are_refused_with_words() {
     assert!(refusal(&four, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 2, 3]]).contains("orientation"));
     assert!(refusal(&four, vec![[0, 1, 9]]).contains("index 9"));
     assert!(refusal(&four, vec![]).contains("no triangle"));
-    assert!(refusal(&four, vec![[0, 0, 1]]).contains("same corner"));
+    assert!(refusal(&four, vec![[0, 0, 1]]).contains("two equal corners"));
     assert!(refusal(&four, vec![[0, 1, 2], [0, 2, 1]]).contains("fewer than three"));
     let bad = vec![Vec3::NAN, Vec3::X, Vec3::Y, Vec3::Z];
     assert!(refusal(&bad, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]).contains("finite"));

@@ -128,7 +128,7 @@ fn frame_axis_by_direction(field: &Field<'_>, axes: &[Axis]) -> Result<Option<us
     match frames[..] {
         [] if axes.len() <= 3 => Ok(None),
         [one] if axes.len() >= 2 => Ok(Some(one)),
-        _ => Err(field.invalid("one to three axes in space and at most one of frames are needed")),
+        _ => Err(field.invalid("must have one to three spatial axes and at most one frame axis")),
     }
 }
 
@@ -145,8 +145,7 @@ fn frame_axis_by_kind(axes: &[Axis]) -> Result<Option<usize>, FormatError> {
         [one] if axes.len() >= 2 => Ok(Some(one)),
         [.., last] if last >= 1 && last == axes.len() - 1 => Ok(Some(last)),
         _ => {
-            let problem =
-                "which axis is of frames is not clear, or there is no other; 'list' or 'time' says it";
+            let problem = "ambiguous frame axis; mark it as 'list' or 'time'";
             Err(FormatError::invalid(FORMAT, "kinds", problem))
         }
     }
@@ -194,7 +193,7 @@ fn columns_from_spacings(fields: &Fields, axes: &[&Axis]) -> Result<[DVec3; 3], 
         *length = axis.spacing;
     }
     if lengths.iter().any(|&l| l == 0.0 || !l.is_finite()) {
-        return Err(field.invalid("finite numbers other than 0 are needed"));
+        return Err(field.invalid("must be finite and not 0"));
     }
     Ok([DVec3::X * lengths[0], DVec3::Y * lengths[1], DVec3::Z * lengths[2]])
 }

@@ -7,7 +7,7 @@ use crate::io::FormatError;
 use crate::io::text::Field;
 
 /// Supported kinds of axes, listed in error messages.
-pub(super) const KINDS: &str = "domain or space for axes in space, list or time for one of frames";
+pub(super) const KINDS: &str = "domain or space for axes in space, list or time for the frame axis";
 
 /// One axis of an NRRD, as described by the header.
 pub(super) struct Axis {
@@ -74,13 +74,13 @@ fn kinds(fields: &Fields, sizes: &[usize]) -> Result<Vec<AxisKind>, FormatError>
     let Some(field) = fields.get("kinds") else { return Ok(vec![AxisKind::Unknown; sizes.len()]) };
     let words: Vec<&str> = field.text.split_whitespace().collect();
     if words.len() != sizes.len() {
-        return Err(field.invalid(&format!("{} kinds are needed", sizes.len())));
+        return Err(field.invalid(&format!("must have {} kinds", sizes.len())));
     }
     let kinds: Result<Vec<AxisKind>, _> =
         words.iter().zip(sizes).enumerate().map(|(axis, (word, &size))| kind(axis, word, size)).collect();
     let kinds = kinds?;
     if kinds.iter().filter(|kind| kind.counts_frames()).count() > 1 {
-        return Err(field.invalid("at most one axis of frames can be read"));
+        return Err(field.invalid("at most one axis may count frames"));
     }
     Ok(kinds)
 }
@@ -111,7 +111,7 @@ fn directions(
     let Some(field) = fields.get("spacedirections") else { return Ok(Vec::new()) };
     let vectors = vectors(&field, world)?;
     if vectors.len() != kinds.len() {
-        return Err(field.invalid(&format!("{} entries are needed", kinds.len())));
+        return Err(field.invalid(&format!("must have {} entries", kinds.len())));
     }
     let stated = |(vector, &kind): (Option<Vector>, &AxisKind)| {
         let none = |v: &Vector| v.is_unknown() || v.is_zero() && zero_means_none(kind, kinds.len());

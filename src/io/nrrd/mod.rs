@@ -45,7 +45,7 @@ pub(super) fn parse(bytes: &[u8], detached: Option<&[u8]>) -> Result<Volume, For
         (None, _) => lines.rest(),
         (Some(_), Some(payload)) => payload,
         (Some(file), None) => {
-            return Err(file.invalid("voxels are in another file; give its bytes as the detached payload"));
+            return Err(file.invalid("the voxels are in another file; pass its bytes as `data`"));
         }
     };
     header.volume(source)
@@ -120,7 +120,7 @@ impl Header {
         for _ in 0..self.line_skip {
             let end = rest.iter().position(|&b| b == b'\n');
             let end =
-                end.ok_or_else(|| FormatError::invalid(FORMAT, "line skip", "fewer lines than that"))?;
+                end.ok_or_else(|| FormatError::invalid(FORMAT, "line skip", "more lines than the file has"))?;
             rest = &rest[end + 1..];
         }
         Ok(rest)
@@ -206,7 +206,7 @@ fn big_endian(fields: &Fields, scalar: Scalar, encoding: Encoding) -> Result<boo
     match field.text.to_ascii_lowercase().as_str() {
         "big" => Ok(true),
         "little" => Ok(false),
-        _ => Err(field.invalid("'big' or 'little' is needed")),
+        _ => Err(field.invalid("must be 'big' or 'little'")),
     }
 }
 
@@ -215,7 +215,7 @@ fn byte_skip(fields: &Fields, encoding: Encoding) -> Result<Option<usize>, Forma
     let Some(field) = fields.get("byteskip") else { return Ok(Some(0)) };
     match field.integer(-1)? {
         -1 if encoding == Encoding::Raw => Ok(None),
-        -1 => Err(field.invalid("-1 goes with encoding raw only")),
+        -1 => Err(field.invalid("-1 is only valid with encoding raw")),
         _ => Ok(Some(field.offset()?)),
     }
 }
@@ -231,7 +231,7 @@ fn unhex(text: &[u8], size: usize) -> Result<Vec<u8>, FormatError> {
             return Err(FormatError::invalid(
                 FORMAT,
                 "voxel data",
-                "a character that is no hexadecimal digit",
+                "contains a character that is not a hexadecimal digit",
             ));
         };
         match high.take() {

@@ -49,9 +49,9 @@ impl World {
         let inner = text.strip_prefix('(').and_then(|t| t.strip_suffix(')'));
         let numbers: Option<Vec<f64>> =
             inner.and_then(|t| t.split(',').map(|word| word.trim().parse().ok()).collect());
-        let numbers = numbers.ok_or_else(|| field.invalid("vectors like (1,0,0) are needed"))?;
+        let numbers = numbers.ok_or_else(|| field.invalid("must be vectors such as (1,0,0)"))?;
         if self.dimension.is_some_and(|n| n != numbers.len()) {
-            return Err(field.invalid("vectors of as many numbers as the space has dimensions are needed"));
+            return Err(field.invalid("vectors must have as many numbers as the space has dimensions"));
         }
         match numbers[..] {
             [x, y] => Ok(Some(Vector { space: DVec3::new(x, y, 0.0), time: 0.0 })),

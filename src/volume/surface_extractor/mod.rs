@@ -57,13 +57,13 @@ impl Lattice {
     fn check(&self) -> Result<(), VolumeError> {
         let Self { origin, edge, dims } = self;
         if dims.iter().any(|n| !(1..=MAX_NODES).contains(n)) {
-            let problem = format!("{dims:?} given; 1 to {MAX_NODES} nodes along each axis are accepted");
+            let problem = format!("must be 1 to {MAX_NODES} nodes per axis, got {dims:?}");
             return Err(VolumeError::invalid("dims", problem));
         }
         if !(edge.is_finite() && *edge >= MIN_EDGE) {
             return Err(VolumeError::invalid(
                 "edge",
-                format!("{edge} given; a length of at least {MIN_EDGE} is needed"),
+                format!("must be finite and at least {MIN_EDGE}, got {edge}"),
             ));
         }
         let last = self.position(*dims);
@@ -71,9 +71,8 @@ impl Lattice {
         if origin.is_finite() && furthest <= MAX_EDGES_AWAY * edge && furthest <= f64::from(f32::MAX) {
             return Ok(());
         }
-        let problem = format!(
-            "{origin} given; the lattice must lie within {MAX_EDGES_AWAY} edges of the world's origin"
-        );
+        let problem =
+            format!("the lattice must lie within {MAX_EDGES_AWAY} edges of the world origin, got {origin}");
         Err(VolumeError::invalid("origin", problem))
     }
 
@@ -192,7 +191,7 @@ impl SurfaceExtractor {
     /// A stride of 0; [`VolumeError::TooLarge`].
     pub fn scan(&mut self, stride: usize) -> Result<(), VolumeError> {
         if stride == 0 {
-            return Err(VolumeError::invalid("stride", "0 given; at least 1 is needed"));
+            return Err(VolumeError::invalid("stride", "must be at least 1, got 0"));
         }
         let mut scan = Scan::new(stride, &self.blocks)?;
         scan.components_found = self.components_found_by_scan();
