@@ -508,8 +508,8 @@ fn append_voxels(out: &mut Vec<u8>, voxels: &Voxels) {
 
 /// Writes bytes at offset `at` of a header.
 fn put<const N: usize>(out: &mut [u8], at: usize, bytes: [u8; N]) {
-    if let Some(place) = out.get_mut(at..at + N) {
-        place.copy_from_slice(&bytes);
+    if let Some(target) = out.get_mut(at..at + N) {
+        target.copy_from_slice(&bytes);
     }
 }
 

@@ -192,8 +192,8 @@ impl Columns {
 
 /// Returns the columns of x, y and z under the names that napari gives, whose axes are ordered from slowest to fastest.
 fn napari_axes(names: &[String]) -> Option<Vec<usize>> {
-    let place = |axis: usize| names.iter().position(|name| *name == format!("axis-{axis}"));
-    let all: Vec<usize> = (0..5).map_while(place).collect();
+    let column_of_axis = |axis: usize| names.iter().position(|name| *name == format!("axis-{axis}"));
+    let all: Vec<usize> = (0..5).map_while(column_of_axis).collect();
     match all.as_slice() {
         [z, y, x] | [_, z, y, x] => Some(vec![*x, *y, *z]),
         _ => None,

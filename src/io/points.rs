@@ -331,15 +331,15 @@ mod tests {
     }
 
     /// Asserts the properties of every cloud that is read without an error.
-    fn assert_sound(bytes: &[u8], place: &str) {
+    fn assert_sound(bytes: &[u8], context: &str) {
         let Ok(cloud) = parse_points(bytes) else { return };
         let count = cloud.points.len();
-        assert!((1..=bytes.len()).contains(&count), "{place}");
+        assert!((1..=bytes.len()).contains(&count), "{context}");
         let normals = cloud.normals.unwrap_or(cloud.points.clone());
         let colors = cloud.colors.unwrap_or(vec![Vec3::ZERO; count]);
-        assert_eq!((normals.len(), colors.len()), (count, count), "{place}");
-        assert!(cloud.points.iter().chain(&normals).all(|v| v.is_finite()), "{place}");
-        assert_eq!(full_channel(colors.into_iter()), Some(1.0), "{place}");
+        assert_eq!((normals.len(), colors.len()), (count, count), "{context}");
+        assert!(cloud.points.iter().chain(&normals).all(|v| v.is_finite()), "{context}");
+        assert_eq!(full_channel(colors.into_iter()), Some(1.0), "{context}");
     }
 
     #[test]

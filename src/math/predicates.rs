@@ -148,7 +148,8 @@ fn segment_intersects_triangle(segment: [Vec3; 2], sides: [f64; 2], triangle: [V
     let [p, q] = segment;
     let [a, b, c] = triangle;
     let orientations = [orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)];
-    !(orientations.iter().any(|&turn| turn > 0.0) && orientations.iter().any(|&turn| turn < 0.0))
+    !(orientations.iter().any(|&orientation| orientation > 0.0)
+        && orientations.iter().any(|&orientation| orientation < 0.0))
 }
 
 /// Returns whether a segment in the triangle's plane meets the triangle. Also correct for a triangle without area,
@@ -166,7 +167,8 @@ fn point_in_triangle(p: Vec3, [a, b, c]: [Vec3; 3]) -> bool {
     }
     let Some(axis) = Axis::ALL.into_iter().find(|axis| axis.orient(a, b, c) != 0.0) else { return false };
     let orientations = [axis.orient(a, b, p), axis.orient(b, c, p), axis.orient(c, a, p)];
-    !(orientations.iter().any(|&turn| turn > 0.0) && orientations.iter().any(|&turn| turn < 0.0))
+    !(orientations.iter().any(|&orientation| orientation > 0.0)
+        && orientations.iter().any(|&orientation| orientation < 0.0))
 }
 
 /// A coordinate axis along which points are projected.
@@ -353,7 +355,7 @@ mod tests {
     #[test]
     fn triangles_agree_with_separating_axes() {
         for range in [1, 2, 5, 100] {
-            let (mut next, mut crossing) = (integers(5, range), 0);
+            let (mut next, mut intersecting) = (integers(5, range), 0);
             for _ in 0..10_000 {
                 let [a, b] = [(); 2].map(|()| [(); 3].map(|()| [(); 3].map(|()| next())));
                 if normal(a) == [0; 3] || normal(b) == [0; 3] {
@@ -361,9 +363,9 @@ mod tests {
                 }
                 let expected = !separated(a, b);
                 assert_eq!(triangles_intersect(a.map(to_vec), b.map(to_vec)), expected, "{a:?} {b:?}");
-                crossing += usize::from(expected);
+                intersecting += usize::from(expected);
             }
-            assert!(crossing > 500, "{crossing} cross");
+            assert!(intersecting > 500, "{intersecting} intersect");
         }
     }
 
@@ -372,7 +374,7 @@ mod tests {
         // With the corner cut off one triangle (a hundredth, less than the distance of the other's opposite edge) no
         // common point is left.
         const CUT: i64 = 100;
-        let (mut next, mut crossing) = (integers(6, 3), 0);
+        let (mut next, mut intersecting) = (integers(6, 3), 0);
         for _ in 0..20_000 {
             let [a0, a1, b0, b1] = [(); 4].map(|()| [(); 3].map(|()| CUT * next()));
             let (a, b) = ([[0; 3], a0, a1], [[0; 3], b0, b1]);
@@ -384,9 +386,9 @@ mod tests {
             let found =
                 triangles_intersect_sharing_vertex(Vec3::ZERO, [a0, a1].map(to_vec), [b0, b1].map(to_vec));
             assert_eq!(found, expected, "{a:?} {b:?}");
-            crossing += usize::from(expected);
+            intersecting += usize::from(expected);
         }
-        assert!(crossing > 500, "{crossing} cross");
+        assert!(intersecting > 500, "{intersecting} intersect");
     }
 
     #[test]

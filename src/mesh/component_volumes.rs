@@ -10,9 +10,9 @@ impl TriangleMesh {
     /// Components are connected through vertices. Cavities are not subtracted from the surface around them, so a small
     /// shell is removed together with its cavity. Only positions and triangles are kept.
     pub fn without_components_below(&self, volume: f64) -> Self {
-        let part_of = self.component_of_each_vertex();
-        let enclosed = self.enclosed_volumes(&part_of);
-        self.components_where(|v| enclosed[part_of[v as usize] as usize].abs() >= volume)
+        let component_of = self.component_of_each_vertex();
+        let enclosed = self.enclosed_volumes(&component_of);
+        self.components_where(|v| enclosed[component_of[v as usize] as usize].abs() >= volume)
     }
 
     /// Appends the positions and triangles of another mesh; other data of it is ignored.
@@ -55,13 +55,13 @@ impl TriangleMesh {
 
     /// Returns the signed volume of each connected component, stored at its lowest vertex index; positive if its
     /// triangles face outwards.
-    fn enclosed_volumes(&self, part_of: &[u32]) -> Vec<f64> {
+    fn enclosed_volumes(&self, component_of: &[u32]) -> Vec<f64> {
         let mut volumes = vec![0.0; self.positions.len()];
         for triangle in &self.triangles {
-            let part = part_of[triangle[0] as usize] as usize;
-            let origin = self.positions[part].as_dvec3();
+            let component = component_of[triangle[0] as usize] as usize;
+            let origin = self.positions[component].as_dvec3();
             let [a, b, c]: [DVec3; 3] = triangle.map(|v| self.positions[v as usize].as_dvec3() - origin);
-            volumes[part] += a.dot(b.cross(c)) / 6.0;
+            volumes[component] += a.dot(b.cross(c)) / 6.0;
         }
         volumes
     }

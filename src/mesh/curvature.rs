@@ -285,8 +285,8 @@ mod tests {
                 assert!(found.areas.iter().all(|a| a.is_finite()), "{seed}");
             }
         }
-        let speck = curvature(&shapes::cuboid(Vec3::splat(1e-30)));
-        assert!(speck.gaussian.iter().all(|&k| k == f64::from(f32::MAX)));
+        let tiny = curvature(&shapes::cuboid(Vec3::splat(1e-30)));
+        assert!(tiny.gaussian.iter().all(|&k| k == f64::from(f32::MAX)));
         let flat = curvature(&shapes::cuboid(Vec3::new(1.0, 0.0, 0.0)));
         assert!(flat.mean.iter().chain(&flat.gaussian).all(|&x| x == 0.0));
     }

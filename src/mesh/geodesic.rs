@@ -224,7 +224,7 @@ mod tests {
     fn plate(size: Vec3, cells: u32, shake: f32) -> TriangleMesh {
         let mut soup = TriangleMesh::default();
         for [p, q, r, s] in shapes::cuboid_faces(size) {
-            let place = |i: u32, j: u32| {
+            let position = |i: u32, j: u32| {
                 let is_inner = |k: u32| k > 0 && k < cells;
                 let wobble =
                     if is_inner(i) && is_inner(j) { shift(i * 1000 + j) * shake } else { Vec3::ZERO };
@@ -232,7 +232,8 @@ mod tests {
                 p + (q - p) * x + (s - p) * y + (r - q + p - s) * (x * y)
             };
             for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
-                let corners = [place(i, j), place(i + 1, j), place(i + 1, j + 1), place(i, j + 1)];
+                let corners =
+                    [position(i, j), position(i + 1, j), position(i + 1, j + 1), position(i, j + 1)];
                 let first = soup.positions.len() as u32;
                 soup.positions.extend(corners);
                 soup.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|v| v + first)));
@@ -241,8 +242,8 @@ mod tests {
         soup.welded()
     }
 
-    fn vertex_at(mesh: &TriangleMesh, place: Vec3) -> u32 {
-        mesh.positions.iter().position(|&p| p.distance(place) < 1e-5).unwrap() as u32
+    fn vertex_at(mesh: &TriangleMesh, position: Vec3) -> u32 {
+        mesh.positions.iter().position(|&p| p.distance(position) < 1e-5).unwrap() as u32
     }
 
     #[test]

@@ -49,8 +49,8 @@ pub struct Measures {
 ///
 /// All measures of a mesh without triangles are zero. Triangles with an invalid index are ignored.
 pub fn measure(mesh: &TriangleMesh) -> Measures {
-    let sound = mesh.triangles.iter().filter(|t| t.iter().all(|&v| (v as usize) < mesh.positions.len()));
-    let triangles: Vec<[u32; 3]> = sound.copied().collect();
+    let valid = mesh.triangles.iter().filter(|t| t.iter().all(|&v| (v as usize) < mesh.positions.len()));
+    let triangles: Vec<[u32; 3]> = valid.copied().collect();
     let uses = sorted_half_edges(&triangles);
     let used = used_vertices(mesh.positions.len(), &triangles);
     let corners = || triangles.iter().map(|t| t.map(|v| mesh.positions[v as usize].as_dvec3()));

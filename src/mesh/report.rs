@@ -92,8 +92,8 @@ struct LinkEdge {
 
 /// Returns the link edges of all vertices, sorted by vertex.
 fn links(mesh: &TriangleMesh) -> Vec<LinkEdge> {
-    let sound = mesh.triangles.iter().filter(|&&[a, b, c]| a != b && b != c && c != a);
-    let mut links: Vec<_> = sound
+    let valid = mesh.triangles.iter().filter(|&&[a, b, c]| a != b && b != c && c != a);
+    let mut links: Vec<_> = valid
         .flat_map(|&[a, b, c]| {
             [(a, b, c), (b, c, a), (c, a, b)].map(|(vertex, from, to)| LinkEdge { vertex, from, to })
         })
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn crossing_tetrahedra_counted_by_hand() {
+    fn intersecting_tetrahedra_counted_by_hand() {
         // The tip of a thin spike is inside a large tetrahedron and passes only through its base z = 0. Three sides of
         // the spike intersect the base; nothing else is near.
         let large = tetrahedron([
@@ -294,8 +294,8 @@ mod tests {
             Vec3::new(0.0, 3.0e38, 0.0),
         ]);
         mesh.triangles.push([n, n + 1, n + 2]);
-        let crossing = intersecting_pairs(&mesh);
-        assert!(!crossing.is_empty() && crossing.len() < 1000, "{}", crossing.len());
-        assert!(crossing.iter().all(|pair| pair[1] == mesh.triangles.len() as u32 - 1));
+        let intersecting = intersecting_pairs(&mesh);
+        assert!(!intersecting.is_empty() && intersecting.len() < 1000, "{}", intersecting.len());
+        assert!(intersecting.iter().all(|pair| pair[1] == mesh.triangles.len() as u32 - 1));
     }
 }

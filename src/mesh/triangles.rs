@@ -114,8 +114,8 @@ impl TriangleMesh {
         let mut slots = vec![u32::MAX; self.positions.len()];
         members
             .iter()
-            .filter(|part| !part.is_empty())
-            .map(|part| self.triangle_subset(part, &mut slots))
+            .filter(|component| !component.is_empty())
+            .map(|component| self.triangle_subset(component, &mut slots))
             .collect()
     }
 
@@ -135,9 +135,9 @@ impl TriangleMesh {
         };
         let renumbered = triangles.iter().map(renumbered).collect();
         used.iter().for_each(|&v| slots[v] = u32::MAX);
-        let part = self.vertex_subset(&used);
+        let component = self.vertex_subset(&used);
         let corner_uvs = self.corner_uvs.as_ref().map(|uvs| triangles.iter().map(|&t| uvs[t]).collect());
-        Self { triangles: renumbered, corner_uvs, ..part }
+        Self { triangles: renumbered, corner_uvs, ..component }
     }
 
     /// Returns a mesh of the given vertices with their normals, texture coordinates and colours, without triangles.
@@ -231,10 +231,10 @@ mod tests {
         all.colors = Some(all.positions.clone());
         let found = all.components();
         assert_eq!(found.len(), 3);
-        for (part, expected) in found.iter().zip(&parts) {
-            part.validate().unwrap();
-            assert_eq!(part.colors.as_ref(), Some(&part.positions));
-            assert_eq!(measure(part), measure(expected));
+        for (component, expected) in found.iter().zip(&parts) {
+            component.validate().unwrap();
+            assert_eq!(component.colors.as_ref(), Some(&component.positions));
+            assert_eq!(measure(component), measure(expected));
         }
     }
 

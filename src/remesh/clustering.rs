@@ -9,7 +9,7 @@ use crate::mesh::{DisjointSets, TriangleMesh};
 const LARGEST_TURN: f64 = 0.5;
 
 /// The smallest valence of a vertex of the result.
-const LEAST_VALENCE: u32 = 3;
+const MIN_VALENCE: u32 = 3;
 
 /// Returns a closed surface simplified by vertex clustering; used to thin out the iso-surface from which a deformable
 /// model starts. Vertices in the same cell that are connected by edges within it are merged at their mean. A cluster is
@@ -108,7 +108,7 @@ impl Clusters {
         let mut is_wrong = vec![false; self.first.len()];
         let valences = valences(merged);
         for (v, &valence) in valences.iter().enumerate() {
-            is_wrong[v] = valence < LEAST_VALENCE;
+            is_wrong[v] = valence < MIN_VALENCE;
         }
         for corner in doubled_edges(merged, &valences).into_iter().flatten() {
             is_wrong[corner as usize] = true;
@@ -191,7 +191,7 @@ mod tests {
         marching_cubes(&Grid { dims: [n; 3], values }, 0.0).unwrap()
     }
 
-    fn sound(mesh: &TriangleMesh) -> Mesh {
+    fn valid_mesh(mesh: &TriangleMesh) -> Mesh {
         let mesh = Mesh::from_triangles(mesh).unwrap();
         assert_eq!(mesh.check(), Ok(()));
         mesh
@@ -201,7 +201,7 @@ mod tests {
     fn a_torus_keeps_its_handle_and_a_quarter_of_its_vertices_go() {
         let torus = contour(|p| 2.5 - Vec3::new(p.truncate().length() - 6.5, p.z, 0.0).length());
         let merged = clustered(&torus, f32::INFINITY, whole);
-        assert_eq!(sound(&merged).euler(), 0);
+        assert_eq!(valid_mesh(&merged).euler(), 0);
         let [before, after] = [&torus, &merged].map(|mesh| mesh.positions.len());
         assert!(4 * after < 3 * before, "{after} of {before}");
         let length = |p: &Vec3| Vec3::new(p.truncate().length() - 6.5, p.z, 0.0).length();
@@ -230,7 +230,7 @@ mod tests {
             let random = std::cell::RefCell::new(crate::math::Random::new(seed));
             let noisy = contour(|p| 8.0 - p.length() + 6.0 * (random.borrow_mut().unit() as f32 - 0.5));
             let merged = clustered(&noisy, f32::INFINITY, whole);
-            let (before, after) = (sound(&noisy), sound(&merged));
+            let (before, after) = (valid_mesh(&noisy), valid_mesh(&merged));
             assert_eq!(after.euler(), before.euler(), "seed {seed}");
             assert_eq!(after.component_count(), before.component_count(), "seed {seed}");
             assert!(after.vertex_count() < before.vertex_count());
@@ -242,6 +242,6 @@ mod tests {
         assert!(clustered(&TriangleMesh::default(), f32::INFINITY, whole).triangles.is_empty());
         let ball = contour(|p| 8.0 - p.length());
         let merged = clustered(&ball, f32::INFINITY, |p| (p / 8.0).round().as_ivec3());
-        assert_eq!(sound(&merged).euler(), 2);
+        assert_eq!(valid_mesh(&merged).euler(), 2);
     }
 }

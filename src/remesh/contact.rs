@@ -56,22 +56,22 @@ impl Resolver {
 
     /// Returns the pairs in contact with at least one marked vertex, nearest first.
     fn find_contacts(&mut self, mesh: &Mesh, sampling: Sampling) -> Vec<ContactPair> {
-        let mut stirred = self.take_dirty();
-        stirred.retain(|&v| mesh.is_live(v));
+        let mut dirty = self.take_dirty();
+        dirty.retain(|&v| mesh.is_live(v));
         let mut contacts = Vec::new();
-        if stirred.is_empty() {
+        if dirty.is_empty() {
             return contacts;
         }
         self.embedding.sync(mesh);
-        let mut is_stirred = vec![false; mesh.slots()];
-        stirred.iter().for_each(|v| is_stirred[v.index()] = true);
-        for &u in &stirred {
+        let mut is_dirty = vec![false; mesh.slots()];
+        dirty.iter().for_each(|v| is_dirty[v.index()] = true);
+        for &u in &dirty {
             self.embedding.for_each_contact(mesh, u, sampling.contact(), |v, square| {
                 let contact = sampling.between(mesh, u, v).contact();
                 if square >= contact * contact {
                     return;
                 }
-                let counted_from_v = v < u && is_stirred[v.index()] && self.embedding.may_have_contacts(v);
+                let counted_from_v = v < u && is_dirty[v.index()] && self.embedding.may_have_contacts(v);
                 if !counted_from_v {
                     contacts.push(ContactPair { square, u: u.min(v), v: u.max(v) });
                 }

@@ -19,10 +19,10 @@ const POINT_WEIGHT: f64 = 1e-4;
 
 /// The highest valence after a collapse: vertices of higher valence are surrounded by needles, and the intersection
 /// test is quadratic in it.
-const MOST_NEIGHBOURS: usize = 24;
+const MAX_NEIGHBOURS: usize = 24;
 
 /// The cosine of the largest angle by which a triangle may turn, 78°.
-const LEAST_COSINE: f64 = 0.2;
+const MIN_COSINE: f64 = 0.2;
 
 /// The number of times all edges are queued. A rejected edge may become possible once its neighbours are gone; rounds
 /// that free one edge each would make the work quadratic.
@@ -174,12 +174,12 @@ impl<'a> Decimation<'a> {
     fn is_safe(&mut self, u: VertexId, v: VertexId, position: Vec3) -> bool {
         // Two triangles are removed: each end loses the other, and the two opposite vertices are counted twice.
         let neighbours = self.mesh.ring(u).valence() + self.mesh.ring(v).valence() - 4;
-        if neighbours > MOST_NEIGHBOURS {
+        if neighbours > MAX_NEIGHBOURS {
             return false;
         }
-        let mut fresh = SmallVec::<[Facet; MOST_NEIGHBOURS]>::new();
-        for (kept, gone) in [(u, v), (v, u)] {
-            for (a, b) in self.mesh.ring(kept).pairs().filter(|&(a, b)| a != gone && b != gone) {
+        let mut fresh = SmallVec::<[Facet; MAX_NEIGHBOURS]>::new();
+        for (kept, removed) in [(u, v), (v, u)] {
+            for (a, b) in self.mesh.ring(kept).pairs().filter(|&(a, b)| a != removed && b != removed) {
                 let old = self.mesh.facet([kept, a, b]);
                 let new =
                     Facet { corners: [u.0, a.0, b.0], points: [position, old.points[1], old.points[2]] };
@@ -197,8 +197,8 @@ impl<'a> Decimation<'a> {
 /// triangle has no orientation to keep.
 fn may_replace(old: &Facet, new: &Facet) -> bool {
     let (before, after) = (triangle::area_vector(old.points), triangle::area_vector(new.points));
-    let turns = before.dot(after) < LEAST_COSINE * before.length() * after.length();
-    !turns && !collinear(new.points)
+    let flips = before.dot(after) < MIN_COSINE * before.length() * after.length();
+    !flips && !collinear(new.points)
 }
 
 /// Returns, by vertex slot, the quadric of the planes of its triangles and, with a small weight, of its position; each

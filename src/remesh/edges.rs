@@ -12,7 +12,7 @@ const LENGTHENED: f32 = 1.6;
 
 /// The largest number of edits around one vertex in a call; it is then skipped until it is marked again. Edits of edges
 /// with different bounds may undo each other; on a head scan they used up the work of a whole call, 20 s.
-const MOST_EDITS: u8 = 40;
+const MAX_EDITS: u8 = 40;
 
 impl Resolver {
     /// Processes the queue until all edges around its vertices are within bounds.
@@ -41,7 +41,7 @@ impl Resolver {
 
     /// Returns whether edges around `u` may still be edited in this call.
     fn may_edit(&self, u: VertexId) -> bool {
-        self.edits.get(u.index()).is_none_or(|&edits| edits < MOST_EDITS)
+        self.edits.get(u.index()).is_none_or(|&edits| edits < MAX_EDITS)
     }
 
     fn count_edit(&mut self, u: VertexId) {

@@ -107,9 +107,9 @@ impl Obstacles {
         self.work_left == 0
     }
 
-    /// Updates the tree after `gone` was removed and the triangles around `centre` changed.
-    pub fn update(&mut self, mesh: &Mesh, centre: VertexId, gone: VertexId) {
-        self.set(gone, Bounds::EMPTY);
+    /// Updates the tree after `removed` was removed and the triangles around `centre` changed.
+    pub fn update(&mut self, mesh: &Mesh, centre: VertexId, removed: VertexId) {
+        self.set(removed, Bounds::EMPTY);
         self.set(centre, one_ring_bounds(mesh, centre));
         for &v in mesh.ring(centre).as_slice() {
             self.set(v, one_ring_bounds(mesh, v));
@@ -222,15 +222,15 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// Returns two adjacent spheres, a vertex `v` of the first, and the triangles around it after a move to `place`.
-    fn moved(place: Vec3) -> (Mesh, VertexId, Vec<Facet>) {
+    /// Returns two adjacent spheres, a vertex `v` of the first, and the triangles around it after a move to `position`.
+    fn moved(position: Vec3) -> (Mesh, VertexId, Vec<Facet>) {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
         mesh.append(&Mesh::icosphere(Vec3::X * 2.2, 1.0, 0.3).unwrap()).unwrap();
         let nearest = mesh.vertices().max_by(|&a, &b| f32::total_cmp(&first_x(&mesh, a), &first_x(&mesh, b)));
         let v = nearest.unwrap();
         let fan = mesh.ring(v).pairs().map(|(a, b)| {
             let mut facet = mesh.facet([v, a, b]);
-            facet.points[0] = place;
+            facet.points[0] = position;
             facet
         });
         let fan = fan.collect();
@@ -267,28 +267,27 @@ mod tests {
     #[test]
     fn a_tree_that_followed_is_one_made_anew() {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.2).unwrap();
-        let mut followed = Obstacles::new(&mesh, u64::MAX);
+        let mut updated = Obstacles::new(&mesh, u64::MAX);
         for i in 0..300 {
             let (u, v) = mesh.edges().nth(i * 7 % mesh.edge_count()).unwrap();
-            let place = mesh.position(v);
-            if mesh.collapse(u, v, place).is_ok() {
-                followed.update(&mesh, u, v);
+            let position = mesh.position(v);
+            if mesh.collapse(u, v, position).is_ok() {
+                updated.update(&mesh, u, v);
             }
         }
-        let leaf =
-            |v: VertexId| followed.nodes[followed.nodes.len() / 2 + followed.leaves[v.index()] as usize];
+        let leaf = |v: VertexId| updated.nodes[updated.nodes.len() / 2 + updated.leaves[v.index()] as usize];
         assert!(mesh.vertices().all(|v| leaf(v) == one_ring_bounds(&mesh, v)));
         let root = mesh.vertices().fold(Bounds::EMPTY, |all, v| all.union(&one_ring_bounds(&mesh, v)));
-        assert_eq!(followed.nodes[1], root);
+        assert_eq!(updated.nodes[1], root);
     }
 
     #[test]
     fn work_ends() {
         let (mesh, v, fan) = moved(Vec3::X);
         let mut obstacles = Obstacles::new(&mesh, 1000);
-        let looks =
+        let visited =
             (0..1000).take_while(|_| !obstacles.blocks(&mesh, &fan, &[v]) && !obstacles.is_exhausted());
-        assert!((2..50).contains(&looks.count()));
+        assert!((2..50).contains(&visited.count()));
     }
 
     #[test]

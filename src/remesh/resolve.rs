@@ -17,7 +17,7 @@ const PASSES: usize = 8;
 /// Without this limit a call might never return: edits can undo each other, and on a needle pulled out of the surface
 /// edges cannot be brought within bounds.
 const EFFORT_PER_VERTEX: u64 = 400;
-const LEAST_EFFORT: u64 = 100_000;
+const MIN_EFFORT: u64 = 100_000;
 
 /// Keeps a moving mesh within the bounds of a [`Sampling`] and free of self-intersections; the deformable model runs it
 /// after moves.
@@ -192,7 +192,7 @@ impl Resolver {
         self.embedding.sync_with_edge(mesh, sampling.longest());
         self.changes = Changes::default();
         self.overflowed = false;
-        let effort = LEAST_EFFORT + EFFORT_PER_VERTEX * mesh.vertex_count() as u64;
+        let effort = MIN_EFFORT + EFFORT_PER_VERTEX * mesh.vertex_count() as u64;
         self.max_effort = self.embedding.effort() + effort;
         self.edited.clear();
         self.edits.clear();
@@ -311,11 +311,11 @@ impl Resolver {
 
     /// Removes and returns the vertices marked for a contact query, in the order they were marked.
     pub(super) fn take_dirty(&mut self) -> Vec<VertexId> {
-        let stirred = std::mem::take(&mut self.dirty);
-        for v in &stirred {
+        let dirty = std::mem::take(&mut self.dirty);
+        for v in &dirty {
             self.is_dirty[v.index()] = false;
         }
-        stirred
+        dirty
     }
 }
 
@@ -350,7 +350,7 @@ mod tests {
             assert!(resolver.is_embedded(&mesh));
             active.clear();
             // The last edit may exceed the budget: in all its variants it may visit and change all triangles.
-            let most = LEAST_EFFORT + (EFFORT_PER_VERTEX + 200) * 500;
+            let most = MIN_EFFORT + (EFFORT_PER_VERTEX + 200) * 500;
             assert!(resolver.embedding.effort() - effort < most);
             effort = resolver.embedding.effort();
         }

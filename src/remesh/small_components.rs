@@ -149,9 +149,9 @@ impl Resolver {
         let members = mesh.component_of(v, MAX_VERTICES + 1);
         let within =
             if members.len() <= MAX_VERTICES { self.vertices_within(mesh, &members) } else { Vec::new() };
-        for part in [v].into_iter().chain(within) {
-            if mesh.is_live(part) {
-                self.embedding.remove_component(mesh, part);
+        for component in [v].into_iter().chain(within) {
+            if mesh.is_live(component) {
+                self.embedding.remove_component(mesh, component);
                 self.changes.vanished += 1;
             }
         }
@@ -270,7 +270,7 @@ mod tests {
     /// All edges are within bounds, and any move inwards is rejected (merge and split, seed 404).
     #[test]
     fn a_part_that_cannot_shrink_vanishes() {
-        let part = mesh(
+        let component = mesh(
             &[
                 [22.015448, 21.224213, 21.005508],
                 [21.30414, 23.457825, 21.515993],
@@ -302,13 +302,13 @@ mod tests {
                 [6, 9, 4],
             ],
         );
-        assert_shrinks_away(part, Sampling::new(1.4), 0.3);
+        assert_shrinks_away(component, Sampling::new(1.4), 0.3);
     }
 
     /// More than half of its vertices are held, though it is larger than the smallest sphere (merge and split, seed 10529).
     #[test]
     fn a_crumpled_part_vanishes() {
-        let part = mesh(
+        let component = mesh(
             &[
                 [30.879736, 22.268867, 22.252005],
                 [30.429016, 20.206413, 21.476469],
@@ -355,7 +355,7 @@ mod tests {
                 [10, 14, 12],
             ],
         );
-        assert_shrinks_away(part, Sampling::new(1.324), 0.02);
+        assert_shrinks_away(component, Sampling::new(1.324), 0.02);
     }
 
     /// Regression: a solid inside a small cavity was left in the foreground after the cavity was removed (deformable
@@ -392,16 +392,16 @@ mod tests {
     }
 
     /// Asserts that a component shrinks and is removed, in steps of `share` times δ.
-    fn assert_shrinks_away(mut part: Mesh, sampling: Sampling, share: f32) {
+    fn assert_shrinks_away(mut component: Mesh, sampling: Sampling, share: f32) {
         for _ in 0..20 {
-            let normals = part.to_triangles().vertex_normals();
+            let normals = component.to_triangles().vertex_normals();
             let displacements = normals.iter().map(|n| *n * (-share * sampling.shortest())).collect();
-            step(&mut part, sampling, displacements);
-            if part.vertex_count() == 0 {
+            step(&mut component, sampling, displacements);
+            if component.vertex_count() == 0 {
                 return;
             }
-            part = Mesh::from_triangles(&part.to_triangles()).unwrap();
+            component = Mesh::from_triangles(&component.to_triangles()).unwrap();
         }
-        panic!("{} vertices are left", part.vertex_count());
+        panic!("{} vertices are left", component.vertex_count());
     }
 }

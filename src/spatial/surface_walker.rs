@@ -197,8 +197,8 @@ mod tests {
         let walker = ball();
         let mut random = Random::new(5);
         for start in 0..walker.mesh().triangles.len() as u32 {
-            let way = Vec3::from_array(std::array::from_fn(|_| random.unit() as f32 - 0.5));
-            let p = Vec3::new(1.0, 2.0, 3.0) + way.normalize() * 2.5;
+            let direction = Vec3::from_array(std::array::from_fn(|_| random.unit() as f32 - 0.5));
+            let p = Vec3::new(1.0, 2.0, 3.0) + direction.normalize() * 2.5;
             let (found, expected) = (walker.walk(start, p), walker.closest(p).unwrap());
             assert!((found.distance - expected.distance).abs() < 1e-6, "{start}");
             assert_eq!(walker.closest_brute_force(p), Some(expected));

@@ -73,7 +73,7 @@ struct Entry {
     level: u32,
     key: u32,
     position: Vec3,
-    longest: f32,
+    radius: f32,
     /// The next vertex in the list of the bucket.
     next: u32,
 }
@@ -93,13 +93,13 @@ pub struct Proximity {
 impl Proximity {
     /// Returns the distance up to which two vertices with the given longest edges are near each other.
     #[inline]
-    pub fn distance_for(self, longest: f32, other: f32) -> f32 {
-        let reach = self.margin + self.share * if other > longest { other } else { longest };
+    pub fn distance_for(self, radius: f32, other: f32) -> f32 {
+        let reach = self.margin + self.share * if other > radius { other } else { radius };
         if reach > self.least { reach } else { self.least }
     }
 }
 
-const ABSENT_ENTRY: Entry = Entry { level: ABSENT, key: 0, position: Vec3::ZERO, longest: 0.0, next: NONE };
+const ABSENT_ENTRY: Entry = Entry { level: ABSENT, key: 0, position: Vec3::ZERO, radius: 0.0, next: NONE };
 
 impl VertexGrid {
     /// Creates an empty grid for about `vertices` vertices that may move by `max_displacement` after insertion. It is
@@ -117,18 +117,18 @@ impl VertexGrid {
     }
 
     /// Inserts `v`, or updates its position and the length of its longest edge.
-    pub fn set(&mut self, v: VertexId, position: Vec3, longest: f32) {
+    pub fn set(&mut self, v: VertexId, position: Vec3, radius: f32) {
         if v.index() >= self.entries.len() {
             self.entries.resize(v.index() + 1, ABSENT_ENTRY);
             // The lists are too long: cells are unlinked, so that the next `link_cells` builds more buckets.
             self.linked &= self.entries.len() <= 2 * LOAD * self.heads.len();
         }
-        let level = self.level_of(longest);
+        let level = self.level_of(radius);
         let old = self.entries[v.index()];
-        let mut entry = Entry { level: level as u32, position, longest, ..old };
+        let mut entry = Entry { level: level as u32, position, radius, ..old };
         if self.linked {
-            if longest > self.largest_radius[level] {
-                self.largest_radius[level] = longest;
+            if radius > self.largest_radius[level] {
+                self.largest_radius[level] = radius;
             }
             entry.key = self.key(self.cell(position, level), level);
             if (old.level, old.key) != (entry.level, entry.key) {
@@ -159,14 +159,14 @@ impl VertexGrid {
         (self.counts, self.largest_radius) = ([0; LEVELS], [0.0; LEVELS]);
         // In reverse, so that lists are in memory order.
         for i in (0..self.entries.len()).rev() {
-            let Entry { level, position, longest, .. } = self.entries[i];
+            let Entry { level, position, radius, .. } = self.entries[i];
             if level == ABSENT {
                 continue;
             }
             let level = level as usize;
             self.counts[level] += 1;
-            if longest > self.largest_radius[level] {
-                self.largest_radius[level] = longest;
+            if radius > self.largest_radius[level] {
+                self.largest_radius[level] = radius;
             }
             let key = self.key(self.cell(position, level), level);
             let next = std::mem::replace(self.head_mut(key), i as u32);
@@ -176,9 +176,9 @@ impl VertexGrid {
     }
 
     /// Increases the longest edge of `v`, which must be in the grid, to `edge` if that is longer.
-    pub fn raise_longest_edge(&mut self, v: VertexId, edge: f32) {
-        let Entry { position, longest, .. } = self.entries[v.index()];
-        if edge > longest {
+    pub fn raise_radius(&mut self, v: VertexId, edge: f32) {
+        let Entry { position, radius, .. } = self.entries[v.index()];
+        if edge > radius {
             self.set(v, position, edge);
         }
     }
@@ -191,15 +191,15 @@ impl VertexGrid {
 
     /// Returns the longest edge last set for `v`, which must be in the grid.
     #[inline]
-    pub fn longest(&self, v: VertexId) -> f32 {
-        self.entries[v.index()].longest
+    pub fn radius(&self, v: VertexId) -> f32 {
+        self.entries[v.index()].radius
     }
 
     /// Returns the bounding ball last set for `v`, which must be in the grid.
     #[inline]
     pub fn ball(&self, v: VertexId) -> VertexBall {
-        let Entry { position, longest, .. } = self.entries[v.index()];
-        VertexBall { position, radius: longest, vertex: v }
+        let Entry { position, radius, .. } = self.entries[v.index()];
+        VertexBall { position, radius, vertex: v }
     }
 
     /// Removes `v` if it is in the grid.
@@ -247,12 +247,12 @@ impl VertexGrid {
         self.search(&point, |_| radius, &mut |ball: &VertexBall| found(ball.vertex));
     }
 
-    /// Collects into `found` the balls near a box of query vertices whose longest edges are at most `longest`: all
+    /// Collects into `found` the balls near a box of query vertices whose longest edges are at most `own_radius`: all
     /// whose distance from the box, in each axis, is at most [`Proximity::distance_for`], and some further away.
-    pub fn near_balls(&self, bounds: &Bounds, longest: f32, near: Proximity, found: &mut Vec<VertexBall>) {
+    pub fn near_balls(&self, bounds: &Bounds, own_radius: f32, near: Proximity, found: &mut Vec<VertexBall>) {
         found.clear();
         let radius = |other: f32| {
-            near.distance_for(longest, other + 2.0 * self.max_displacement) + self.max_displacement
+            near.distance_for(own_radius, other + 2.0 * self.max_displacement) + self.max_displacement
         };
         self.search(bounds, radius, &mut |ball: &VertexBall| found.push(*ball));
     }
@@ -284,7 +284,7 @@ impl VertexGrid {
         found: &mut impl FnMut(&VertexBall),
     ) {
         for (i, entry) in self.entries.iter().enumerate().filter(|(_, entry)| entry.level != ABSENT) {
-            let around = Vec3::splat(radius(entry.longest) + self.max_displacement);
+            let around = Vec3::splat(radius(entry.radius) + self.max_displacement);
             let wide = Bounds { min: bounds.min - around, max: bounds.max + around };
             if wide.contains(entry.position) {
                 found(&self.ball(VertexId::from_index(i)));
@@ -315,9 +315,9 @@ impl VertexGrid {
     fn search_cell(&self, key: u32, wide: &Bounds, found: &mut impl FnMut(&VertexBall)) {
         let mut at = self.heads[(key & self.mask) as usize];
         while at != NONE {
-            let &Entry { position, longest, next, .. } = &self.entries[at as usize];
+            let &Entry { position, radius, next, .. } = &self.entries[at as usize];
             if self.entries[at as usize].key == key && wide.contains(position) {
-                found(&VertexBall { position, radius: longest, vertex: VertexId(at) });
+                found(&VertexBall { position, radius, vertex: VertexId(at) });
             }
             at = next;
         }
@@ -331,8 +331,8 @@ impl VertexGrid {
         }
     }
 
-    fn level_of(&self, longest: f32) -> usize {
-        (0..LEVELS).find(|&level| longest <= self.max_radius[level]).unwrap_or(LEVELS - 1)
+    fn level_of(&self, radius: f32) -> usize {
+        (0..LEVELS).find(|&level| radius <= self.max_radius[level]).unwrap_or(LEVELS - 1)
     }
 
     #[inline]
@@ -394,16 +394,16 @@ mod tests {
                 known[v] = None;
                 continue;
             }
-            let longest = [0.001, 0.5, 0.9, 1.0, 1.4, 7.0, 1e9][(next() * next() * 7.0) as usize] * next();
+            let radius = [0.001, 0.5, 0.9, 1.0, 1.4, 7.0, 1e9][(next() * next() * 7.0) as usize] * next();
             let position = Vec3::new(next(), next(), next()) * 20.0 - 10.0;
-            grid.set(VertexId::from_index(v), position, longest);
-            known[v] = Some((position, longest));
+            grid.set(VertexId::from_index(v), position, radius);
+            known[v] = Some((position, radius));
         }
         known
     }
 
     fn expected(known: &Known, near: impl Fn(Vec3, f32) -> bool) -> Vec<usize> {
-        (0..known.len()).filter(|&v| known[v].is_some_and(|(p, longest)| near(p, longest))).collect()
+        (0..known.len()).filter(|&v| known[v].is_some_and(|(p, radius)| near(p, radius))).collect()
     }
 
     /// Asserts that `found` has no duplicates and contains all `expected` vertices.
@@ -431,15 +431,14 @@ mod tests {
                 let bounds = Bounds { min: p, max: p + Vec3::new(next(), next(), next()) };
                 let mut found = Vec::new();
                 grid.near_box(&bounds, 0.5, |v| found.push(v.index()));
-                let in_box = |q, longest| bounds.distance_squared(q).sqrt() < 0.5 * f64::from(longest);
+                let in_box = |q, radius| bounds.distance_squared(q).sqrt() < 0.5 * f64::from(radius);
                 assert_complete(found, &expected(&known, in_box));
 
                 let near = Proximity { least: 0.7, margin: 0.1, share: 0.8 };
                 let mut found = Vec::new();
                 grid.near_balls(&bounds, 1.1, near, &mut found);
-                let in_reach = |q, longest| {
-                    bounds.distance_squared(q).sqrt() < f64::from(near.distance_for(1.1, longest))
-                };
+                let in_reach =
+                    |q, radius| bounds.distance_squared(q).sqrt() < f64::from(near.distance_for(1.1, radius));
                 let found = found.into_iter().map(|ball| ball.vertex.index()).collect();
                 assert_complete(found, &expected(&known, in_reach));
             }

@@ -42,11 +42,11 @@ pub fn marching_cubes(grid: &Grid, iso: f32) -> Result<TriangleMesh, VolumeError
         return Err(VolumeError::invalid("iso", format!("must be finite, got {iso}")));
     }
     grid.check()?;
-    let mut march = MarchingCubes::new(grid, iso)?;
+    let mut marching = MarchingCubes::new(grid, iso)?;
     for z in 0..=grid.dims[2] {
-        march.layer(z)?;
+        marching.layer(z)?;
     }
-    Ok(march.mesh)
+    Ok(marching.mesh)
 }
 
 /// Reserves memory for `additional` elements, growing by at least a quarter: doubling the arrays of a large surface would
@@ -158,8 +158,8 @@ impl<'a> MarchingCubes<'a> {
         if mesh.positions.len() + vertices > u32::MAX as usize {
             return Err(too_large);
         }
-        let room = grow(&mut mesh.positions, vertices).and_then(|()| grow(&mut mesh.triangles, triangles));
-        room.map_err(|_| too_large)
+        let grown = grow(&mut mesh.positions, vertices).and_then(|()| grow(&mut mesh.triangles, triangles));
+        grown.map_err(|_| too_large)
     }
 
     /// Appends the vertices and triangles of one row of cubes.

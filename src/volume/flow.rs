@@ -317,19 +317,19 @@ mod tests {
     }
 
     #[test]
-    fn pictures_alike_or_empty_stay_where_they_are() {
-        for picture in [disc([30.0, 20.0], 8.0), Image::flat(64, 48, 3.0).unwrap()] {
-            let flow = symmetric_flow(&picture, &picture).unwrap();
+    fn equal_or_constant_images_have_no_flow() {
+        for image in [disc([30.0, 20.0], 8.0), Image::flat(64, 48, 3.0).unwrap()] {
+            let flow = symmetric_flow(&image, &image).unwrap();
             assert!(flow.x.values.iter().chain(&flow.y.values).all(|u| *u == 0.0));
         }
     }
 
     #[test]
-    fn pictures_of_one_pixel_are_pictures() {
+    fn images_of_one_pixel_have_a_flow() {
         for (width, height) in [(1, 1), (1, 9), (200, 1)] {
-            let picture = Image::flat(width, height, 1.0).unwrap();
+            let image = Image::flat(width, height, 1.0).unwrap();
             let other = Image::flat(width, height, 2.0).unwrap();
-            assert_eq!(symmetric_flow(&picture, &other).unwrap().x.values, vec![0.0; width * height]);
+            assert_eq!(symmetric_flow(&image, &other).unwrap().x.values, vec![0.0; width * height]);
         }
     }
 
@@ -337,12 +337,12 @@ mod tests {
     fn sums_over_windows_are_those_of_their_pixels() {
         let mut random = crate::math::Random::new(5);
         let values = (0..13 * 17).map(|_| random.unit() as f32).collect();
-        let picture = Image { width: 13, height: 17, values };
-        let sums = picture.window_sums().unwrap();
+        let image = Image { width: 13, height: 17, values };
+        let sums = image.window_sums().unwrap();
         for (x, y) in [(0, 0), (6, 8), (12, 16), (3, 15)] {
             let near = |a: usize, b: usize| a.abs_diff(b) <= RADIUS;
             let cells = (0..13 * 17).filter(|i| near(i % 13, x) && near(i / 13, y));
-            let sum: f32 = cells.map(|i| picture.values[i]).sum();
+            let sum: f32 = cells.map(|i| image.values[i]).sum();
             assert!((sums.values[y * 13 + x] - sum).abs() < 1e-3);
         }
     }

@@ -26,17 +26,17 @@ pub(super) fn triangle_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f3
         mesh.ring(hub).pairs().filter(move |&(a, b)| a != not && b != not).map(move |(a, b)| [hub, a, b])
     };
     let others: SmallVec<[([VertexId; 3], Triangle, Bounds); ORDINARY_RING]> = triangles_at(v, u)
-        .map(|names| (names, names.map(at)))
-        .map(|(names, points)| (names, points, Bounds::from_points(&points)))
+        .map(|corners| (corners, corners.map(at)))
+        .map(|(corners, points)| (corners, points, Bounds::from_points(&points)))
         .collect();
     let mut clearance = f32::INFINITY;
     let mut axis = Vec3::ZERO;
-    for names in triangles_at(u, v) {
-        let triangle = names.map(at);
+    for corners in triangles_at(u, v) {
+        let triangle = corners.map(at);
         let bounds = Bounds::from_points(&triangle);
-        for (other_names, other, other_bounds) in &others {
+        for (other_corners, other, other_bounds) in &others {
             // `u` and `v` themselves are corners of one of the two only.
-            if names[1..].iter().any(|w| other_names[1..].contains(w)) {
+            if corners[1..].iter().any(|w| other_corners[1..].contains(w)) {
                 continue;
             }
             let wanted = 2.0 * (lower(enough, clearance) + ROUNDING);
@@ -241,8 +241,8 @@ mod tests {
     fn rough(random: &mut Random) -> Mesh {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.8).unwrap();
         let (rough, flat) = (0.6 * random.unit() as f32, [1.0, 0.1][random.below(2) as usize]);
-        let names: Vec<VertexId> = mesh.vertices().collect();
-        for v in names {
+        let vertices: Vec<VertexId> = mesh.vertices().collect();
+        for v in vertices {
             let p = (mesh.position(v) + any(random) * rough) * Vec3::new(1.0, 1.0, flat);
             mesh.set_position(v, p);
         }
@@ -252,8 +252,8 @@ mod tests {
     /// Returns the mesh with each vertex moved by nearly `displacement`.
     fn shaken(mesh: &Mesh, displacement: f32, random: &mut Random) -> Mesh {
         let mut mesh = mesh.clone();
-        let names: Vec<VertexId> = mesh.vertices().collect();
-        for v in names {
+        let vertices: Vec<VertexId> = mesh.vertices().collect();
+        for v in vertices {
             mesh.set_position(v, mesh.position(v) + any(random).normalize_or_zero() * (0.999 * displacement));
         }
         mesh
@@ -309,8 +309,8 @@ mod tests {
             let random = &mut Random::new(seed);
             let mesh = rough(random);
             let longest = mesh.vertices().map(|v| longest_edge(&mesh, v)).fold(0.0, higher);
-            let names: Vec<VertexId> = mesh.vertices().collect();
-            for &v in &names {
+            let vertices: Vec<VertexId> = mesh.vertices().collect();
+            for &v in &vertices {
                 let clearance = fan_clearance(&mesh, v, longest);
                 if clearance > 0.0 {
                     clear[0] += 1;
@@ -320,7 +320,7 @@ mod tests {
                 } else {
                     unclear[0] += 1;
                 }
-                let w = names[random.below(names.len() as u32) as usize];
+                let w = vertices[random.below(vertices.len() as u32) as usize];
                 let clearance = if v == w { 0.0 } else { triangle_clearance(&mesh, [v, w], longest, 0.01) };
                 if clearance > 0.0 && clearance < f32::INFINITY {
                     clear[1] += 1;

@@ -306,7 +306,7 @@ impl Embedding {
                 self.forget(v);
                 let longest = &mut self.longest[v.index()];
                 *longest = if edge > *longest { edge } else { *longest };
-                self.grid.raise_longest_edge(v, edge);
+                self.grid.raise_radius(v, edge);
             }
         }
     }

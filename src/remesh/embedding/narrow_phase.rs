@@ -232,9 +232,9 @@ mod tests {
         let rough = one_of(random, [0.0, 1e-6, 0.05, 0.2, 1.0]);
         let squash = Vec3::new(1.0, 1.0, one_of(random, [1.0, 1.0, 1.0, 0.5, 1e-3, 1e-9, 0.0]));
         let size = one_of(random, [1.0, 1.0, 1.0, 0.1, 1e-4, 50.0]);
-        let place = any(random) * one_of(random, [0.0, 1.0, 3.0]);
+        let offset = any(random) * one_of(random, [0.0, 1.0, 3.0]);
         for p in mesh.positions_mut() {
-            *p = (*p + any(random) * rough) * squash * size + place;
+            *p = (*p + any(random) * rough) * squash * size + offset;
         }
         let count = mesh.slots() as u32;
         let [v, w] = [(); 2].map(|()| VertexId(random.below(count)));
@@ -260,8 +260,8 @@ mod tests {
     /// Returns the corners of the triangles that intersect, by testing all pairs.
     fn expected(mesh: &Mesh) -> Vec<VertexId> {
         let triangles = mesh.to_triangles();
-        let names: Vec<VertexId> = mesh.vertices().collect();
-        let corners = |t: u32| triangles.triangles[t as usize].map(|v| names[v as usize]);
+        let vertices: Vec<VertexId> = mesh.vertices().collect();
+        let corners = |t: u32| triangles.triangles[t as usize].map(|v| vertices[v as usize]);
         let mut intersecting: Vec<VertexId> =
             intersecting_pairs(&triangles).into_iter().flatten().flat_map(corners).collect();
         intersecting.sort_unstable();

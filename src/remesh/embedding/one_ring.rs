@@ -238,7 +238,7 @@ pub(super) fn changes_intersect_around(
     output: Option<&OutputSpace>,
 ) -> bool {
     let is_changed =
-        |facet: &Facet| changed.iter().any(|names| names.iter().all(|w| facet.corners.contains(&w.0)));
+        |facet: &Facet| changed.iter().any(|corners| corners.iter().all(|w| facet.corners.contains(&w.0)));
     let facets: SmallVec<[(Facet, bool); ORDINARY_RING]> =
         facets_at(mesh, v).map(|facet| (facet, is_changed(&facet))).collect();
     let margin = 2.0 * (exact_below(output) + ROUNDING * longest);

@@ -23,20 +23,20 @@ fn changed(facet: Facet, output: Option<&OutputSpace>) -> Changed {
 impl Embedding {
     /// Returns whether the triangles changed since [`Mesh::begin`], given by their corners, intersect each other or any
     /// others. The grid still holds the mesh before the edit.
-    pub(super) fn changes_intersect(&mut self, mesh: &Mesh, names: &[[VertexId; 3]]) -> bool {
+    pub(super) fn changes_intersect(&mut self, mesh: &Mesh, triangles: &[[VertexId; 3]]) -> bool {
         let edited: Vec<Changed> =
-            names.iter().map(|&names| changed(mesh.facet(names), self.output.as_ref())).collect();
+            triangles.iter().map(|&corners| changed(mesh.facet(corners), self.output.as_ref())).collect();
         // Counted even if the cheap tests below reject the edit.
         self.effort += 1;
-        self.any_one_ring_intersects(mesh, names)
+        self.any_one_ring_intersects(mesh, triangles)
             || intersect_each_other(&edited, self.output.as_ref())
             || self.intersect_others(mesh, &edited)
     }
 
     /// Does the same as [`Self::changes_intersect`], for pairs of triangles with a common corner only.
-    pub(super) fn one_rings_intersect(&mut self, mesh: &Mesh, names: &[[VertexId; 3]]) -> bool {
+    pub(super) fn one_rings_intersect(&mut self, mesh: &Mesh, triangles: &[[VertexId; 3]]) -> bool {
         self.effort += UNSEARCHED;
-        self.any_one_ring_intersects(mesh, names)
+        self.any_one_ring_intersects(mesh, triangles)
     }
 
     /// Returns whether two triangles with a common corner intersect, at the corners of the changed triangles.

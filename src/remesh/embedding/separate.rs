@@ -14,7 +14,7 @@ const SHARES: [f32; 2] = [0.5, 1.0];
 const CLUSTER_DISTANCE: f32 = 1.0;
 
 /// The largest number of corners of intersecting triangles: with more, moving a few vertices is no remedy.
-const MOST: usize = 4000;
+const MAX_VERTICES: usize = 4000;
 
 /// Vertices, each with its displacement before scaling.
 type Moves = Vec<(VertexId, Vec3)>;
@@ -27,7 +27,7 @@ impl Embedding {
     /// `intersecting` must contain all corners of intersecting triangles, as returned by
     /// [`Self::intersecting_vertices`].
     pub fn separate(&mut self, mesh: &mut Mesh, intersecting: &[VertexId]) -> bool {
-        intersecting.len() <= MOST
+        intersecting.len() <= MAX_VERTICES
             && clusters(mesh, intersecting, CLUSTER_DISTANCE * self.ordinary_edge)
                 .iter()
                 .all(|cluster| self.separate_cluster(mesh, cluster))
@@ -62,7 +62,8 @@ impl Embedding {
                 .for_each(|&(v, displacement)| mesh.set_position(v, mesh.position(v) + displacement * share));
             Ok(())
         };
-        self.attempt_with(mesh, edit, |guard, mesh, _| guard.changes_intersect(mesh, &triangles)).is_ok()
+        self.attempt_with(mesh, edit, |embedding, mesh, _| embedding.changes_intersect(mesh, &triangles))
+            .is_ok()
     }
 }
 

@@ -20,7 +20,7 @@ mod one_ring;
 mod relax;
 mod session;
 
-use super::restructure::{MOST_VERTICES, bytes, collapse_short, flip_for_valence, split_long};
+use super::restructure::{MAX_VERTICES, bytes, collapse_short, flip_for_valence, split_long};
 use super::{Changes, EdgeBounds, EditPolicy, Embedding, Unchecked};
 use crate::mesh::{Mesh, MeshError};
 use conflicts::ConflictMask;
@@ -66,9 +66,9 @@ pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError>
     let [shrink, grow] = [-exponent, exponent].map(|power| libm::ldexpf(1.0, power));
     mesh.positions_mut().iter_mut().for_each(|p| *p *= shrink);
     let changes = remesh_scaled(mesh, bounds.scaled(shrink));
-    if mesh.vertex_count() >= MOST_VERTICES {
+    if mesh.vertex_count() >= MAX_VERTICES {
         mesh.clone_from(&before);
-        return Err(MeshError::TooLarge { bytes: bytes(MOST_VERTICES as f64) });
+        return Err(MeshError::TooLarge { bytes: bytes(MAX_VERTICES as f64) });
     }
     mesh.reorder();
     mesh.positions_mut().iter_mut().for_each(|p| *p *= grow);
@@ -144,7 +144,7 @@ fn last_round<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut 
 /// Does the same as [`restructure`](super::restructure()), with a limit on the number of vertices.
 fn pass<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
     let mut changes = collapse_short(mesh, bounds, session);
-    changes += split_long(mesh, bounds, MOST_VERTICES, session);
+    changes += split_long(mesh, bounds, MAX_VERTICES, session);
     changes += flip_for_valence(mesh, bounds, session);
     changes
 }

@@ -153,8 +153,8 @@ impl Blocks {
         if self.origins.len() >= MAX_BLOCKS {
             return Err(too_large);
         }
-        let room = self.values.try_reserve(BLOCK).and_then(|()| self.visited.try_reserve(BLOCK / 64));
-        room.and_then(|()| self.origins.try_reserve(1)).map_err(|_| too_large)?;
+        let reserved = self.values.try_reserve(BLOCK).and_then(|()| self.visited.try_reserve(BLOCK / 64));
+        reserved.and_then(|()| self.origins.try_reserve(1)).map_err(|_| too_large)?;
         let position = self.block_position(node);
         self.table[position] = self.origins.len() as u32;
         self.origins.push(node.map(|k| (k / SIDE * SIDE) as u16));
