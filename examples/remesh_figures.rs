@@ -102,7 +102,7 @@ fn main() {
             let ok = mesh.check();
             let out = mesh.to_triangles();
             let after = measure(&out);
-            let crossings = count_self_intersections(&out);
+            let self_intersections = count_self_intersections(&out);
             let distance = surface_distance(&out, &input).unwrap().hausdorff;
             let dense = surface_distance(&finer(&out, 2), &finer(&input, 1)).unwrap().hausdorff;
             let sharp = out.corners().filter(|&c| smallest(c) < 30.0).count();
@@ -112,7 +112,7 @@ fn main() {
             let long = lengths.iter().filter(|&&l| l > bounds.max).count();
             all_angles.push(after.min_angle_degrees);
             println!(
-                "{name:28} {factor:5.2} {:7} {:7} {:6.2} {crossings:5} {was:5} {:6.1} {sharp:6} {:6.3} {:6.3} {short:5} {long:5} {:6} {}",
+                "{name:28} {factor:5.2} {:7} {:7} {:6.2} {self_intersections:5} {was:5} {:6.1} {sharp:6} {:6.3} {:6.3} {short:5} {long:5} {:6} {}",
                 before.triangles,
                 after.triangles,
                 best * 1e6 / after.triangles as f64,

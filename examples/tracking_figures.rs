@@ -112,10 +112,10 @@ fn track(cine: &Cine) {
         let truth = cine.truth(frame as f64, 0.8);
         let (a, b) = (measure(mesh), measure(&truth));
         let off = surface_distance(mesh, &truth).unwrap();
-        let crossings = count_self_intersections(mesh);
+        let self_intersections = count_self_intersections(mesh);
         let folds = 100.0 * facts.folded as f64 / facts.triangles as f64;
         println!(
-            "{frame} {:.0} ms {:?}\n   volume {:.2} of {:.2} ({:+.1} %), area {:+.1} %, mean {:.2}, p95 {:.2}, max {:.1}, folds {:.2} %, chi {}, crossings {}",
+            "{frame} {:.0} ms {:?}\n   volume {:.2} of {:.2} ({:+.1} %), area {:+.1} %, mean {:.2}, p95 {:.2}, max {:.1}, folds {:.2} %, chi {}, self-intersections {}",
             took * 1e3,
             facts,
             a.volume / 1000.0,
@@ -127,13 +127,13 @@ fn track(cine: &Cine) {
             off.hausdorff,
             folds,
             a.euler,
-            crossings
+            self_intersections
         );
         all.mean = all.mean.max(off.mean);
         all.p95 = all.p95.max(off.p95);
         all.folds = all.folds.max(folds);
         all.areas.push(100.0 * (a.area / b.area - 1.0));
-        all.crossings += crossings;
+        all.self_intersections += self_intersections;
         all.steps += facts.steps / tracker.frames() as f64;
         all.volumes.push([a.volume, b.volume]);
         all.times.push(took);
@@ -150,7 +150,7 @@ struct Worst {
     p95: f64,
     folds: f64,
     areas: Vec<f64>,
-    crossings: usize,
+    self_intersections: usize,
     /// Mean number of steps per frame.
     steps: f64,
     /// Measured and true volume of each frame.
@@ -169,11 +169,11 @@ impl Worst {
         };
         self.times.sort_by(f64::total_cmp);
         println!(
-            "worst: mean {:.2}, p95 {:.2}, folds {:.2} %, area {small:+.1} to {large:+.1} %, crossings {}; ejected {:.1} of {:.1} %; steps {:.1}; votes {:.2} s, frames {:.0} ms in the middle, {:.0} at most",
+            "worst: mean {:.2}, p95 {:.2}, folds {:.2} %, area {small:+.1} to {large:+.1} %, self-intersections {}; ejected {:.1} of {:.1} %; steps {:.1}; votes {:.2} s, frames {:.0} ms in the middle, {:.0} at most",
             self.mean,
             self.p95,
             self.folds,
-            self.crossings,
+            self.self_intersections,
             ejected(0),
             ejected(1),
             self.steps,
@@ -220,7 +220,7 @@ fn follow_file(volume: &Volume, voxel: DVec3, reach: f64) {
         let (Some(mesh), None) = (tracker.meshes().last(), tracker.closing()) else { continue };
         let (m, facts) = (measure(mesh), tracker.facts()[tracker.frame()]);
         println!(
-            "{} {:.0} ms, {} triangles, volume {:.2}, area {:.1}, chi {}, crossings {}, folds {:.2} %, {:?}",
+            "{} {:.0} ms, {} triangles, volume {:.2}, area {:.1}, chi {}, self-intersections {}, folds {:.2} %, {:?}",
             tracker.frame(),
             began.elapsed().as_secs_f64() * 1e3,
             m.triangles,

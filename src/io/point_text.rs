@@ -429,7 +429,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_name_their_line() {
         for (text, said) in [
             ("1 2 3\r\n4 5\r\n", "point text: line 2: '4 5': must have 3 columns"),
             ("1,2,3\n4,5,6,\n", "point text: line 2: '4,5,6,': must have 3 columns"),

@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn errors_name_the_format_and_field() {
         let ply = |vertices: &str, color: &str| {
             let properties = "property float x\nproperty float y\nproperty double z\n";
             let colors = ["red", "green", "blue"].map(|name| format!("property {color} {name}\n")).concat();

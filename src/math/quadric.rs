@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn least_where_three_planes_meet() {
+    fn the_minimizer_of_three_planes_is_their_intersection() {
         let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::new(0.6, 0.0, 0.8)];
         let corner =
             Quadric::of_plane(P, x, 1.0) + Quadric::of_plane(P, y, 2.0) + Quadric::of_plane(P, z, 5.0);

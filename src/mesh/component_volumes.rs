@@ -76,7 +76,7 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     #[test]
-    fn small_parts_go_whichever_way_they_face() {
+    fn small_components_are_removed_whatever_their_orientation() {
         let ball = |at: Vec3, radius: f32| Mesh::icosphere(at, radius, 0.5).unwrap().to_triangles();
         let mut hollow = ball(Vec3::ZERO, 0.9);
         hollow.triangles.iter_mut().for_each(|t| t.swap(1, 2));

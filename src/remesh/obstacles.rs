@@ -48,7 +48,7 @@ impl Obstacles {
     /// `mesh` is the mesh before the edit; the first of `replaced` is in the edited component.
     pub fn blocks(&mut self, mesh: &Mesh, fresh: &[Facet], replaced: &[VertexId]) -> bool {
         let boxes: Vec<Bounds> = fresh.iter().map(|facet| Bounds::from_points(&facet.points)).collect();
-        if cross_each_other(fresh, &boxes) {
+        if intersect_each_other(fresh, &boxes) {
             return true;
         }
         let edit = Edit { fresh, boxes: &boxes, replaced, around: around(mesh, &boxes, replaced) };
@@ -171,7 +171,7 @@ fn components(mesh: &Mesh) -> Vec<u32> {
     components
 }
 
-fn cross_each_other(fresh: &[Facet], boxes: &[Bounds]) -> bool {
+fn intersect_each_other(fresh: &[Facet], boxes: &[Bounds]) -> bool {
     (0..fresh.len())
         .any(|i| (0..i).any(|j| boxes[i].overlaps(&boxes[j]) && facets_intersect(&fresh[i], &fresh[j])))
 }
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tree_that_followed_is_one_made_anew() {
+    fn an_updated_tree_equals_a_new_one() {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.2).unwrap();
         let mut updated = Obstacles::new(&mesh, u64::MAX);
         for i in 0..300 {

@@ -250,7 +250,7 @@ mod tests {
 
     /// Neither state intersects itself. Regression: an inverted component grew until it filled the image (merge and split, seed 297).
     #[test]
-    fn a_part_turned_inside_out_vanishes() {
+    fn an_inverted_component_is_removed() {
         let rim = |k: u32| {
             let angle = TAU * k as f32 / 6.0;
             [libm::cosf(angle), libm::sinf(angle), 0.0]
@@ -269,7 +269,7 @@ mod tests {
 
     /// All edges are within bounds, and any move inwards is rejected (merge and split, seed 404).
     #[test]
-    fn a_part_that_cannot_shrink_vanishes() {
+    fn a_component_that_cannot_shrink_is_removed() {
         let component = mesh(
             &[
                 [22.015448, 21.224213, 21.005508],
@@ -307,7 +307,7 @@ mod tests {
 
     /// More than half of its vertices are held, though it is larger than the smallest sphere (merge and split, seed 10529).
     #[test]
-    fn a_crumpled_part_vanishes() {
+    fn a_crumpled_component_is_removed() {
         let component = mesh(
             &[
                 [30.879736, 22.268867, 22.252005],
@@ -361,7 +361,7 @@ mod tests {
     /// Regression: a solid inside a small cavity was left in the foreground after the cavity was removed (deformable
     /// fuzz, seed 21981).
     #[test]
-    fn what_is_within_a_part_vanishes_with_it() {
+    fn components_inside_a_removed_one_are_removed() {
         let (mut both, hollow) = nested();
         let mut resolver = Resolver::with_max_vertices(1000);
         resolver.remove_component(&mut both, hollow[0]);
@@ -371,7 +371,7 @@ mod tests {
 
     /// The inner component is listed after the one with which it is removed.
     #[test]
-    fn parts_that_vanished_with_others_are_not_asked_for_again() {
+    fn removed_components_are_not_visited_again() {
         let (mut both, hollow) = nested();
         let mut resolver = Resolver::with_max_vertices(1000);
         resolver.remove_crushed(&mut both, Sampling::new(0.2), &Unguided, &hollow);

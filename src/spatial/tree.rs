@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_that_meet_are_all_found() {
+    fn all_overlapping_boxes_are_found() {
         let (mesh, points) = scattered();
         let tree = TriangleTree::new(&mesh).unwrap();
         for pair in points.windows(2) {

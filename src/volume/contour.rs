@@ -373,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_crosses_itself_neither_in_index_nor_in_world_coordinates() {
+    fn noise_has_no_self_intersections_in_index_or_world_coordinates() {
         for seed in 0..12 {
             let grid = noise([14, 12, 13], seed, 7);
             let mut mesh = marching_cubes(&grid, 2.0 + (seed % 3) as f32 * 0.75).unwrap();

@@ -9,7 +9,7 @@
 //! diagonal joins two edges of one face. A diagonal within a face could be used by the neighbouring cube, too, and the
 //! edge would then have four triangles. For loops of up to six, any such triangulation is free of self-intersections
 //! wherever the vertices lie on their edges. Of the sixteen for a loop of seven some are not, and that of least area is
-//! free of them; `tests::no_case_crosses_itself` verifies this.
+//! free of them; `tests::no_case_intersects_itself` verifies this.
 
 use std::sync::OnceLock;
 
@@ -223,15 +223,15 @@ mod tests {
     }
 
     #[test]
-    fn no_case_crosses_itself() {
+    fn no_case_intersects_itself() {
         let mut state = 7;
         for (number, case) in cases().iter().enumerate() {
             for _ in 0..200 {
                 let points: [DVec3; 12] = std::array::from_fn(|e| point_on(e, random_fraction(&mut state)));
                 for (i, &a) in case.triangles.iter().enumerate() {
                     for &b in &case.triangles[..i] {
-                        let crosses = one_pierces(a, b, &points) || one_pierces(b, a, &points);
-                        assert!(!crosses, "case {number}: {a:?} and {b:?} cross at {points:?}");
+                        let intersect = one_pierces(a, b, &points) || one_pierces(b, a, &points);
+                        assert!(!intersect, "case {number}: {a:?} and {b:?} intersect at {points:?}");
                     }
                 }
             }

@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_known_of_a_cell_has_no_influence() {
+    fn the_cell_cache_has_no_influence() {
         let g = grid([6, 5, 4], |p| (p.x * 7.0 + p.y * p.y * 3.0 + p.z * p.x * 5.0) % 11.0);
         let mut cache = CellCache::default();
         for i in 0..2000 {

@@ -12,7 +12,7 @@ use wasm_bindgen_test::wasm_bindgen_test as test;
 
 /// The mesh with `target` triangles or less, after all promises were checked.
 fn decimated(mesh: &TriangleMesh, target: usize) -> TriangleMesh {
-    assert_eq!(count_self_intersections(mesh), 0, "a crossing in the test's own mesh");
+    assert_eq!(count_self_intersections(mesh), 0, "the test mesh intersects itself");
     let mut dynamic = Mesh::from_triangles(mesh).unwrap();
     let collapses = decimate(&mut dynamic, target);
     assert_eq!(dynamic.check(), Ok(()));

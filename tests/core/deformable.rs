@@ -20,8 +20,8 @@ fn run(model: &mut DeformableModel, most: u32) -> StepReport {
         assert_eq!(model.mesh().check(), Ok(()), "iteration {}", report.iteration);
         assert_eq!(report.euler as i64, model.mesh().euler());
         assert!((0.0..=1.0).contains(&report.progress) && (report.progress == 1.0 || !report.done));
-        let crossing = count_self_intersections(&model.mesh().to_triangles());
-        assert_eq!(crossing, 0, "iteration {}", report.iteration);
+        let self_intersections = count_self_intersections(&model.mesh().to_triangles());
+        assert_eq!(self_intersections, 0, "iteration {}", report.iteration);
         if report.done || report.iteration >= most {
             return report;
         }

@@ -175,7 +175,7 @@ fn nearly_touching(outer: &Mesh, inner: &Mesh, most: f32) -> Mesh {
 
 #[test]
 fn refinement_of_facing_sheets_does_not_cross() {
-    let mut crossed = 0;
+    let mut intersecting = 0;
     for seed in 0..6 {
         let mut random = Random(seed);
         let mut ball = |edge: f32| {
@@ -187,7 +187,7 @@ fn refinement_of_facing_sheets_does_not_cross() {
         let mut mesh = nearly_touching(&ball(2.0), &ball(2.6), 1.2);
         let mut unguarded = mesh.clone();
         unguarded.refine().unwrap();
-        crossed += usize::from(!embedded(&unguarded));
+        intersecting += usize::from(!embedded(&unguarded));
 
         let mut embedding = Embedding::default();
         embedding.sync_with_edge(&mesh, EDGE);
@@ -197,5 +197,5 @@ fn refinement_of_facing_sheets_does_not_cross() {
         assert_eq!(mesh.check(), Ok(()), "seed {seed}");
         assert_eq!(mesh.vertex_count(), unguarded.vertex_count(), "seed {seed}");
     }
-    assert!(crossed > 2, "only {crossed} cross when refined without a guard");
+    assert!(intersecting > 2, "only {intersecting} intersect themselves when refined without a guard");
 }

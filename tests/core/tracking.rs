@@ -48,7 +48,7 @@ fn errors(cine: &Cine, meshes: &[TriangleMesh]) -> Vec<f64> {
 }
 
 #[test]
-fn a_beating_ball_is_followed_through_all_frames_closed_and_without_crossings() {
+fn a_beating_ball_is_tracked_through_all_frames_closed_and_without_self_intersections() {
     let cine = Cine::small();
     let tracker = tracked(options(&cine, cine.volume()));
     assert_eq!(tracker.meshes().len(), cine.frames);

@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn triangles_do_not_cross_while_nothing_moves_further_than_they_are_clear() {
+    fn triangles_do_not_intersect_within_their_clearance() {
         let (mut clear, mut unclear) = ([0; 2], [0; 2]);
         for seed in 0..120 {
             let random = &mut Random::new(seed);

@@ -281,7 +281,7 @@ mod tests {
             assert_eq!(found, expected(&mesh), "seed {seed}");
             if found.is_empty() { separate += 1 } else { intersecting += 1 }
         }
-        assert!(separate > 200 && intersecting > 200, "{separate} sound, {intersecting} crossing");
+        assert!(separate > 200 && intersecting > 200, "{separate} separate, {intersecting} intersecting");
     }
 
     #[test]

@@ -277,7 +277,7 @@ fn where_every_face_is_ambiguous_each_node_has_its_own_part() {
 }
 
 #[test]
-fn noise_refined_in_any_way_crosses_nothing() {
+fn refined_noise_has_no_self_intersections() {
     for seed in 0..12 {
         let mut extractor = extracted(unit(12), &[], 1, noise(seed, 3 + seed % 10));
         extractor.refine(4);
@@ -474,7 +474,7 @@ fn memory_grows_with_the_surface_and_not_with_the_lattice() {
 }
 
 #[test]
-fn a_lattice_as_far_away_as_may_be_crosses_nothing() {
+fn the_farthest_lattice_has_no_self_intersections() {
     let edge = 0.03;
     let origin = DVec3::new(8180.0, -8190.0, 8170.0) * edge;
     let lattice = Lattice { origin, edge, dims: [10; 3] };
