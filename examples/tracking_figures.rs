@@ -59,7 +59,7 @@ fn left_out_error(given: &Volume, volume: &Volume, method: Enrichment) -> f64 {
 }
 
 /// Prints the errors of enrichment by optical flow and by linear interpolation.
-fn tell_enrichment(given: &Volume, truth: &Volume) {
+fn print_enrichment(given: &Volume, truth: &Volume) {
     let began = Instant::now();
     let flow = left_out_error(given, truth, Enrichment::Flow);
     let took = began.elapsed().as_secs_f64();
@@ -99,7 +99,7 @@ fn track(cine: &Cine) {
     };
     let mut tracker = SurfaceTracker::new(options).unwrap();
     println!("noise {:.2}, {:?}", tracker.noise(), tracker.params());
-    let mut all = Worst::default();
+    let mut all = ErrorSummary::default();
     while !tracker.is_done() {
         let began = Instant::now();
         tracker.step().unwrap();
@@ -138,14 +138,14 @@ fn track(cine: &Cine) {
         all.volumes.push([a.volume, b.volume]);
         all.times.push(took);
     }
-    all.tell();
+    all.print();
     println!("closes with {:.3} mm", tracker.closing().unwrap_or(f64::NAN));
     println!("tracked in {:.1} s", began.elapsed().as_secs_f64());
 }
 
 /// The largest errors of all frames.
 #[derive(Default)]
-struct Worst {
+struct ErrorSummary {
     mean: f64,
     p95: f64,
     folds: f64,
@@ -159,8 +159,8 @@ struct Worst {
     votes: f64,
 }
 
-impl Worst {
-    fn tell(mut self) {
+impl ErrorSummary {
+    fn print(mut self) {
         let ends = |list: &[f64]| list.iter().fold([f64::MAX, f64::MIN], |[a, b], &x| [a.min(x), b.max(x)]);
         let [small, large] = ends(&self.areas);
         let ejected = |k: usize| {
@@ -185,7 +185,7 @@ impl Worst {
 }
 
 /// Tracks the surface nearest to a voxel, in a box that extends `reach` world units from it on all sides.
-fn follow_file(volume: &Volume, voxel: DVec3, reach: f64) {
+fn track_file(volume: &Volume, voxel: DVec3, reach: f64) {
     let affine = volume.affine();
     let center = affine.transform_point3(voxel);
     let number = |name: &str| std::env::var(name).ok().and_then(|v| v.parse().ok());
@@ -251,18 +251,18 @@ fn main() {
         let numbers: Vec<f64> = center.split(',').map(|x| x.parse().unwrap()).collect();
         for file in std::env::args().skip(1) {
             let volume = parse_volume(&std::fs::read(&file).unwrap(), None).unwrap();
-            follow_file(&volume, DVec3::from_slice(&numbers), numbers[3]);
+            track_file(&volume, DVec3::from_slice(&numbers), numbers[3]);
         }
         return;
     }
     let full = Cine { frames: 4, ..Cine::full() };
     let (noisy, clean) = (full.volume(), Cine { noise: 0.0, ..full }.volume());
-    tell_enrichment(&noisy, &noisy);
-    tell_enrichment(&noisy, &clean);
-    tell_enrichment(&clean, &clean);
+    print_enrichment(&noisy, &noisy);
+    print_enrichment(&noisy, &clean);
+    print_enrichment(&clean, &clean);
     for file in std::env::args().skip(1) {
         let volume = parse_volume(&std::fs::read(&file).unwrap(), None).unwrap();
         println!("{file}: {:?} x {}, {:?}", volume.dims(), volume.frames(), volume.spacing());
-        tell_enrichment(&volume, &volume);
+        print_enrichment(&volume, &volume);
     }
 }
