@@ -107,7 +107,7 @@ fn floor(x: f64) -> i32 {
     whole - i32::from(f64::from(whole) > x)
 }
 
-/// Returns the indices that sort `columns`, columns of balls. A counting sort, several times as fast, is used if the
+/// Returns the indices that sort `columns`, the columns of balls. A counting sort, several times as fast, is used if the
 /// columns are as densely occupied as those of a mesh.
 fn column_order(columns: &[[i32; 2]]) -> Vec<u32> {
     let extent = |axis: usize| {
