@@ -93,16 +93,16 @@ impl DocumentBuilder {
         self.accessor(start, VERTICES, [5126, uvs.len()], "VEC2", "")
     }
 
-    /// Adds an accessor of vectors and returns its index; `more` is appended to its JSON.
+    /// Adds an accessor of vectors and returns its index; `extra_json` is appended to its JSON.
     pub(super) fn vectors(
         &mut self,
         vectors: impl ExactSizeIterator<Item = Vec3>,
         target: Option<u32>,
-        more: &str,
+        extra_json: &str,
     ) -> usize {
         let (start, count) = (self.bytes.len(), vectors.len());
         vectors.for_each(|v| push_floats(&mut self.bytes, &v.to_array()));
-        self.accessor(start, target, [5126, count], "VEC3", more)
+        self.accessor(start, target, [5126, count], "VEC3", extra_json)
     }
 
     /// Adds an accessor of ascending animation times in seconds and returns its index.
@@ -122,11 +122,11 @@ impl DocumentBuilder {
         target: Option<u32>,
         [component, count]: [usize; 2],
         kind: &str,
-        more: &str,
+        extra_json: &str,
     ) -> usize {
         let view = self.view(start, target);
         self.accessors.push(format!(
-            r#"{{"bufferView":{view},"componentType":{component},"count":{count},"type":"{kind}"{more}}}"#
+            r#"{{"bufferView":{view},"componentType":{component},"count":{count},"type":"{kind}"{extra_json}}}"#
         ));
         self.accessors.len() - 1
     }
@@ -156,23 +156,23 @@ impl DocumentBuilder {
         Ok(self.textures.len() - 1)
     }
 
-    /// Reserves memory for `more` bytes, so that lack of memory is an error instead of a crash.
-    fn reserve(&mut self, more: usize) -> Result<(), MeshError> {
-        let bytes = self.bytes.len() as u64 + more as u64;
-        let fits = bytes <= u64::from(u32::MAX) && self.bytes.try_reserve(more).is_ok();
+    /// Reserves memory for `additional` bytes, so that lack of memory is an error instead of a crash.
+    fn reserve(&mut self, additional: usize) -> Result<(), MeshError> {
+        let bytes = self.bytes.len() as u64 + additional as u64;
+        let fits = bytes <= u64::from(u32::MAX) && self.bytes.try_reserve(additional).is_ok();
         if fits { Ok(()) } else { Err(MeshError::TooLarge { bytes }) }
     }
 
-    /// Returns the bytes of the file, with all nodes as roots of one scene; `more` is appended to the members of the
+    /// Returns the bytes of the file, with all nodes as roots of one scene; `extra_json` is appended to the members of the
     /// JSON.
     ///
     /// # Errors
     /// [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
-    pub(super) fn finish(mut self, more: &str) -> Result<Vec<u8>, MeshError> {
+    pub(super) fn finish(mut self, extra_json: &str) -> Result<Vec<u8>, MeshError> {
         let mut json = String::from(r#"{"asset":{"version":"2.0","generator":"vesicle"},"scene":0"#);
         let nodes: Vec<String> = (0..self.nodes.len()).map(|node| node.to_string()).collect();
         json += &format!(r#","scenes":[{{"nodes":[{}]}}]"#, nodes.join(","));
-        json += more;
+        json += extra_json;
         json += &self.materials_json();
         let buffers = [format!(r#"{{"byteLength":{}}}"#, self.bytes.len())];
         let buffers = if self.bytes.is_empty() { &[][..] } else { &buffers };
