@@ -74,7 +74,7 @@ fn replay(name: &str) {
         fuzz::run(target.name, data);
     }
     let mut random = Random(1);
-    for _ in 0..target.changes {
+    for _ in 0..target.mutations {
         let data = mutated(&seeds, &mut random);
         let _running = Running(target.name, &data);
         fuzz::run(target.name, &data);

@@ -1,7 +1,7 @@
 //! Validation of meshes passed in by the caller, shared by all methods.
 
 use super::MethodError;
-use crate::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure};
+use crate::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections, measure};
 
 /// The shortest mean edge accepted. With shorter ones, areas in single precision are rounded to few digits, or to 0.
 const SHORTEST: f64 = 1e-12;
@@ -18,7 +18,7 @@ pub(super) fn surface(parameter: &'static str, mesh: &TriangleMesh) -> Result<Me
         let problem = "the triangles face inwards; counter-clockwise seen from outside is needed";
         return Err(MethodError::invalid(parameter, problem));
     }
-    match count_crossings(mesh) {
+    match count_self_intersections(mesh) {
         0 => Ok(surface),
         pairs => Err(MeshError::SelfIntersecting { pairs }.into()),
     }

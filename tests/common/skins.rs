@@ -2,7 +2,7 @@
 #![allow(clippy::panic, reason = "the lints spare tests, but not their helpers")]
 
 use vesicle::math::{DVec3, Vec3, triangle};
-use vesicle::mesh::{Mesh, count_crossings, measure};
+use vesicle::mesh::{Mesh, count_self_intersections, measure};
 use vesicle::methods::StepReport;
 use vesicle::methods::multires::{ControlEllipsoid, MultiresolutionModel};
 
@@ -65,7 +65,7 @@ pub fn covers(mesh: &Mesh, e: &ControlEllipsoid, share: f64) -> bool {
 pub fn assert_sound(model: &MultiresolutionModel, report: &StepReport) {
     for mesh in [model.base_mesh(), model.mesh()] {
         assert_eq!(mesh.check(), Ok(()));
-        assert_eq!(count_crossings(&mesh.to_triangles()), 0, "frame {}", report.iteration);
+        assert_eq!(count_self_intersections(&mesh.to_triangles()), 0, "frame {}", report.iteration);
     }
     let measures = measure(&model.base_mesh().to_triangles());
     assert_eq!(measures.components as u32, report.components);

@@ -4,7 +4,7 @@ use crate::common::scenes;
 use crate::common::shapes::HOSTILE_SCALES;
 use crate::common::{Random, euler_of_parts, torus_around};
 use vesicle::math::{Vec3, triangle};
-use vesicle::mesh::{Mesh, TriangleMesh, count_crossings, measure, report};
+use vesicle::mesh::{Mesh, TriangleMesh, count_self_intersections, measure, report};
 use vesicle::remesh::decimate;
 use vesicle::volume::{Volume, marching_cubes_world};
 #[cfg(target_arch = "wasm32")]
@@ -12,7 +12,7 @@ use wasm_bindgen_test::wasm_bindgen_test as test;
 
 /// Returns the mesh decimated to at most `target` triangles if possible, after checking all guarantees.
 fn decimated(mesh: &TriangleMesh, target: usize) -> TriangleMesh {
-    assert_eq!(count_crossings(mesh), 0, "a crossing in the test's own mesh");
+    assert_eq!(count_self_intersections(mesh), 0, "the test mesh intersects itself");
     let mut dynamic = Mesh::from_triangles(mesh).unwrap();
     let collapses = decimate(&mut dynamic, target);
     assert_eq!(dynamic.check(), Ok(()));

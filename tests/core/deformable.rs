@@ -4,7 +4,7 @@
 use crate::common::euler_of_parts;
 use crate::common::scenes;
 use vesicle::math::{DAffine3, DMat3, DVec3, Vec3};
-use vesicle::mesh::{Measures, Mesh, MeshError, TriangleMesh, count_crossings, measure};
+use vesicle::mesh::{Measures, Mesh, MeshError, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::deformable::{
     Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Start, Topology,
 };
@@ -20,8 +20,8 @@ fn run(model: &mut DeformableModel, most: u32) -> StepReport {
         assert_eq!(model.mesh().check(), Ok(()), "iteration {}", report.iteration);
         assert_eq!(report.euler as i64, model.mesh().euler());
         assert!((0.0..=1.0).contains(&report.progress) && (report.progress == 1.0 || !report.done));
-        let crossing = count_crossings(&model.mesh().to_triangles());
-        assert_eq!(crossing, 0, "iteration {}", report.iteration);
+        let self_intersections = count_self_intersections(&model.mesh().to_triangles());
+        assert_eq!(self_intersections, 0, "iteration {}", report.iteration);
         if report.done || report.iteration >= most {
             return report;
         }
@@ -419,7 +419,7 @@ fn flat_and_tiny_volumes_have_an_enclosing_start() {
                 DeformableOptions { start: Start::Enclosing, edge: Some(edge), ..Default::default() };
             let model = DeformableModel::new(&volume, options).unwrap();
             assert_eq!((model.mesh().check(), model.mesh().euler()), (Ok(()), 2), "{dims:?} {edge}");
-            assert_eq!(count_crossings(&model.mesh().to_triangles()), 0, "{dims:?} {edge}");
+            assert_eq!(count_self_intersections(&model.mesh().to_triangles()), 0, "{dims:?} {edge}");
         }
     }
 }
@@ -652,5 +652,5 @@ fn oscillations_in_a_noisy_image_converge() {
     while !model.step().unwrap().done {}
     let iterations = model.step().unwrap().iteration - before;
     assert!(iterations <= 150, "done after {iterations}");
-    assert_eq!(count_crossings(&model.mesh().to_triangles()), 0);
+    assert_eq!(count_self_intersections(&model.mesh().to_triangles()), 0);
 }

@@ -2,7 +2,7 @@
 
 use crate::common::{Random, torus_around};
 use vesicle::math::Vec3;
-use vesicle::mesh::{EditError, Mesh, TriangleMesh, VertexId, count_crossings};
+use vesicle::mesh::{EditError, Mesh, TriangleMesh, VertexId, count_self_intersections};
 use vesicle::remesh::{Embedding, Resolver, Sampling};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -11,7 +11,7 @@ use wasm_bindgen_test::wasm_bindgen_test as test;
 const EDGE: f32 = 2.5;
 
 fn embedded(mesh: &Mesh) -> bool {
-    count_crossings(&mesh.to_triangles()) == 0
+    count_self_intersections(&mesh.to_triangles()) == 0
 }
 
 /// Returns two spheres and two tori, side by side with little space between them.
@@ -49,11 +49,11 @@ fn a_mesh_moved_at_random_never_intersects_itself() {
             let (mut other, mut other_ways) = (mesh.clone(), ways.clone());
             let before = mesh.positions().to_vec();
 
-            follower.follow_with(&mesh, EDGE);
-            let shares = follower.carry(&mut mesh, &mut ways);
+            follower.sync_with_edge(&mesh, EDGE);
+            let shares = follower.move_all(&mut mesh, &mut ways);
             let mut stranger = Embedding::default();
-            stranger.follow_with(&other, EDGE);
-            assert_eq!(stranger.carry(&mut other, &mut other_ways), shares, "{what}");
+            stranger.sync_with_edge(&other, EDGE);
+            assert_eq!(stranger.move_all(&mut other, &mut other_ways), shares, "{what}");
 
             assert!(mesh.positions() == other.positions(), "{what}");
             assert!(embedded(&mesh), "{what}");
@@ -77,8 +77,8 @@ fn spheres_pushed_together_flatten() {
     let mut embedding = Embedding::default();
     for _ in 0..20 {
         let mut ways: Vec<Vec3> = mesh.positions().iter().map(|p| Vec3::X * 0.1 * -p.x.signum()).collect();
-        embedding.follow_with(&mesh, EDGE);
-        embedding.carry(&mut mesh, &mut ways);
+        embedding.sync_with_edge(&mesh, EDGE);
+        embedding.move_all(&mut mesh, &mut ways);
         assert!(embedded(&mesh));
     }
     let gone = began - far(&mesh);
@@ -100,8 +100,8 @@ fn large_and_small_triangles_do_not_intersect() {
         // The small spheres move outwards; the large one shrinks.
         let mut ways: Vec<Vec3> = mesh.positions().iter().map(|p| *p * 0.02).collect();
         ways[..12].iter_mut().for_each(|way| *way *= -0.5);
-        embedding.follow_with(&mesh, EDGE);
-        embedding.carry(&mut mesh, &mut ways);
+        embedding.sync_with_edge(&mesh, EDGE);
+        embedding.move_all(&mut mesh, &mut ways);
         assert!(embedded(&mesh));
     }
 }
@@ -119,10 +119,10 @@ fn an_edit_that_would_intersect_is_rolled_back() {
     let v = mesh.ring(u).as_slice()[0];
     let before = mesh.to_triangles();
     let mut embedding = Embedding::default();
-    embedding.follow_with(&mesh, EDGE);
+    embedding.sync_with_edge(&mesh, EDGE);
     let piercing = Vec3::X * 5.0;
     let refused = embedding.attempt(&mut mesh, |mesh| mesh.collapse(u, v, piercing));
-    assert_eq!(refused, Err(EditError::WouldCross));
+    assert_eq!(refused, Err(EditError::WouldSelfIntersect));
     assert!(mesh.to_triangles() == before);
     let beside = mesh.position(u);
     assert_eq!(embedding.attempt(&mut mesh, |mesh| mesh.collapse(u, v, beside)), Ok(()));
@@ -136,14 +136,14 @@ fn a_mesh_resolved_after_every_move_never_intersects_itself() {
     for seed in 0..10 {
         let mut random = Random(seed);
         let mut mesh = crowd();
-        let mut resolver = Resolver::with_room_for(100_000);
+        let mut resolver = Resolver::with_max_vertices(100_000);
         let everything: Vec<VertexId> = mesh.vertices().collect();
         resolver.resolve(&mut mesh, sampling, &everything);
         let mut changes = resolver.resolve(&mut mesh, sampling, &[]);
         for step in 0..30 {
             let size = [0.5, 0.3, 0.1][random.below(3)];
             let mut ways = random_ways(&mesh, &mut random, size);
-            resolver.carry(&mut mesh, sampling, &mut ways);
+            resolver.move_all(&mut mesh, sampling, &mut ways);
             let everything: Vec<VertexId> = mesh.vertices().collect();
             changes += resolver.resolve(&mut mesh, sampling, &everything);
             assert_eq!(mesh.check(), Ok(()), "seed {seed}, step {step}");
@@ -175,7 +175,7 @@ fn nearly_touching(outer: &Mesh, inner: &Mesh, most: f32) -> Mesh {
 
 #[test]
 fn refinement_of_facing_sheets_does_not_intersect() {
-    let mut crossed = 0;
+    let mut intersecting = 0;
     for seed in 0..6 {
         let mut random = Random(seed);
         let mut ball = |edge: f32| {
@@ -187,15 +187,15 @@ fn refinement_of_facing_sheets_does_not_intersect() {
         let mut mesh = nearly_touching(&ball(2.0), &ball(2.6), 1.2);
         let mut unguarded = mesh.clone();
         unguarded.refine().unwrap();
-        crossed += usize::from(!embedded(&unguarded));
+        intersecting += usize::from(!embedded(&unguarded));
 
         let mut embedding = Embedding::default();
-        embedding.follow_with(&mesh, EDGE);
+        embedding.sync_with_edge(&mesh, EDGE);
         assert!(embedding.is_embedded(&mesh));
         assert!(embedding.refine(&mut mesh).unwrap());
         assert!(embedded(&mesh) && embedding.is_embedded(&mesh), "seed {seed}");
         assert_eq!(mesh.check(), Ok(()), "seed {seed}");
         assert_eq!(mesh.vertex_count(), unguarded.vertex_count(), "seed {seed}");
     }
-    assert!(crossed > 2, "only {crossed} cross when refined without a guard");
+    assert!(intersecting > 2, "only {intersecting} intersect themselves when refined without a guard");
 }

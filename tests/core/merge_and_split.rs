@@ -6,7 +6,7 @@
 use crate::common::scenes;
 use crate::common::{Named, Random, euler_of_parts, misplaced_parts, seeds};
 use vesicle::math::Vec3;
-use vesicle::mesh::count_crossings;
+use vesicle::mesh::count_self_intersections;
 use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Seeding, Start};
 use vesicle::volume::Volume;
 #[cfg(target_arch = "wasm32")]
@@ -142,7 +142,7 @@ fn run(seed: u64) -> [u32; 2] {
         let report = model.step().unwrap();
         assert_eq!(i64::from(report.euler), model.mesh().euler(), "{what}: {report:?}");
         let triangles = model.mesh().to_triangles();
-        assert_eq!(count_crossings(&triangles), 0, "{what}: {report:?}");
+        assert_eq!(count_self_intersections(&triangles), 0, "{what}: {report:?}");
         let misplaced = misplaced_parts(&triangles);
         assert!(misplaced.is_empty(), "{what}: {misplaced:?}, {report:?}");
         changes[0] += report.events.axial;

@@ -403,7 +403,7 @@ fn bytes_that_are_no_mesh_are_refused() {
         (b"\x1f\x8b\x08\0\0", "gzip"),
         (b"{\"asset\":{}}", "JSON"),
         (b"<?xml version=\"1.0\"?>", "XML"),
-        (b"\0\x01\x02", "without a known mark"),
+        (b"\0\x01\x02", "unknown binary format"),
         (&[1; 200], "STL: triangles: needs"),
         (&[0; 200], "STL: triangle count"),
         (b"ply\n", "PLY: header: has no end_header"),
@@ -411,7 +411,7 @@ fn bytes_that_are_no_mesh_are_refused() {
         (b"ply\nformat ascii 2.0\nend_header\n", "PLY: format: ascii 2.0"),
         (b"ply\nformat ascii 1.0\nend_header\n", "PLY: faces"),
         (b"ply\nformat ascii 1.0\nproperty float x\n", "PLY: property"),
-        (b"ply\nformat ascii 1.0\nelement vertex -1\n", "PLY: element vertex: count -1"),
+        (b"ply\nformat ascii 1.0\nelement vertex -1\n", "PLY: element vertex: count must be"),
         (
             b"ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n1 2\n",
             "PLY: element vertex: needs",
@@ -419,9 +419,9 @@ fn bytes_that_are_no_mesh_are_refused() {
         (b"v 1 2 3\n", "OBJ: faces"),
         (b"v 1 2\nf 1 1 1\n", "OBJ: line 1"),
         (b"v 1 2 x\n", "OBJ: line 1"),
-        (b"v 1 2 3\nv 1 2 4\nv 1 2 5\nf 1 2 4\n", "OBJ: line 4: a face names v 4"),
+        (b"v 1 2 3\nv 1 2 4\nv 1 2 5\nf 1 2 4\n", "OBJ: line 4: v index 4 is out of range"),
         (b"v 1 2 3\nf 0 0 0\n", "OBJ: line 2"),
-        (b"v 1 2 3\nf 1 1\n", "OBJ: line 2: a face has 2 corners"),
+        (b"v 1 2 3\nf 1 1\n", "OBJ: line 2: a face must have at least three corners, got 2"),
         (b"v nan 2 3\nv 1 2 4\nv 1 3 5\nf 1 2 3\n", "OBJ: positions: vertex 0"),
         (b"glTF\x01\0\0\0", "GLB: version: 1"),
         (b"glTF\x02\0\0\0\x04\0\0\0", "GLB: JSON chunk: is missing"),
@@ -436,10 +436,10 @@ fn bytes_that_are_no_mesh_are_refused() {
 #[test]
 fn ply_bodies_that_contradict_the_header_are_refused() {
     for (from, to, field) in [
-        ("0 4 0 2 3 1", "0 4 0 2 3 8", "face 0: names vertex 8"),
+        ("0 4 0 2 3 1", "0 4 0 2 3 8", "face 0: vertex index 8"),
         ("0 4 0 2 3 1", "0 4 0 2 3 -1", "face 0"),
         ("0 4 0 2 3 1", "0 4 0 2 3 1.5", "face 0"),
-        ("0 4 0 2 3 1", "0 2 0 2", "face 0: has 2 corners"),
+        ("0 4 0 2 3 1", "0 2 0 2", "face 0: must have at least three corners, got 2"),
         ("0 4 0 2 3 1", "0 4000 0 2 3 1", "vertex_index: a list of 4000"),
         ("0 4 0 2 3 1", "0 x 0 2 3 1", "vertex_index: \"x\""),
         ("0 4 1 3 7 5\n", "", "flags"),

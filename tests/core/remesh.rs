@@ -4,7 +4,7 @@ use crate::common::shapes;
 use crate::common::shapes::HOSTILE_SCALES;
 use crate::common::{Named, Random, euler_of_parts, seeds, torus_around};
 use vesicle::math::{DVec3, Vec3, triangle};
-use vesicle::mesh::{Mesh, MeshError, TriangleMesh, count_crossings, measure, report};
+use vesicle::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections, measure, report};
 use vesicle::remesh::{EdgeBounds, remesh};
 use vesicle::spatial::surface_distance;
 #[cfg(target_arch = "wasm32")]
@@ -17,7 +17,7 @@ fn about(aim: f32) -> EdgeBounds {
 
 /// Returns the remeshed mesh, after checking all guarantees.
 fn remeshed(mesh: &TriangleMesh, bounds: EdgeBounds) -> TriangleMesh {
-    assert_eq!(count_crossings(mesh), 0, "a crossing in the test's own mesh");
+    assert_eq!(count_self_intersections(mesh), 0, "a crossing in the test's own mesh");
     let mut dynamic = Mesh::from_triangles(mesh).unwrap();
     remesh(&mut dynamic, bounds).unwrap();
     assert_eq!(dynamic.check(), Ok(()));

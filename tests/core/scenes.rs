@@ -7,7 +7,7 @@ use crate::common::scenes;
 use crate::common::{Random, euler_of_parts, fingerprint};
 use std::collections::BTreeMap;
 use vesicle::math::Vec3;
-use vesicle::mesh::{Measures, Mesh, count_crossings, measure};
+use vesicle::mesh::{Measures, Mesh, count_self_intersections, measure};
 use vesicle::methods::deformable::{DeformableModel, DeformableOptions, DeformableParams, Start};
 use vesicle::volume::{Volume, marching_cubes_world};
 #[cfg(target_arch = "wasm32")]
@@ -35,7 +35,7 @@ fn play(name: &str, volume: &Volume, options: DeformableOptions, most: u32) -> (
         assert_eq!(model.mesh().check(), Ok(()), "{what}");
         assert_eq!(i64::from(report.euler), model.mesh().euler(), "{what}");
         let triangles = model.mesh().to_triangles();
-        assert_eq!(count_crossings(&triangles), 0, "{what}");
+        assert_eq!(count_self_intersections(&triangles), 0, "{what}");
         assert!(measure(&triangles).volume > 0.0, "{what}");
         if report.done {
             break report.iteration;
@@ -176,7 +176,7 @@ fn marching_cubes_of_noise_without_rigidity_stay_valid() {
     for step in 0..steps {
         model.step().unwrap();
         assert_eq!(model.mesh().check(), Ok(()), "step {step}");
-        assert_eq!(count_crossings(&model.mesh().to_triangles()), 0, "step {step}");
+        assert_eq!(count_self_intersections(&model.mesh().to_triangles()), 0, "step {step}");
     }
     println!("noisy ball, no rigidity: {steps} iterations, {} vertices", model.mesh().vertex_count());
 }
@@ -241,7 +241,7 @@ fn timed(name: &str, volume: &Volume, levels: usize, iso: f64) -> (Measures, f64
         println!("  level {level}  {part:<10} {:>7.2} s", 0.001 * time);
     }
     let surface = model.surface();
-    assert_eq!(count_crossings(&surface), 0);
+    assert_eq!(count_self_intersections(&surface), 0);
     let found = measure(&surface);
     println!(
         "  {} vertices, χ {}, area {:.0}, volume {:.0}",

@@ -3,7 +3,7 @@
 
 use crate::common::{Random, euler_of_parts, scenes};
 use vesicle::math::{DAffine3, DMat3, DVec3, Vec3};
-use vesicle::mesh::{TriangleMesh, count_crossings, measure};
+use vesicle::mesh::{TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::deformable::{
     Coverage, DeformableModel, DeformableOptions, DeformableParams, Missing, Seeding, Start,
 };
@@ -35,7 +35,7 @@ fn run(volume: &Volume, options: DeformableOptions) -> (TriangleMesh, Coverage) 
         let report = model.step().unwrap();
         assert_eq!(model.mesh().check(), Ok(()), "iteration {iteration}");
         assert_eq!(i64::from(report.euler), model.mesh().euler(), "iteration {iteration}");
-        assert_eq!(count_crossings(&model.mesh().to_triangles()), 0, "iteration {iteration}");
+        assert_eq!(count_self_intersections(&model.mesh().to_triangles()), 0, "iteration {iteration}");
         if report.done {
             return (model.surface(), model.coverage().unwrap());
         }
@@ -224,7 +224,7 @@ fn nothing_intersects_in_world_space() {
     let mut model = DeformableModel::new(&volume, options).unwrap();
     for iteration in 0..25 {
         let report = model.step().unwrap();
-        assert_eq!(count_crossings(&model.surface()), 0, "iteration {iteration}");
+        assert_eq!(count_self_intersections(&model.surface()), 0, "iteration {iteration}");
         assert!(report.vertices > 800);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::common::cine::Cine;
 use vesicle::math::{DAffine3, DVec3, Vec3};
-use vesicle::mesh::{MeshError, TriangleMesh, count_crossings, measure};
+use vesicle::mesh::{MeshError, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
 use vesicle::spatial::surface_distance;
@@ -54,7 +54,7 @@ fn a_beating_ball_is_tracked_through_all_frames_without_self_intersections() {
     assert_eq!(tracker.meshes().len(), cine.frames);
     for (frame, mesh) in tracker.meshes().iter().enumerate() {
         let found = measure(mesh);
-        assert_eq!((found.euler, found.components, count_crossings(mesh)), (2, 1, 0), "{frame}");
+        assert_eq!((found.euler, found.components, count_self_intersections(mesh)), (2, 1, 0), "{frame}");
         let truth = measure(&cine.truth(frame as f64, 0.8));
         assert!((found.volume / truth.volume - 1.0).abs() < 0.1, "{frame} {} {}", found.volume, truth.volume);
     }
@@ -112,7 +112,7 @@ fn gaps_behind_papillary_muscles_close_and_open_without_folds() {
     let mut retracted = 0;
     for (frame, (mesh, facts)) in tracker.meshes().iter().zip(tracker.facts()).enumerate() {
         let (found, truth) = (measure(mesh), measure(&cine.truth(frame as f64, 0.7)));
-        assert_eq!((found.components, count_crossings(mesh)), (1, 0), "{frame}");
+        assert_eq!((found.components, count_self_intersections(mesh)), (1, 0), "{frame}");
         let [area, volume] = [found.area / truth.area, found.volume / truth.volume];
         assert!((area - 1.0).abs() < 0.1 && (volume - 1.0).abs() < 0.05, "{frame} {area} {volume}");
         assert!(facts.folded * 100 < facts.triangles, "{frame} {facts:?}");
@@ -175,7 +175,11 @@ fn the_box_closes_surfaces_that_continue_beyond_it_also_in_mirrored_volumes() {
             let ends = if bounds.is_some() { [5.5, 25.5] } else { [-0.5, 29.5] };
             for (frame, mesh) in tracker.meshes().iter().enumerate() {
                 let found = measure(mesh);
-                assert_eq!((found.euler, found.components, count_crossings(mesh)), (2, 1, 0), "{frame}");
+                assert_eq!(
+                    (found.euler, found.components, count_self_intersections(mesh)),
+                    (2, 1, 0),
+                    "{frame}"
+                );
                 let radius = 7.0 + libm::cos(frame as f64 * std::f64::consts::TAU / 6.0);
                 let truth = std::f64::consts::PI * radius * radius * (ends[1] - ends[0]) * 3.375;
                 assert!((found.volume / truth - 1.0).abs() < 0.06, "{frame} {} {truth}", found.volume);
@@ -196,7 +200,7 @@ fn a_side_of_the_box_inside_the_cavity_closes_the_surface() {
     let tracker = tracked(TrackingOptions { bounds, volume, ..open_ended(&cine) });
     for (frame, (mesh, facts)) in tracker.meshes().iter().zip(tracker.facts()).enumerate() {
         let found = measure(mesh);
-        assert_eq!((found.euler, found.components, count_crossings(mesh)), (2, 1, 0), "{frame}");
+        assert_eq!((found.euler, found.components, count_self_intersections(mesh)), (2, 1, 0), "{frame}");
         let x = mesh.positions.iter().map(|p| p.x).fold(f32::MAX, f32::min);
         assert!((x - 35.0).abs() < 1.2, "{frame} {x}");
         assert!(facts.retracted < facts.triangles / 20, "{frame} {facts:?}");

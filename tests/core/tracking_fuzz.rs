@@ -5,7 +5,7 @@
 
 use crate::common::{Named, Random, seeds};
 use vesicle::math::{DAffine3, DVec3};
-use vesicle::mesh::{count_crossings, measure};
+use vesicle::mesh::{count_self_intersections, measure};
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
 use vesicle::volume::{Space, Volume, VolumeInit, Voxels};
@@ -92,7 +92,7 @@ fn track(options: TrackingOptions) -> Result<usize, MethodError> {
         assert!(tracker.mesh().check().is_ok());
         if let Some(mesh) = tracker.meshes().get(frames) {
             let found = measure(mesh);
-            assert_eq!((found.components, count_crossings(mesh)), (1, 0));
+            assert_eq!((found.components, count_self_intersections(mesh)), (1, 0));
             assert!(mesh.positions.iter().all(|p| p.is_finite()));
         }
     }

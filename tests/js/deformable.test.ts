@@ -412,7 +412,7 @@ const REFUSED: [string, string, string, () => unknown][] = [
   [
     'a start mesh that crosses itself',
     'self-intersecting',
-    'cross',
+    'intersects itself',
     () => {
       const { positions, indices } = closed.arrays();
       const twice = Float32Array.from([...positions, ...positions.map((value) => value + 1)]);

@@ -519,7 +519,7 @@ const REFUSED: [string, string, string, () => unknown][] = [
   ['a component nowhere', 'invalid-argument', 'component', () => tracker({ component: [1, Number.NaN, 2] })],
   ['a start that is none', 'invalid-argument', 'start', () => tracker({ start: wrong(closed) })],
   ['an open start', 'not-closed', 'closed', () => tracker({ start: open() })],
-  ['a start that crosses itself', 'self-intersecting', 'cross', () => tracker({ start: crossing() })],
+  ['a start that crosses itself', 'self-intersecting', 'intersects itself', () => tracker({ start: crossing() })],
   ['a start inside out', 'invalid-argument', 'start', () => tracker({ start: insideOut() })],
   ['an empty start', 'invalid-argument', 'start', () => tracker({ start: tracker().mesh })],
   ['parameters in a row', 'invalid-argument', 'params', () => tracker({ params: wrong([1]) })],

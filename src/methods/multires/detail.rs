@@ -152,7 +152,7 @@ pub(super) fn detailed(
         fine.refine(bands, fineness.longest);
     }
     let shown = carried(fine, bands, guard);
-    if fineness.rounds > 0 && guard.left_crossing(&shown.mesh) {
+    if fineness.rounds > 0 && guard.still_intersects(&shown.mesh) {
         // A part of the membrane is so small that rounding dominates: edge midpoints then cause intersections.
         return carried(Samples::new(surface, link, bands), bands, guard);
     }
@@ -169,13 +169,13 @@ fn carried(samples: Samples, bands: &Bands, guard: &mut Embedding) -> Detailed {
             let normal = if k == 0 { normals[v.index()] } else { mesh.area_normal(v).normalize_or_zero() };
             ways[v.index()] = normal * offsets[v.index()].lambdas[k];
         }
-        guard.follow_with(&mesh, super::usual_edge(&mesh));
+        guard.sync_with_edge(&mesh, super::usual_edge(&mesh));
         let wanted = ways.clone();
-        let back = guard.carry(&mut mesh, &mut ways);
+        let back = guard.move_all(&mut mesh, &mut ways);
         held += back.len();
         if !back.is_empty() {
             let mut ways = softened(&mesh, &wanted, &back);
-            guard.carry(&mut mesh, &mut ways);
+            guard.move_all(&mut mesh, &mut ways);
         }
     }
     let missed = mesh.vertices().filter(|v| offsets[v.index()].missed).count();
@@ -267,7 +267,7 @@ impl Samples {
     /// Returns the midpoint of an edge, with its detail.
     fn middle(&self, bands: &Bands, u: VertexId, v: VertexId) -> Sample {
         let (from, to) = (&self.link[u.index()], &self.link[v.index()]);
-        let on_base = bands.base().walker.march(from.triangle, (from.point + to.point) * 0.5);
+        let on_base = bands.base().walker.walk(from.triangle, (from.point + to.point) * 0.5);
         let link: Linked = on_base.into();
         Sample {
             position: (self.mesh.position(u) + self.mesh.position(v)) * 0.5,

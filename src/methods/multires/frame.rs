@@ -100,8 +100,8 @@ impl MultiresolutionModel {
         }
         let mut next = self.surface.clone();
         let mut ways = ways_to(&next, ahead.carried.positions());
-        self.guard.follow_with(&next, usual_edge(&next));
-        if !self.guard.carry(&mut next, &mut ways).is_empty() {
+        self.guard.sync_with_edge(&next, usual_edge(&next));
+        if !self.guard.move_all(&mut next, &mut ways).is_empty() {
             return None;
         }
         if deepest > ROUNDING {
@@ -165,7 +165,7 @@ impl MultiresolutionModel {
 
     fn followed_with_care(&self, ahead: &Ahead) -> (Mesh, Changes) {
         let mut next = self.surface.clone();
-        let resolver = &mut Resolver::with_room_for(MOST_VERTICES);
+        let resolver = &mut Resolver::with_max_vertices(MOST_VERTICES);
         let changes = follow(&mut next, ahead.carried.positions(), &ahead.are, &ahead.params, resolver);
         (next, changes)
     }
@@ -182,7 +182,7 @@ impl MultiresolutionModel {
         if held(&self.surface, &ahead.were).into_iter().zip(held(&mesh, &ahead.are)).any(loses) {
             return None;
         }
-        self.guard.follow_with(&mesh, usual_edge(&mesh));
+        self.guard.sync_with_edge(&mesh, usual_edge(&mesh));
         if !self.guard.is_embedded(&mesh) {
             return None;
         }

@@ -77,13 +77,13 @@ fn nearest(
         let [a, b, c] = walker.corners(found.triangle);
         (b - a).cross(c - a).dot(normal) >= 0.0
     };
-    let marched = start.map(|start| walker.march(start, p));
+    let marched = start.map(|start| walker.walk(start, p));
     match marched.filter(|found| found.distance <= farthest && faces_alike(found)) {
         Some(found) => found,
         // Positions are finite, so a closest point exists.
         None => {
-            let found = if start.is_some() { walker.closest(p) } else { walker.closest_of_all(p) };
-            found.unwrap_or_else(|| walker.march(0, p))
+            let found = if start.is_some() { walker.closest(p) } else { walker.closest_brute_force(p) };
+            found.unwrap_or_else(|| walker.walk(0, p))
         }
     }
 }
@@ -94,7 +94,7 @@ fn onto_base(before: &Before, base: &SurfaceWalker, at: &SurfacePoint) -> Linked
     let weights = at.barycentric;
     let point = corners[0].point * weights.x + corners[1].point * weights.y + corners[2].point * weights.z;
     let heaviest = (0..3).fold(0, |best, k| if weights[k] > weights[best] { k } else { best });
-    linked(base, &base.march(corners[heaviest].triangle, point))
+    linked(base, &base.walk(corners[heaviest].triangle, point))
 }
 
 /// Visits every vertex, starting each component at any vertex and continuing with neighbours. `visit` is passed its
@@ -151,7 +151,7 @@ fn spread(
         total += density(w);
     }
     let here = link[v.index()];
-    if total > 0.0 { linked(base, &base.march(here.triangle, sum * (1.0 / total))) } else { here }
+    if total > 0.0 { linked(base, &base.walk(here.triangle, sum * (1.0 / total))) } else { here }
 }
 
 /// Whether the image of a triangle on the base is flipped or has no area.

@@ -115,11 +115,11 @@ impl MultiresolutionModel {
         let mut surface = base;
         check_size(area(&surface), &params)?;
         let mut guard = Embedding::default();
-        guard.follow_with(&surface, usual_edge(&surface));
+        guard.sync_with_edge(&surface, usual_edge(&surface));
         restructure(&mut surface, params.bounds(), &mut guard);
         let places = hold(&surface, &movers.now());
         let mut ways = ways_to(&surface, &places);
-        guard.carry(&mut surface, &mut ways);
+        guard.move_all(&mut surface, &mut ways);
         let walker = &bands.base().walker;
         let itself = on_itself(walker);
         let before = Before { walker, link: &itself };
@@ -292,7 +292,7 @@ impl MultiresolutionModel {
     fn show(&mut self) {
         let shown = detailed(&self.surface, &self.link, &self.bands, &mut self.guard, fineness(&self.params));
         let replaced = std::mem::replace(&mut self.shown, shown);
-        self.shown.mesh.count_on_from(&replaced.mesh);
+        self.shown.mesh.advance_versions_past(&replaced.mesh);
     }
 
     fn report(&self, events: Changes, times: Times) -> StepReport {

@@ -67,7 +67,7 @@ impl MultiresolutionModel {
         let Some(link) = self.linked(&state.link) else { return bad("link", "it leads nowhere") };
         (self.params, self.movers, self.link) = (state.params, state.movers, link);
         let replaced = std::mem::replace(&mut self.surface, state.surface);
-        self.surface.count_on_from(&replaced);
+        self.surface.advance_versions_past(&replaced);
         (self.iteration, self.passing) = (state.iteration, state.passing);
         (self.components, self.residual) = (state.components, state.residual);
         self.show();

@@ -32,7 +32,7 @@ fn of_triangle(corners: [VertexId; 3], places: &Link, finest: &SurfaceWalker) ->
         return own;
     }
     // All three from one side of the seam, that of the centroid.
-    let middle: Linked = finest.march(at[0].triangle, (p + q + r) * (1.0 / 3.0)).into();
+    let middle: Linked = finest.walk(at[0].triangle, (p + q + r) * (1.0 / 3.0)).into();
     at.map(|at| continued(finest, middle.triangle, at.point))
 }
 

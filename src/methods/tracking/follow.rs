@@ -230,8 +230,8 @@ impl Follower {
 
     /// Moves the vertices by `ways` under the collision guard. Returns the number held back.
     pub(super) fn carry(&mut self, mesh: &mut Mesh, mut ways: Vec<Vec3>) -> usize {
-        self.guard.follow_with(mesh, self.bounds.max);
-        self.guard.carry(mesh, &mut ways).len()
+        self.guard.sync_with_edge(mesh, self.bounds.max);
+        self.guard.move_all(mesh, &mut ways).len()
     }
 }
 

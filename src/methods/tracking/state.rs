@@ -89,7 +89,7 @@ impl SurfaceTracker {
         self.params = params;
         self.begin();
         let replaced = std::mem::replace(&mut self.mesh, state.mesh);
-        self.mesh.count_on_from(&replaced);
+        self.mesh.advance_versions_past(&replaced);
         self.faces = state.faces;
         (self.meshes, self.facts) = (meshes, state.facts);
         (self.closing, self.steps) = (state.closing, state.steps);

@@ -71,7 +71,7 @@ impl System {
         let places: Vec<Vec3> = order.iter().map(|&i| constraints.centres[i as usize]).collect();
         let centres: Vec<DVec3> = places.iter().map(|p| p.as_dvec3()).collect();
         let values = at_places(&order, &constraints.values);
-        let shuffled = Random::new(seed).order(places.len());
+        let shuffled = Random::new(seed).permutation(places.len());
         let (surface, outside): (Vec<u32>, Vec<u32>) =
             shuffled.iter().partition(|&&i| values[i as usize] == 0.0);
         Self {

@@ -14,23 +14,23 @@ impl Mesh {
     /// over rings then read memory nearly in order; on a shuffled mesh they take 3–6 times as long.
     pub fn reorder(&mut self) -> Vec<Option<VertexId>> {
         let order = self.component_members().concat();
-        self.keep(&order)
+        self.apply_order(&order)
     }
 
     /// Moves vertex `order[i]` to slot `i`; `order` contains every live vertex once. Returns the new id of each old
     /// slot.
-    fn keep(&mut self, order: &[VertexId]) -> Vec<Option<VertexId>> {
-        let mut names = vec![None; self.slots()];
+    fn apply_order(&mut self, order: &[VertexId]) -> Vec<Option<VertexId>> {
+        let mut new_ids = vec![None; self.slots()];
         for (i, &v) in order.iter().enumerate() {
-            names[v.index()] = Some(VertexId::from_index(i));
+            new_ids[v.index()] = Some(VertexId::from_index(i));
         }
         self.positions = order.iter().map(|v| self.positions[v.index()]).collect();
         self.attributes.reorder(order);
         let mut rings: Vec<_> = order.iter().map(|v| std::mem::take(&mut self.rings[v.index()])).collect();
-        rings.iter_mut().for_each(|ring| ring.rename(|v| names[v.index()].unwrap_or(v)));
+        rings.iter_mut().for_each(|ring| ring.renumber(|v| new_ids[v.index()].unwrap_or(v)));
         self.rings = rings;
         self.free.clear();
         self.topology_changed();
-        names
+        new_ids
     }
 }

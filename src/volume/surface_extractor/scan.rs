@@ -27,7 +27,7 @@ struct Line {
 
 impl Line {
     /// Returns whether a component of the surface that crosses the line has not been found, by parity.
-    fn misses_a_piece(&self, blocks: &Blocks) -> bool {
+    fn has_missing_component(&self, blocks: &Blocks) -> bool {
         (self.inside[0] != self.inside[1]) != blocks.crosses_oddly(self.from, self.axis, self.to)
     }
 
@@ -46,7 +46,7 @@ impl Line {
         let middle = self.middle();
         let first = Line { to: middle[self.axis], inside: [self.inside[0], middle_inside], ..*self };
         let second = Line { from: middle, inside: [middle_inside, self.inside[1]], ..*self };
-        if first.misses_a_piece(blocks) { first } else { second }
+        if first.has_missing_component(blocks) { first } else { second }
     }
 }
 
@@ -59,15 +59,15 @@ pub(super) struct Scan {
     /// Number of coarse nodes that were evaluated or requested.
     known: usize,
     /// Coarse nodes of the current batch.
-    asked: Vec<usize>,
+    requested: Vec<usize>,
     /// Index of the next line: axis + 3 × the coarse node where it starts.
     next_line: usize,
     /// The line that is being bisected.
     line: Option<Line>,
     /// Whether a component was found in the current pass over all lines.
-    found_some: bool,
+    found_in_pass: bool,
     /// Number of components found so far.
-    pub found: usize,
+    pub components_found: usize,
 }
 
 impl Scan {
@@ -83,13 +83,22 @@ impl Scan {
         let count = axes.iter().map(Vec::len).product();
         let mut inside = reserve(count)?;
         inside.resize(count, false);
-        let asked = Vec::new();
-        Ok(Self { axes, inside, known: 0, asked, next_line: 0, line: None, found_some: false, found: 0 })
+        let requested = Vec::new();
+        Ok(Self {
+            axes,
+            inside,
+            known: 0,
+            requested,
+            next_line: 0,
+            line: None,
+            found_in_pass: false,
+            components_found: 0,
+        })
     }
 
     /// Fills `batch` with the points the scan needs next, or queues a cell in the flood; returns false when the scan is
     /// complete.
-    pub fn ask(
+    pub fn request(
         &mut self,
         blocks: &mut Blocks,
         flood: &mut Flood,
@@ -97,18 +106,18 @@ impl Scan {
         batch: &mut Batch,
     ) -> Result<bool, VolumeError> {
         if self.known < self.inside.len() {
-            self.ask_nodes(blocks);
-            batch.extend(self.asked.iter().map(|&coarse| lattice.position(self.node(coarse))));
+            self.request_nodes(blocks);
+            batch.extend(self.requested.iter().map(|&coarse| lattice.position(self.node(coarse))));
             return Ok(true);
         }
         self.line = self.line.or_else(|| self.find_line(blocks));
         let Some(line) = self.line else { return Ok(false) };
         if line.is_edge() {
             // The cell was visited before only if the function is inconsistent: such a line would be found for ever.
-            let is_new = flood.look_at(line.from, blocks)?;
+            let is_new = flood.visit(line.from, blocks)?;
             self.line = None;
-            self.found += usize::from(is_new);
-            self.found_some |= is_new;
+            self.components_found += usize::from(is_new);
+            self.found_in_pass |= is_new;
         } else {
             batch.extend([lattice.position(line.middle())]);
         }
@@ -116,8 +125,8 @@ impl Scan {
     }
 
     /// Stores the values of the batch: of coarse nodes, or of the middle of the line being bisected.
-    pub fn take(&mut self, values: &[f64], blocks: &Blocks) {
-        for (coarse, &value) in self.asked.drain(..).zip(values) {
+    pub fn store_values(&mut self, values: &[f64], blocks: &Blocks) {
+        for (coarse, &value) in self.requested.drain(..).zip(values) {
             self.inside[coarse] = is_inside(value);
         }
         // There is no line until all coarse nodes are evaluated.
@@ -127,15 +136,15 @@ impl Scan {
     }
 
     /// Selects the next coarse nodes to evaluate, and reuses values that the flood evaluated.
-    fn ask_nodes(&mut self, blocks: &Blocks) {
-        self.asked.clear();
-        while self.known < self.inside.len() && self.asked.len() < BATCH {
+    fn request_nodes(&mut self, blocks: &Blocks) {
+        self.requested.clear();
+        while self.known < self.inside.len() && self.requested.len() < BATCH {
             let node = self.node(self.known);
             let value = blocks.value(blocks.slot(node));
             if !value.is_nan() {
                 self.inside[self.known] = is_inside(value);
             } else if !blocks.is_padding(node) {
-                self.asked.push(self.known);
+                self.requested.push(self.known);
             }
             self.known += 1;
         }
@@ -148,11 +157,11 @@ impl Scan {
             while self.next_line < 3 * self.inside.len() {
                 let line = self.line(self.next_line);
                 self.next_line += 1;
-                if let Some(line) = line.filter(|line| line.misses_a_piece(blocks)) {
+                if let Some(line) = line.filter(|line| line.has_missing_component(blocks)) {
                     return Some(line);
                 }
             }
-            if !std::mem::take(&mut self.found_some) {
+            if !std::mem::take(&mut self.found_in_pass) {
                 return None;
             }
             self.next_line = 0;

@@ -5,7 +5,7 @@ use super::super::error::{VolumeError, reserve};
 use super::Lattice;
 use super::batch::Batch;
 use super::blocks::{Blocks, next};
-use super::flood::CutCell;
+use super::flood::CrossedCell;
 use super::root::Root;
 use crate::math::DVec3;
 use crate::mesh::TriangleMesh;
@@ -13,7 +13,7 @@ use crate::mesh::TriangleMesh;
 const NONE: u32 = u32::MAX;
 
 /// Returns the cut edges that start at the cell's first node, one bit per axis.
-fn near_cuts(case: u8) -> u8 {
+fn crossed_near_edges(case: u8) -> u8 {
     let far_ends = [corner([1, 0, 0]), corner([0, 1, 0]), corner([0, 0, 1])];
     (0..3).fold(0, |cuts, axis| cuts | ((case ^ case >> far_ends[axis]) & 1) << axis)
 }
@@ -27,52 +27,52 @@ struct Vertex {
 
 /// The crossed cells and their vertices, both sorted by block, then node.
 pub(super) struct Surface {
-    cells: Vec<CutCell>,
+    cells: Vec<CrossedCell>,
     /// For each cell, the vertex on the first cut edge that starts at its first node; those on its other edges follow.
     first: Vec<u32>,
     /// For each slot, the index of its cell in `cells`, or [`NONE`].
     index: Vec<u32>,
     vertices: Vec<Vertex>,
     /// Vertices in the current refinement batch.
-    asked: Vec<usize>,
+    requested: Vec<usize>,
 }
 
 impl Surface {
     /// Builds the surface of the given cells, with vertices placed by linear interpolation of the node values.
-    pub fn new(cut: &[CutCell], blocks: &Blocks) -> Result<Self, VolumeError> {
-        let (mut order, mut cells) = (reserve(cut.len())?, reserve(cut.len())?);
-        order.extend(cut.iter().map(|cell| blocks.rank(cell.slot)).zip(0_u32..));
+    pub fn new(crossed: &[CrossedCell], blocks: &Blocks) -> Result<Self, VolumeError> {
+        let (mut order, mut cells) = (reserve(crossed.len())?, reserve(crossed.len())?);
+        order.extend(crossed.iter().map(|cell| blocks.rank(cell.slot)).zip(0_u32..));
         order.sort_unstable();
-        cells.extend(order.iter().map(|&(_, i)| cut[i as usize]));
-        let count = cells.iter().map(|cell| near_cuts(cell.case).count_ones() as usize).sum();
+        cells.extend(order.iter().map(|&(_, i)| crossed[i as usize]));
+        let count = cells.iter().map(|cell| crossed_near_edges(cell.case).count_ones() as usize).sum();
         let (mut vertices, mut first, mut index) =
             (reserve(count)?, reserve(cells.len())?, reserve(blocks.slots())?);
         index.resize(blocks.slots(), NONE);
-        for (at, &CutCell { slot, case }) in cells.iter().enumerate() {
+        for (at, &CrossedCell { slot, case }) in cells.iter().enumerate() {
             index[slot as usize] = at as u32;
             first.push(vertices.len() as u32);
-            let axes = (0..3).filter(|axis| near_cuts(case) >> axis & 1 == 1);
+            let axes = (0..3).filter(|axis| crossed_near_edges(case) >> axis & 1 == 1);
             vertices.extend(axes.map(|axis| Vertex { slot, axis, root: root(slot, axis, blocks) }));
         }
-        Ok(Self { cells, first, index, vertices, asked: Vec::new() })
+        Ok(Self { cells, first, index, vertices, requested: Vec::new() })
     }
 
     /// Fills `batch` with the estimates of all vertices that have not converged; returns false if all have.
-    pub fn ask(&mut self, blocks: &Blocks, lattice: &Lattice, batch: &mut Batch) -> bool {
-        let Self { vertices, asked, .. } = self;
-        asked.clear();
-        asked.extend((0..vertices.len()).filter(|&v| !vertices[v].root.is_settled()));
-        batch.extend(asked.iter().map(|&v| {
+    pub fn request(&mut self, blocks: &Blocks, lattice: &Lattice, batch: &mut Batch) -> bool {
+        let Self { vertices, requested, .. } = self;
+        requested.clear();
+        requested.extend((0..vertices.len()).filter(|&v| !vertices[v].root.has_converged()));
+        batch.extend(requested.iter().map(|&v| {
             let Vertex { slot, axis, root } = &vertices[v];
             lattice.on_edge(blocks.node(*slot), *axis, root.estimate())
         }));
-        !asked.is_empty()
+        !requested.is_empty()
     }
 
     /// Passes the values of the refinement batch to the roots of its vertices.
-    pub fn take(&mut self, values: &[f64]) {
-        for (v, &value) in self.asked.drain(..).zip(values) {
-            self.vertices[v].root.take(value);
+    pub fn store_values(&mut self, values: &[f64]) {
+        for (v, &value) in self.requested.drain(..).zip(values) {
+            self.vertices[v].root.add_sample(value);
         }
     }
 
@@ -84,7 +84,7 @@ impl Surface {
     /// Builds the mesh of all triangles whose three vertices exist, which are all once the flood is complete.
     pub fn mesh(&self, blocks: &Blocks, lattice: &Lattice) -> Result<TriangleMesh, VolumeError> {
         let cases = cases();
-        let case = |cell: &CutCell| &cases[usize::from(cell.case)];
+        let case = |cell: &CrossedCell| &cases[usize::from(cell.case)];
         let mut positions = reserve(self.vertices.len())?;
         positions.extend(self.positions(blocks, lattice).map(|p| p.as_vec3()));
         let mut triangles = reserve(self.cells.iter().map(|cell| case(cell).triangles.len()).sum())?;
@@ -96,7 +96,7 @@ impl Surface {
 
     fn triangles<'a>(
         &'a self,
-        cell: &CutCell,
+        cell: &CrossedCell,
         case: &'a Case,
         blocks: &Blocks,
     ) -> impl Iterator<Item = [u32; 3]> + 'a {
@@ -112,7 +112,7 @@ impl Surface {
     /// found yet.
     fn vertex(&self, slot: u32, axis: usize) -> Option<u32> {
         let at = *self.index.get(slot as usize)? as usize;
-        let before = near_cuts(self.cells.get(at)?.case) & ((1 << axis) - 1);
+        let before = crossed_near_edges(self.cells.get(at)?.case) & ((1 << axis) - 1);
         Some(self.first[at] + before.count_ones())
     }
 }

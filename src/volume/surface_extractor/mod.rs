@@ -1,10 +1,10 @@
 //! Surface-following marching cubes: extracts the zero set of an implicit function, evaluated only near the surface.
 //!
-//! For functions that are expensive and best evaluated for many points at a time. A [`Follower`] starts in the cells of
-//! its seeds and continues from cell to cell through the faces that the surface crosses (`flood`); a coarse scan of the
-//! rest of the lattice finds components without a seed (`scan`); a few root-finding iterations along its lattice edge
-//! move each vertex onto the surface (`root`). Work is done in slices of a given number of evaluations, and the mesh
-//! found so far is available after each.
+//! For functions that are expensive and best evaluated for many points at a time. A [`SurfaceExtractor`] starts in the
+//! cells of its seeds and continues from cell to cell through the faces that the surface crosses (`flood`); a coarse
+//! scan of the rest of the lattice finds components without a seed (`scan`); a few root-finding iterations along its
+//! lattice edge move each vertex onto the surface (`root`). Work is done in slices of a given number of evaluations,
+//! and the mesh found so far is available after each.
 //!
 //! Guarantees: cubes are triangulated as by [`marching_cubes`](super::marching_cubes), values of 0 and above are
 //! inside, NaN and everything beyond the lattice are outside. So the mesh is closed, oriented, 2-manifold and free of
@@ -41,8 +41,8 @@ const MAX_EDGES_AWAY: f64 = 8192.0;
 /// Smallest accepted edge length, in world units: far below it, `f32` cannot distinguish vertices.
 const MIN_EDGE: f64 = 1e-30;
 
-/// A regular lattice of cubes in world space on which [`Follower`] extracts a surface. Node (i, j, k) is at origin +
-/// edge × (i, j, k).
+/// A regular lattice of cubes in world space on which [`SurfaceExtractor`] extracts a surface. Node (i, j, k) is at
+/// origin + edge × (i, j, k).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
     /// World position of node (0, 0, 0).
@@ -57,13 +57,13 @@ impl Lattice {
     fn check(&self) -> Result<(), VolumeError> {
         let Self { origin, edge, dims } = self;
         if dims.iter().any(|n| !(1..=MAX_NODES).contains(n)) {
-            let problem = format!("{dims:?} given; 1 to {MAX_NODES} nodes along each axis are accepted");
+            let problem = format!("must be 1 to {MAX_NODES} nodes per axis, got {dims:?}");
             return Err(VolumeError::invalid("dims", problem));
         }
         if !(edge.is_finite() && *edge >= MIN_EDGE) {
             return Err(VolumeError::invalid(
                 "edge",
-                format!("{edge} given; a length of at least {MIN_EDGE} is needed"),
+                format!("must be finite and at least {MIN_EDGE}, got {edge}"),
             ));
         }
         let last = self.position(*dims);
@@ -71,9 +71,8 @@ impl Lattice {
         if origin.is_finite() && furthest <= MAX_EDGES_AWAY * edge && furthest <= f64::from(f32::MAX) {
             return Ok(());
         }
-        let problem = format!(
-            "{origin} given; the lattice must lie within {MAX_EDGES_AWAY} edges of the world's origin"
-        );
+        let problem =
+            format!("the lattice must lie within {MAX_EDGES_AWAY} edges of the world origin, got {origin}");
         Err(VolumeError::invalid("origin", problem))
     }
 
@@ -120,29 +119,29 @@ enum Task {
 ///
 /// ```
 /// use vesicle::math::DVec3;
-/// use vesicle::volume::{Follower, Lattice};
+/// use vesicle::volume::{Lattice, SurfaceExtractor};
 ///
 /// let mut ball = |points: &[DVec3], values: &mut [f64]| {
 ///     values.iter_mut().zip(points).for_each(|(value, p)| *value = 1.0 - p.length());
 /// };
 /// let lattice = Lattice { origin: DVec3::splat(-1.5), edge: 0.1, dims: [31; 3] };
-/// let mut follower = Follower::new(lattice)?;
-/// follower.seed(DVec3::X);
-/// follower.scan(4)?;
-/// follower.refine(3);
-/// while !follower.advance(1000, &mut ball)? {}
-/// assert_eq!(follower.found_by_scan(), 0);
-/// assert!(follower.mesh()?.positions.iter().all(|p| (p.length() - 1.0).abs() < 4e-4));
+/// let mut extractor = SurfaceExtractor::new(lattice)?;
+/// extractor.seed(DVec3::X);
+/// extractor.scan(4)?;
+/// extractor.refine(3);
+/// while !extractor.advance(1000, &mut ball)? {}
+/// assert_eq!(extractor.components_found_by_scan(), 0);
+/// assert!(extractor.mesh()?.positions.iter().all(|p| (p.length() - 1.0).abs() < 4e-4));
 /// # Ok::<(), vesicle::volume::VolumeError>(())
 /// ```
-pub struct Follower {
+pub struct SurfaceExtractor {
     lattice: Lattice,
     blocks: Blocks,
     flood: Flood,
     scan: Option<Scan>,
-    /// Refinement steps requested per vertex; `taken` is the number performed.
-    steps: usize,
-    taken: usize,
+    /// Refinement steps requested per vertex; `refine_steps_done` is the number performed.
+    refine_steps: usize,
+    refine_steps_done: usize,
     /// The surface during and after refinement.
     surface: Option<Surface>,
     batch: Batch,
@@ -151,7 +150,7 @@ pub struct Follower {
     evaluations: usize,
 }
 
-impl Follower {
+impl SurfaceExtractor {
     /// Creates an extractor without seeds.
     ///
     /// # Errors
@@ -164,8 +163,8 @@ impl Follower {
             blocks: Blocks::new(lattice.dims)?,
             flood: Flood::default(),
             scan: None,
-            steps: 0,
-            taken: 0,
+            refine_steps: 0,
+            refine_steps_done: 0,
             surface: None,
             batch: Batch::default(),
             task: Task::Nothing,
@@ -192,12 +191,12 @@ impl Follower {
     /// A stride of 0; [`VolumeError::TooLarge`].
     pub fn scan(&mut self, stride: usize) -> Result<(), VolumeError> {
         if stride == 0 {
-            return Err(VolumeError::invalid("stride", "0 given; at least 1 is needed"));
+            return Err(VolumeError::invalid("stride", "must be at least 1, got 0"));
         }
         let mut scan = Scan::new(stride, &self.blocks)?;
-        scan.found = self.found_by_scan();
+        scan.components_found = self.components_found_by_scan();
         self.scan = Some(scan);
-        self.drop_batch_of(Task::Scan);
+        self.discard_batch_of(Task::Scan);
         Ok(())
     }
 
@@ -209,7 +208,7 @@ impl Follower {
     /// `f32`, and to 4e-12 by two. A vertex takes no more steps once they would not move it, and stays 1/256 of an edge
     /// away from nodes.
     pub fn refine(&mut self, steps: usize) {
-        self.steps = steps;
+        self.refine_steps = steps;
     }
 
     /// Continues with at most `budget` evaluations, but at least one; returns true when the extraction is complete.
@@ -229,11 +228,11 @@ impl Follower {
             let count = self.batch.evaluate(left, f);
             left -= count;
             self.evaluations += count;
-            if !self.take()? {
+            if !self.store_values()? {
                 return Ok(false);
             }
-            self.drop_batch_of(self.task);
-            self.task = self.ask()?;
+            self.discard_batch_of(self.task);
+            self.task = self.next_task()?;
             if self.task == Task::Nothing {
                 return Ok(true);
             }
@@ -241,46 +240,46 @@ impl Follower {
     }
 
     /// Passes the values of the batch to the stage that requested them; returns false if some are missing.
-    fn take(&mut self) -> Result<bool, VolumeError> {
+    fn store_values(&mut self) -> Result<bool, VolumeError> {
         let Some(values) = self.batch.values() else { return Ok(false) };
         match self.task {
             Task::Nothing => {}
             Task::Wave => {
-                (self.surface, self.taken, self.waves) = (None, 0, self.waves + 1);
-                self.flood.take(values, &mut self.blocks)?;
+                (self.surface, self.refine_steps_done, self.waves) = (None, 0, self.waves + 1);
+                self.flood.store_values(values, &mut self.blocks)?;
             }
-            Task::Scan => self.scan.iter_mut().for_each(|scan| scan.take(values, &self.blocks)),
+            Task::Scan => self.scan.iter_mut().for_each(|scan| scan.store_values(values, &self.blocks)),
             Task::Refine => {
-                self.surface.iter_mut().for_each(|surface| surface.take(values));
-                self.taken += 1;
+                self.surface.iter_mut().for_each(|surface| surface.store_values(values));
+                self.refine_steps_done += 1;
             }
         }
         Ok(true)
     }
 
     /// Selects the next stage and fills the batch for it: first the flood, then the scan, then refinement.
-    fn ask(&mut self) -> Result<Task, VolumeError> {
+    fn next_task(&mut self) -> Result<Task, VolumeError> {
         let Self { lattice, blocks, flood, batch, .. } = self;
-        if flood.ask(blocks, lattice, batch)? {
+        if flood.request(blocks, lattice, batch)? {
             return Ok(Task::Wave);
         }
         if let Some(scan) = &mut self.scan
-            && scan.ask(blocks, flood, lattice, batch)?
+            && scan.request(blocks, flood, lattice, batch)?
         {
             return Ok(Task::Scan);
         }
-        if self.taken >= self.steps {
+        if self.refine_steps_done >= self.refine_steps {
             return Ok(Task::Nothing);
         }
         let surface = match &mut self.surface {
             Some(surface) => surface,
-            none => none.insert(Surface::new(&flood.cut, blocks)?),
+            none => none.insert(Surface::new(&flood.crossed, blocks)?),
         };
-        Ok(if surface.ask(blocks, lattice, batch) { Task::Refine } else { Task::Nothing })
+        Ok(if surface.request(blocks, lattice, batch) { Task::Refine } else { Task::Nothing })
     }
 
     /// Discards the current batch if `task` requested it.
-    fn drop_batch_of(&mut self, task: Task) {
+    fn discard_batch_of(&mut self, task: Task) {
         if self.task == task {
             self.batch.clear();
             self.task = Task::Nothing;
@@ -314,7 +313,7 @@ impl Follower {
     fn with_surface<T>(&self, read: impl Fn(&Surface) -> Result<T, VolumeError>) -> Result<T, VolumeError> {
         match &self.surface {
             Some(surface) => read(surface),
-            None => read(&Surface::new(&self.flood.cut, &self.blocks)?),
+            None => read(&Surface::new(&self.flood.crossed, &self.blocks)?),
         }
     }
 
@@ -327,19 +326,19 @@ impl Follower {
             Task::Nothing => 0.0,
             Task::Wave => 0.6 * waves / (waves + 2.0),
             Task::Scan => 0.6,
-            Task::Refine => 0.6 + 0.4 * (self.taken as f64 + share) / self.steps as f64,
+            Task::Refine => 0.6 + 0.4 * (self.refine_steps_done as f64 + share) / self.refine_steps as f64,
         }
     }
 
     /// Returns the number of components of the surface without a seed that the scan found; components that share a cell
     /// count as one.
-    pub fn found_by_scan(&self) -> usize {
-        self.scan.as_ref().map_or(0, |scan| scan.found)
+    pub fn components_found_by_scan(&self) -> usize {
+        self.scan.as_ref().map_or(0, |scan| scan.components_found)
     }
 
     /// Returns the number of cells that the surface crosses, as found so far.
     pub fn crossed_cells(&self) -> usize {
-        self.flood.cut.len()
+        self.flood.crossed.len()
     }
 
     /// Returns the number of function evaluations so far.

@@ -7,21 +7,21 @@ use crate::mesh::{Mesh, VertexId};
 
 /// The largest number of vertices of a component that may be removed, whatever its volume; the volume of a cavity is
 /// negative.
-const LARGEST_SPECK: usize = 32;
+const MAX_VERTICES: usize = 32;
 
 /// The volume of an icosahedron with edges of length δ, in δ³: the smallest sphere that can be sampled.
-const SMALLEST_BALL: f32 = 2.18;
+const SMALLEST_SPHERE: f32 = 2.18;
 
 /// The components of a mesh small enough to be removed.
 #[derive(Clone, Debug, Default)]
-pub(super) struct SmallParts {
+pub(super) struct SmallComponents {
     /// A vertex of each component, and whether it is solid, with a positive volume.
-    parts: Vec<(VertexId, bool)>,
+    components: Vec<(VertexId, bool)>,
     /// The topology version of the mesh for which the list is valid.
     topology_version: Option<u32>,
 }
 
-impl SmallParts {
+impl SmallComponents {
     /// Finds the small components, unless the list is up to date.
     pub(super) fn find(&mut self, mesh: &Mesh) {
         if self.topology_version != Some(mesh.topology_version()) {
@@ -31,23 +31,23 @@ impl SmallParts {
 
     /// Updates the small components after edits of the components of `edited`.
     fn find_again(&mut self, mesh: &Mesh, edited: &[VertexId]) {
-        let known = std::mem::take(&mut self.parts);
+        let known = std::mem::take(&mut self.components);
         let members = known.into_iter().map(|(v, _)| v).chain(edited.iter().copied());
         self.find_among(mesh, members.filter(|&v| mesh.is_live(v)));
     }
 
     fn find_among(&mut self, mesh: &Mesh, vertices: impl Iterator<Item = VertexId>) {
-        self.parts.clear();
+        self.components.clear();
         let mut seen = vec![false; mesh.slots()];
         for v in vertices {
             if seen[v.index()] {
                 continue;
             }
             // A search that stops early is within a large component.
-            let found = mesh.component_of(v, LARGEST_SPECK + 1);
+            let found = mesh.component_of(v, MAX_VERTICES + 1);
             found.iter().for_each(|w| seen[w.index()] = true);
-            if found.len() <= LARGEST_SPECK {
-                self.parts.push((v, volume(mesh, &found) > 0.0));
+            if found.len() <= MAX_VERTICES {
+                self.components.push((v, volume(mesh, &found) > 0.0));
             }
         }
         self.topology_version = Some(mesh.topology_version());
@@ -61,7 +61,7 @@ impl Resolver {
     ///
     /// Such a component has at most 32 vertices and a volume less than δ³. One of negative volume would grow in empty
     /// space, unless `guide` finds a cavity there.
-    pub(super) fn remove_speck(
+    pub(super) fn remove_if_negligible(
         &mut self,
         mesh: &mut Mesh,
         sampling: Sampling,
@@ -71,15 +71,15 @@ impl Resolver {
         if !mesh.is_live(v) {
             return true;
         }
-        let members = mesh.component_of(v, LARGEST_SPECK + 1);
-        if members.len() > LARGEST_SPECK {
+        let members = mesh.component_of(v, MAX_VERTICES + 1);
+        if members.len() > MAX_VERTICES {
             return false;
         }
         let (volume, least) = (volume(mesh, &members), sampling.smallest_volume());
         if volume >= least || volume <= -least && guide.has_content(mesh, &members, false) {
             return false;
         }
-        self.remove_part(mesh, v);
+        self.remove_component(mesh, v);
         true
     }
 
@@ -98,46 +98,46 @@ impl Resolver {
     ) {
         self.small.find(mesh);
         let is_stuck = |v: &VertexId| stuck.binary_search(v).is_ok();
-        for (v, was_solid) in std::mem::take(&mut self.small.parts) {
+        for (v, was_solid) in std::mem::take(&mut self.small.components) {
             // It may have been inside a component that was removed.
             if !mesh.is_live(v) {
                 continue;
             }
-            let members = mesh.component_of(v, LARGEST_SPECK + 1);
+            let members = mesh.component_of(v, MAX_VERTICES + 1);
             let volume = volume(mesh, &members);
             let stuck = members.iter().filter(|v| is_stuck(v)).count();
             let is_crushed = stuck > 0 && is_crushed(mesh, &members, stuck, volume, sampling, guide);
             if is_crushed || (volume > 0.0) != was_solid {
-                self.remove_part(mesh, v);
+                self.remove_component(mesh, v);
             } else {
-                self.small.parts.push((v, was_solid));
+                self.small.components.push((v, was_solid));
             }
         }
     }
 
     /// Updates the small components after the edits of a call, and removes cavities smaller than the smallest sphere:
     /// an edit may have inverted a solid, which would grow in empty space.
-    pub(super) fn note_small_parts(
+    pub(super) fn update_small_components(
         &mut self,
         mesh: &mut Mesh,
         sampling: Sampling,
         guide: &dyn TopologyGuide,
     ) {
         self.small.find_again(mesh, &self.edited);
-        let least = SMALLEST_BALL * sampling.smallest_volume();
-        for (v, is_solid) in std::mem::take(&mut self.small.parts) {
+        let least = SMALLEST_SPHERE * sampling.smallest_volume();
+        for (v, is_solid) in std::mem::take(&mut self.small.components) {
             if !mesh.is_live(v) {
                 continue;
             }
             let is_left = || {
-                let members = mesh.component_of(v, LARGEST_SPECK);
+                let members = mesh.component_of(v, MAX_VERTICES);
                 let volume = volume(mesh, &members);
                 volume <= -least || kept_volume(mesh, &members, volume, guide) >= sampling.smallest_volume()
             };
             if !is_solid && !is_left() {
-                self.remove_part(mesh, v);
+                self.remove_component(mesh, v);
             } else {
-                self.small.parts.push((v, is_solid));
+                self.small.components.push((v, is_solid));
             }
         }
         self.small.topology_version = Some(mesh.topology_version());
@@ -145,13 +145,13 @@ impl Resolver {
 
     /// Removes the component of `v` and, if it is small, the components inside it, which would otherwise be on the
     /// wrong side of the surface around them.
-    pub(super) fn remove_part(&mut self, mesh: &mut Mesh, v: VertexId) {
-        let members = mesh.component_of(v, LARGEST_SPECK + 1);
+    pub(super) fn remove_component(&mut self, mesh: &mut Mesh, v: VertexId) {
+        let members = mesh.component_of(v, MAX_VERTICES + 1);
         let within =
-            if members.len() <= LARGEST_SPECK { self.vertices_within(mesh, &members) } else { Vec::new() };
-        for part in [v].into_iter().chain(within) {
-            if mesh.is_live(part) {
-                self.embedding.remove_component(mesh, part);
+            if members.len() <= MAX_VERTICES { self.vertices_within(mesh, &members) } else { Vec::new() };
+        for component in [v].into_iter().chain(within) {
+            if mesh.is_live(component) {
+                self.embedding.remove_component(mesh, component);
                 self.changes.vanished += 1;
             }
         }
@@ -160,16 +160,21 @@ impl Resolver {
     /// Returns the vertices of other components that lie inside a component.
     fn vertices_within(&mut self, mesh: &Mesh, members: &[VertexId]) -> Vec<VertexId> {
         let positions: Vec<Vec3> = members.iter().map(|&v| mesh.position(v)).collect();
-        let mut found = self.embedding.vertices_in(mesh, &Bounds::of(&positions));
+        let mut found = self.embedding.vertices_in(mesh, &Bounds::from_points(&positions));
         found.retain(|v| !members.contains(v) && is_within(mesh, members, mesh.position(*v)));
         found
     }
 
     /// Removes all negligibly small components, and returns their number.
-    pub fn sweep(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide) -> u32 {
+    pub fn remove_negligible(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        guide: &dyn TopologyGuide,
+    ) -> u32 {
         let before = self.changes.vanished;
         for members in mesh.component_members() {
-            self.remove_speck(mesh, sampling, guide, members[0]);
+            self.remove_if_negligible(mesh, sampling, guide, members[0]);
         }
         self.changes.vanished - before
     }
@@ -185,7 +190,7 @@ fn is_crushed(
     sampling: Sampling,
     guide: &dyn TopologyGuide,
 ) -> bool {
-    let is_flat = kept_volume(mesh, members, volume, guide) < SMALLEST_BALL * sampling.smallest_volume();
+    let is_flat = kept_volume(mesh, members, volume, guide) < SMALLEST_SPHERE * sampling.smallest_volume();
     let is_empty = || volume > 0.0 && !guide.has_content(mesh, members, true);
     is_flat || stuck == members.len() || 2 * stuck > members.len() && is_empty()
 }
@@ -236,16 +241,16 @@ mod tests {
             .unwrap()
     }
 
-    fn step(mesh: &mut Mesh, sampling: Sampling, mut ways: Vec<Vec3>) -> Changes {
-        let mut resolver = Resolver::with_room_for(1000);
-        resolver.carry(mesh, sampling, &mut ways);
+    fn step(mesh: &mut Mesh, sampling: Sampling, mut displacements: Vec<Vec3>) -> Changes {
+        let mut resolver = Resolver::with_max_vertices(1000);
+        resolver.move_all(mesh, sampling, &mut displacements);
         let all: Vec<VertexId> = mesh.vertices().collect();
         resolver.resolve(mesh, sampling, &all)
     }
 
     /// Neither state intersects itself. Regression: an inverted component grew until it filled the image (merge and split, seed 297).
     #[test]
-    fn a_part_turned_inside_out_vanishes() {
+    fn an_inverted_component_is_removed() {
         let rim = |k: u32| {
             let angle = TAU * k as f32 / 6.0;
             [libm::cosf(angle), libm::sinf(angle), 0.0]
@@ -254,18 +259,18 @@ mod tests {
         positions.extend([[0.0, 0.0, 0.45], [0.0, 0.0, -0.45]]);
         let sides = (0..6).flat_map(|k| [[k, (k + 1) % 6, 6], [(k + 1) % 6, k, 7]]);
         let lens = mesh(&positions, &sides.collect::<Vec<_>>());
-        let mut ways = vec![Vec3::ZERO; 8];
-        assert_eq!(step(&mut lens.clone(), Sampling::new(0.6), ways.clone()), Changes::default());
-        (ways[6], ways[7]) = (Vec3::Z * -0.95, Vec3::Z * 0.95);
+        let mut displacements = vec![Vec3::ZERO; 8];
+        assert_eq!(step(&mut lens.clone(), Sampling::new(0.6), displacements.clone()), Changes::default());
+        (displacements[6], displacements[7]) = (Vec3::Z * -0.95, Vec3::Z * 0.95);
         let mut passing = lens;
-        assert_eq!(step(&mut passing, Sampling::new(0.6), ways).vanished, 1);
+        assert_eq!(step(&mut passing, Sampling::new(0.6), displacements).vanished, 1);
         assert_eq!(passing.vertex_count(), 0);
     }
 
     /// All edges are within bounds, and any move inwards is rejected (merge and split, seed 404).
     #[test]
-    fn a_part_that_cannot_shrink_vanishes() {
-        let part = mesh(
+    fn a_component_that_cannot_shrink_is_removed() {
+        let component = mesh(
             &[
                 [22.015448, 21.224213, 21.005508],
                 [21.30414, 23.457825, 21.515993],
@@ -297,13 +302,13 @@ mod tests {
                 [6, 9, 4],
             ],
         );
-        assert_shrinks_away(part, Sampling::new(1.4), 0.3);
+        assert_shrinks_away(component, Sampling::new(1.4), 0.3);
     }
 
     /// More than half of its vertices are held, though it is larger than the smallest sphere (merge and split, seed 10529).
     #[test]
-    fn a_crumpled_part_vanishes() {
-        let part = mesh(
+    fn a_crumpled_component_is_removed() {
+        let component = mesh(
             &[
                 [30.879736, 22.268867, 22.252005],
                 [30.429016, 20.206413, 21.476469],
@@ -350,28 +355,28 @@ mod tests {
                 [10, 14, 12],
             ],
         );
-        assert_shrinks_away(part, Sampling::new(1.324), 0.02);
+        assert_shrinks_away(component, Sampling::new(1.324), 0.02);
     }
 
     /// Regression: a solid inside a small cavity was left in the foreground after the cavity was removed (deformable
     /// fuzz, seed 21981).
     #[test]
-    fn what_is_within_a_part_vanishes_with_it() {
+    fn components_inside_a_removed_one_are_removed() {
         let (mut both, hollow) = nested();
-        let mut resolver = Resolver::with_room_for(1000);
-        resolver.remove_part(&mut both, hollow[0]);
+        let mut resolver = Resolver::with_max_vertices(1000);
+        resolver.remove_component(&mut both, hollow[0]);
         assert_eq!(both.vertex_count(), 12);
         assert!(both.vertices().all(|v| both.position(v).x > 1.0));
     }
 
     /// The inner component is listed after the one with which it is removed.
     #[test]
-    fn parts_that_vanished_with_others_are_not_asked_for_again() {
+    fn removed_components_are_not_visited_again() {
         let (mut both, hollow) = nested();
-        let mut resolver = Resolver::with_room_for(1000);
+        let mut resolver = Resolver::with_max_vertices(1000);
         resolver.remove_crushed(&mut both, Sampling::new(0.2), &Unguided, &hollow);
         assert_eq!(both.vertex_count(), 12);
-        resolver.note_small_parts(&mut both, Sampling::new(0.2), &Unguided);
+        resolver.update_small_components(&mut both, Sampling::new(0.2), &Unguided);
         assert_eq!(both.vertex_count(), 12);
     }
 
@@ -387,16 +392,16 @@ mod tests {
     }
 
     /// Asserts that a component shrinks and is removed, in steps of `share` times δ.
-    fn assert_shrinks_away(mut part: Mesh, sampling: Sampling, share: f32) {
+    fn assert_shrinks_away(mut component: Mesh, sampling: Sampling, share: f32) {
         for _ in 0..20 {
-            let normals = part.to_triangles().vertex_normals();
-            let ways = normals.iter().map(|n| *n * (-share * sampling.shortest())).collect();
-            step(&mut part, sampling, ways);
-            if part.vertex_count() == 0 {
+            let normals = component.to_triangles().vertex_normals();
+            let displacements = normals.iter().map(|n| *n * (-share * sampling.shortest())).collect();
+            step(&mut component, sampling, displacements);
+            if component.vertex_count() == 0 {
                 return;
             }
-            part = Mesh::from_triangles(&part.to_triangles()).unwrap();
+            component = Mesh::from_triangles(&component.to_triangles()).unwrap();
         }
-        panic!("{} vertices are left", part.vertex_count());
+        panic!("{} vertices are left", component.vertex_count());
     }
 }

@@ -15,7 +15,7 @@ const FACES: [(usize, bool, u8); 6] =
 
 /// A cell that the surface crosses, with its marching cubes case.
 #[derive(Clone, Copy)]
-pub(super) struct CutCell {
+pub(super) struct CrossedCell {
     pub slot: u32,
     /// Marching cubes case: one bit per corner, set if it is inside.
     pub case: u8,
@@ -27,15 +27,15 @@ pub(super) struct Flood {
     /// Cells of seeds added since the last wave.
     seeds: Vec<Node>,
     /// Visited cells of seeds whose neighbours are queued if no surface is found near them.
-    waiting: Vec<u32>,
+    unresolved_seeds: Vec<u32>,
     /// Cells of the next wave.
     queue: Vec<u32>,
     /// Unprocessed cells of the current wave.
     wave: Vec<u32>,
     /// Slots of the nodes evaluated for the current wave.
-    wanted: Vec<u32>,
+    requested: Vec<u32>,
     /// All crossed cells found so far, in the order of discovery.
-    pub cut: Vec<CutCell>,
+    pub crossed: Vec<CrossedCell>,
 }
 
 impl Flood {
@@ -45,9 +45,9 @@ impl Flood {
     }
 
     /// Queues a cell unless it was visited or queued before; returns whether it was queued.
-    pub fn look_at(&mut self, cell: Node, blocks: &mut Blocks) -> Result<bool, VolumeError> {
+    pub fn visit(&mut self, cell: Node, blocks: &mut Blocks) -> Result<bool, VolumeError> {
         let slot = blocks.open(cell)?;
-        let is_new = blocks.see(slot);
+        let is_new = blocks.mark_visited(slot);
         if is_new {
             self.queue.push(slot);
         }
@@ -55,15 +55,15 @@ impl Flood {
     }
 
     /// Fills `batch` with the points of the next wave, which may be none; returns false if no cell is left.
-    pub fn ask(
+    pub fn request(
         &mut self,
         blocks: &mut Blocks,
         lattice: &Lattice,
         batch: &mut Batch,
     ) -> Result<bool, VolumeError> {
-        self.sow(blocks)?;
+        self.queue_seeds(blocks)?;
         if self.queue.is_empty() {
-            self.widen(blocks)?;
+            self.queue_seed_neighbours(blocks)?;
         }
         for &cell in &self.queue {
             blocks.open_corners(cell)?;
@@ -71,27 +71,27 @@ impl Flood {
         // Nothing below can fail: after an error above, the queue is unchanged.
         self.wave = std::mem::take(&mut self.queue);
         let corners = self.wave.iter().flat_map(|&cell| blocks.corners(cell));
-        self.wanted.clear();
-        self.wanted.extend(corners.filter(|&slot| blocks.is_unknown(slot)));
+        self.requested.clear();
+        self.requested.extend(corners.filter(|&slot| blocks.is_unknown(slot)));
         // Sorted by block and node, so that neighbouring points are adjacent.
-        self.wanted.sort_unstable();
-        self.wanted.dedup();
-        batch.extend(self.wanted.iter().map(|&slot| lattice.position(blocks.node(slot))));
+        self.requested.sort_unstable();
+        self.requested.dedup();
+        batch.extend(self.requested.iter().map(|&slot| lattice.position(blocks.node(slot))));
         Ok(!self.wave.is_empty())
     }
 
     /// Stores the values of the wave, records its crossed cells and queues the next wave. Can be called again after an
     /// error.
-    pub fn take(&mut self, values: &[f64], blocks: &mut Blocks) -> Result<(), VolumeError> {
-        for (&slot, &value) in self.wanted.iter().zip(values) {
+    pub fn store_values(&mut self, values: &[f64], blocks: &mut Blocks) -> Result<(), VolumeError> {
+        for (&slot, &value) in self.requested.iter().zip(values) {
             blocks.set(slot, value);
         }
         while let Some(&slot) = self.wave.last() {
             let case = blocks.case(slot);
             if case != 0 && case != 255 {
-                self.cut.try_reserve(1).map_err(|_| too_large(&self.cut))?;
+                self.crossed.try_reserve(1).map_err(|_| too_large(&self.crossed))?;
                 self.cross_faces(slot, case, blocks)?;
-                self.cut.push(CutCell { slot, case });
+                self.crossed.push(CrossedCell { slot, case });
             }
             self.wave.pop();
         }
@@ -107,39 +107,40 @@ impl Flood {
             if inside != 0 && inside != mask {
                 let mut beyond = cell;
                 beyond[axis] = if is_far { cell[axis] + 1 } else { cell[axis] - 1 };
-                self.look_at(beyond, blocks)?;
+                self.visit(beyond, blocks)?;
             }
         }
         Ok(())
     }
 
     /// Queues the cells of new seeds.
-    fn sow(&mut self, blocks: &mut Blocks) -> Result<(), VolumeError> {
+    fn queue_seeds(&mut self, blocks: &mut Blocks) -> Result<(), VolumeError> {
         while let Some(&cell) = self.seeds.last() {
-            self.look_at(cell, blocks)?;
-            self.waiting.push(blocks.slot(cell));
+            self.visit(cell, blocks)?;
+            self.unresolved_seeds.push(blocks.slot(cell));
             self.seeds.pop();
         }
         Ok(())
     }
 
     /// Queues the neighbours of those seed cells near which no surface was found.
-    fn widen(&mut self, blocks: &mut Blocks) -> Result<(), VolumeError> {
-        self.waiting.sort_unstable();
-        self.waiting.dedup();
-        self.waiting.retain(|&cell| !around(cell, blocks).iter().any(|&near| is_followed(near, blocks)));
-        while let Some(&cell) = self.waiting.last() {
-            around(cell, blocks).into_iter().try_for_each(|near| self.look_at(near, blocks).map(drop))?;
-            self.waiting.pop();
+    fn queue_seed_neighbours(&mut self, blocks: &mut Blocks) -> Result<(), VolumeError> {
+        self.unresolved_seeds.sort_unstable();
+        self.unresolved_seeds.dedup();
+        self.unresolved_seeds
+            .retain(|&cell| !around(cell, blocks).iter().any(|&near| is_crossed(near, blocks)));
+        while let Some(&cell) = self.unresolved_seeds.last() {
+            around(cell, blocks).into_iter().try_for_each(|near| self.visit(near, blocks).map(drop))?;
+            self.unresolved_seeds.pop();
         }
         Ok(())
     }
 }
 
 /// Returns whether a cell was visited and the surface crosses it.
-fn is_followed(cell: Node, blocks: &Blocks) -> bool {
+fn is_crossed(cell: Node, blocks: &Blocks) -> bool {
     let slot = blocks.slot(cell);
-    slot != ABSENT && blocks.is_seen(slot) && !matches!(blocks.case(slot), 0 | 255)
+    slot != ABSENT && blocks.is_visited(slot) && !matches!(blocks.case(slot), 0 | 255)
 }
 
 /// Returns a cell and its neighbours, up to 27 within the padded lattice.

@@ -32,7 +32,7 @@ pub(super) fn is_inside(value: f64) -> bool {
 }
 
 /// Replaces NaN by [`OUTSIDE`], since NaN marks unknown values in the storage.
-pub(super) fn sound(value: f64) -> f64 {
+pub(super) fn nan_to_outside(value: f64) -> f64 {
     if value.is_nan() { OUTSIDE } else { value }
 }
 
@@ -65,7 +65,7 @@ pub(super) struct Blocks {
     origins: Vec<[u16; 3]>,
     values: Vec<f64>,
     /// One bit per cell: whether the flood has visited or queued it.
-    seen: Vec<u64>,
+    visited: Vec<u64>,
 }
 
 impl Blocks {
@@ -73,10 +73,10 @@ impl Blocks {
     pub fn new(dims: [usize; 3]) -> Result<Self, VolumeError> {
         let nodes = dims.map(|n| n + 2);
         let dims = nodes.map(|n| n.div_ceil(SIDE));
-        let places = dims.iter().product();
-        let mut table = reserve(places)?;
-        table.resize(places, ABSENT);
-        Ok(Self { nodes, dims, table, origins: Vec::new(), values: Vec::new(), seen: Vec::new() })
+        let positions = dims.iter().product();
+        let mut table = reserve(positions)?;
+        table.resize(positions, ABSENT);
+        Ok(Self { nodes, dims, table, origins: Vec::new(), values: Vec::new(), visited: Vec::new() })
     }
 
     /// Returns the bytes allocated.
@@ -84,7 +84,7 @@ impl Blocks {
         size_of_val(&self.table[..])
             + size_of_val(&self.origins[..])
             + size_of_val(&self.values[..])
-            + size_of_val(&self.seen[..])
+            + size_of_val(&self.visited[..])
     }
 
     /// Returns the number of slots.
@@ -102,14 +102,14 @@ impl Blocks {
         (0..3).any(|k| node[k] == 0 || node[k] + 1 >= self.nodes[k])
     }
 
-    fn place(&self, node: Node) -> usize {
+    fn block_position(&self, node: Node) -> usize {
         let [x, y, z] = node.map(|k| k / SIDE);
         (z * self.dims[1] + y) * self.dims[0] + x
     }
 
     /// Returns the slot of a node, [`ABSENT`] if its block is not allocated.
     pub fn slot(&self, node: Node) -> u32 {
-        match self.table[self.place(node)] {
+        match self.table[self.block_position(node)] {
             ABSENT => ABSENT,
             block => block * BLOCK as u32 + local(node) as u32,
         }
@@ -124,8 +124,8 @@ impl Blocks {
 
     /// Returns a sort key that orders slots by block position, then node, independent of the order of allocation.
     pub fn rank(&self, slot: u32) -> u64 {
-        let place = self.place(self.node(slot)) as u64;
-        place * BLOCK as u64 + u64::from(slot) % BLOCK as u64
+        let position = self.block_position(self.node(slot)) as u64;
+        position * BLOCK as u64 + u64::from(slot) % BLOCK as u64
     }
 
     /// Returns the slot of a node, allocating its block if necessary.
@@ -153,12 +153,12 @@ impl Blocks {
         if self.origins.len() >= MAX_BLOCKS {
             return Err(too_large);
         }
-        let room = self.values.try_reserve(BLOCK).and_then(|()| self.seen.try_reserve(BLOCK / 64));
-        room.and_then(|()| self.origins.try_reserve(1)).map_err(|_| too_large)?;
-        let place = self.place(node);
-        self.table[place] = self.origins.len() as u32;
+        let reserved = self.values.try_reserve(BLOCK).and_then(|()| self.visited.try_reserve(BLOCK / 64));
+        reserved.and_then(|()| self.origins.try_reserve(1)).map_err(|_| too_large)?;
+        let position = self.block_position(node);
+        self.table[position] = self.origins.len() as u32;
         self.origins.push(node.map(|k| (k / SIDE * SIDE) as u16));
-        self.seen.resize(self.seen.len() + BLOCK / 64, 0);
+        self.visited.resize(self.visited.len() + BLOCK / 64, 0);
         for slot in self.slots()..self.slots() + BLOCK {
             let value = if self.is_padding(self.node(slot as u32)) { OUTSIDE } else { UNKNOWN };
             self.values.push(value);
@@ -189,7 +189,7 @@ impl Blocks {
 
     /// Sets the value at a node.
     pub fn set(&mut self, slot: u32, value: f64) {
-        self.values[slot as usize] = sound(value);
+        self.values[slot as usize] = nan_to_outside(value);
     }
 
     /// Returns the marching cubes case of a cell, one bit per inside corner. Unknown corners count as outside.
@@ -199,16 +199,16 @@ impl Blocks {
     }
 
     /// Marks a cell as visited; returns false if it was marked already.
-    pub fn see(&mut self, cell: u32) -> bool {
-        let (word, bit) = (&mut self.seen[cell as usize / 64], 1 << (cell % 64));
+    pub fn mark_visited(&mut self, cell: u32) -> bool {
+        let (word, bit) = (&mut self.visited[cell as usize / 64], 1 << (cell % 64));
         let is_new = *word & bit == 0;
         *word |= bit;
         is_new
     }
 
     /// Returns whether a cell is marked as visited.
-    pub fn is_seen(&self, cell: u32) -> bool {
-        self.seen.get(cell as usize / 64).is_some_and(|word| word >> (cell % 64) & 1 == 1)
+    pub fn is_visited(&self, cell: u32) -> bool {
+        self.visited.get(cell as usize / 64).is_some_and(|word| word >> (cell % 64) & 1 == 1)
     }
 
     /// Returns whether the surface found so far crosses a straight lattice line an odd number of times; valid when the
@@ -226,7 +226,7 @@ impl Blocks {
                 continue;
             }
             let after = next(node, axis);
-            if self.is_seen(slot) {
+            if self.is_visited(slot) {
                 odd ^= is_inside(self.value(slot)) != is_inside(self.value(self.slot(after)));
             }
             node = after;
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_counts_only_what_was_followed() {
+    fn a_line_counts_only_visited_cells() {
         let mut blocks = Blocks::new([30; 3]).unwrap();
         for x in 9..16 {
             let slot = blocks.open([x, 1, 1]).unwrap();
@@ -294,10 +294,10 @@ mod tests {
         }
         assert!(!blocks.crosses_oddly([1; 3], 0, 30));
         let seen = blocks.slot([12, 1, 1]);
-        assert!(blocks.see(seen) && !blocks.see(seen) && blocks.is_seen(seen));
+        assert!(blocks.mark_visited(seen) && !blocks.mark_visited(seen) && blocks.is_visited(seen));
         assert!(blocks.crosses_oddly([1; 3], 0, 30));
         assert!(!blocks.crosses_oddly([1; 3], 0, 12) && blocks.crosses_oddly([12, 1, 1], 0, 13));
-        assert!(blocks.see(seen - 1));
+        assert!(blocks.mark_visited(seen - 1));
         assert!(!blocks.crosses_oddly([1; 3], 0, 30));
     }
 }

@@ -1,16 +1,16 @@
 //! Root finding on a lattice edge: the zero of a function between an inside and an outside node.
 
 use super::super::contour::MARGIN;
-use super::blocks::{is_inside, sound};
+use super::blocks::{is_inside, nan_to_outside};
 
 /// Convergence threshold, as a fraction of the edge: a smaller step is not worth an evaluation. Steps shrink so fast
 /// that the next one is far below the resolution of `f32` positions.
-const SETTLED: f64 = 1e-6;
+const CONVERGED: f64 = 1e-6;
 
 /// Largest relative curvature for which parabolic interpolation is used instead of linear. At 1 the parabola is level
 /// at one end, as when the surface is tangent to the edge. A jump gives a much larger value, and parabolic steps would
 /// converge slowly from one side of it.
-const MAX_BEND: f64 = 4.0;
+const MAX_CURVATURE: f64 = 4.0;
 
 /// A sample on the edge: the position as a fraction of the edge, and the function value.
 #[derive(Clone, Copy, Debug)]
@@ -63,26 +63,26 @@ impl Root {
         }
         let height = inside.value / fall;
         let s = (before.at - inside.at) / (outside.at - inside.at);
-        let bend = ((before.value - inside.value) / fall + s) / (s * (s - 1.0));
-        if bend.is_nan() || bend.abs() > MAX_BEND {
+        let curvature = ((before.value - inside.value) / fall + s) / (s * (s - 1.0));
+        if curvature.is_nan() || curvature.abs() > MAX_CURVATURE {
             return height;
         }
-        let slope = 1.0 + bend;
-        let share = 2.0 * height / (slope + (slope * slope - 4.0 * bend * height).sqrt());
+        let slope = 1.0 + curvature;
+        let share = 2.0 * height / (slope + (slope * slope - 4.0 * curvature * height).sqrt());
         // Rounding can give a zero outside the bracket, and a zero at its end gives 0 / 0.
         if (0.0..=1.0).contains(&share) { share } else { height }
     }
 
     /// Adds the function value at [`Self::estimate`] and shrinks the bracket.
-    pub fn take(&mut self, value: f64) {
-        let sample = Sample { at: self.estimate(), value: sound(value) };
+    pub fn add_sample(&mut self, value: f64) {
+        let sample = Sample { at: self.estimate(), value: nan_to_outside(value) };
         let end = if is_inside(sample.value) { &mut self.inside } else { &mut self.outside };
         self.before = std::mem::replace(end, sample);
     }
 
     /// Returns whether the root has converged: another evaluation would move it by a negligible amount.
-    pub fn is_settled(&self) -> bool {
-        [self.inside, self.outside].iter().any(|end| (self.estimate() - end.at).abs() <= SETTLED)
+    pub fn has_converged(&self) -> bool {
+        [self.inside, self.outside].iter().any(|end| (self.estimate() - end.at).abs() <= CONVERGED)
     }
 
     /// Returns the estimate, kept [`MARGIN`] away from both ends of the edge: the vertex position on it.
@@ -102,8 +102,8 @@ mod tests {
     fn solved(f: impl Fn(f64) -> f64, most: usize) -> (Root, usize) {
         let mut root = Root::between(f(0.0), f(1.0));
         let mut steps = 0;
-        while steps < most && !root.is_settled() {
-            root.take(f(root.estimate()));
+        while steps < most && !root.has_converged() {
+            root.add_sample(f(root.estimate()));
             steps += 1;
         }
         (root, steps)
@@ -113,12 +113,12 @@ mod tests {
     fn smooth_functions_take_a_few_steps() {
         for k in 1..100 {
             let zero = f64::from(k) / 100.0;
-            for (bend, most) in [(0.0, 1), (0.01, 2), (0.1, 2), (-0.9, 3)] {
-                let f = |t: f64| (t - zero) * (1.0 + bend * t);
+            for (curvature, most) in [(0.0, 1), (0.01, 2), (0.1, 2), (-0.9, 3)] {
+                let f = |t: f64| (t - zero) * (1.0 + curvature * t);
                 for sign in [1.0, -1.0] {
                     let (root, steps) = solved(|t| sign * f(t), 10);
                     let error = (root.fraction() - zero).abs();
-                    assert!(error < 1e-8 && steps <= most, "{zero}, {bend}: {error}, {steps}");
+                    assert!(error < 1e-8 && steps <= most, "{zero}, {curvature}: {error}, {steps}");
                 }
             }
         }
@@ -153,7 +153,7 @@ mod tests {
             let ends = [root.inside.at, root.outside.at];
             assert!(is_inside(f(ends[0])) && !is_inside(f(ends[1])));
             assert!((root.estimate() - ends[0]) * (root.estimate() - ends[1]) <= 0.0);
-            root.take(f(root.estimate()));
+            root.add_sample(f(root.estimate()));
         }
     }
 
@@ -165,7 +165,7 @@ mod tests {
             for [start, end] in [[start, end], [end, start]] {
                 let mut root = Root::between(start, end);
                 for value in [middle, 0.0, middle, -1.0, 0.0] {
-                    root.take(value);
+                    root.add_sample(value);
                     assert!((0.0..=1.0).contains(&root.estimate()), "{root:?}");
                 }
             }
@@ -176,7 +176,7 @@ mod tests {
             outside: Sample { at: 1.0, value: -1.0 },
             before: Sample { at: 0.0, value: -3.0 },
         };
-        assert!(bent.estimate() == 0.5 && bent.is_settled());
+        assert!(bent.estimate() == 0.5 && bent.has_converged());
     }
 
     #[test]
@@ -184,7 +184,7 @@ mod tests {
         assert_eq!(Root::between(0.0, -1.0).fraction(), 1.0 / 256.0);
         assert_eq!(Root::between(-1.0, 0.0).fraction(), 255.0 / 256.0);
         assert_eq!(Root::between(3.0, -1.0).fraction(), 0.75);
-        assert!(Root::between(0.0, -1.0).is_settled());
-        assert!(Root::fixed().is_settled() && Root::fixed().fraction() == 0.5);
+        assert!(Root::between(0.0, -1.0).has_converged());
+        assert!(Root::fixed().has_converged() && Root::fixed().fraction() == 0.5);
     }
 }
