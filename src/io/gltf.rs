@@ -221,7 +221,8 @@ impl<'a> Document<'a> {
         buffer.is_ok_and(|buffer| buffer["extensions"][extension]["fallback"] == true)
     }
 
-    /// Returns whether an accessor has no buffer view, because its elements are compressed elsewhere.
+    /// Returns whether an accessor has no buffer view; in a compressed primitive, the data of the extension then hold its
+    /// elements.
     fn lacks_buffer_view(&self, accessor: u64) -> bool {
         self.entry("accessors", accessor).is_ok_and(|accessor| accessor["bufferView"].is_null())
     }

@@ -168,7 +168,8 @@ impl Resolver {
         std::mem::take(&mut self.overflowed).then_some(self.max_vertices)
     }
 
-    /// Returns whether a vertex may be added; if not, [`Self::take_overflow`] reports it.
+    /// Returns whether a vertex may be added; if not, [`Self::take_overflow`] reports it, and none may be
+    /// until the next call of [`Self::resolve`].
     pub(super) fn may_add_vertex(&mut self, mesh: &Mesh) -> bool {
         self.overflowed |= mesh.vertex_count() >= self.max_vertices;
         !self.overflowed

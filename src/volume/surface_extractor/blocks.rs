@@ -187,7 +187,7 @@ impl Blocks {
         self.value(slot).is_nan()
     }
 
-    /// Sets the value at a node.
+    /// Sets the value at a node; NaN counts as outside.
     pub fn set(&mut self, slot: u32, value: f64) {
         self.values[slot as usize] = nan_to_outside(value);
     }

@@ -1,4 +1,4 @@
-/** The part of bench.json, written by scripts/bench.mjs, that is drawn. Times are in milliseconds. */
+/** The part of bench.json, written by scripts/bench.mjs, that is drawn. Times are in milliseconds unless noted. */
 export interface Report {
   processor?: string;
   bestOf: number;

@@ -80,7 +80,7 @@ export interface SurfaceError {
 /** Reply about a newly built tracker, before its first step. */
 export interface Ready {
   params: ParamValues;
-  /** The edge threshold τ that the noise suggests. */
+  /** The tracker's default for the edge threshold τ, from the noise and the range of intensities. */
   suggested: number;
   /** Standard deviation of the noise, in intensity units. */
   noise: number;

@@ -41,7 +41,7 @@ export class History {
     return (iteration) => ({ reports, iteration });
   }
 
-  /** Restores the state at a mark. The list of reports extended since stays unchanged for holders of later marks. */
+  /** Restores the state at a mark. Builds a new list of reports, since later marks still refer to the old one. */
   rewind({ reports, iteration }: HistoryMark): void {
     this.#reports = [];
     this.phases.length = 0;

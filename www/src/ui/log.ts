@@ -3,7 +3,7 @@ import { h } from './dom';
 import { count } from './format';
 import type { Change, History } from './history';
 
-/** Number of entries kept on the page; the totals above them count all. */
+/** Largest number of entries listed; the totals above the list count all topology changes. */
 const MOST_ENTRIES = 300;
 
 /** Log of events, newest first: level changes, joins, cuts, components that vanished or were seeded. */

@@ -74,7 +74,8 @@ const SECTION_SIZE = 28;
 
 /**
  * Paints the section of the slice around the crosshair, with the voxels of the window there classified as bright and
- * dark: green and red, as in figure 4 a. Returns whether the two clusters differ by the threshold.
+ * dark: green and red, as in figure 4 a. Returns whether the window contains a
+ * boundary: both clusters are large enough, and their means differ by more than the threshold.
  */
 export function paintWindow(
   picture: FigureImage,

@@ -247,7 +247,10 @@ export class SlicePanel {
     }
   }
 
-  /** Marks uncovered regions near this slice: a dot where matter is missing, a ring at a cavity. */
+  /**
+   * Marks the parts of the iso-surface near this slice that the surface does not cover: a dot where object lies outside
+   * the surface, a ring where background lies inside it.
+   */
   #drawUncovered(context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
     context.lineWidth = 1.5;
     for (const { position, kind } of this.#uncovered) {

@@ -38,7 +38,7 @@ const ROWS: Record<Exclude<Layout, 'stages' | 'levels'>, readonly MeshName[]> = 
   row: ['S1', 'S0', 'T', 'S0dash', 'S1dash'],
 };
 
-/** Caption under each mesh. */
+/** Captions of the meshes; those of the stages A to E come with the stages. */
 const CAPTIONS: Partial<Record<MeshName, string>> = {
   S1: text('view.meshOriginal'),
   S0: text('view.meshBase'),
